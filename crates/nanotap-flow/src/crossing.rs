@@ -1,0 +1,450 @@
+//! The certified first zero of a signal: no contact can be missed, however brief
+//! or grazing.
+//!
+//! Value, rate and curvature at a point and a bound `B` on the third derivative
+//! from there on enclose the signal between two cubics,
+//! `g + ġh + ½g̈h² ∓ ⅙Bh³`. The signal is positive for certain up to the first
+//! zero of the lower cubic, so a step of that length cannot jump over a zero; it
+//! turns into a third-order root finder close to one. When the upper cubic crosses
+//! zero and the rate is negative for certain up to there, the zero is bracketed
+//! and unique, and a safeguarded Newton–Halley iteration finishes, its own last
+//! error bounded by `B`.
+//!
+//! Two places need more than double precision's plain sums. Near a tangency the
+//! sign of the extremum can drown in rounding: it is then found in twice double
+//! precision, so a dip of 1e-17 is seen for what it is. Right after a switch the
+//! signal is zero *by definition* and the next zero may be arbitrarily close: the
+//! zero is divided out of the Taylor series, whose remainder is bounded, and the
+//! quotient is searched.
+//!
+//! What it cannot do: tell a triple zero (value, rate and curvature all zero
+//! within rounding) from a near miss; it then decides by the value in twice double
+//! precision at the points it visits and reports the crossing as grazing.
+
+use crate::double_double;
+use crate::signal::{Jet, Signal};
+
+/// Where the search starts from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// Inside the regime, the signal positive.
+    Inside,
+    /// On the surface, the signal zero and rising. `rate` overrides its first
+    /// derivative where the caller knows it better than the signal does.
+    Surface {
+        /// The rate of leaving the surface, if known.
+        rate: Option<f64>,
+    },
+    /// On the surface with rate and curvature zero as well: release from sticking.
+    Release,
+}
+
+/// A zero of a signal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// Where.
+    pub at: f64,
+    /// The signal's rate there, negative or (at a grazing touch) zero.
+    pub rate: f64,
+    /// Whether value and rate vanish together within rounding.
+    pub grazing: bool,
+}
+
+/// What a search cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Evaluations of the signal with its derivatives.
+    pub evaluations: u64,
+    /// Certified steps.
+    pub steps: u64,
+    /// Tangencies decided in twice double precision.
+    pub tangencies: u64,
+}
+
+/// The first `s` in `(0, length]` where the signal falls to zero, or `None` when it
+/// stays positive for certain.
+pub fn first_crossing(signal: &Signal, length: f64, start: Start, statistics: &mut Statistics) -> Option<Crossing> {
+    let mut search = Search { signal, length, noise: signal.noise(), statistics };
+    let (s, jet) = match start {
+        Start::Inside => {
+            search.statistics.evaluations += 1;
+            (0.0, signal.first_jet())
+        }
+        Start::Surface { rate } => match search.leave_surface(1, rate) {
+            Departure::Crossing(crossing) => return Some(crossing),
+            Departure::Inside(s, jet) => (s, jet),
+        },
+        Start::Release => match search.leave_surface(3, None) {
+            Departure::Crossing(crossing) => return Some(crossing),
+            Departure::Inside(s, jet) => (s, jet),
+        },
+    };
+    search.run(s, jet)
+}
+
+enum Departure {
+    Crossing(Crossing),
+    Inside(f64, Jet),
+}
+
+struct Search<'a> {
+    signal: &'a Signal,
+    length: f64,
+    noise: f64,
+    statistics: &'a mut Statistics,
+}
+
+/// Orders of the Taylor series used right after a switch.
+const TAYLOR_ORDER: usize = 10;
+/// Its reach, as an angle of the fastest term.
+const TAYLOR_REACH: f64 = 0.25;
+
+impl Search<'_> {
+    fn jet(&mut self, s: f64) -> Jet {
+        self.statistics.evaluations += 1;
+        self.signal.jet(s)
+    }
+
+    fn run(&mut self, mut s: f64, mut jet: Jet) -> Option<Crossing> {
+        loop {
+            let left = self.length - s;
+            if left < 0.0 {
+                return None;
+            }
+            if jet.value <= 0.0 {
+                if let Some(crossing) = self.at_or_below_zero(s, &mut jet) {
+                    return Some(crossing);
+                }
+            }
+            if let Some(reach) = certain_crossing(&jet) {
+                return self.polish(s, jet, s + reach);
+            }
+            if let Some(distance) = self.unresolved_tangency(&jet) {
+                match self.tangency(s + distance) {
+                    Departure::Crossing(crossing) => {
+                        return (crossing.at <= self.length).then_some(crossing);
+                    }
+                    Departure::Inside(at, after) => {
+                        s = at;
+                        jet = after;
+                    }
+                }
+            }
+            let step = certified_step(&jet);
+            self.statistics.steps += 1;
+            if step >= self.length - s {
+                return None;
+            }
+            // A step below rounding would never end; the value there is decided
+            // in twice double precision.
+            s += step.max(4.0 * f64::EPSILON * self.length);
+            jet = self.jet(s);
+        }
+    }
+
+    /// The value came out as zero or less although no crossing was certain:
+    /// rounding, or a crossing within it.
+    fn at_or_below_zero(&mut self, s: f64, jet: &mut Jet) -> Option<Crossing> {
+        let value = double_double::signal_value(self.signal, s);
+        self.statistics.tangencies += 1;
+        if value > 0.0 {
+            jet.value = value;
+            return None;
+        }
+        // A dip that began and was not seen as a tangency, or the start itself.
+        Some(Crossing { at: s, rate: jet.rate.min(0.0), grazing: jet.rate.abs() < self.noise.sqrt() })
+    }
+
+    /// The distance to a minimum whose sign cannot be told from rounding.
+    fn unresolved_tangency(&self, jet: &Jet) -> Option<f64> {
+        if jet.rate >= 0.0 || jet.curvature <= 0.0 {
+            return None;
+        }
+        let distance = -jet.rate / jet.curvature;
+        let minimum = jet.value + 0.5 * jet.rate * distance;
+        let quadratic = jet.third * distance < 0.2 * jet.curvature;
+        let exact = jet.third * distance.powi(3) < 6.0 * self.noise;
+        (quadratic && exact && minimum.abs() <= 4.0 * self.noise).then_some(distance)
+    }
+
+    /// Decides a tangency near `s`: a miss continues from the minimum with its
+    /// true value, a touch crosses where the parabola through the minimum does.
+    fn tangency(&mut self, mut s: f64) -> Departure {
+        let mut jet = self.jet(s);
+        for _ in 0..8 {
+            let step = -jet.rate / jet.curvature;
+            if !(step.abs() > f64::EPSILON * self.length) {
+                break;
+            }
+            s += step;
+            jet = self.jet(s);
+        }
+        self.statistics.tangencies += 1;
+        jet.value = double_double::signal_value(self.signal, s);
+        jet.rate = 0.0;
+        if jet.value >= 0.0 {
+            return Departure::Inside(s, jet);
+        }
+        let half_width = (-2.0 * jet.value / jet.curvature).sqrt();
+        Departure::Crossing(Crossing { at: s - half_width, rate: -jet.curvature * half_width, grazing: true })
+    }
+
+    /// The unique zero in `(s, high]`, by Newton–Halley steps kept inside the bracket.
+    fn polish(&mut self, s: f64, jet: Jet, high: f64) -> Option<Crossing> {
+        let tolerance = 0.25 * f64::EPSILON * self.length;
+        let (mut low, mut high) = (s, high);
+        let (mut at, mut jet) = (s, jet);
+        for _ in 0..200 {
+            let mut step = quadratic_root(&jet);
+            if !(at + step >= low && at + step <= high) {
+                step = 0.5 * (low + high) - at;
+            }
+            let rate = jet.rate + jet.curvature * step;
+            // |g(at + step)| ≤ ⅙ B |step|³ when the step solves the parabola.
+            let error = jet.third * step.abs().powi(3) / 6.0;
+            let solved = (jet.value + step * (jet.rate + 0.5 * jet.curvature * step)).abs() <= self.noise;
+            if solved && error <= tolerance * rate.abs() || high - low <= tolerance {
+                let at = at + step;
+                return (at <= self.length).then_some(Crossing { at, rate: rate.min(0.0), grazing: false });
+            }
+            at += step;
+            if low > self.length {
+                return None;
+            }
+            jet = self.jet(at);
+            if jet.value > 0.0 { low = at } else { high = at }
+        }
+        (at <= self.length).then_some(Crossing { at, rate: jet.rate.min(0.0), grazing: false })
+    }
+
+    /// Leaves the surface on which the signal's first `vanishing` derivatives
+    /// (counting the value) are zero by definition.
+    fn leave_surface(&mut self, vanishing: usize, rate: Option<f64>) -> Departure {
+        self.statistics.evaluations += 1;
+        let mut first = self.signal.first_jet();
+        first.value = 0.0;
+        first.rate = rate.unwrap_or(first.rate);
+        if vanishing == 1 && first.rate > 0.0 {
+            // The common case: fast departure, the next zero far away. The cubic's
+            // first zero is a certified step, divided by h since g(0) = 0.
+            let step = step_from_surface(&first);
+            if step * self.signal.fastest() >= TAYLOR_REACH {
+                self.statistics.steps += 1;
+                let step = step.min(self.length);
+                return Departure::Inside(step, self.jet(step));
+            }
+        }
+        self.taylor_departure(vanishing, rate)
+    }
+
+    fn taylor_departure(&mut self, vanishing: usize, rate: Option<f64>) -> Departure {
+        let reach = (TAYLOR_REACH / self.signal.fastest()).min(self.length);
+        let mut derivatives = [0.0; TAYLOR_ORDER + 1];
+        for (order, d) in derivatives.iter_mut().enumerate().skip(vanishing) {
+            *d = self.signal.derivative_at_start(order as u32);
+        }
+        if let (1, Some(rate)) = (vanishing, rate) {
+            derivatives[1] = rate;
+        }
+        let mut vanishing = vanishing;
+        while vanishing < TAYLOR_ORDER && derivatives[vanishing] == 0.0 {
+            vanishing += 1;
+        }
+        if derivatives[vanishing] < 0.0 {
+            // It does not leave at all: it falls back at once.
+            let rate = if vanishing == 1 { derivatives[1] } else { 0.0 };
+            return Departure::Crossing(Crossing { at: 0.0, rate, grazing: vanishing > 1 });
+        }
+        // p(h) = g(h) / h^v · …, positive at 0; its coefficients.
+        let mut coefficients = [0.0; TAYLOR_ORDER + 1];
+        let mut factorial = 1.0;
+        for order in 1..=TAYLOR_ORDER {
+            factorial *= order as f64;
+            if order >= vanishing {
+                coefficients[order - vanishing] = derivatives[order] / factorial;
+            }
+        }
+        let p = &coefficients[..=TAYLOR_ORDER - vanishing];
+        let remainder_order = TAYLOR_ORDER as u32 + 1;
+        let remainder = self.signal.derivative_bound(remainder_order, self.length)
+            / (factorial * f64::from(remainder_order))
+            * reach.powi(remainder_order as i32 - vanishing as i32);
+        match first_polynomial_zero(p, reach, remainder) {
+            Some(h) => {
+                // g = h^v p(h), so ġ = h^v p'(h) at the zero of p.
+                let (_, slope, _) = polynomial_jet(p, h);
+                let rate = (h.powi(vanishing as i32) * slope).min(0.0);
+                Departure::Crossing(Crossing { at: h, rate, grazing: false })
+            }
+            None => {
+                let mut jet = self.jet(reach);
+                // The Taylor value keeps its relative accuracy where plain sums drown.
+                let value = polynomial_jet(p, reach).0 * reach.powi(vanishing as i32);
+                if value > 0.0 {
+                    jet.value = value;
+                }
+                Departure::Inside(reach, jet)
+            }
+        }
+    }
+}
+
+/// Length up to which the lower cubic stays positive, for certain.
+fn certified_step(jet: &Jet) -> f64 {
+    let (g, v, c, b) = (jet.value, jet.rate, jet.curvature, jet.third);
+    if b <= 0.0 {
+        return certified_parabola(g, v, c);
+    }
+    let lower = |h: f64| g + h * (v + h * (0.5 * c - b * h / 6.0));
+    let slope = |h: f64| v + h * (c - 0.5 * b * h);
+    // Beyond the later critical point the cubic only falls; before the earlier one
+    // (if positive) it falls too.
+    let discriminant = c * c + 2.0 * b * v;
+    let mut floor = 0.0;
+    if discriminant > 0.0 {
+        let root = discriminant.sqrt();
+        let later = (c + root) / b;
+        if v >= 0.0 {
+            floor = later;
+        } else if c > 0.0 {
+            let earlier = -2.0 * v / (c + root);
+            if lower(earlier) > 0.0 {
+                floor = later;
+            }
+        }
+    }
+    let mut h;
+    if floor > 0.0 {
+        // Past the maximum the cubic is concave and falls at least as fast as its
+        // parabola and as its cube: start right of its zero, Newton from there.
+        let top = lower(floor);
+        h = floor + (6.0 * top / b).cbrt().min((2.0 * top / discriminant.sqrt()).sqrt());
+        for _ in 0..6 {
+            let next = h - lower(h) / slope(h);
+            if !(next < h) {
+                break;
+            }
+            h = next.max(floor);
+        }
+    } else {
+        // Falling from the start: a step that is too short is still certified.
+        h = g / -v.min(-f64::MIN_POSITIVE);
+        let cubic_reach = (6.0 * g / b).cbrt();
+        h = h.min(cubic_reach);
+        for _ in 0..4 {
+            let s = slope(h);
+            if s >= 0.0 {
+                h *= 0.5;
+                continue;
+            }
+            h -= lower(h) / s;
+            h = h.max(0.0);
+        }
+    }
+    // Make it safe whatever the iterations did.
+    h *= 1.0 - 1e-6;
+    for _ in 0..60 {
+        if h >= floor && lower(h) > 0.0 && (floor > 0.0 || slope_negative_up_to(v, c, b, h)) {
+            return h;
+        }
+        h = floor + 0.9 * (h - floor);
+        if h <= floor * (1.0 + 1e-12) {
+            return floor;
+        }
+    }
+    floor
+}
+
+/// Whether `v + ch − ½bh²` stays negative on `[0, h]`.
+fn slope_negative_up_to(v: f64, c: f64, b: f64, h: f64) -> bool {
+    let peak = (c / b).clamp(0.0, h);
+    v + peak * (c - 0.5 * b * peak) <= 0.0
+}
+
+/// The same for a signal without third derivative: a parabola.
+fn certified_parabola(g: f64, v: f64, c: f64) -> f64 {
+    let discriminant = v * v - 2.0 * g * c;
+    if discriminant < 0.0 || (v >= 0.0 && c >= 0.0) {
+        return f64::INFINITY;
+    }
+    let root = discriminant.sqrt();
+    let h = if v < 0.0 { 2.0 * g / (-v + root) } else { (v + root) / -c };
+    h * (1.0 - 1e-9)
+}
+
+/// The first zero of the lower cubic divided by `h`, from the surface with rate `v > 0`.
+fn step_from_surface(jet: &Jet) -> f64 {
+    let (v, c, b) = (jet.rate, jet.curvature, jet.third);
+    let root = (0.25 * c * c + 2.0 / 3.0 * b * v).sqrt();
+    // v + ½ c h − ⅙ b h² = 0, in the form without cancellation.
+    let h = if c < 0.0 { 2.0 * v / (root - 0.5 * c) } else { 3.0 * (0.5 * c + root) / b.max(f64::MIN_POSITIVE) };
+    h * (1.0 - 1e-9)
+}
+
+/// A reach within which the signal falls through zero exactly once, for certain.
+fn certain_crossing(jet: &Jet) -> Option<f64> {
+    let (g, v, c, b) = (jet.value, jet.rate, jet.curvature, jet.third);
+    if v >= 0.0 {
+        return None;
+    }
+    let root = quadratic_root(jet);
+    if !(root.is_finite() && root > 0.0) {
+        return None;
+    }
+    // A little beyond the parabola's zero, so that the upper cubic is below zero.
+    let excess = b * root.powi(3) / 6.0;
+    let slope = v + c * root;
+    if slope >= 0.0 {
+        return None;
+    }
+    let reach = (root - 2.0 * excess / slope) * (1.0 + 1e-12);
+    let upper = g + reach * (v + reach * (0.5 * c + b * reach / 6.0));
+    let steepest = v + reach * (c + 0.5 * b * reach);
+    (upper < 0.0 && steepest < 0.0).then_some(reach)
+}
+
+/// The zero of `g + vh + ½ch²` nearest to `h = 0` (a Newton step where there is none).
+fn quadratic_root(jet: &Jet) -> f64 {
+    let (g, v, c) = (jet.value, jet.rate, jet.curvature);
+    let discriminant = v * v - 2.0 * g * c;
+    if discriminant >= 0.0 { 2.0 * g / (-v + discriminant.sqrt()) } else { -g / v }
+}
+
+/// Value, slope and curvature of `Σ p_j h^j`.
+fn polynomial_jet(p: &[f64], h: f64) -> (f64, f64, f64) {
+    let (mut value, mut slope, mut curvature) = (0.0, 0.0, 0.0);
+    for &coefficient in p.iter().rev() {
+        curvature = curvature * h + 2.0 * slope;
+        slope = slope * h + value;
+        value = value * h + coefficient;
+    }
+    (value, slope, curvature)
+}
+
+/// The first zero of `p` in `(0, reach]`, stepping by a bound on its curvature.
+/// `remainder` bounds what the series leaves out: within it the sign is not
+/// known, and the zero of `p` itself is taken.
+fn first_polynomial_zero(p: &[f64], reach: f64, remainder: f64) -> Option<f64> {
+    let curvature_bound: f64 = p
+        .iter()
+        .enumerate()
+        .skip(2)
+        .map(|(j, c)| c.abs() * (j * (j - 1)) as f64 * reach.powi(j as i32 - 2))
+        .sum::<f64>()
+        .max(f64::MIN_POSITIVE);
+    let mut h = 0.0;
+    let resolution = f64::EPSILON * reach;
+    while h < reach {
+        let (value, slope, _) = polynomial_jet(p, h);
+        if value <= remainder.min(1e-16 * p[0].abs()) {
+            return Some(h);
+        }
+        let root = (slope * slope + 2.0 * curvature_bound * value).sqrt();
+        let step = if slope < 0.0 { 2.0 * value / (root - slope) } else { (slope + root) / curvature_bound };
+        if step < resolution.min(1e-15 * h) {
+            return Some(h);
+        }
+        h += step;
+    }
+    None
+}

@@ -1,0 +1,67 @@
+//! The periodic drive: a period and the tones (integer multiples of its
+//! frequency) that the forcing and the guards may contain.
+
+use crate::{Complex, FlowError};
+use std::f64::consts::TAU;
+
+/// A periodic drive with tones `ω_k = h_k · 2π/T`.
+///
+/// Several tones (two-tone, bimodal drive) share the period `T`, after which the
+/// system is the same again; this is the period of the stroboscopic map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    period: f64,
+    harmonics: Vec<u32>,
+    frequencies: Vec<f64>,
+}
+
+impl Drive {
+    /// A drive of period `period` whose tones are the given harmonics of `2π/period`.
+    ///
+    /// # Errors
+    /// When the period is not positive and finite, or a harmonic is zero.
+    pub fn new(period: f64, harmonics: &[u32]) -> Result<Self, FlowError> {
+        if !(period.is_finite() && period > 0.0) {
+            return Err(FlowError::Drive { what: format!("a period of {period}") });
+        }
+        if harmonics.contains(&0) {
+            return Err(FlowError::Drive { what: "a harmonic of 0".into() });
+        }
+        let frequencies = harmonics.iter().map(|&h| f64::from(h) * TAU / period).collect();
+        Ok(Self { period, harmonics: harmonics.to_vec(), frequencies })
+    }
+
+    /// A single tone of angular frequency `omega`.
+    ///
+    /// # Errors
+    /// When `omega` is not positive and finite.
+    pub fn single(omega: f64) -> Result<Self, FlowError> {
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(FlowError::Drive { what: format!("an angular frequency of {omega}") });
+        }
+        let mut drive = Self::new(TAU / omega, &[1])?;
+        drive.frequencies[0] = omega;
+        Ok(drive)
+    }
+
+    /// The period `T`.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// The harmonics `h_k`.
+    pub fn harmonics(&self) -> &[u32] {
+        &self.harmonics
+    }
+
+    /// The angular frequencies `ω_k`.
+    pub fn frequencies(&self) -> &[f64] {
+        &self.frequencies
+    }
+
+    /// `e^{iω_k t}` of tone `k`.
+    pub fn phasor(&self, k: usize, t: f64) -> Complex {
+        let (sin, cos) = (self.frequencies[k] * t).sin_cos();
+        Complex::new(cos, sin)
+    }
+}

@@ -1,0 +1,81 @@
+//! Why a flow cannot be built or run.
+
+use thiserror::Error;
+
+/// What can go wrong in building or running a piecewise-linear flow.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum FlowError {
+    /// Sizes of matrices, vectors or tone lists do not fit together.
+    #[error("{what} has {found} entries where {expected} are needed")]
+    Shape {
+        /// The thing whose size is wrong.
+        what: &'static str,
+        /// Its size.
+        found: usize,
+        /// The size that would fit.
+        expected: usize,
+    },
+    /// A number is not finite.
+    #[error("{what} holds a value that is not a finite number")]
+    NotFinite {
+        /// The thing that holds it.
+        what: &'static str,
+    },
+    /// The drive's period or a harmonic makes no sense.
+    #[error("the drive needs a positive, finite period and harmonics of at least 1, got {what}")]
+    Drive {
+        /// What was given.
+        what: String,
+    },
+    /// An undamped mode is driven at its own frequency: no bounded response exists.
+    #[error(
+        "regime {regime}: the drive at angular frequency {frequency} meets an undamped mode at \
+         {mode}; the response grows without bound, so add damping or move the frequency"
+    )]
+    Resonance {
+        /// The regime.
+        regime: usize,
+        /// Angular frequency of the drive's tone (0 for the constant force).
+        frequency: f64,
+        /// Angular frequency of the mode.
+        mode: f64,
+    },
+    /// The eigenbasis of a regime is too ill-conditioned to carry double precision.
+    #[error(
+        "regime {regime}: the eigenbasis loses {digits} digits even with close eigenvalues \
+         grouped; rescale the state or move the parameters"
+    )]
+    IllConditioned {
+        /// The regime.
+        regime: usize,
+        /// Digits lost.
+        digits: u32,
+    },
+    /// The starting state lies in no regime.
+    #[error("the starting state lies in no regime: every regime's exit is already passed there")]
+    NoRegime,
+    /// The motion left the range of double precision.
+    #[error("the motion grew beyond the range of double precision at time {time}")]
+    Diverged {
+        /// When.
+        time: f64,
+    },
+    /// Switches pile up at one instant and no sticking regime was given.
+    #[error(
+        "switches accumulate at time {time} (chatter) and the exit names no sticking regime \
+         in which the motion could go on"
+    )]
+    Accumulation {
+        /// When.
+        time: f64,
+    },
+    /// An exit names a regime that is not there.
+    #[error("an exit leads to regime {target}, but there are {regimes}")]
+    Target {
+        /// The regime named.
+        target: usize,
+        /// How many there are.
+        regimes: usize,
+    },
+}

@@ -1,0 +1,100 @@
+//! Extrema of outputs: zeros of the derivative, found with the same certificate as
+//! switches, never from samples.
+
+use crate::crossing::{Start, Statistics, first_crossing};
+use crate::signal::Signal;
+use crate::trajectory::PiecewiseSignal;
+
+/// A point of a signal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extremum {
+    /// When.
+    pub time: f64,
+    /// The value.
+    pub value: f64,
+}
+
+/// Every zero in `(0, length)` at which the signal changes sign, in order.
+pub fn sign_changes(signal: &Signal, length: f64) -> Vec<f64> {
+    let mut zeros = Vec::new();
+    let mut statistics = Statistics::default();
+    let mut offset = 0.0;
+    let value = signal.at(0.0);
+    let on_surface = value.abs() <= signal.noise();
+    let mut sign = if on_surface { first_sign(signal) } else { value.signum() };
+    let mut start = if on_surface { Start::Surface { rate: None } } else { Start::Inside };
+    while sign != 0.0 && offset < length {
+        let left = length - offset;
+        let part = signal.shifted(offset, sign, left);
+        let Some(crossing) = first_crossing(&part, left, start, &mut statistics) else { break };
+        offset += crossing.at;
+        if offset >= length {
+            break;
+        }
+        if crossing.at > 0.0 {
+            zeros.push(offset);
+        }
+        sign = -sign;
+        start = Start::Surface { rate: (crossing.rate < 0.0).then_some(-crossing.rate) };
+    }
+    zeros
+}
+
+/// The sign just after the start of a signal that starts at zero.
+fn first_sign(signal: &Signal) -> f64 {
+    (1..6)
+        .map(|order| signal.derivative_at_start(order))
+        .find(|d| *d != 0.0)
+        .map_or(0.0, f64::signum)
+}
+
+impl PiecewiseSignal {
+    /// Every local extremum inside the pieces (zeros of the derivative), in order of
+    /// time. Kinks at switches are not among them; see [`PiecewiseSignal::range`].
+    pub fn local_extrema(&self) -> Vec<Extremum> {
+        let mut out = Vec::new();
+        for piece in &self.pieces {
+            let rate = piece.signal.differentiated(piece.length);
+            for s in sign_changes(&rate, piece.length) {
+                out.push(Extremum { time: piece.start + s, value: piece.signal.at(s) });
+            }
+        }
+        out
+    }
+
+    /// The least and the greatest value, ends and switches included; `None` if empty.
+    pub fn range(&self) -> Option<(Extremum, Extremum)> {
+        let ends = self.pieces.iter().flat_map(|p| {
+            [0.0, p.length].map(|s| Extremum { time: p.start + s, value: p.signal.at(s) })
+        });
+        let mut all: Vec<Extremum> = ends.collect();
+        all.extend(self.local_extrema());
+        let least = all.iter().copied().min_by(|a, b| a.value.total_cmp(&b.value))?;
+        let greatest = all.iter().copied().max_by(|a, b| a.value.total_cmp(&b.value))?;
+        Some((least, greatest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Complex;
+    use std::f64::consts::PI;
+
+    /// sin s has its zeros at multiples of π, sin² s − ½ at odd multiples of π/4.
+    #[test]
+    fn zeros_of_known_functions() {
+        let sine = Signal::from_terms(0.0, vec![Complex::new(0.0, 1.0)], vec![Complex::new(0.0, -1.0)], 10.0);
+        let zeros = sign_changes(&sine, 10.0);
+        assert_eq!(zeros.len(), 3);
+        for (k, z) in zeros.iter().enumerate() {
+            assert!((z - PI * (k + 1) as f64).abs() < 1e-14);
+        }
+        let cosine = Signal::from_terms(0.0, vec![Complex::new(0.0, 2.0)], vec![Complex::new(-0.5, 0.0)], 10.0);
+        let zeros = sign_changes(&cosine, 10.0);
+        assert_eq!(zeros.len(), 6);
+        for (k, z) in zeros.iter().enumerate() {
+            assert!((z - PI / 4.0 * (2 * k + 1) as f64).abs() < 1e-14);
+        }
+    }
+}

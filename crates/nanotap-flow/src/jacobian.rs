@@ -1,0 +1,97 @@
+//! The derivative of the flow with respect to the state, exact through switches.
+
+use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::regime::Regime;
+use crate::{Complex, Flow, FlowError};
+use nalgebra::{DMatrix, DVector};
+
+/// Carries `∂q/∂x₀` along a flow, in modal coordinates: a column for each
+/// component of the initial state.
+#[derive(Clone, Debug)]
+pub struct Jacobian {
+    /// `[Re; Im]` of `∂q/∂x₀`, `2m × n`.
+    columns: DMatrix<f64>,
+    scratch: Vec<Complex>,
+}
+
+impl Jacobian {
+    /// The identity, for a flow that is in `regime`.
+    pub fn identity(regime: &Regime) -> Self {
+        let left = &regime.basis().left;
+        let (m, n) = left.shape();
+        let mut columns = DMatrix::zeros(2 * m, n);
+        columns.view_mut((0, 0), (m, n)).copy_from(&left.map(|z| z.re));
+        columns.view_mut((m, 0), (m, n)).copy_from(&left.map(|z| z.im));
+        Self { columns, scratch: Vec::new() }
+    }
+
+    /// `∂x/∂x₀` (`n × n`) of a flow that is in `regime` now.
+    pub fn to_state(&self, regime: &Regime, jacobian: &mut DMatrix<f64>) {
+        let right = &regime.basis().right;
+        let (n, m) = right.shape();
+        jacobian.fill(0.0);
+        for j in 0..self.columns.ncols() {
+            for k in 0..m {
+                let (re, im) = (self.columns[(k, j)], self.columns[(m + k, j)]);
+                for i in 0..n {
+                    let r = right[(i, k)];
+                    jacobian[(i, j)] += r.re * re - r.im * im;
+                }
+            }
+        }
+    }
+}
+
+impl Observer for Jacobian {
+    fn segment(&mut self, segment: &SegmentView<'_>) {
+        let basis = segment.regime().basis();
+        let m = basis.len();
+        if basis.clusters.is_empty() {
+            for mut column in self.columns.column_iter_mut() {
+                for (k, factor) in segment.factors.iter().enumerate() {
+                    let (re, im) = (column[k], column[m + k]);
+                    column[k] = re * factor.re - im * factor.im;
+                    column[m + k] = re * factor.im + im * factor.re;
+                }
+            }
+            return;
+        }
+        for mut column in self.columns.column_iter_mut() {
+            self.scratch.clear();
+            self.scratch.extend((0..m).map(|k| Complex::new(column[k], column[m + k])));
+            basis.apply(&mut self.scratch, segment.length, segment.factors);
+            for (k, q) in self.scratch.iter().enumerate() {
+                column[k] = q.re;
+                column[m + k] = q.im;
+            }
+        }
+    }
+
+    fn switch(&mut self, view: &SwitchView<'_>) {
+        self.columns = match &view.switch.tangent {
+            Some(tangent) => tangent * &self.columns,
+            None => {
+                let regime = &view.system.regimes()[view.switch.from];
+                let mut x = DVector::zeros(view.system.dimension());
+                regime.to_state(view.system.drive(), view.modal, view.phase, x.as_mut_slice());
+                let saltation =
+                    view.system.saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
+                &view.switch.to_modal * (saltation * (&view.switch.from_modal * &self.columns))
+            }
+        };
+    }
+}
+
+impl Flow {
+    /// Runs one drive period from the present state at phase 0 and writes the
+    /// period map's exact Jacobian (`n × n`) to `jacobian`.
+    ///
+    /// # Errors
+    /// As [`Flow::run_period`].
+    pub fn run_period_with_jacobian(&mut self, jacobian: &mut DMatrix<f64>) -> Result<(), FlowError> {
+        let mut carried = Jacobian::identity(&self.system().regimes()[self.regime()]);
+        self.run_period(&mut carried)?;
+        carried.to_state(&self.system().regimes()[self.regime()], jacobian);
+        Ok(())
+    }
+}

@@ -1,0 +1,177 @@
+//! One linear regime, `ẋ = A x + f(t)` with harmonic `f`, solved in closed form.
+
+use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
+use nalgebra::{DMatrix, DVector};
+
+/// A linear regime with its spectral basis and its forced response `x_p(t)`; the
+/// solution is `x(t) = x_p(t) + Re(R e^{Λ(t − t₀)} q)`, `q = L (x(t₀) − x_p(t₀))`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Regime {
+    matrix: DMatrix<f64>,
+    forcing: HarmonicVector,
+    basis: SpectralBasis,
+    response: HarmonicVector,
+}
+
+impl Regime {
+    /// The regime of matrix `A` (`n × n`) and forcing `f` (length `n`). `index` is
+    /// its number in the system, for messages.
+    ///
+    /// # Errors
+    /// When sizes do not fit, a value is not finite, the basis is too
+    /// ill-conditioned, or an undamped mode is driven at resonance.
+    pub fn new(
+        index: usize,
+        matrix: DMatrix<f64>,
+        forcing: HarmonicVector,
+        drive: &Drive,
+    ) -> Result<Self, FlowError> {
+        check(&matrix, &forcing, drive)?;
+        let basis = SpectralBasis::of(&matrix, drive.period(), index)?;
+        Self::with_basis(index, matrix, forcing, drive, basis)
+    }
+
+    /// The same with a basis that the caller knows.
+    ///
+    /// # Errors
+    /// As [`Regime::new`].
+    pub fn with_basis(
+        index: usize,
+        matrix: DMatrix<f64>,
+        forcing: HarmonicVector,
+        drive: &Drive,
+        basis: SpectralBasis,
+    ) -> Result<Self, FlowError> {
+        check(&matrix, &forcing, drive)?;
+        let response = forced_response(index, &forcing, drive, &basis)?;
+        Ok(Self { matrix, forcing, basis, response })
+    }
+
+    /// `A`.
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
+    }
+
+    /// `f`.
+    pub fn forcing(&self) -> &HarmonicVector {
+        &self.forcing
+    }
+
+    /// The spectral basis.
+    pub fn basis(&self) -> &SpectralBasis {
+        &self.basis
+    }
+
+    /// The forced response `x_p`.
+    pub fn response(&self) -> &HarmonicVector {
+        &self.response
+    }
+
+    /// The vector field at state `x`, time `t`.
+    pub fn field(&self, drive: &Drive, x: &DVector<f64>, t: f64) -> DVector<f64> {
+        &self.matrix * x + self.forcing.at(drive, t)
+    }
+
+    /// Modal coordinates of state `x` at time `t`, written to `q`.
+    pub(crate) fn to_modal(&self, drive: &Drive, x: &[f64], t: f64, q: &mut [Complex]) {
+        let response = self.response.at(drive, t);
+        for (k, q) in q.iter_mut().enumerate() {
+            *q = self
+                .basis
+                .left
+                .row(k)
+                .iter()
+                .zip(x.iter().zip(response.iter()))
+                .map(|(l, (x, p))| l * (x - p))
+                .sum();
+        }
+    }
+
+    /// The state of modal coordinates `q` at time `t`, written to `x`.
+    pub(crate) fn to_state(&self, drive: &Drive, q: &[Complex], t: f64, x: &mut [f64]) {
+        x.copy_from_slice(self.response.at(drive, t).as_slice());
+        for (k, q) in q.iter().enumerate() {
+            for (x, r) in x.iter_mut().zip(self.basis.right.column(k).iter()) {
+                *x += r.re * q.re - r.im * q.im;
+            }
+        }
+    }
+
+    /// What an output is in this regime's modal coordinates.
+    pub fn project(&self, output: &Output) -> ModalOutput {
+        let dot = |column: &[Complex]| -> Complex {
+            output.row.iter().zip(column).map(|(r, z)| z * *r).sum()
+        };
+        ModalOutput {
+            modal: (0..self.basis.len()).map(|k| dot(self.basis.right.column(k).as_slice())).collect(),
+            tones: output
+                .tones
+                .iter()
+                .zip(&self.response.tones)
+                .map(|(z, response)| z + dot(response.as_slice()))
+                .collect(),
+            constant: output.constant + (&output.row * &self.response.constant)[0],
+        }
+    }
+}
+
+/// An output in modal coordinates: `Re(modal · q) + Re Σ tones_k e^{iω_k t} + constant`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalOutput {
+    /// One complex weight a modal coordinate.
+    pub modal: Vec<Complex>,
+    /// One complex amplitude a tone.
+    pub tones: Vec<Complex>,
+    /// The constant.
+    pub constant: f64,
+}
+
+fn check(matrix: &DMatrix<f64>, forcing: &HarmonicVector, drive: &Drive) -> Result<(), FlowError> {
+    let n = matrix.nrows();
+    if n == 0 {
+        return Err(FlowError::Shape { what: "a regime's matrix", found: 0, expected: 1 });
+    }
+    if matrix.ncols() != n {
+        return Err(FlowError::Shape { what: "a regime's matrix", found: matrix.ncols(), expected: n });
+    }
+    if matrix.iter().any(|v| !v.is_finite()) {
+        return Err(FlowError::NotFinite { what: "a regime's matrix" });
+    }
+    forcing.check("a regime's forcing", n, drive.frequencies().len())
+}
+
+/// `x_p`: each tone's complex amplitude solves `(iω − A) X = F`, mode by mode.
+fn forced_response(
+    index: usize,
+    forcing: &HarmonicVector,
+    drive: &Drive,
+    basis: &SpectralBasis,
+) -> Result<HarmonicVector, FlowError> {
+    let n = forcing.constant.len();
+    let resonance = |frequency: f64| {
+        move |mode: Complex| FlowError::Resonance { regime: index, frequency, mode: mode.im.abs() }
+    };
+    let mut tones = Vec::with_capacity(forcing.tones.len());
+    for (tone, &omega) in forcing.tones.iter().zip(drive.frequencies()) {
+        // A pair stands for itself and its conjugate. Re(R y) with R's factor 2
+        // covers both for real right-hand sides; for a complex F, solve for its
+        // real and imaginary parts as two real forcings and combine.
+        let solve = |part: &DVector<f64>| -> Result<DVector<Complex>, FlowError> {
+            let b = &basis.left * part.map(|v| Complex::new(v, 0.0));
+            let z = Complex::new(0.0, omega);
+            let plus = basis.resolvent(z, &b).map_err(resonance(omega))?;
+            let minus = basis.resolvent(-z, &b).map_err(resonance(omega))?;
+            // (R y₊ + conj(R y₋)) / 2 is the response to e^{iωt} with all eigenvalues.
+            let half = Complex::new(0.5, 0.0);
+            Ok((&basis.right * plus + (&basis.right * minus).map(|v| v.conj())) * half)
+        };
+        let real = solve(&tone.map(|z| z.re))?;
+        let imaginary = solve(&tone.map(|z| z.im))?;
+        tones.push(real + imaginary * Complex::new(0.0, 1.0));
+    }
+    let b = &basis.left * forcing.constant.map(|v| Complex::new(v, 0.0));
+    let y = basis.resolvent(Complex::new(0.0, 0.0), &b).map_err(resonance(0.0))?;
+    let constant = (&basis.right * y).map(|z| z.re);
+    debug_assert_eq!(constant.len(), n);
+    Ok(HarmonicVector { constant, tones })
+}

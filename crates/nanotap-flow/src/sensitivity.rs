@@ -1,0 +1,291 @@
+//! The derivative of the flow with respect to parameters, exact through switches.
+//!
+//! Inside a regime the sensitivity `s = ∂x/∂θ` obeys `ṡ = A s + (∂A x + ∂f)`, whose
+//! right-hand side is again a sum of exponentials: it is integrated in closed
+//! form, mode by mode, with divided differences of exponentials. A parameter that
+//! changes the drive's period is treated in time measured by the drive's phase,
+//! where only `A` and `f` (times the period) change.
+
+use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::harmonic::{HarmonicVector, Output};
+use crate::integral::phi1;
+use crate::system::{Reset, System};
+use crate::{Complex, Drive, Flow, FlowError, Regime};
+use nalgebra::{DMatrix, DVector};
+
+/// The derivative of a [`System`] with respect to one parameter: the same shape
+/// with a derivative in place of every entry. Harmonic terms are differentiated at
+/// fixed drive phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SystemTangent {
+    /// `∂A`, `∂f` of each regime.
+    pub regimes: Vec<RegimeTangent>,
+    /// `∂guard` of each exit of each regime.
+    pub guards: Vec<Vec<Output>>,
+    /// `∂reset` of each exit of each regime, where the exit has a reset.
+    pub resets: Vec<Vec<Option<Reset>>>,
+    /// `∂ ln T` of the drive period.
+    pub log_period: f64,
+}
+
+/// The derivative of a regime.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegimeTangent {
+    /// `∂A`, `n × n`.
+    pub matrix: DMatrix<f64>,
+    /// `∂f`, of length `n`.
+    pub forcing: HarmonicVector,
+}
+
+impl SystemTangent {
+    /// The derivative of nothing: every entry zero, to be filled in.
+    pub fn zeros(system: &System) -> Self {
+        let (n, tones) = (system.dimension(), system.drive().frequencies().len());
+        let regime = RegimeTangent { matrix: DMatrix::zeros(n, n), forcing: HarmonicVector::zeros(n, tones) };
+        Self {
+            regimes: vec![regime; system.regimes().len()],
+            guards: system.exits().iter().map(|e| e.iter().map(|e| e.guard.scaled(0.0)).collect()).collect(),
+            resets: system.exits().iter().map(|e| vec![None; e.len()]).collect(),
+            log_period: 0.0,
+        }
+    }
+}
+
+/// Carries `∂x/∂θ` of several parameters along a flow.
+#[derive(Clone, Debug)]
+pub struct Sensitivity<'a> {
+    tangents: &'a [SystemTangent],
+    /// `source[p][r]`: what drives the sensitivity to parameter `p` in regime `r`.
+    sources: Vec<Vec<Source>>,
+    /// `∂q/∂θ_p` in the present regime.
+    modal: Vec<Vec<Complex>>,
+}
+
+/// `∂A x + ∂f` (times the period's change) in modal coordinates.
+#[derive(Clone, Debug)]
+struct Source {
+    /// Multiplies `e^{λ_j s} q_j`, `m × m`.
+    direct: DMatrix<Complex>,
+    /// Multiplies `e^{λ̄_j s} q̄_j`, `m × m`.
+    mirrored: DMatrix<Complex>,
+    /// Multiplies `e^{iω_k t}` and `e^{−iω_k t}` of tone `k`.
+    tones: Vec<[DVector<Complex>; 2]>,
+    constant: DVector<Complex>,
+    /// `∂A + A ∂ln T` and `∂f + f ∂ln T`.
+    matrix: DMatrix<f64>,
+    forcing: HarmonicVector,
+}
+
+impl Source {
+    fn new(regime: &Regime, tangent: &RegimeTangent, log_period: f64) -> Self {
+        let complex = |m: &DMatrix<f64>| m.map(|v| Complex::new(v, 0.0));
+        let matrix = &tangent.matrix + regime.matrix() * log_period;
+        let forcing = tangent.forcing.plus(log_period, regime.forcing());
+        let (left, right) = (&regime.basis().left, &regime.basis().right);
+        let half = Complex::new(0.5, 0.0);
+        let driven = left * complex(&matrix);
+        // Along the forced response, ∂A x_p + ∂f.
+        let harmonic = regime.response().mapped(&matrix).plus(1.0, &forcing);
+        Self {
+            direct: &driven * right * half,
+            mirrored: &driven * right.map(|z| z.conj()) * half,
+            tones: harmonic
+                .tones
+                .iter()
+                .map(|z| [left * z * half, left * z.map(|z| z.conj()) * half])
+                .collect(),
+            constant: left * harmonic.constant.map(|v| Complex::new(v, 0.0)),
+            matrix,
+            forcing,
+        }
+    }
+}
+
+/// `∫₀^L e^{λ(L−τ)} e^{μτ} dτ`, without overflow or cancellation.
+fn response(lambda: Complex, mu: Complex, length: f64) -> Complex {
+    let (slow, fast) = if lambda.re >= mu.re { (lambda, mu) } else { (mu, lambda) };
+    (slow * length).exp() * phi1((fast - slow) * length) * length
+}
+
+impl<'a> Sensitivity<'a> {
+    /// Zero sensitivities to the parameters of `tangents`, for a flow of `system` that
+    /// is in regime `regime`.
+    pub fn new(system: &System, tangents: &'a [SystemTangent], regime: usize) -> Self {
+        let sources = tangents
+            .iter()
+            .map(|t| {
+                let pairs = system.regimes().iter().zip(&t.regimes);
+                pairs.map(|(r, tangent)| Source::new(r, tangent, t.log_period)).collect()
+            })
+            .collect();
+        let m = system.regimes()[regime].basis().len();
+        Self { tangents, sources, modal: vec![vec![Complex::new(0.0, 0.0); m]; tangents.len()] }
+    }
+
+    /// `∂x/∂θ_p` (length `n`) of a flow that is in `regime` now.
+    pub fn to_state(&self, regime: &Regime, p: usize, derivative: &mut [f64]) {
+        derivative.fill(0.0);
+        for (k, q) in self.modal[p].iter().enumerate() {
+            for (d, r) in derivative.iter_mut().zip(regime.basis().right.column(k).iter()) {
+                *d += r.re * q.re - r.im * q.im;
+            }
+        }
+    }
+}
+
+impl Observer for Sensitivity<'_> {
+    fn segment(&mut self, segment: &SegmentView<'_>) {
+        let regime = segment.regime();
+        for (modal, sources) in self.modal.iter_mut().zip(&self.sources) {
+            let source = &sources[segment.regime];
+            if regime.basis().clusters.is_empty() {
+                simple_segment(modal, source, segment);
+            } else {
+                augmented_segment(modal, source, segment);
+            }
+        }
+    }
+
+    fn switch(&mut self, view: &SwitchView<'_>) {
+        let system = view.system;
+        let from = &system.regimes()[view.switch.from];
+        let mut x = DVector::zeros(system.dimension());
+        from.to_state(system.drive(), view.modal, view.phase, x.as_mut_slice());
+        let saltation = system.saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
+        let exit = &system.exits()[view.switch.from][view.exit];
+        let reset = if view.stuck { exit.sticking.as_ref().map(|s| &s.reset) } else { exit.reset.as_ref() };
+        let n = system.dimension();
+        let jump = reset.map_or_else(|| DMatrix::identity(n, n), |r| r.matrix.clone());
+        let mut before = DVector::zeros(n);
+        for p in 0..self.tangents.len() {
+            self.to_state(from, p, before.as_mut_slice());
+            let tangent = &self.tangents[p];
+            let guard = tangent.guards[view.switch.from][view.exit].at(system.drive(), x.as_slice(), view.phase);
+            let mut after = &saltation * &before;
+            // The part of the saltation beyond the jump is u hᵀ with h s + ∂g in place
+            // of h s: the switch moves with the guard as well.
+            if guard != 0.0 {
+                let along = &exit.guard.row;
+                let size = along.norm_squared();
+                let u = (&saltation - &jump) * along.transpose() / size;
+                after += u * guard;
+            }
+            if let (Some(change), false) = (&tangent.resets[view.switch.from][view.exit], view.stuck) {
+                after += &change.matrix * &x + change.offset.at(system.drive(), view.phase);
+            }
+            let stacked = &view.switch.to_modal * after;
+            let m = stacked.len() / 2;
+            self.modal[p] = (0..m).map(|k| Complex::new(stacked[k], stacked[m + k])).collect();
+        }
+    }
+}
+
+/// Closed form, mode by mode.
+fn simple_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<'_>) {
+    let lambdas = &segment.regime().basis().eigenvalues;
+    let drive = segment.system.drive();
+    for (k, sigma) in modal.iter_mut().enumerate() {
+        let lambda = lambdas[k];
+        let mut sum = *sigma * segment.factors[k];
+        for (j, q) in segment.modal.iter().enumerate() {
+            sum += source.direct[(k, j)] * q * response(lambda, lambdas[j], segment.length);
+            sum += source.mirrored[(k, j)] * q.conj() * response(lambda, lambdas[j].conj(), segment.length);
+        }
+        for (t, [direct, mirrored]) in source.tones.iter().enumerate() {
+            let phasor = drive.phasor(t, segment.phase);
+            let omega = Complex::new(0.0, drive.frequencies()[t]);
+            sum += direct[k] * phasor * response(lambda, omega, segment.length);
+            sum += mirrored[k] * phasor.conj() * response(lambda, -omega, segment.length);
+        }
+        sum += source.constant[k] * response(lambda, Complex::new(0.0, 0.0), segment.length);
+        *sigma = sum;
+    }
+}
+
+/// The exponential of the state, its sensitivity and the drive as one linear system,
+/// for regimes whose eigenvalues coincide.
+fn augmented_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<'_>) {
+    let regime = segment.regime();
+    let drive = segment.system.drive();
+    let n = segment.system.dimension();
+    let (extended, start) = augmented(regime.matrix(), regime.forcing(), source, drive, segment.phase);
+    let mut z = start;
+    regime.to_state(drive, segment.modal, segment.phase, &mut z.as_mut_slice()[n..2 * n]);
+    for (k, q) in modal.iter().enumerate() {
+        for (i, r) in regime.basis().right.column(k).iter().enumerate() {
+            z[i] += r.re * q.re - r.im * q.im;
+        }
+    }
+    let end = (extended * segment.length).exp() * z;
+    for (k, sigma) in modal.iter_mut().enumerate() {
+        *sigma = regime.basis().left.row(k).iter().zip(end.iter()).map(|(l, s)| l * *s).sum();
+    }
+}
+
+/// The matrix of `(s, x, cos, sin, …, 1)` and its start with `s` and `x` left zero.
+fn augmented(
+    a: &DMatrix<f64>,
+    f: &HarmonicVector,
+    source: &Source,
+    drive: &Drive,
+    phase: f64,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let n = a.nrows();
+    let tones = drive.frequencies().len();
+    let size = 2 * n + 2 * tones + 1;
+    let mut g = DMatrix::zeros(size, size);
+    let mut start = DVector::zeros(size);
+    g.view_mut((0, 0), (n, n)).copy_from(a);
+    g.view_mut((n, n), (n, n)).copy_from(a);
+    g.view_mut((0, n), (n, n)).copy_from(&source.matrix);
+    for (offset, forcing) in [(0, &source.forcing), (n, f)] {
+        for (k, tone) in forcing.tones.iter().enumerate() {
+            for (i, z) in tone.iter().enumerate() {
+                g[(offset + i, 2 * n + 2 * k)] = z.re;
+                g[(offset + i, 2 * n + 2 * k + 1)] = -z.im;
+            }
+        }
+        for (i, c) in forcing.constant.iter().enumerate() {
+            g[(offset + i, size - 1)] = *c;
+        }
+    }
+    for (k, &omega) in drive.frequencies().iter().enumerate() {
+        let c = 2 * n + 2 * k;
+        g[(c, c + 1)] = -omega;
+        g[(c + 1, c)] = omega;
+        let phasor = drive.phasor(k, phase);
+        start[c] = phasor.re;
+        start[c + 1] = phasor.im;
+    }
+    start[size - 1] = 1.0;
+    (g, start)
+}
+
+impl Flow {
+    /// Runs one drive period from phase 0 and writes the period map's Jacobian
+    /// (`n × n`) and its derivative with respect to each parameter of `tangents` (one
+    /// column each, `n × p`).
+    ///
+    /// # Errors
+    /// As [`Flow::run_period`].
+    pub fn run_period_with_sensitivities(
+        &mut self,
+        tangents: &[SystemTangent],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: &mut DMatrix<f64>,
+    ) -> Result<(), FlowError> {
+        let system = std::sync::Arc::clone(self.system());
+        let start = self.regime();
+        let mut carried = crate::jacobian::Jacobian::identity(&system.regimes()[start]);
+        let mut sensitivity = Sensitivity::new(&system, tangents, start);
+        self.run_period(&mut (&mut carried, &mut sensitivity))?;
+        let regime = &system.regimes()[self.regime()];
+        carried.to_state(regime, jacobian);
+        let mut column = vec![0.0; system.dimension()];
+        for p in 0..tangents.len() {
+            sensitivity.to_state(regime, p, &mut column);
+            derivatives.column_mut(p).copy_from_slice(&column);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,408 @@
+//! A piecewise-linear system: its regimes and the exits between them.
+
+use crate::harmonic::{HarmonicVector, Output};
+use crate::regime::{ModalOutput, Regime};
+use crate::{Complex, Drive, FlowError};
+use nalgebra::{DMatrix, DVector};
+
+/// A jump of the state at a switch: `x⁺ = matrix · x⁻ + offset(t)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reset {
+    /// `n × n`.
+    pub matrix: DMatrix<f64>,
+    /// Of length `n`.
+    pub offset: HarmonicVector,
+}
+
+/// Where impacts end that pile up (chatter): once an impact is so slow that the
+/// rest of the sequence moves the motion by less than rounding, `reset` (the
+/// perfectly inelastic impact) is applied and the motion goes on in `regime`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sticking {
+    /// The regime in which the guard stays at zero.
+    pub regime: usize,
+    /// The inelastic impact.
+    pub reset: Reset,
+}
+
+/// A way out of a regime: when `guard` falls to zero, the motion goes on in
+/// `target`, after `reset` if there is one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exit {
+    /// Positive inside the regime.
+    pub guard: Output,
+    /// The next regime.
+    pub target: usize,
+    /// The jump of the state, none if it is continuous.
+    pub reset: Option<Reset>,
+    /// What ends chatter, if the exit can chatter.
+    pub sticking: Option<Sticking>,
+    /// Whether the next regime begins with guard, rate and acceleration all zero
+    /// by definition (release from sticking).
+    pub release: bool,
+}
+
+impl Exit {
+    /// A continuous switch to `target` when `guard` falls to zero.
+    pub fn new(guard: Output, target: usize) -> Self {
+        Self { guard, target, reset: None, sticking: None, release: false }
+    }
+
+    /// With a jump of the state.
+    #[must_use]
+    pub fn with_reset(mut self, reset: Reset) -> Self {
+        self.reset = Some(reset);
+        self
+    }
+
+    /// With a sticking regime for chatter to end in.
+    #[must_use]
+    pub fn with_sticking(mut self, sticking: Sticking) -> Self {
+        self.sticking = Some(sticking);
+        self
+    }
+
+    /// As a release from sticking: the target's guard starts with value, rate and
+    /// acceleration zero.
+    #[must_use]
+    pub fn as_release(mut self) -> Self {
+        self.release = true;
+        self
+    }
+}
+
+/// A harmonically forced piecewise-linear system, ready to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct System {
+    dimension: usize,
+    drive: Drive,
+    regimes: Vec<Regime>,
+    exits: Vec<Vec<Exit>>,
+    switches: Vec<Vec<PreparedExit>>,
+}
+
+/// What an exit needs at run time.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PreparedExit {
+    /// The guard in modal coordinates of the regime it leaves.
+    pub(crate) guard: ModalOutput,
+    /// The change of basis of the plain switch.
+    pub(crate) switch: Switch,
+    /// The change of basis into the sticking regime.
+    pub(crate) sticking: Option<Switch>,
+    /// In the target regime, the exit whose guard is this one reversed (or the
+    /// same, at an impact), so that it starts at zero.
+    pub(crate) twin: Option<usize>,
+    /// The same in the sticking regime.
+    pub(crate) sticking_twin: Option<usize>,
+    /// The guard's acceleration in the target regime, for telling chatter.
+    pub(crate) acceleration: Option<Output>,
+}
+
+/// A switch from one regime to another as a change of modal coordinates:
+/// `q⁺ = matrix · q⁻ + offset(t)` with real and imaginary parts stacked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Switch {
+    /// The regime it leaves.
+    pub from: usize,
+    /// The regime it enters.
+    pub to: usize,
+    /// `2m⁺ × 2m⁻`, acting on `[Re q; Im q]`.
+    pub(crate) matrix: DMatrix<f64>,
+    pub(crate) constant: DVector<f64>,
+    /// Multiplies `[cos ω_k t, −sin ω_k t]`, a pair of columns a tone.
+    pub(crate) tones: Vec<[DVector<f64>; 2]>,
+    /// The constant saltation `1 + u hᵀ` where the vector field's jump is
+    /// proportional to the guard's rate; then the map is smooth through grazing.
+    pub(crate) saltation: Option<DVector<f64>>,
+    /// `matrix` with the constant saltation in it: the switch of a Jacobian.
+    pub(crate) tangent: Option<DMatrix<f64>>,
+    /// State from `[Re q⁻; Im q⁻]`, `n × 2m⁻`.
+    pub(crate) from_modal: DMatrix<f64>,
+    /// `[Re q⁺; Im q⁺]` from the state, `2m⁺ × n`.
+    pub(crate) to_modal: DMatrix<f64>,
+}
+
+impl System {
+    /// Joins regimes and exits (`exits[r]` lead out of regime `r`).
+    ///
+    /// # Errors
+    /// When sizes do not fit or an exit leads nowhere.
+    pub fn new(drive: Drive, regimes: Vec<Regime>, exits: Vec<Vec<Exit>>) -> Result<Self, FlowError> {
+        let dimension = regimes.first().map_or(0, |r| r.matrix().nrows());
+        if dimension == 0 {
+            return Err(FlowError::Shape { what: "the list of regimes", found: 0, expected: 1 });
+        }
+        if exits.len() != regimes.len() {
+            return Err(FlowError::Shape { what: "the list of exits", found: exits.len(), expected: regimes.len() });
+        }
+        let tones = drive.frequencies().len();
+        for regime in &regimes {
+            let found = regime.matrix().nrows();
+            if found != dimension {
+                return Err(FlowError::Shape { what: "a regime's matrix", found, expected: dimension });
+            }
+        }
+        for exit in exits.iter().flatten() {
+            exit.guard.check("a guard", dimension, tones)?;
+            let targets = std::iter::once(exit.target).chain(exit.sticking.as_ref().map(|s| s.regime));
+            for target in targets {
+                if target >= regimes.len() {
+                    return Err(FlowError::Target { target, regimes: regimes.len() });
+                }
+            }
+            for reset in exit.reset.iter().chain(exit.sticking.as_ref().map(|s| &s.reset)) {
+                let (rows, columns) = reset.matrix.shape();
+                for found in [rows, columns] {
+                    if found != dimension {
+                        return Err(FlowError::Shape { what: "a reset's matrix", found, expected: dimension });
+                    }
+                }
+                reset.offset.check("a reset's offset", dimension, tones)?;
+            }
+        }
+        let mut system = Self { dimension, drive, regimes, exits, switches: Vec::new() };
+        system.switches = (0..system.regimes.len())
+            .map(|r| system.exits[r].iter().map(|exit| system.prepare(r, exit)).collect())
+            .collect();
+        Ok(system)
+    }
+
+    /// Dimension of the state.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// The drive.
+    pub fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// The regimes.
+    pub fn regimes(&self) -> &[Regime] {
+        &self.regimes
+    }
+
+    /// The exits of each regime.
+    pub fn exits(&self) -> &[Vec<Exit>] {
+        &self.exits
+    }
+
+    pub(crate) fn prepared(&self, regime: usize) -> &[PreparedExit] {
+        &self.switches[regime]
+    }
+
+    /// The regime in which a motion starts at state `x` and time `t`: the first
+    /// whose guards are all positive, a guard that is zero within rounding counting
+    /// as positive when its first non-zero derivative is. Says as well which guard
+    /// starts at zero. A sticking regime is entered only from a state that sticks.
+    ///
+    /// # Errors
+    /// [`FlowError::NoRegime`] when there is none.
+    pub fn regime_at(&self, x: &[f64], t: f64) -> Result<(usize, Option<usize>), FlowError> {
+        for (r, exits) in self.exits.iter().enumerate() {
+            if !self.may_stick(r, x, t) {
+                continue;
+            }
+            let mut surface = None;
+            let inside = exits.iter().enumerate().all(|(e, exit)| {
+                let value = exit.guard.at(&self.drive, x, t);
+                if value.abs() <= rounding(&exit.guard, x) {
+                    surface = Some(e);
+                    return self.rises(r, &exit.guard, x, t);
+                }
+                value > 0.0
+            });
+            if inside {
+                return Ok((r, surface));
+            }
+        }
+        Err(FlowError::NoRegime)
+    }
+
+    /// Whether regime `r` is no sticking regime, or one in which this state sticks:
+    /// guard and rate of the impact are zero.
+    fn may_stick(&self, r: usize, x: &[f64], t: f64) -> bool {
+        let mut impacts = self.exits.iter().enumerate().flat_map(|(from, exits)| {
+            let leads_here = move |e: &&Exit| e.sticking.as_ref().is_some_and(|s| s.regime == r);
+            exits.iter().filter(leads_here).map(move |e| (from, e))
+        });
+        let Some((from, impact)) = impacts.next() else { return true };
+        let regime = &self.regimes[from];
+        let rate = impact.guard.rate(regime.matrix(), regime.forcing(), &self.drive);
+        [&impact.guard, &rate]
+            .iter()
+            .all(|output| output.at(&self.drive, x, t).abs() <= 64.0 * rounding(output, x))
+    }
+
+    fn rises(&self, regime: usize, guard: &Output, x: &[f64], t: f64) -> bool {
+        let regime = &self.regimes[regime];
+        let mut output = guard.clone();
+        for _ in 0..4 {
+            output = output.rate(regime.matrix(), regime.forcing(), &self.drive);
+            let value = output.at(&self.drive, x, t);
+            if value.abs() > rounding(&output, x) {
+                return value > 0.0;
+            }
+        }
+        true
+    }
+
+    fn prepare(&self, from: usize, exit: &Exit) -> PreparedExit {
+        let acceleration = exit.sticking.as_ref().map(|_| {
+            let target = &self.regimes[exit.target];
+            exit.guard
+                .rate(target.matrix(), target.forcing(), &self.drive)
+                .rate(target.matrix(), target.forcing(), &self.drive)
+        });
+        PreparedExit {
+            guard: self.regimes[from].project(&exit.guard),
+            switch: self.switch(from, exit.target, exit.reset.as_ref(), &exit.guard),
+            sticking: exit.sticking.as_ref().map(|s| self.switch(from, s.regime, Some(&s.reset), &exit.guard)),
+            twin: if exit.release {
+                // After release the guard that starts at zero is the impact's.
+                self.exits[exit.target].iter().position(|e| e.sticking.as_ref().is_some_and(|s| s.regime == from))
+            } else {
+                self.twin(&exit.guard, exit.target)
+            },
+            sticking_twin: exit.sticking.as_ref().and_then(|s| self.twin(&exit.guard, s.regime)),
+            acceleration,
+        }
+    }
+
+    /// The exit of `target` whose guard is `guard` or its negative.
+    fn twin(&self, guard: &Output, target: usize) -> Option<usize> {
+        let reversed = guard.scaled(-1.0);
+        self.exits[target].iter().position(|e| e.guard == reversed || e.guard == *guard)
+    }
+
+    fn switch(&self, from: usize, to: usize, reset: Option<&Reset>, guard: &Output) -> Switch {
+        let (a, b) = (&self.regimes[from], &self.regimes[to]);
+        let n = self.dimension;
+        let (ma, mb) = (a.basis().len(), b.basis().len());
+        let identity = DMatrix::identity(n, n);
+        let jump = reset.map_or(&identity, |r| &r.matrix);
+        // x⁻ = Re(R q) = [Re R, −Im R] [Re q; Im q]
+        let mut from_modal = DMatrix::zeros(n, 2 * ma);
+        from_modal.view_mut((0, 0), (n, ma)).copy_from(&a.basis().right.map(|z| z.re));
+        from_modal.view_mut((0, ma), (n, ma)).copy_from(&a.basis().right.map(|z| -z.im));
+        let mut to_modal = DMatrix::zeros(2 * mb, n);
+        to_modal.view_mut((0, 0), (mb, n)).copy_from(&b.basis().left.map(|z| z.re));
+        to_modal.view_mut((mb, 0), (mb, n)).copy_from(&b.basis().left.map(|z| z.im));
+        let mut shift = a.response().mapped(jump);
+        if let Some(reset) = reset {
+            shift = shift.plus(1.0, &reset.offset);
+        }
+        let shift = shift.plus(-1.0, b.response());
+        let tones = shift
+            .tones
+            .iter()
+            .map(|z| [&to_modal * z.map(|z| z.re), &to_modal * z.map(|z| z.im)])
+            .collect();
+        let saltation = self.constant_saltation(from, to, reset, guard);
+        let tangent = saltation.as_ref().map(|u| &to_modal * (jump + u * &guard.row) * &from_modal);
+        Switch {
+            from,
+            to,
+            matrix: &to_modal * jump * &from_modal,
+            constant: &to_modal * &shift.constant,
+            tones,
+            saltation,
+            tangent,
+            from_modal,
+            to_modal,
+        }
+    }
+
+    /// `u` with `f⁺(x⁺) − R f⁻(x⁻) − ρ̇ = u ġ` for every state on the guard's zero
+    /// set, where such a `u` exists.
+    fn constant_saltation(
+        &self,
+        from: usize,
+        to: usize,
+        reset: Option<&Reset>,
+        guard: &Output,
+    ) -> Option<DVector<f64>> {
+        let (a, b) = (&self.regimes[from], &self.regimes[to]);
+        let (matrix, forcing) = self.field_jump(from, to, reset);
+        let rate = guard.rate(a.matrix(), a.forcing(), &self.drive);
+        debug_assert_eq!(matrix.nrows(), b.matrix().nrows());
+        let rate_row = flat(&rate.row.transpose(), rate.constant, &rate.tones);
+        let guard_row = flat(&guard.row.transpose(), guard.constant, &guard.tones);
+        // Orthonormal basis of the span of ġ and g.
+        let e1 = &guard_row / guard_row.norm();
+        let across = &rate_row - &e1 * e1.dot(&rate_row);
+        if across.norm() <= 1e-12 * rate_row.norm() {
+            return None;
+        }
+        let e2 = &across / across.norm();
+        let mut u = DVector::zeros(self.dimension);
+        for i in 0..self.dimension {
+            let tones: Vec<Complex> = forcing.tones.iter().map(|z| z[i]).collect();
+            let row = flat(&matrix.row(i).transpose(), forcing.constant[i], &tones);
+            let rest = &row - &e1 * e1.dot(&row) - &e2 * e2.dot(&row);
+            let (af, bf) = (a.matrix().row(i).norm(), b.matrix().row(i).norm());
+            if rest.norm() > 1e-12 * row.norm() && rest.norm() > 1e-14 * (af + bf) {
+                return None;
+            }
+            u[i] = e2.dot(&row) / across.norm();
+        }
+        Some(u)
+    }
+
+    /// `f⁺(Rx + ρ, t) − R f⁻(x, t) − ρ̇` as an affine function of the state.
+    fn field_jump(&self, from: usize, to: usize, reset: Option<&Reset>) -> (DMatrix<f64>, HarmonicVector) {
+        let (a, b) = (&self.regimes[from], &self.regimes[to]);
+        match reset {
+            None => (b.matrix() - a.matrix(), b.forcing().plus(-1.0, a.forcing())),
+            Some(reset) => (
+                b.matrix() * &reset.matrix - &reset.matrix * a.matrix(),
+                b.forcing()
+                    .plus(1.0, &reset.offset.mapped(b.matrix()))
+                    .plus(-1.0, &a.forcing().mapped(&reset.matrix))
+                    .plus(-1.0, &reset.offset.rate(&self.drive)),
+            ),
+        }
+    }
+
+    /// The saltation matrix (`n × n`) of exit `exit` of regime `from` (into its
+    /// sticking regime if `stuck`) at state `x` before the switch and time `t`.
+    ///
+    /// Constant wherever the field's jump is proportional to the guard's rate;
+    /// otherwise `R + (f⁺ − R f⁻ − ρ̇) hᵀ/ġ`, singular at grazing.
+    pub fn saltation(&self, from: usize, exit: usize, stuck: bool, x: &DVector<f64>, t: f64) -> DMatrix<f64> {
+        let description = &self.exits[from][exit];
+        let prepared = &self.switches[from][exit];
+        let (switch, reset) = match (&description.sticking, &prepared.sticking) {
+            (Some(sticking), Some(switch)) if stuck => (switch, Some(&sticking.reset)),
+            _ => (&prepared.switch, description.reset.as_ref()),
+        };
+        let n = self.dimension;
+        let jump = reset.map_or_else(|| DMatrix::identity(n, n), |r| r.matrix.clone());
+        let h = &description.guard.row;
+        if let Some(u) = &switch.saltation {
+            return jump + u * h;
+        }
+        let (matrix, forcing) = self.field_jump(from, switch.to, reset);
+        let change = matrix * x + forcing.at(&self.drive, t);
+        let regime = &self.regimes[from];
+        let rate = description.guard.rate(regime.matrix(), regime.forcing(), &self.drive);
+        jump + change * h / rate.at(&self.drive, x.as_slice(), t)
+    }
+}
+
+/// The size of rounding errors in an output's value.
+fn rounding(output: &Output, x: &[f64]) -> f64 {
+    let linear: f64 = output.row.iter().zip(x).map(|(r, x)| (r * x).abs()).sum();
+    let harmonic: f64 = output.tones.iter().map(|z| z.norm()).sum();
+    f64::EPSILON * (linear + output.constant.abs() + harmonic)
+}
+
+/// An affine-harmonic scalar as one vector, for projections.
+fn flat(row: &DVector<f64>, constant: f64, tones: &[Complex]) -> DVector<f64> {
+    let harmonic = tones.iter().flat_map(|z| [z.re, z.im]);
+    DVector::from_iterator(
+        row.len() + 1 + 2 * tones.len(),
+        row.iter().copied().chain(std::iter::once(constant)).chain(harmonic),
+    )
+}

@@ -1,0 +1,212 @@
+//! A recorded motion with closed-form dense output.
+
+use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::signal::Signal;
+use crate::system::System;
+use crate::{Complex, Flow, FlowError, Output};
+use std::sync::Arc;
+
+/// A stretch of a trajectory within one regime and one drive period.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// The regime's number.
+    pub regime: usize,
+    /// Time at its start, counted from the start of the recording's first period.
+    pub start: f64,
+    /// Its start within the drive period.
+    pub phase: f64,
+    /// How long it lasts.
+    pub length: f64,
+    /// Modal coordinates at its start.
+    pub modal: Vec<Complex>,
+}
+
+/// A switch in a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// When, counted from the start of the recording's first period.
+    pub time: f64,
+    /// The regime left.
+    pub from: usize,
+    /// The regime entered.
+    pub to: usize,
+    /// The guard's rate before the switch.
+    pub rate: f64,
+    /// Whether the guard only grazed zero within rounding.
+    pub grazing: bool,
+}
+
+/// A recorded motion; between its switches everything is known in closed form.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    system: Arc<System>,
+    segments: Vec<Segment>,
+    events: Vec<Event>,
+    end: f64,
+}
+
+/// Records a flow.
+#[derive(Clone, Debug, Default)]
+pub struct Recorder {
+    segments: Vec<Segment>,
+    events: Vec<Event>,
+    periods: u64,
+}
+
+impl Recorder {
+    fn offset(&self, system: &System) -> f64 {
+        self.periods as f64 * system.drive().period()
+    }
+
+    /// The recording, of a flow of `system`.
+    pub fn finish(self, system: Arc<System>) -> Trajectory {
+        let end = self.segments.last().map_or(0.0, |s| s.start + s.length);
+        Trajectory { system, segments: self.segments, events: self.events, end }
+    }
+}
+
+impl Observer for Recorder {
+    fn segment(&mut self, segment: &SegmentView<'_>) {
+        if segment.length > 0.0 {
+            self.segments.push(Segment {
+                regime: segment.regime,
+                start: self.offset(segment.system) + segment.phase,
+                phase: segment.phase,
+                length: segment.length,
+                modal: segment.modal.to_vec(),
+            });
+        }
+    }
+
+    fn switch(&mut self, switch: &SwitchView<'_>) {
+        self.events.push(Event {
+            time: self.offset(switch.system) + switch.phase,
+            from: switch.switch.from,
+            to: switch.switch.to,
+            rate: switch.rate,
+            grazing: switch.grazing,
+        });
+    }
+
+    fn period_end(&mut self) {
+        self.periods += 1;
+    }
+}
+
+/// One output over a trajectory: a signal on each piece.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PiecewiseSignal {
+    /// The pieces, in order of time.
+    pub pieces: Vec<Piece>,
+}
+
+/// One piece: `signal(s)` is the output at time `start + s`, `0 ≤ s ≤ length`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Piece {
+    /// Time at its start.
+    pub start: f64,
+    /// How long it lasts.
+    pub length: f64,
+    /// The output.
+    pub signal: Signal,
+}
+
+impl Trajectory {
+    /// Runs `periods` drive periods from state `x` at phase 0 and records them.
+    ///
+    /// # Errors
+    /// As [`Flow::start`] and [`Flow::run_period`].
+    pub fn record(system: &Arc<System>, x: &[f64], periods: usize) -> Result<Self, FlowError> {
+        let mut flow = Flow::new(Arc::clone(system));
+        flow.start(x, 0.0)?;
+        let mut recorder = Recorder::default();
+        for _ in 0..periods {
+            flow.run_period(&mut recorder)?;
+        }
+        Ok(recorder.finish(Arc::clone(system)))
+    }
+
+    /// The system.
+    pub fn system(&self) -> &Arc<System> {
+        &self.system
+    }
+
+    /// The segments, in order of time.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// The switches, in order of time.
+    pub fn events(&self) -> &[Event] {
+        &self.events
+    }
+
+    /// Time at the end; the start is 0.
+    pub fn end(&self) -> f64 {
+        self.end
+    }
+
+    /// The segment that holds time `t` (the nearest one outside the recording).
+    pub fn segment_at(&self, t: f64) -> Option<&Segment> {
+        let after = self.segments.partition_point(|s| s.start <= t);
+        self.segments.get(after.saturating_sub(1))
+    }
+
+    /// The state at time `t`, `None` of an empty recording.
+    pub fn state_at(&self, t: f64) -> Option<Vec<f64>> {
+        let segment = self.segment_at(t)?;
+        let regime = &self.system.regimes()[segment.regime];
+        let s = (t - segment.start).clamp(0.0, segment.length);
+        let mut modal = segment.modal.clone();
+        let mut factors = modal.clone();
+        regime.basis().advance(&mut modal, s, &mut factors);
+        let mut x = vec![0.0; self.system.dimension()];
+        regime.to_state(self.system.drive(), &modal, segment.phase + s, &mut x);
+        Some(x)
+    }
+
+    /// How long the motion stays in `regime`.
+    pub fn time_in(&self, regime: usize) -> f64 {
+        self.segments.iter().filter(|s| s.regime == regime).map(|s| s.length).sum()
+    }
+
+    /// An output over the whole trajectory, the same in every regime.
+    pub fn signal(&self, output: &Output) -> PiecewiseSignal {
+        self.signal_by_regime(&vec![output.clone(); self.system.regimes().len()])
+    }
+
+    /// An output that differs from regime to regime (one entry a regime), such as a
+    /// contact force.
+    ///
+    /// # Panics
+    /// When there are fewer outputs than regimes.
+    pub fn signal_by_regime(&self, outputs: &[Output]) -> PiecewiseSignal {
+        let drive = self.system.drive();
+        let regimes = self.system.regimes();
+        let modal: Vec<_> = regimes.iter().zip(outputs).map(|(r, o)| r.project(o)).collect();
+        let pieces = self
+            .segments
+            .iter()
+            .map(|s| Piece {
+                start: s.start,
+                length: s.length,
+                signal: Signal::of(&regimes[s.regime], drive, &modal[s.regime], &s.modal, s.phase, s.length),
+            })
+            .collect();
+        PiecewiseSignal { pieces }
+    }
+}
+
+impl PiecewiseSignal {
+    /// The value at time `t` (of the nearest piece outside), `None` if empty.
+    pub fn at(&self, t: f64) -> Option<f64> {
+        let after = self.pieces.partition_point(|p| p.start <= t);
+        let piece = self.pieces.get(after.saturating_sub(1))?;
+        Some(piece.signal.at((t - piece.start).clamp(0.0, piece.length)))
+    }
+
+    /// Length of time covered.
+    pub fn duration(&self) -> f64 {
+        self.pieces.iter().map(|p| p.length).sum()
+    }
+}

@@ -1,2 +1,28 @@
-//! The terminal door.
-fn main() {}
+//! The terminal door: parsing, formatting, files. No physics and no numerics here.
+//!
+//! Exit codes: 0 done, 1 failed, 2 bad input.
+
+mod arguments;
+mod command;
+mod failure;
+mod file;
+mod number;
+mod output;
+mod style;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use arguments::Arguments;
+use output::Output;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let output = Output::new(arguments.json, arguments.quiet);
+    match command::run(&arguments.command, &output) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

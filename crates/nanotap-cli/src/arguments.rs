@@ -1,0 +1,76 @@
+//! What can be typed, as it was typed. Each command resolves its own arguments.
+
+use std::path::PathBuf;
+
+use clap::builder::styling::{AnsiColor, Styles};
+use clap::{Args, Parser};
+
+use crate::command::Command;
+
+const STYLES: Styles = Styles::styled()
+    .header(AnsiColor::Green.on_default().bold())
+    .usage(AnsiColor::Green.on_default().bold())
+    .literal(AnsiColor::Cyan.on_default().bold())
+    .placeholder(AnsiColor::Cyan.on_default());
+
+const AFTER_HELP: &str = "\
+A case is a TOML file:
+
+    [model]
+    modes = 3
+    alpha1 = 0.1    # tip_mass_ratio
+    alpha2 = 0.1    # drive_amplitude
+    alpha3 = 0.1    # beam_damping
+    alpha4 = 20.0   # contact_stiffness
+    alpha5 = 0.0    # gap
+    alpha6 = 0.2    # contact_damping
+    omega = 2.6     # drive_frequency
+
+Exit codes: 0 done, 1 failed, 2 bad input.";
+
+/// What an AFM cantilever does when its tip taps a sample: every motion, its
+/// stability, and what an experimenter would measure in it.
+#[derive(Debug, Parser)]
+#[command(name = "nanotap", version, styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
+pub(crate) struct Arguments {
+    /// Print one JSON document on standard output, and nothing else there
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+
+    /// Leave out notes, warnings and progress
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// The case that a command works on.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CaseArguments {
+    /// The case file (TOML); without one, --set must say all that has no default
+    #[arg(value_name = "CASE")]
+    pub(crate) file: Option<PathBuf>,
+
+    /// Set a key of the case, as in omega=20 or sample.stiffness="20 N/m"; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+}
+
+/// Where data go.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct OutArgument {
+    /// Write the data to this file; its ending decides the format
+    #[arg(long, value_name = "PATH")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Arguments::command().debug_assert();
+    }
+}

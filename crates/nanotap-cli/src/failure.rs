@@ -1,0 +1,96 @@
+//! Why a command could not be done, and how that is shown.
+
+use std::process::ExitCode;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use nanotap::case::CaseError;
+use nanotap::case_file::{CaseFileError, Place, Problem, Source};
+
+use crate::style;
+
+/// Why a command could not be done.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The case is not right: exit code 2.
+    Case(CaseFileError),
+    /// Something else that was asked for is not right: exit code 2. What is wrong, and
+    /// what would be right.
+    Request(String, String),
+    /// It was right, and still did not work out: exit code 1.
+    Failed(String),
+}
+
+impl Failure {
+    /// Something asked for that is not right, and what would be.
+    pub(crate) fn request(what: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Request(what.into(), help.into())
+    }
+
+    /// Says on standard error what went wrong; returns the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        let (text, code) = match self {
+            Self::Case(error) => (drawn(error), 2),
+            Self::Request(what, help) => (
+                format!("{}\n  {}\n", style::error(what), style::help(help)),
+                2,
+            ),
+            Self::Failed(what) => (format!("{}\n", style::error(what)), 1),
+        };
+        anstream::eprint!("{text}");
+        ExitCode::from(code)
+    }
+}
+
+impl From<CaseFileError> for Failure {
+    fn from(error: CaseFileError) -> Self {
+        Self::Case(error)
+    }
+}
+
+impl From<CaseError> for Failure {
+    fn from(error: CaseError) -> Self {
+        Self::request(
+            error.to_string(),
+            "change it in the case file or with --set",
+        )
+    }
+}
+
+/// All problems of a case, each with the line of the file that it stands in.
+fn drawn(error: &CaseFileError) -> String {
+    let renderer = Renderer::styled();
+    let drawn: Vec<String> = error
+        .problems
+        .iter()
+        .map(|problem| {
+            let title = Level::ERROR.primary_title(title(problem, error.source.as_ref()));
+            let group = match (&problem.place, &error.source) {
+                (Place::Span(span), Some(source)) => {
+                    let label = (!problem.label.is_empty()).then_some(problem.label.as_str());
+                    let annotation = AnnotationKind::Primary.span(span.clone()).label(label);
+                    let snippet = Snippet::source(&source.text)
+                        .path(&source.name)
+                        .annotation(annotation);
+                    title.element(snippet)
+                }
+                _ => Group::with_title(title),
+            };
+            // What stands under the place already need not be said again.
+            let help = problem.help.as_ref().filter(|help| **help != problem.label);
+            let group = match help {
+                Some(help) => group.element(Level::HELP.message(help.as_str())),
+                None => group,
+            };
+            renderer.render(&[group])
+        })
+        .collect();
+    format!("{}\n", drawn.join("\n\n"))
+}
+
+fn title(problem: &Problem, source: Option<&Source>) -> String {
+    match (&problem.place, source) {
+        (Place::Override(written), _) => format!("--set {written}: {}", problem.message),
+        (Place::Whole, Some(source)) => format!("{}: {}", source.name, problem.message),
+        _ => problem.message.clone(),
+    }
+}

@@ -1,0 +1,68 @@
+//! What a command says: results on standard output, remarks on standard error.
+
+use std::io::{ErrorKind, Write as _};
+
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::style;
+
+/// How results are to be shown.
+#[derive(Debug)]
+pub(crate) struct Output {
+    json: bool,
+    quiet: bool,
+}
+
+impl Output {
+    /// Results as JSON or as text, remarks or none.
+    pub(crate) fn new(json: bool, quiet: bool) -> Self {
+        Self { json, quiet }
+    }
+
+    /// Prints a result: as the one JSON document where that was asked for, else the
+    /// text that `text` makes.
+    pub(crate) fn result<R: Serialize>(
+        &self,
+        result: &R,
+        text: impl FnOnce(&R) -> String,
+    ) -> Result<(), Failure> {
+        if self.json {
+            let mut json = serde_json::to_string_pretty(result)
+                .map_err(|error| Failure::Failed(format!("no JSON of the result: {error}")))?;
+            json.push('\n');
+            print(&json)
+        } else {
+            print(&text(result))
+        }
+    }
+
+    /// A remark worth knowing.
+    pub(crate) fn note(&self, text: &str) {
+        if !self.quiet {
+            anstream::eprintln!("{}", style::note(text));
+        }
+    }
+
+    /// A remark that puts the result in doubt.
+    pub(crate) fn warning(&self, text: &str) {
+        if !self.quiet {
+            anstream::eprintln!("{}", style::warning(text));
+        }
+    }
+}
+
+fn print(text: &str) -> Result<(), Failure> {
+    let mut stream = anstream::stdout().lock();
+    match stream
+        .write_all(text.as_bytes())
+        .and_then(|()| stream.flush())
+    {
+        // Whoever reads has seen enough (`| head`).
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => Err(Failure::Failed(format!(
+            "cannot write to standard output: {error}"
+        ))),
+        Ok(()) => Ok(()),
+    }
+}

@@ -1,6 +1,37 @@
 //! Analysis of any periodically forced system through its stroboscopic map:
 //! which motions exist, how stable each is, where it is born and dies.
 //!
-//! Nothing here knows of beams, tips or contact.
+//! Nothing here knows of beams, tips or contact. A system implements
+//! [`map::StroboscopicMap`] (and [`map::MapFamily`] for continuation); everything
+//! else follows from it.
 
+mod adapted_norm;
+mod birkhoff;
+mod block_average;
+mod block_cyclic;
+pub mod control;
+mod failure;
+pub mod lyapunov;
 pub mod map;
+pub mod multipliers;
+pub mod neighbourhood;
+pub mod orbit;
+pub mod period;
+pub mod settle;
+pub mod shooting;
+mod vector;
+
+pub use birkhoff::birkhoff_digits;
+pub use control::Control;
+pub use failure::MapFailure;
+pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
+pub use map::{MapFamily, StroboscopicMap, Tangency};
+pub use multipliers::{MultiplierError, Multipliers, Stability};
+pub use nalgebra::{Complex, DMatrix};
+pub use neighbourhood::Neighbourhood;
+pub use orbit::PeriodicOrbit;
+pub use period::{Candidate, candidate_periods};
+pub use settle::{Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict, settle};
+pub use shooting::{
+    DivergenceReason, ShootingError, ShootingOptions, close_orbit, close_orbit_from_points,
+};

@@ -1,0 +1,245 @@
+//! The linear system of multiple shooting, solved by structured orthogonal
+//! elimination (S. J. Wright, SIAM J. Sci. Stat. Comput. 13, 742, 1992).
+//!
+//! For segments k = 0 … n−1 with δ_n = δ_0,
+//!
+//! ```text
+//! A_k δ_k − δ_{k+1} + b_k δ_λ = −f_k
+//! ```
+//!
+//! and, if the parameter λ is free, one bordering row on (δ_0, δ_λ). Multiplying
+//! the A_k together would lose the contracting directions of a chaotic stretch
+//! under the growing ones; Householder elimination keeps both. Cost O(n d³).
+//!
+//! Fails (returns `None`) where the closing block is exactly singular; near that,
+//! the solution is large, which is what the caller measures.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The eliminated system; its storage is reused from one factorisation to the next.
+#[derive(Debug)]
+pub(crate) struct BlockCyclic {
+    d: usize,
+    n: usize,
+    /// n − 1 panels of 2d rows × (3d + 2) columns, column major:
+    /// δ_k | δ_0 | δ_{k+1} | δ_λ | right side.
+    panels: Vec<f64>,
+    /// Closing d × d block, parameter column and right side.
+    closing: DMatrix<f64>,
+    column: DVector<f64>,
+    right: DVector<f64>,
+}
+
+impl BlockCyclic {
+    pub(crate) fn new(d: usize, n: usize) -> Self {
+        Self {
+            d,
+            n,
+            panels: vec![0.0; n.saturating_sub(1) * 2 * d * (3 * d + 2)],
+            closing: DMatrix::zeros(d, d),
+            column: DVector::zeros(d),
+            right: DVector::zeros(d),
+        }
+    }
+
+    /// Eliminates δ_1 … δ_{n−1}. `f` and `b` hold n rows of d values.
+    pub(crate) fn factor(&mut self, jacobians: &[DMatrix<f64>], f: &[f64], b: Option<&[f64]>) {
+        let (d, n) = (self.d, self.n);
+        let rows = 2 * d;
+        let size = rows * (3 * d + 2);
+        let parameter = |k: usize, i: usize| b.map_or(0.0, |b| b[k * d + i]);
+        // The running relation U δ_0 + V δ_k + w δ_λ = r.
+        let mut u = jacobians[0].clone();
+        let mut v = -DMatrix::<f64>::identity(d, d);
+        for i in 0..d {
+            self.column[i] = parameter(0, i);
+            self.right[i] = -f[i];
+        }
+        for k in 1..n {
+            let panel = &mut self.panels[(k - 1) * size..k * size];
+            panel.fill(0.0);
+            for j in 0..d {
+                for i in 0..d {
+                    panel[j * rows + i] = v[(i, j)];
+                    panel[j * rows + d + i] = jacobians[k][(i, j)];
+                    panel[(d + j) * rows + i] = u[(i, j)];
+                }
+                panel[(2 * d + j) * rows + d + j] = -1.0;
+            }
+            for i in 0..d {
+                panel[3 * d * rows + i] = self.column[i];
+                panel[3 * d * rows + d + i] = parameter(k, i);
+                panel[(3 * d + 1) * rows + i] = self.right[i];
+                panel[(3 * d + 1) * rows + d + i] = -f[k * d + i];
+            }
+            triangularise(panel, rows, d);
+            for j in 0..d {
+                for i in 0..d {
+                    u[(i, j)] = panel[(d + j) * rows + d + i];
+                    v[(i, j)] = panel[(2 * d + j) * rows + d + i];
+                }
+            }
+            for i in 0..d {
+                self.column[i] = panel[3 * d * rows + d + i];
+                self.right[i] = panel[(3 * d + 1) * rows + d + i];
+            }
+        }
+        self.closing = u + v;
+    }
+
+    /// Newton correction at a fixed parameter, written to `out` (n rows of d).
+    pub(crate) fn solve(&self, out: &mut [f64]) -> Option<()> {
+        let first = self.closing.clone().lu().solve(&self.right)?;
+        self.back_substitute(first.as_slice(), 0.0, true, out);
+        Some(())
+    }
+
+    /// Solution with the bordering row `row·δ_0 + corner δ_λ = value`; the right
+    /// sides of the segments count only if `with_residual`. Returns δ_λ.
+    pub(crate) fn solve_bordered(
+        &self,
+        row: &[f64],
+        corner: f64,
+        value: f64,
+        with_residual: bool,
+        out: &mut [f64],
+    ) -> Option<f64> {
+        let d = self.d;
+        let mut matrix = DMatrix::zeros(d + 1, d + 1);
+        matrix.view_mut((0, 0), (d, d)).copy_from(&self.closing);
+        let mut right = DVector::zeros(d + 1);
+        for i in 0..d {
+            matrix[(i, d)] = self.column[i];
+            matrix[(d, i)] = row[i];
+            if with_residual {
+                right[i] = self.right[i];
+            }
+        }
+        matrix[(d, d)] = corner;
+        right[d] = value;
+        let solution = matrix.lu().solve(&right)?;
+        self.back_substitute(&solution.as_slice()[..d], solution[d], with_residual, out);
+        Some(solution[d])
+    }
+
+    fn back_substitute(&self, first: &[f64], parameter: f64, with_residual: bool, out: &mut [f64]) {
+        let (d, n) = (self.d, self.n);
+        let rows = 2 * d;
+        let size = rows * (3 * d + 2);
+        out[..d].copy_from_slice(first);
+        for k in (1..n).rev() {
+            let panel = &self.panels[(k - 1) * size..k * size];
+            let next = if k + 1 == n { 0 } else { k + 1 };
+            for i in (0..d).rev() {
+                let mut sum = -panel[3 * d * rows + i] * parameter;
+                if with_residual {
+                    sum += panel[(3 * d + 1) * rows + i];
+                }
+                for j in 0..d {
+                    sum -= panel[(d + j) * rows + i] * first[j];
+                    sum -= panel[(2 * d + j) * rows + i] * out[next * d + j];
+                }
+                for j in i + 1..d {
+                    sum -= panel[j * rows + i] * out[k * d + j];
+                }
+                out[k * d + i] = sum / panel[i * rows + i];
+            }
+        }
+    }
+}
+
+/// Householder triangularisation of the first `d` columns of a column-major panel,
+/// applied to all its columns.
+fn triangularise(panel: &mut [f64], rows: usize, d: usize) {
+    for j in 0..d {
+        let (head, tail) = panel.split_at_mut((j + 1) * rows);
+        let pivot = &mut head[j * rows + j..(j + 1) * rows];
+        let length = pivot.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if length == 0.0 {
+            continue;
+        }
+        let alpha = if pivot[0] > 0.0 { -length } else { length };
+        // The reflector I − v vᵀ/(v₀ length'), v = pivot − alpha e_0.
+        pivot[0] -= alpha;
+        let half = -alpha * pivot[0];
+        for column in tail.chunks_exact_mut(rows) {
+            let part = &mut column[j..];
+            let factor = pivot
+                .iter()
+                .zip(part.iter())
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / half;
+            for (p, v) in part.iter_mut().zip(pivot.iter()) {
+                *p -= factor * v;
+            }
+        }
+        pivot.fill(0.0);
+        pivot[0] = alpha;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::unit;
+
+    fn random(seed: &mut u64) -> f64 {
+        *seed += 1;
+        2.0 * unit(*seed) - 1.0
+    }
+
+    /// The structured solution against a dense LU of the whole system.
+    #[test]
+    fn agrees_with_the_dense_system() {
+        let mut seed = 7;
+        for (d, n) in [(1, 1), (1, 4), (2, 3), (3, 5), (4, 1)] {
+            let jacobians: Vec<_> = (0..n)
+                .map(|_| DMatrix::from_fn(d, d, |_, _| 2.0 * random(&mut seed)))
+                .collect();
+            let f: Vec<f64> = (0..n * d).map(|_| random(&mut seed)).collect();
+            let b: Vec<f64> = (0..n * d).map(|_| random(&mut seed)).collect();
+            let row: Vec<f64> = (0..d).map(|_| random(&mut seed)).collect();
+            let (corner, value) = (0.3, 0.7);
+            let size = n * d + 1;
+            let mut dense = DMatrix::zeros(size, size);
+            let mut right = DVector::zeros(size);
+            for k in 0..n {
+                for i in 0..d {
+                    for j in 0..d {
+                        dense[(k * d + i, k * d + j)] += jacobians[k][(i, j)];
+                    }
+                    dense[(k * d + i, (k + 1) % n * d + i)] -= 1.0;
+                    dense[(k * d + i, n * d)] = b[k * d + i];
+                    right[k * d + i] = -f[k * d + i];
+                }
+            }
+            for i in 0..d {
+                dense[(n * d, i)] = row[i];
+            }
+            dense[(n * d, n * d)] = corner;
+            right[n * d] = value;
+            let expected = dense.clone().lu().solve(&right).unwrap();
+            let mut system = BlockCyclic::new(d, n);
+            system.factor(&jacobians, &f, Some(&b));
+            let mut out = vec![0.0; n * d];
+            let parameter = system
+                .solve_bordered(&row, corner, value, true, &mut out)
+                .unwrap();
+            let scale = expected.amax();
+            assert!((parameter - expected[n * d]).abs() < 1e-11 * scale);
+            for i in 0..n * d {
+                assert!((out[i] - expected[i]).abs() < 1e-11 * scale);
+            }
+            let plain = dense.view((0, 0), (n * d, n * d)).into_owned();
+            let expected = plain
+                .lu()
+                .solve(&right.rows(0, n * d).into_owned())
+                .unwrap();
+            system.solve(&mut out).unwrap();
+            for i in 0..n * d {
+                assert!((out[i] - expected[i]).abs() < 1e-10 * expected.amax());
+            }
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Why one period of a map could not be used.
+
+use std::error::Error;
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use crate::map::{StroboscopicMap, Tangency};
+
+/// Why one period could not be advanced.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum MapFailure {
+    /// The map itself refused.
+    #[error("the map failed: {0}")]
+    Refused(Arc<dyn Error + Send + Sync>),
+    /// The map returned an infinity or a NaN.
+    #[error("the map returned a state or Jacobian that is not finite")]
+    NotFinite,
+}
+
+impl MapFailure {
+    pub(crate) fn refused(error: impl Error + Send + Sync + 'static) -> Self {
+        Self::Refused(Arc::new(error))
+    }
+}
+
+/// Advances one period and refuses a result that is not finite.
+#[inline]
+pub(crate) fn advance<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+) -> Result<(), MapFailure> {
+    map.advance(state).map_err(MapFailure::refused)?;
+    finite(state)
+}
+
+/// As [`advance`], with the Jacobian.
+#[inline]
+pub(crate) fn advance_with_jacobian<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+    jacobian: &mut DMatrix<f64>,
+) -> Result<(), MapFailure> {
+    map.advance_with_jacobian(state, jacobian)
+        .map_err(MapFailure::refused)?;
+    finite(state)?;
+    finite(jacobian.as_slice())
+}
+
+/// As [`advance`], with the extrema of the switching functions.
+pub(crate) fn advance_with_tangencies<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+    tangencies: &mut Vec<Tangency>,
+) -> Result<(), MapFailure> {
+    map.advance_with_tangencies(state, tangencies)
+        .map_err(MapFailure::refused)?;
+    finite(state)
+}
+
+#[inline]
+pub(crate) fn finite(values: &[f64]) -> Result<(), MapFailure> {
+    if values.iter().all(|v| v.is_finite()) {
+        Ok(())
+    } else {
+        Err(MapFailure::NotFinite)
+    }
+}

@@ -1,0 +1,268 @@
+//! Lyapunov spectrum by QR on the exact Jacobians, with error bars.
+//!
+//! A frame of d tangent vectors is carried along, orthonormalised after every
+//! period (Benettin et al. 1980); the logarithms of the stretch factors average to
+//! the exponents, in natural logarithm per period. Error bars come from block
+//! averages ([`crate::block_average`]), which follow the correlations of the motion.
+//!
+//! Fails: exponents of a finite stretch say nothing of what the motion does later;
+//! positive ones for thousands of periods may be a transient ([`crate::settle`] and
+//! [`crate::census`] look for the escape). Near zero, convergence is like 1/T with
+//! no random scatter, so a bar may understate the error by up to about
+//! log(stretch)/T. A singular Jacobian counts as a stretch of the smallest positive
+//! number.
+
+use nalgebra::DMatrix;
+
+use crate::block_average::BlockAverage;
+use crate::failure::{MapFailure, advance_with_jacobian};
+use crate::map::StroboscopicMap;
+
+/// How many periods to average over.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LyapunovOptions {
+    /// Periods run first without counting, for the frame to align (the state moves
+    /// on as well).
+    pub alignment: usize,
+    /// Periods counted at least.
+    pub min_periods: usize,
+    /// Periods counted at most. Set equal to `min_periods` for a fixed length.
+    pub max_periods: usize,
+    /// The run stops between the two once every error bar is below this plus
+    /// `relative_error` of its exponent.
+    pub absolute_error: f64,
+    /// See `absolute_error`.
+    pub relative_error: f64,
+}
+
+impl Default for LyapunovOptions {
+    fn default() -> Self {
+        Self {
+            alignment: 100,
+            min_periods: 1000,
+            max_periods: 20_000,
+            absolute_error: 1e-3,
+            relative_error: 0.02,
+        }
+    }
+}
+
+impl LyapunovOptions {
+    /// True if every error bar is within the two allowances.
+    pub(crate) fn is_met_by(&self, spectrum: &LyapunovSpectrum) -> bool {
+        spectrum
+            .exponents
+            .iter()
+            .zip(&spectrum.errors)
+            .all(|(l, e)| *e <= self.absolute_error + self.relative_error * l.abs())
+    }
+}
+
+/// Lyapunov exponents per period and what the same run says of the motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LyapunovSpectrum {
+    /// Exponents, natural logarithm per drive period, largest first.
+    pub exponents: Vec<f64>,
+    /// One standard error of each.
+    pub errors: Vec<f64>,
+    /// Periods averaged over.
+    pub periods: usize,
+    /// Mean of the strobe states.
+    pub mean: Vec<f64>,
+    /// One standard error of that mean.
+    pub mean_errors: Vec<f64>,
+}
+
+impl LyapunovSpectrum {
+    /// Largest exponent with its standard error.
+    pub fn largest(&self) -> (f64, f64) {
+        (
+            self.exponents.first().copied().unwrap_or(f64::NAN),
+            self.errors.first().copied().unwrap_or(f64::NAN),
+        )
+    }
+
+    /// Kaplan–Yorke dimension of the strobe points: j + Σ_{i≤j}λ_i/|λ_{j+1}| for the
+    /// last j with a non-negative sum; the dimension of the state if no sum is
+    /// negative, 0 if λ₁ is.
+    pub fn kaplan_yorke_dimension(&self) -> f64 {
+        let mut sum = 0.0;
+        for (j, &exponent) in self.exponents.iter().enumerate() {
+            if sum + exponent < 0.0 {
+                return j as f64 + sum / exponent.abs();
+            }
+            sum += exponent;
+        }
+        self.exponents.len() as f64
+    }
+}
+
+/// The spectrum of the motion that starts at `state`, which is replaced by where
+/// the run ends.
+///
+/// # Errors
+/// When the map cannot be followed.
+pub fn lyapunov_spectrum<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+    options: &LyapunovOptions,
+) -> Result<LyapunovSpectrum, MapFailure> {
+    let mut run = LyapunovRun::new(map.dimension());
+    run.align(map, state, options.alignment)?;
+    run.advance(map, state, options.min_periods)?;
+    while run.periods() < options.max_periods && !options.is_met_by(&run.spectrum()) {
+        let more = run
+            .periods()
+            .max(64)
+            .min(options.max_periods - run.periods());
+        run.advance(map, state, more)?;
+    }
+    Ok(run.spectrum())
+}
+
+/// A spectrum under way, to be lengthened piece by piece.
+#[derive(Clone, Debug)]
+pub(crate) struct LyapunovRun {
+    d: usize,
+    /// Orthonormal tangent vectors, column major.
+    frame: Vec<f64>,
+    image: Vec<f64>,
+    jacobian: DMatrix<f64>,
+    /// Logarithms of the stretches, then the state.
+    sample: Vec<f64>,
+    average: BlockAverage,
+}
+
+impl LyapunovRun {
+    pub(crate) fn new(d: usize) -> Self {
+        let mut frame = vec![0.0; d * d];
+        for i in 0..d {
+            frame[i * d + i] = 1.0;
+        }
+        Self {
+            d,
+            image: frame.clone(),
+            frame,
+            jacobian: DMatrix::zeros(d, d),
+            sample: vec![0.0; 2 * d],
+            average: BlockAverage::new(2 * d),
+        }
+    }
+
+    pub(crate) fn periods(&self) -> usize {
+        self.average.count()
+    }
+
+    pub(crate) fn align<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        state: &mut [f64],
+        periods: usize,
+    ) -> Result<(), MapFailure> {
+        for _ in 0..periods {
+            self.step(map, state)?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn advance<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        state: &mut [f64],
+        periods: usize,
+    ) -> Result<(), MapFailure> {
+        for _ in 0..periods {
+            self.step(map, state)?;
+            self.record(state);
+        }
+        Ok(())
+    }
+
+    /// Counts the period just stepped, which ended at `state`.
+    #[inline]
+    pub(crate) fn record(&mut self, state: &[f64]) {
+        self.sample[self.d..].copy_from_slice(state);
+        self.average.push(&self.sample);
+    }
+
+    /// One period of the state and the frame, not yet counted.
+    pub(crate) fn step<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        state: &mut [f64],
+    ) -> Result<(), MapFailure> {
+        advance_with_jacobian(map, state, &mut self.jacobian)?;
+        let d = self.d;
+        let jacobian = self.jacobian.as_slice();
+        self.image.fill(0.0);
+        for (image, frame) in self
+            .image
+            .chunks_exact_mut(d)
+            .zip(self.frame.chunks_exact(d))
+        {
+            for (column, &f) in jacobian.chunks_exact(d).zip(frame) {
+                for (o, a) in image.iter_mut().zip(column) {
+                    *o += a * f;
+                }
+            }
+        }
+        self.orthonormalise();
+        std::mem::swap(&mut self.frame, &mut self.image);
+        Ok(())
+    }
+
+    /// Gram–Schmidt with one repetition on the image, the logarithms of the lengths
+    /// into the sample. A vector that vanishes is replaced by a unit vector.
+    fn orthonormalise(&mut self) {
+        let d = self.d;
+        for k in 0..d {
+            let (done, rest) = self.image.split_at_mut(k * d);
+            let v = &mut rest[..d];
+            let mut length = remove(done, v, d);
+            self.sample[k] = length.max(f64::MIN_POSITIVE).ln();
+            let mut substitute = 0;
+            while length <= f64::MIN_POSITIVE && substitute < d {
+                v.fill(0.0);
+                v[substitute] = 1.0;
+                length = remove(done, v, d);
+                if length < 1e-3 / d as f64 {
+                    length = 0.0;
+                }
+                substitute += 1;
+            }
+            for x in v {
+                *x /= length;
+            }
+        }
+    }
+
+    pub(crate) fn spectrum(&self) -> LyapunovSpectrum {
+        let d = self.d;
+        let mean = self.average.mean();
+        let errors = self.average.standard_error();
+        let mut order: Vec<usize> = (0..d).collect();
+        order.sort_by(|&a, &b| mean[b].total_cmp(&mean[a]));
+        LyapunovSpectrum {
+            exponents: order.iter().map(|&i| mean[i]).collect(),
+            errors: order.iter().map(|&i| errors[i]).collect(),
+            periods: self.periods(),
+            mean: mean[d..].to_vec(),
+            mean_errors: errors[d..].to_vec(),
+        }
+    }
+}
+
+/// Removes from `v` its parts along the orthonormal rows of `done`, twice, and
+/// returns what length is left.
+#[inline]
+fn remove(done: &[f64], v: &mut [f64], d: usize) -> f64 {
+    for _ in 0..2 {
+        for u in done.chunks_exact(d) {
+            let part: f64 = u.iter().zip(v.iter()).map(|(a, b)| a * b).sum();
+            for (x, a) in v.iter_mut().zip(u) {
+                *x -= part * a;
+            }
+        }
+    }
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

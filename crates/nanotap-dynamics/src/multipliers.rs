@@ -1,0 +1,398 @@
+//! Floquet multipliers: the eigenvalues of the monodromy matrix
+//! DPⁿ = A_{n−1} … A_0.
+//!
+//! When the product spans many orders of magnitude its small eigenvalues would be
+//! rubbish; then the factors are swept by QR (treppen iteration, the simultaneous
+//! iteration of a cyclic product) until the invariant subspaces of well-separated
+//! moduli part, and each diagonal block is multiplied up on its own. The
+//! determinant, summed from the factors, checks the result.
+//!
+//! Fails: eigenvalues of a nearly defective product are only accurate to the
+//! square root of rounding, as for any method; a QR iteration that does not
+//! converge is reported.
+
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
+use nalgebra::{Complex, DMatrix, Schur};
+
+/// A modulus within this of 1 is called marginal: a motion that needs ten million
+/// periods to grow or fade by a factor e, and the accuracy to which a double
+/// multiplier on the unit circle (an undamped system) is known.
+pub const MARGIN: f64 = 1e-7;
+
+/// Span (natural logarithm) of the factors' diagonal beyond which the plain product
+/// is not trusted: 1e5, so that small multipliers keep ten digits.
+const PLAIN_SPAN: f64 = 11.5;
+/// Coupling between two blocks below which they are taken as parted.
+const PARTED: f64 = 1e-13;
+const SWEEPS: usize = 80;
+
+/// What the multipliers say about an orbit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stability {
+    /// Every multiplier is inside the unit circle by more than [`MARGIN`].
+    Stable,
+    /// Some multipliers are outside the unit circle by more than [`MARGIN`].
+    Unstable {
+        /// How many, pairs counted twice.
+        unstable_dimension: usize,
+    },
+    /// None is outside, but some lie on the unit circle within [`MARGIN`]:
+    /// an undamped system, or a bifurcation point.
+    Marginal,
+}
+
+/// Eigenvalues of a product of matrices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Multipliers {
+    /// Largest modulus first; a pair has its positive imaginary part first.
+    pub values: Vec<Complex<f64>>,
+    /// log|det| summed over the factors.
+    pub log_determinant: f64,
+    /// |Σ log|μ| − log|det||: what the two computations disagree by; 0 for a
+    /// singular product.
+    pub determinant_defect: f64,
+}
+
+/// Why the multipliers could not be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MultiplierError {
+    /// No factor, or factors that are not square and of one size.
+    #[error("multipliers need at least one square factor, all of one size")]
+    Shape,
+    /// An entry is infinite or NaN, or the product overflows.
+    #[error("the monodromy matrix is not finite")]
+    NotFinite,
+    /// The QR iteration did not converge.
+    #[error("the eigenvalue iteration did not converge")]
+    NoConvergence,
+}
+
+impl Multipliers {
+    /// Eigenvalues of `factors[n−1] … factors[0]`.
+    ///
+    /// # Errors
+    /// See [`MultiplierError`].
+    pub fn of_product(factors: &[DMatrix<f64>]) -> Result<Self, MultiplierError> {
+        let d = factors.first().map_or(0, DMatrix::nrows);
+        if d == 0 || factors.iter().any(|a| a.nrows() != d || a.ncols() != d) {
+            return Err(MultiplierError::Shape);
+        }
+        if factors.iter().any(|a| a.iter().any(|v| !v.is_finite())) {
+            return Err(MultiplierError::NotFinite);
+        }
+        let log_determinant = factors.iter().map(log_determinant).sum::<f64>();
+        let product = Scaled::product(factors.iter());
+        let mut values = if factors.len() == 1 || span(factors) < PLAIN_SPAN {
+            product.eigenvalues()?
+        } else {
+            swept(factors, &product)?
+        };
+        if values
+            .iter()
+            .any(|v| !v.re.is_finite() || !v.im.is_finite())
+        {
+            return Err(MultiplierError::NotFinite);
+        }
+        values.sort_by(|a, b| {
+            b.norm()
+                .total_cmp(&a.norm())
+                .then(b.re.total_cmp(&a.re))
+                .then(b.im.total_cmp(&a.im))
+        });
+        pair_up(&mut values);
+        let sum: f64 = values.iter().map(|v| v.norm().ln()).sum();
+        let defect = (sum - log_determinant).abs();
+        Ok(Self {
+            values,
+            log_determinant,
+            determinant_defect: if defect.is_finite() { defect } else { 0.0 },
+        })
+    }
+
+    /// What the moduli say.
+    pub fn stability(&self) -> Stability {
+        stability_of(&self.values)
+    }
+}
+
+/// What a set of multipliers says about its orbit.
+pub fn stability_of(multipliers: &[Complex<f64>]) -> Stability {
+    let outside = multipliers
+        .iter()
+        .filter(|m| m.norm() > 1.0 + MARGIN)
+        .count();
+    if outside > 0 {
+        Stability::Unstable {
+            unstable_dimension: outside,
+        }
+    } else if multipliers.iter().all(|m| m.norm() < 1.0 - MARGIN) {
+        Stability::Stable
+    } else {
+        Stability::Marginal
+    }
+}
+
+/// Puts each conjugate pair side by side, positive imaginary part first: rounding
+/// may part two pairs of equal modulus.
+fn pair_up(values: &mut [Complex<f64>]) {
+    let mut k = 0;
+    while k + 1 < values.len() {
+        if values[k].im == 0.0 {
+            k += 1;
+            continue;
+        }
+        let partner = values[k].conj();
+        let nearest = (k + 1..values.len()).min_by(|&a, &b| {
+            (values[a] - partner)
+                .norm()
+                .total_cmp(&(values[b] - partner).norm())
+        });
+        if let Some(j) = nearest {
+            values[k + 1..=j].rotate_right(1);
+        }
+        if values[k].im < 0.0 {
+            values.swap(k, k + 1);
+        }
+        k += 2;
+    }
+}
+
+/// log|det A|, minus infinity for a singular matrix.
+fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
+    let lu = matrix.clone().lu();
+    lu.u().diagonal().iter().map(|v| v.abs().ln()).sum()
+}
+
+/// Spread of log|R_ii| summed over one QR sweep: how graded the product is.
+fn span(factors: &[DMatrix<f64>]) -> f64 {
+    let d = factors[0].nrows();
+    let mut q = DMatrix::identity(d, d);
+    let mut logs = vec![0.0; d];
+    for a in factors {
+        let (next, r) = (a * &q).qr().unpack();
+        for (log, v) in logs.iter_mut().zip(r.diagonal().iter()) {
+            *log += v.abs().max(f64::MIN_POSITIVE).ln();
+        }
+        q = next;
+    }
+    let high = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = logs.iter().copied().fold(f64::INFINITY, f64::min);
+    high - low
+}
+
+/// A matrix times a power of two, so that long products neither overflow nor vanish.
+struct Scaled {
+    matrix: DMatrix<f64>,
+    exponent: i64,
+}
+
+impl Scaled {
+    fn product<'a>(factors: impl Iterator<Item = &'a DMatrix<f64>>) -> Self {
+        let mut product: Option<Self> = None;
+        for factor in factors {
+            let next = match product {
+                None => Self {
+                    matrix: factor.clone(),
+                    exponent: 0,
+                },
+                Some(p) => Self {
+                    matrix: factor * p.matrix,
+                    exponent: p.exponent,
+                },
+            };
+            product = Some(next.normalised());
+        }
+        product.unwrap_or_else(|| Self {
+            matrix: DMatrix::zeros(0, 0),
+            exponent: 0,
+        })
+    }
+
+    fn normalised(mut self) -> Self {
+        let size = self.matrix.amax();
+        if size > 0.0 && size.is_finite() {
+            let exponent = size.log2().floor() as i32;
+            self.matrix *= 2f64.powi(-exponent);
+            self.exponent += i64::from(exponent);
+        }
+        self
+    }
+
+    fn eigenvalues(&self) -> Result<Vec<Complex<f64>>, MultiplierError> {
+        let mut values = eigenvalues(&self.matrix)?;
+        let exponent = self.exponent.clamp(-4000, 4000) as i32;
+        for v in &mut values {
+            // In two halves, so that a representable product of a large power and a
+            // small value does not overflow on the way.
+            let half = exponent / 2;
+            *v = *v * 2f64.powi(half) * 2f64.powi(exponent - half);
+        }
+        Ok(values)
+    }
+}
+
+/// Eigenvalues of one balanced matrix by Schur decomposition.
+fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MultiplierError> {
+    if matrix.iter().any(|v| !v.is_finite()) {
+        return Err(MultiplierError::NotFinite);
+    }
+    if matrix.nrows() == 1 {
+        return Ok(vec![Complex::new(matrix[(0, 0)], 0.0)]);
+    }
+    let mut balanced = matrix.clone();
+    balance_parlett_reinsch(&mut balanced);
+    let schur = Schur::try_new(balanced, f64::EPSILON, 400 * matrix.nrows())
+        .ok_or(MultiplierError::NoConvergence)?;
+    Ok(schur.complex_eigenvalues().iter().copied().collect())
+}
+
+/// Eigenvalues of a graded product by QR sweeps over the factors.
+fn swept(factors: &[DMatrix<f64>], product: &Scaled) -> Result<Vec<Complex<f64>>, MultiplierError> {
+    let d = factors[0].nrows();
+    let mut start = Schur::try_new(product.matrix.clone(), f64::EPSILON, 400 * d)
+        .map_or_else(|| DMatrix::identity(d, d), |s| s.unpack().0);
+    let mut triangles = Vec::with_capacity(factors.len());
+    let mut turn = DMatrix::identity(d, d);
+    let mut previous = f64::INFINITY;
+    for sweep in 0..SWEEPS {
+        triangles.clear();
+        let mut q = start.clone();
+        for a in factors {
+            let (next, r) = (a * &q).qr().unpack();
+            triangles.push(r);
+            q = next;
+        }
+        turn = start.transpose() * &q;
+        start = q;
+        // Stop once no coupling that is still falling is above the threshold.
+        let remaining: f64 = (1..d)
+            .map(|j| coupling(&turn, j))
+            .filter(|&c| c > PARTED)
+            .sum();
+        if remaining == 0.0 || (sweep > 10 && remaining > 0.999 * previous) {
+            break;
+        }
+        previous = remaining;
+    }
+    let mut values = Vec::with_capacity(d);
+    let mut first = 0;
+    for end in 1..=d {
+        if end < d && coupling(&turn, end) > PARTED {
+            continue;
+        }
+        let size = end - first;
+        let blocks: Vec<DMatrix<f64>> = triangles
+            .iter()
+            .map(|r| r.view((first, first), (size, size)).into_owned())
+            .collect();
+        let corner = turn.view((first, first), (size, size)).into_owned();
+        let block = Scaled::product(blocks.iter().chain(std::iter::once(&corner)));
+        values.extend(block.eigenvalues()?);
+        first = end;
+    }
+    Ok(values)
+}
+
+/// Largest entry of the lower-left block that would be zero if the first `j`
+/// directions were invariant.
+fn coupling(turn: &DMatrix<f64>, j: usize) -> f64 {
+    turn.view((j, 0), (turn.nrows() - j, j)).amax()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn one_factor_gives_its_eigenvalues() {
+        let a = DMatrix::from_row_slice(2, 2, &[0.0, -1.0, 1.0, 0.0]) * 0.5;
+        let m = Multipliers::of_product(&[a]).unwrap();
+        assert!((m.values[0] - Complex::new(0.0, 0.5)).norm() < 1e-15);
+        assert!((m.values[1] - Complex::new(0.0, -0.5)).norm() < 1e-15);
+        assert_eq!(m.stability(), Stability::Stable);
+        assert!(m.determinant_defect < 1e-14);
+    }
+
+    /// The eigenvalues of (B A)ᵏ are powers of those of B A, over 60 orders of
+    /// magnitude: the plain product would lose the small one entirely.
+    #[test]
+    fn small_multipliers_of_a_long_product_keep_their_digits() {
+        let a = DMatrix::from_row_slice(3, 3, &[2.0, 1.0, 0.3, 0.5, 0.4, -0.2, 0.1, 0.7, 0.05]);
+        let b = DMatrix::from_row_slice(3, 3, &[1.0, -0.3, 0.0, 0.2, 1.1, 0.4, -0.6, 0.0, 0.9]);
+        let base = Multipliers::of_product(&[&b * &a]).unwrap();
+        let k = 40;
+        let factors: Vec<_> = (0..k).flat_map(|_| [a.clone(), b.clone()]).collect();
+        let long = Multipliers::of_product(&factors).unwrap();
+        for (short, long) in base.values.iter().zip(&long.values) {
+            let expected = f64::from(k) * short.norm().ln();
+            assert!(
+                (long.norm().ln() - expected).abs() < 1e-9,
+                "{long} {expected}"
+            );
+        }
+        assert!(long.determinant_defect < 1e-9);
+    }
+
+    #[test]
+    fn a_product_with_a_complex_pair_and_a_tiny_real_one() {
+        let turn = DMatrix::from_row_slice(3, 3, &[0.6, -0.8, 0.1, 0.8, 0.6, 0.2, 0.0, 0.0, 1e-3]);
+        let shear = DMatrix::from_row_slice(3, 3, &[1.0, 0.4, 0.0, 0.0, 1.0, 0.3, 0.2, 0.0, 1.0]);
+        let inverse = shear.clone().try_inverse().unwrap();
+        let factors = vec![inverse * turn * shear; 10];
+        let m = Multipliers::of_product(&factors).unwrap();
+        let angle = 10.0 * 0.8f64.atan2(0.6);
+        assert!((m.values[0] - Complex::new(angle.cos(), angle.sin().abs())).norm() < 1e-10);
+        assert!(
+            (m.values[2].re / 1e-30 - 1.0).abs() < 1e-9,
+            "{}",
+            m.values[2]
+        );
+    }
+
+    #[test]
+    fn a_singular_product_has_a_zero_multiplier() {
+        let a = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0]);
+        let m = Multipliers::of_product(&[a.clone(), a]).unwrap();
+        assert_eq!(m.values[1], Complex::new(0.0, 0.0));
+        assert_eq!(m.log_determinant, f64::NEG_INFINITY);
+        assert_eq!(m.determinant_defect, 0.0);
+    }
+
+    #[test]
+    fn bad_factors_are_refused() {
+        assert_eq!(Multipliers::of_product(&[]), Err(MultiplierError::Shape));
+        let nan = DMatrix::from_element(2, 2, f64::NAN);
+        assert_eq!(
+            Multipliers::of_product(&[nan]),
+            Err(MultiplierError::NotFinite)
+        );
+        let wide = DMatrix::zeros(2, 3);
+        assert_eq!(
+            Multipliers::of_product(&[wide]),
+            Err(MultiplierError::Shape)
+        );
+    }
+
+    proptest! {
+        /// A cyclic rotation of the factors leaves the multipliers alone.
+        #[test]
+        fn multipliers_do_not_depend_on_the_phase(
+            entries in prop::collection::vec(-1.0f64..1.0, 3 * 9),
+        ) {
+            let factors: Vec<_> = entries
+                .chunks(9)
+                .map(|c| DMatrix::from_column_slice(3, 3, c) + DMatrix::identity(3, 3))
+                .collect();
+            let mut turned = factors.clone();
+            turned.rotate_left(1);
+            let a = Multipliers::of_product(&factors).unwrap();
+            let b = Multipliers::of_product(&turned).unwrap();
+            // Nearly double eigenvalues move by the square root of rounding.
+            let gap = a.values[0].norm().max(1.0) * 1e-6;
+            for x in &a.values {
+                prop_assert!(b.values.iter().any(|y| (x - y).norm() < gap));
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! A periodic orbit of the stroboscopic map, closed by Newton.
+
+use nalgebra::Complex;
+
+use crate::multipliers::Stability;
+use crate::vector::{distance, norm};
+
+/// A periodic orbit, its accuracy and its stability.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PeriodicOrbit {
+    /// Minimal period in drive periods.
+    pub period: usize,
+    /// All `period` strobe points `x_0 … x_{n−1}`, `P(x_k) = x_{k+1 mod n}`.
+    pub states: Vec<Vec<f64>>,
+    /// Largest entry of `P(x_k) − x_{k+1}` over the orbit, in units of the state.
+    pub residual: f64,
+    /// Estimated distance of `states` from the true orbit (largest entry): the
+    /// residual and the rounding of one period, carried through the inverse of
+    /// the Newton system. Two orbits closer than a few of these are one orbit.
+    pub error: f64,
+    /// Floquet multipliers, largest modulus first; a pair has its positive
+    /// imaginary part first.
+    pub multipliers: Vec<Complex<f64>>,
+    /// log|det DPⁿ|, summed over the factors: an independent check of the
+    /// multipliers and of any trace formula the system has.
+    pub log_determinant: f64,
+    /// What the multipliers say.
+    pub stability: Stability,
+}
+
+impl PeriodicOrbit {
+    /// Dimension of the state.
+    pub fn dimension(&self) -> usize {
+        self.states.first().map_or(0, Vec::len)
+    }
+
+    /// Largest modulus of a multiplier.
+    pub fn spectral_radius(&self) -> f64 {
+        self.multipliers.first().map_or(0.0, |m| m.norm())
+    }
+
+    /// True if every multiplier lies inside the unit circle by more than the margin
+    /// of [`Stability`].
+    pub fn is_stable(&self) -> bool {
+        self.stability == Stability::Stable
+    }
+
+    /// Largest entry of any state.
+    pub fn scale(&self) -> f64 {
+        self.states.iter().fold(0.0, |m, s| m.max(norm(s)))
+    }
+
+    /// Smallest distance (largest entry over all phases) to another orbit of the
+    /// same period over all cyclic shifts, with the shift `s` that gives it
+    /// (`states[k]` beside `other.states[(k + s) mod n]`); infinite if periods or
+    /// dimensions differ.
+    pub fn distance_to(&self, other: &Self) -> (usize, f64) {
+        if self.period != other.period || self.dimension() != other.dimension() {
+            return (0, f64::INFINITY);
+        }
+        let n = self.period;
+        let mut best = (0, f64::INFINITY);
+        for shift in 0..n {
+            let mut worst: f64 = 0.0;
+            for k in 0..n {
+                worst = worst.max(distance(&self.states[k], &other.states[(k + shift) % n]));
+                if worst >= best.1 {
+                    break;
+                }
+            }
+            if worst < best.1 {
+                best = (shift, worst);
+            }
+        }
+        best
+    }
+
+    /// True if the two are one orbit up to a cyclic shift: closer than ten times
+    /// the sum of their error estimates.
+    ///
+    /// Fails, by calling one what is two, only within that distance of a fold or
+    /// flip, where the error estimates themselves grow and say so.
+    pub fn is_same_as(&self, other: &Self) -> bool {
+        self.distance_to(other).1 <= 10.0 * (self.error + other.error)
+    }
+
+    /// The same orbit starting from its lexicographically smallest state, so that
+    /// the phase at which it happened to be found does not show.
+    #[must_use]
+    pub fn canonical(mut self) -> Self {
+        if let Some(first) = (0..self.states.len()).min_by(|&a, &b| {
+            self.states[a]
+                .partial_cmp(&self.states[b])
+                .unwrap_or(std::cmp::Ordering::Equal)
+        }) {
+            self.states.rotate_left(first);
+        }
+        self
+    }
+
+    /// The states in one row-major block, `period × dimension`.
+    pub(crate) fn flat(&self) -> Vec<f64> {
+        self.states.concat()
+    }
+}

@@ -1,0 +1,391 @@
+//! Periodic orbits by Newton's method on all their strobe points at once
+//! (multiple shooting; for period 1 it is single shooting).
+//!
+//! Unknown are x_0 … x_{n−1} with P(x_k) = x_{k+1}, x_n = x_0, so a chaotic stretch
+//! grows by one period only. Steps are damped until the sum of squared residuals
+//! falls. Iteration goes on until rounding stops it, not until a tolerance is met.
+//!
+//! The minimal period is proved, not read off: for every proper divisor m of n,
+//! either P^m(x) differs from x by far more than the orbit's error estimate, or
+//! Newton on P^m from x finds an orbit at the same place, which is then the answer.
+//!
+//! Fails, with a typed reason: where no descent is possible (a residual minimum that
+//! is no orbit, a map that refuses), and near a multiplier +1 (fold), where the
+//! orbit is not isolated to rounding. Newton finds *an* orbit near the guess, not
+//! necessarily the one that the motion tends to: [`crate::settle`] checks that.
+
+use nalgebra::DMatrix;
+
+use crate::block_cyclic::BlockCyclic;
+use crate::failure::{MapFailure, advance, advance_with_jacobian};
+use crate::map::StroboscopicMap;
+use crate::multipliers::{MultiplierError, Multipliers};
+use crate::orbit::PeriodicOrbit;
+use crate::vector::{distance, mix, norm, sum_of_squares};
+
+/// How hard Newton tries.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShootingOptions {
+    /// Largest number of Newton steps.
+    pub max_iterations: usize,
+    /// Shortest fraction of a Newton step that is tried before giving up.
+    pub min_damping: f64,
+    /// A residual above this times the orbit's scale (its largest entry) when the
+    /// iteration stalls is not an orbit. Set it to the accuracy of the map; the
+    /// residual reached is normally far below.
+    pub residual_tolerance: f64,
+}
+
+impl Default for ShootingOptions {
+    fn default() -> Self {
+        Self {
+            max_iterations: 40,
+            min_damping: 1.0 / 256.0,
+            residual_tolerance: 1e-10,
+        }
+    }
+}
+
+/// Why no orbit was closed.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ShootingError {
+    /// The guess does not fit the map.
+    #[error("bad guess: {0}")]
+    BadGuess(String),
+    /// The map failed at the guess.
+    #[error("the map could not be followed from the guess")]
+    Map(#[from] MapFailure),
+    /// Newton stalled where there is no orbit.
+    #[error(
+        "Newton found no period-{period} orbit: residual {residual:.3e} after {iterations} steps ({reason})"
+    )]
+    Diverged {
+        /// Period asked for.
+        period: usize,
+        /// Newton steps taken.
+        iterations: usize,
+        /// Largest entry of the residual at the end.
+        residual: f64,
+        /// What stopped it.
+        reason: DivergenceReason,
+    },
+    /// The orbit is not isolated to rounding: a multiplier is too near +1.
+    #[error(
+        "the period-{period} orbit is not isolated: the multiplier nearest +1 is {distance:.3e} from it (residual {residual:.3e})"
+    )]
+    Singular {
+        /// Period asked for.
+        period: usize,
+        /// Distance of the nearest multiplier from +1 where Newton stopped.
+        distance: f64,
+        /// Largest entry of the residual there.
+        residual: f64,
+    },
+    /// The multipliers of a closed orbit could not be computed.
+    #[error(transparent)]
+    Multipliers(#[from] MultiplierError),
+}
+
+/// What stopped a Newton iteration that found nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DivergenceReason {
+    /// No fraction of the step lowers the residual.
+    #[error("no step lowers the residual")]
+    NoDescent,
+    /// The allowed number of steps was used up.
+    #[error("too many steps")]
+    TooManySteps,
+}
+
+/// Closes a period-`period` orbit near the trajectory that starts at `guess`
+/// (length: dimension of the map). The orbit that comes back has its minimal
+/// period, which may divide `period`.
+///
+/// # Errors
+/// See [`ShootingError`].
+pub fn close_orbit<M: StroboscopicMap>(
+    map: &mut M,
+    guess: &[f64],
+    period: usize,
+    options: &ShootingOptions,
+) -> Result<PeriodicOrbit, ShootingError> {
+    check(map, guess, 1, period)?;
+    let d = guess.len();
+    let mut points = Vec::with_capacity(period * d);
+    let mut state = guess.to_vec();
+    for k in 0..period {
+        points.extend_from_slice(&state);
+        if k + 1 < period {
+            advance(map, &mut state)?;
+        }
+    }
+    close_orbit_from_points(map, &points, period, options)
+}
+
+/// As [`close_orbit`], from guesses for all strobe points, row by row
+/// (`period × dimension` values).
+///
+/// # Errors
+/// See [`ShootingError`].
+pub fn close_orbit_from_points<M: StroboscopicMap>(
+    map: &mut M,
+    points: &[f64],
+    period: usize,
+    options: &ShootingOptions,
+) -> Result<PeriodicOrbit, ShootingError> {
+    check(map, points, period, period)?;
+    let mut newton = Segments::new(map.dimension(), period);
+    newton.points.copy_from_slice(points);
+    newton.converge(map, options)?;
+    newton.into_minimal_orbit(map, options)
+}
+
+fn check<M: StroboscopicMap>(
+    map: &M,
+    values: &[f64],
+    rows: usize,
+    period: usize,
+) -> Result<(), ShootingError> {
+    let d = map.dimension();
+    if d == 0 || period == 0 {
+        return Err(ShootingError::BadGuess(format!(
+            "dimension {d} and period {period} must both be at least 1"
+        )));
+    }
+    if values.len() != rows * d {
+        return Err(ShootingError::BadGuess(format!(
+            "{} numbers given, {} needed ({rows} states of {d})",
+            values.len(),
+            rows * d
+        )));
+    }
+    if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
+        return Err(ShootingError::BadGuess(format!("{bad} is not finite")));
+    }
+    Ok(())
+}
+
+/// The segments of an orbit with their residuals and Jacobians.
+pub(crate) struct Segments {
+    pub(crate) d: usize,
+    pub(crate) n: usize,
+    pub(crate) points: Vec<f64>,
+    pub(crate) residuals: Vec<f64>,
+    pub(crate) jacobians: Vec<DMatrix<f64>>,
+    /// Largest entry of any state, the guess's included: an orbit at the origin
+    /// has no scale of its own.
+    pub(crate) scale: f64,
+    state: Vec<f64>,
+}
+
+impl Segments {
+    pub(crate) fn new(d: usize, n: usize) -> Self {
+        Self {
+            d,
+            n,
+            points: vec![0.0; n * d],
+            residuals: vec![0.0; n * d],
+            jacobians: vec![DMatrix::zeros(d, d); n],
+            scale: 0.0,
+            state: vec![0.0; d],
+        }
+    }
+
+    /// Residuals and Jacobians at the present points.
+    fn evaluate<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), MapFailure> {
+        let (d, n) = (self.d, self.n);
+        for k in 0..n {
+            self.state.copy_from_slice(&self.points[k * d..(k + 1) * d]);
+            advance_with_jacobian(map, &mut self.state, &mut self.jacobians[k])?;
+            let next = (k + 1) % n;
+            for i in 0..d {
+                self.residuals[k * d + i] = self.state[i] - self.points[next * d + i];
+            }
+        }
+        Ok(())
+    }
+
+    /// Newton until rounding stops it.
+    fn converge<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        options: &ShootingOptions,
+    ) -> Result<(), ShootingError> {
+        let mut trial = Self::new(self.d, self.n);
+        let mut system = BlockCyclic::new(self.d, self.n);
+        let mut step = vec![0.0; self.points.len()];
+        self.scale = self.scale.max(norm(&self.points));
+        self.evaluate(map)?;
+        for iteration in 0..options.max_iterations {
+            let residual = norm(&self.residuals);
+            if residual == 0.0 {
+                return Ok(());
+            }
+            let small = residual <= options.residual_tolerance * self.scale;
+            system.factor(&self.jacobians, &self.residuals, None);
+            if system.solve(&mut step).is_none() || step.iter().any(|v| !v.is_finite()) {
+                return Err(self.singular(residual));
+            }
+            let merit = sum_of_squares(&self.residuals);
+            let mut damping = 1.0;
+            loop {
+                for ((t, x), s) in trial.points.iter_mut().zip(&self.points).zip(&step) {
+                    *t = x + damping * s;
+                }
+                // A map that refuses the trial point is one more reason to go less far.
+                let lowered = trial.evaluate(map).is_ok() && {
+                    let wanted = 1.0 - 0.5 * damping;
+                    sum_of_squares(&trial.residuals) < wanted * wanted * merit
+                };
+                if lowered {
+                    trial.scale = self.scale.max(norm(&trial.points));
+                    std::mem::swap(self, &mut trial);
+                    break;
+                }
+                if small {
+                    // At rounding level: a full step no longer halves the residual.
+                    return Ok(());
+                }
+                damping *= 0.5;
+                if damping < options.min_damping {
+                    return Err(self.stalled(iteration, DivergenceReason::NoDescent));
+                }
+            }
+        }
+        let residual = norm(&self.residuals);
+        if residual <= options.residual_tolerance * self.scale {
+            Ok(())
+        } else {
+            Err(self.stalled(options.max_iterations, DivergenceReason::TooManySteps))
+        }
+    }
+
+    fn distance_from_one(&self) -> f64 {
+        Multipliers::of_product(&self.jacobians).map_or(f64::NAN, |m| {
+            m.values
+                .iter()
+                .fold(f64::INFINITY, |best, v| best.min((v - 1.0).norm()))
+        })
+    }
+
+    fn singular(&self, residual: f64) -> ShootingError {
+        ShootingError::Singular {
+            period: self.n,
+            distance: self.distance_from_one(),
+            residual,
+        }
+    }
+
+    fn stalled(&self, iterations: usize, reason: DivergenceReason) -> ShootingError {
+        let residual = norm(&self.residuals);
+        // A stall beside a multiplier +1 is the mark of a fold just passed.
+        let distance = self.distance_from_one();
+        if distance < 1e-6 {
+            return ShootingError::Singular {
+                period: self.n,
+                distance,
+                residual,
+            };
+        }
+        ShootingError::Diverged {
+            period: self.n,
+            iterations,
+            residual,
+            reason,
+        }
+    }
+
+    /// How far the points may be from the true orbit: the Newton corrections that
+    /// answer the residual and a rounding error in every entry of every period.
+    pub(crate) fn error_estimate(&self) -> Option<f64> {
+        let growth = self.jacobians.iter().fold(1.0f64, |m, a| m.max(a.amax()));
+        let noise = 4.0 * f64::EPSILON * self.scale * growth.min(1e4);
+        let mut system = BlockCyclic::new(self.d, self.n);
+        let mut step = vec![0.0; self.points.len()];
+        let mut error = noise;
+        for sample in 0..3u64 {
+            let right: Vec<f64> = (0..self.points.len())
+                .map(|i| {
+                    if sample == 0 {
+                        self.residuals[i]
+                    } else if mix(sample << 32 | i as u64) & 1 == 0 {
+                        noise
+                    } else {
+                        -noise
+                    }
+                })
+                .collect();
+            system.factor(&self.jacobians, &right, None);
+            system.solve(&mut step)?;
+            if step.iter().any(|v| !v.is_finite()) {
+                return None;
+            }
+            error = error.max(norm(&step));
+        }
+        Some(error)
+    }
+
+    /// The orbit with its minimal period, multipliers and error estimate.
+    fn into_minimal_orbit<M: StroboscopicMap>(
+        self,
+        map: &mut M,
+        options: &ShootingOptions,
+    ) -> Result<PeriodicOrbit, ShootingError> {
+        let (d, n) = (self.d, self.n);
+        let residual = norm(&self.residuals);
+        let error = self.error_estimate();
+        let reach = error.map(|e| 100.0 * e);
+        for m in (1..n).filter(|m| n % m == 0) {
+            let apart = (0..n)
+                .map(|k| {
+                    let later = (k + m) % n;
+                    distance(
+                        &self.points[k * d..(k + 1) * d],
+                        &self.points[later * d..(later + 1) * d],
+                    )
+                })
+                .fold(0.0, f64::max);
+            if reach.is_some_and(|reach| apart > reach) {
+                continue;
+            }
+            let mut shorter = Self::new(d, m);
+            shorter.points.copy_from_slice(&self.points[..m * d]);
+            shorter.scale = self.scale;
+            let closed = shorter
+                .converge(map, options)
+                .and_then(|()| shorter.into_minimal_orbit(map, options));
+            if let Ok(orbit) = closed {
+                let near = 2.0 * apart + 100.0 * orbit.error + 1e-6 * self.scale;
+                if distance(&orbit.states[0], &self.points[..d]) <= near {
+                    return Ok(orbit);
+                }
+            }
+            if reach.is_some() {
+                // Neither far from closing early nor closing early.
+                return Err(self.singular(residual));
+            }
+        }
+        let error = error.ok_or_else(|| self.singular(residual))?;
+        if error > 1e-3 * self.scale {
+            return Err(self.singular(residual));
+        }
+        self.into_orbit(residual, error)
+    }
+
+    pub(crate) fn into_orbit(
+        self,
+        residual: f64,
+        error: f64,
+    ) -> Result<PeriodicOrbit, ShootingError> {
+        let multipliers = Multipliers::of_product(&self.jacobians)?;
+        Ok(PeriodicOrbit {
+            period: self.n,
+            states: self.points.chunks(self.d).map(<[f64]>::to_vec).collect(),
+            residual,
+            error,
+            stability: multipliers.stability(),
+            multipliers: multipliers.values,
+            log_determinant: multipliers.log_determinant,
+        })
+    }
+}

@@ -1,0 +1,143 @@
+//! Newton, minimal periods, multipliers.
+
+use nanotap_dynamics::{ShootingError, ShootingOptions, Stability, StroboscopicMap, close_orbit};
+
+use crate::systems::{Focus, Henon, Logistic, System};
+
+#[test]
+fn the_henon_fixed_point_closes_to_rounding() {
+    let mut map = System(Henon { a: 0.3, b: 0.3 });
+    let exact = map.0.fixed_point();
+    let orbit = close_orbit(&mut map, &[0.5, 0.0], 1, &ShootingOptions::default()).unwrap();
+    assert_eq!(orbit.period, 1);
+    assert!((orbit.states[0][0] - exact[0]).abs() < 1e-15);
+    assert!((orbit.states[0][1] - exact[1]).abs() < 1e-15);
+    assert!(orbit.error < 1e-13 && orbit.residual < 1e-15);
+    // μ² + 2 a x μ − b = 0.
+    let p = map.0.a * exact[0];
+    let root = (p * p + map.0.b).sqrt();
+    assert!((orbit.multipliers[0].re - (-p - root)).abs() < 1e-14);
+    assert!((orbit.multipliers[1].re - (-p + root)).abs() < 1e-14);
+    assert!((orbit.log_determinant - 0.3f64.ln()).abs() < 1e-14);
+    assert_eq!(orbit.stability, Stability::Stable);
+}
+
+/// Asking for period 4 of a fixed point gives the fixed point: 1 and 2 are tried.
+#[test]
+fn a_multiple_of_the_period_comes_back_minimal() {
+    let mut map = System(Logistic(2.8));
+    for period in [2, 3, 4, 12] {
+        let orbit = close_orbit(&mut map, &[0.6], period, &ShootingOptions::default()).unwrap();
+        assert_eq!(orbit.period, 1);
+        assert!((orbit.states[0][0] - (1.0 - 1.0 / 2.8)).abs() < 1e-15);
+    }
+}
+
+/// Just past the doubling at r = 3 the two points are ±√(r−3)·const apart, and the
+/// fixed point is still there: both must be told apart however near.
+#[test]
+fn a_newborn_doubled_orbit_is_told_from_its_parent() {
+    for excess in [1e-2, 1e-4, 1e-6, 1e-8] {
+        let r: f64 = 3.0 + excess;
+        let mut map = System(Logistic(r));
+        let root = ((r + 1.0) * (r - 3.0)).sqrt();
+        let exact = (r + 1.0 + root) / (2.0 * r);
+        let orbit = close_orbit(&mut map, &[exact], 2, &ShootingOptions::default()).unwrap();
+        assert_eq!(orbit.period, 2, "at r = 3 + {excess}");
+        let high = orbit.states[0][0].max(orbit.states[1][0]);
+        assert!((high - exact).abs() <= 10.0 * orbit.error);
+        // μ = 4 + 2r − r².
+        let multiplier = 4.0 + 2.0 * r - r * r;
+        assert!((orbit.multipliers[0].re - multiplier).abs() < 1e-9);
+        let parent = close_orbit(&mut map, &[1.0 - 1.0 / r], 2, &ShootingOptions::default());
+        assert!(parent.is_err() || parent.unwrap().period == 1);
+    }
+}
+
+/// A period-17 orbit of the chaotic Hénon map: single shooting would face a growth
+/// of e^{0.42·17} ≈ 1260 and worse along bad stretches.
+#[test]
+fn long_unstable_orbits_close_and_repeat() {
+    let mut map = System(Henon { a: 1.4, b: 0.3 });
+    let mut start = vec![0.1, 0.1];
+    let mut closed = 0;
+    for _ in 0..400 {
+        map.advance(&mut start).unwrap();
+        let Ok(orbit) = close_orbit(&mut map, &start, 17, &ShootingOptions::default()) else {
+            continue;
+        };
+        assert!(orbit.period == 17 || orbit.period == 1);
+        if orbit.period == 17 {
+            closed += 1;
+            assert!(orbit.residual < 1e-14);
+            assert_eq!(
+                orbit.stability,
+                Stability::Unstable {
+                    unstable_dimension: 1
+                }
+            );
+            // |det| = b^17, though the other multiplier is thousands.
+            let sum: f64 = orbit.multipliers.iter().map(|m| m.norm().ln()).sum();
+            assert!((sum - 17.0 * 0.3f64.ln()).abs() < 1e-8);
+        }
+    }
+    assert!(closed > 10, "{closed}");
+}
+
+#[test]
+fn an_undamped_oscillator_is_marginal() {
+    let mut map = System(Focus {
+        radius: 1.0,
+        angle: 1.0,
+    });
+    let orbit = close_orbit(&mut map, &[0.0, 0.0], 1, &ShootingOptions::default()).unwrap();
+    assert_eq!(orbit.stability, Stability::Marginal);
+}
+
+/// Below its fold (a < −(1−b)²/4) the Hénon map has no fixed point.
+#[test]
+fn where_there_is_no_orbit_newton_says_so() {
+    let mut map = System(Henon { a: -0.2, b: 0.3 });
+    let error = close_orbit(&mut map, &[1.0, 0.0], 1, &ShootingOptions::default()).unwrap_err();
+    assert!(matches!(
+        error,
+        ShootingError::Diverged { .. } | ShootingError::Singular { .. }
+    ));
+}
+
+/// Every point of a rigid rotation by a rational angle is periodic: not isolated.
+#[test]
+fn a_continuum_of_orbits_is_singular() {
+    let mut map = System(Focus {
+        radius: 1.0,
+        angle: std::f64::consts::FRAC_PI_2,
+    });
+    let error = close_orbit(&mut map, &[3.0, 0.3], 4, &ShootingOptions::default());
+    match error {
+        Err(ShootingError::Singular { distance, .. }) => assert!(distance < 1e-12),
+        // Its centre is the fixed point, an honest answer too.
+        Ok(orbit) => assert_eq!(orbit.period, 1),
+        Err(other) => panic!("{other}"),
+    }
+}
+
+#[test]
+fn bad_guesses_are_refused() {
+    let mut map = System(Logistic(3.0));
+    let options = ShootingOptions::default();
+    for (guess, period) in [
+        (vec![], 1),
+        (vec![0.1, 0.2], 1),
+        (vec![f64::NAN], 1),
+        (vec![0.1], 0),
+    ] {
+        assert!(matches!(
+            close_orbit(&mut map, &guess, period, &options),
+            Err(ShootingError::BadGuess(_))
+        ));
+    }
+    assert!(matches!(
+        close_orbit(&mut map, &[1e300], 3, &options),
+        Err(ShootingError::Map(_))
+    ));
+}

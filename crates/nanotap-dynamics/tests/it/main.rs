@@ -1,0 +1,8 @@
+//! All methods on systems with known answers.
+#![allow(missing_docs)]
+
+mod systems;
+
+mod closing;
+mod exponents;
+mod settling;

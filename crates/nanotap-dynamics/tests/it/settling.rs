@@ -1,0 +1,198 @@
+//! The verdict on one start.
+
+use nanotap_dynamics::{LyapunovOptions, SettleOptions, UndecidedReason, Verdict, settle};
+
+use crate::systems::{DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning};
+
+fn period_of(verdict: &Verdict) -> usize {
+    match verdict {
+        Verdict::Periodic(orbit) => {
+            assert!(orbit.is_stable());
+            orbit.period
+        }
+        other => panic!("not periodic: {other:?}"),
+    }
+}
+
+/// Logistic map: 1, 2, 4, the period-3 window, and a fixed point one part in 1e5
+/// before its doubling, where 1 − |μ| = 1e-5: no long period, no chaos.
+#[test]
+fn known_periods_are_found() {
+    let options = SettleOptions::default();
+    for (r, period) in [
+        (2.9, 1),
+        (3.2, 2),
+        (3.5, 4),
+        (3.83, 3),
+        (2.99999, 1),
+        (3.55, 8),
+    ] {
+        let settled = settle(&mut System(Logistic(r)), &[0.3], &options);
+        assert_eq!(period_of(&settled.verdict), period, "r = {r}");
+    }
+}
+
+/// A focus with |μ| = 0.9999 whose angle is near 2π/5: strobe points nearly repeat
+/// after 5 for thousands of periods.
+#[test]
+fn slow_decay_does_not_pass_for_a_long_period() {
+    let mut map = System(Focus {
+        radius: 0.9999,
+        angle: 2.0 * std::f64::consts::PI / 5.0 + 1e-4,
+    });
+    let settled = settle(&mut map, &[40.0, 0.0], &SettleOptions::default());
+    assert_eq!(period_of(&settled.verdict), 1);
+    assert!(settled.periods <= 64, "{}", settled.periods);
+}
+
+#[test]
+fn the_henon_attractor_is_chaotic_with_a_bound() {
+    let settled = settle(
+        &mut System(Henon { a: 1.4, b: 0.3 }),
+        &[0.1, 0.1],
+        &SettleOptions::default(),
+    );
+    let Verdict::Chaotic(chaos) = settled.verdict else {
+        panic!("{:?}", settled.verdict)
+    };
+    let (largest, error) = chaos.spectrum.largest();
+    assert!((largest - 0.41922).abs() < 5.0 * error);
+    assert_eq!(chaos.lifetime_above, chaos.observed as f64 / 3.0);
+}
+
+/// Past its Neimark–Sacker point at a = 2 the delayed logistic map moves on a
+/// closed curve.
+#[test]
+fn tori_are_named_with_their_evidence() {
+    for start in [[0.6, 0.5], [0.45, 0.5]] {
+        let settled = settle(
+            &mut System(DelayedLogistic(2.05)),
+            &start,
+            &SettleOptions::default(),
+        );
+        let Verdict::QuasiPeriodic(torus) = settled.verdict else {
+            panic!("{:?}", settled.verdict)
+        };
+        assert!(torus.birkhoff_digits > 7.0);
+        assert!(torus.spectrum.largest().0.abs() < 1e-3);
+        assert!(torus.spectrum.exponents[1] < -0.01);
+        assert!(torus.nearest_return > 1e-6);
+    }
+}
+
+/// A rigid turn by a rational angle is periodic from every start, but no orbit of it
+/// is isolated: neither "periodic" nor "quasi-periodic" would be right.
+#[test]
+fn a_resonant_turn_is_left_undecided_with_its_reason() {
+    let mut map = System(Turning {
+        angle: 2.0 * std::f64::consts::PI * 3.0 / 7.0,
+        gain: 0.2,
+    });
+    let settled = settle(&mut map, &[0.3, 0.4], &SettleOptions::default());
+    let Verdict::Undecided { reason, .. } = settled.verdict else {
+        panic!("{:?}", settled.verdict)
+    };
+    assert!(
+        matches!(
+            reason,
+            UndecidedReason::NotIsolated { period: 7, .. }
+                | UndecidedReason::OnOrbitThatDoesNotAttract(_)
+        ),
+        "{reason}"
+    );
+}
+
+/// Survival 2/s per period with s = 2.002: thousands of chaotic periods, then the sink.
+#[test]
+fn transient_chaos_is_not_taken_for_an_attractor() {
+    let options = SettleOptions {
+        max_transient: 64,
+        lyapunov: LyapunovOptions {
+            min_periods: 256,
+            max_periods: 100_000,
+            absolute_error: 0.0,
+            relative_error: 0.0,
+            ..LyapunovOptions::default()
+        },
+        ..SettleOptions::default()
+    };
+    let mut seen = 0;
+    for k in 0..12 {
+        let start = [0.05 + 0.07 * f64::from(k)];
+        let settled = settle(&mut System(OpenTent(2.002)), &start, &options);
+        match settled.verdict {
+            Verdict::TransientChaos {
+                orbit, spectrum, ..
+            } => {
+                seen += 1;
+                assert_eq!(orbit.states[0], vec![2.0]);
+                assert!((spectrum.largest().0 - 2.002f64.ln()).abs() < 1e-12);
+            }
+            Verdict::Periodic(orbit) => assert_eq!(orbit.states[0], vec![2.0]),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(seen > 3, "{seen}");
+}
+
+#[test]
+fn a_motion_that_runs_off_is_unbounded() {
+    let settled = settle(
+        &mut System(Henon { a: 1.4, b: 0.3 }),
+        &[3.0, 3.0],
+        &SettleOptions::default(),
+    );
+    assert!(matches!(settled.verdict, Verdict::Unbounded));
+    assert!(settled.periods < 20);
+}
+
+/// Started exactly on an unstable fixed point, the run never leaves it; that is no
+/// attractor.
+#[test]
+fn a_run_on_an_unstable_orbit_is_not_called_an_attractor() {
+    let settled = settle(
+        &mut System(Logistic(3.5)),
+        &[0.0],
+        &SettleOptions::default(),
+    );
+    assert!(matches!(
+        settled.verdict,
+        Verdict::Undecided {
+            reason: UndecidedReason::OnOrbitThatDoesNotAttract(_),
+            ..
+        }
+    ));
+}
+
+/// An undamped oscillator beats for ever: a torus, exponents zero.
+#[test]
+fn an_undamped_beat_is_a_torus() {
+    let mut map = System(Focus {
+        radius: 1.0,
+        angle: 1.0,
+    });
+    let settled = settle(&mut map, &[0.0, 0.0], &SettleOptions::default());
+    assert!(
+        matches!(settled.verdict, Verdict::QuasiPeriodic(_)),
+        "{:?}",
+        settled.verdict
+    );
+}
+
+#[test]
+fn bad_starts_are_refused() {
+    for start in [vec![], vec![0.1, 0.2], vec![f64::INFINITY]] {
+        let settled = settle(
+            &mut System(Logistic(3.5)),
+            &start,
+            &SettleOptions::default(),
+        );
+        assert!(matches!(
+            settled.verdict,
+            Verdict::Undecided {
+                reason: UndecidedReason::BadStart(_),
+                ..
+            }
+        ));
+    }
+}

@@ -1,0 +1,326 @@
+//! Systems whose answers are known, shared by all tests.
+
+use std::convert::Infallible;
+
+use nanotap_dynamics::{DMatrix, MapFamily, StroboscopicMap, Tangency};
+
+/// A map given by formulas.
+pub(crate) trait Formula: Clone + Send + Sync {
+    const DIMENSION: usize;
+    fn image(&self, x: &[f64], out: &mut [f64]);
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>);
+    /// Derivative with respect to the family's parameter.
+    fn derivative(&self, x: &[f64], out: &mut [f64]);
+    /// Value of the one tangency per period, if the system has one.
+    fn tangency(&self, _x: &[f64]) -> Option<f64> {
+        None
+    }
+}
+
+/// The stroboscopic map of a formula.
+#[derive(Clone, Debug)]
+pub(crate) struct System<F>(pub F);
+
+impl<F: Formula> StroboscopicMap for System<F> {
+    type Error = Infallible;
+
+    fn dimension(&self) -> usize {
+        F::DIMENSION
+    }
+
+    fn period(&self) -> f64 {
+        1.0
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+        let mut out = [0.0; 8];
+        self.0.image(state, &mut out[..F::DIMENSION]);
+        state.copy_from_slice(&out[..F::DIMENSION]);
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Infallible> {
+        self.0.jacobian(state, jacobian);
+        self.advance(state)
+    }
+
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), Infallible> {
+        if let Some(value) = self.0.tangency(state) {
+            tangencies.push(Tangency { phase: 0.5, value });
+        }
+        self.advance(state)
+    }
+}
+
+/// A family of formulas.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Family<F>(pub fn(f64) -> F);
+
+impl<F: Formula> MapFamily for Family<F> {
+    type Map = System<F>;
+    type Error = Infallible;
+
+    fn at(&self, parameter: f64) -> Result<System<F>, Infallible> {
+        Ok(System((self.0)(parameter)))
+    }
+
+    fn advance_with_derivatives(
+        &self,
+        _parameter: f64,
+        map: &mut System<F>,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivative: &mut [f64],
+    ) -> Result<(), Infallible> {
+        map.0.derivative(state, derivative);
+        map.advance_with_jacobian(state, jacobian)
+    }
+}
+
+/// x → 1 − a x² + y, y → b x (Hénon 1976); the parameter is a.
+///
+/// Fixed points x = (b − 1 ± √((1−b)² + 4a))/(2a); fold at a = −(1−b)²/4, flip at
+/// a = 3(1−b)²/4 (0.3675 at b = 0.3). At a = 1.4, b = 0.3: λ₁ = 0.41922 (Sprott,
+/// "Chaos and Time-Series Analysis", 2003), λ₁ + λ₂ = ln b.
+#[derive(Clone, Debug)]
+pub(crate) struct Henon {
+    pub a: f64,
+    pub b: f64,
+}
+
+impl Henon {
+    pub(crate) fn fixed_point(&self) -> [f64; 2] {
+        let x = (self.b - 1.0 + ((1.0 - self.b).powi(2) + 4.0 * self.a).sqrt()) / (2.0 * self.a);
+        [x, self.b * x]
+    }
+}
+
+impl Formula for Henon {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = 1.0 - self.a * x[0] * x[0] + x[1];
+        out[1] = self.b * x[0];
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = -2.0 * self.a * x[0];
+        out[(0, 1)] = 1.0;
+        out[(1, 0)] = self.b;
+        out[(1, 1)] = 0.0;
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = -x[0] * x[0];
+        out[1] = 0.0;
+    }
+}
+
+/// x → r x (1 − x). Doublings at r = 3 and 1 + √6, period-3 fold at 1 + √8; at r = 4
+/// λ = ln 2.
+#[derive(Clone, Debug)]
+pub(crate) struct Logistic(pub f64);
+
+impl Formula for Logistic {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = self.0 * x[0] * (1.0 - x[0]);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = self.0 * (1.0 - 2.0 * x[0]);
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] * (1.0 - x[0]);
+    }
+}
+
+/// x → a x (1 − y), y → x (Maynard Smith 1968): x = y = 1 − 1/a has
+/// trace 1, determinant a − 1: Neimark–Sacker at a = 2 with multipliers e^{±iπ/3}.
+#[derive(Clone, Debug)]
+pub(crate) struct DelayedLogistic(pub f64);
+
+impl Formula for DelayedLogistic {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = self.0 * x[0] * (1.0 - x[1]);
+        out[1] = x[0];
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = self.0 * (1.0 - x[1]);
+        out[(0, 1)] = -self.0 * x[0];
+        out[(1, 0)] = 1.0;
+        out[(1, 1)] = 0.0;
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] * (1.0 - x[1]);
+        out[1] = 0.0;
+    }
+}
+
+/// z → e^{iθ} z (1 + g (1 − |z|²)): for 0 < g < 1 the unit circle attracts, radially
+/// by 1 − 2g, and turns rigidly by θ: exponents 0 and ln(1 − 2g). The parameter is θ.
+#[derive(Clone, Debug)]
+pub(crate) struct Turning {
+    pub angle: f64,
+    pub gain: f64,
+}
+
+impl Formula for Turning {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = self.angle.sin_cos();
+        let r = 1.0 + self.gain * (1.0 - x[0] * x[0] - x[1] * x[1]);
+        out[0] = r * (c * x[0] - s * x[1]);
+        out[1] = r * (s * x[0] + c * x[1]);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        let (s, c) = self.angle.sin_cos();
+        let r = 1.0 + self.gain * (1.0 - x[0] * x[0] - x[1] * x[1]);
+        let turned = [c * x[0] - s * x[1], s * x[0] + c * x[1]];
+        let turn = [[c, -s], [s, c]];
+        for i in 0..2 {
+            for j in 0..2 {
+                out[(i, j)] = r * turn[i][j] - 2.0 * self.gain * turned[i] * x[j];
+            }
+        }
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = self.angle.sin_cos();
+        let r = 1.0 + self.gain * (1.0 - x[0] * x[0] - x[1] * x[1]);
+        out[0] = r * (-s * x[0] - c * x[1]);
+        out[1] = r * (c * x[0] - s * x[1]);
+    }
+}
+
+/// x → ρ R(θ) x + (1, 0): one stable focus with multipliers ρ e^{±iθ}; ρ = 1 is an
+/// undamped oscillator. The parameter is ρ.
+#[derive(Clone, Debug)]
+pub(crate) struct Focus {
+    pub radius: f64,
+    pub angle: f64,
+}
+
+impl Formula for Focus {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = self.angle.sin_cos();
+        out[0] = self.radius * (c * x[0] - s * x[1]) + 1.0;
+        out[1] = self.radius * (s * x[0] + c * x[1]);
+    }
+    fn jacobian(&self, _x: &[f64], out: &mut DMatrix<f64>) {
+        let (s, c) = self.angle.sin_cos();
+        out.copy_from(&(DMatrix::from_row_slice(2, 2, &[c, -s, s, c]) * self.radius));
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = self.angle.sin_cos();
+        out[0] = c * x[0] - s * x[1];
+        out[1] = s * x[0] + c * x[1];
+    }
+}
+
+/// An open tent map with a hole that leads to a sink.
+///
+/// On [0, 1]: x → s min(x, 1 − x), s > 2, of which the fraction 2/s stays in [0, 1];
+/// survivors stay uniform, so lifetimes are geometric with survival 2/s exactly.
+/// What leaves goes to the fixed point 2, which attracts by 1/2.
+#[derive(Clone, Debug)]
+pub(crate) struct OpenTent(pub f64);
+
+impl Formula for OpenTent {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = if (0.0..=1.0).contains(&x[0]) {
+            self.0 * x[0].min(1.0 - x[0])
+        } else {
+            2.0 + 0.5 * (x[0] - 2.0)
+        };
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = if !(0.0..=1.0).contains(&x[0]) {
+            0.5
+        } else if x[0] < 0.5 {
+            self.0
+        } else {
+            -self.0
+        };
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = if (0.0..=1.0).contains(&x[0]) {
+            x[0].min(1.0 - x[0])
+        } else {
+            0.0
+        };
+    }
+}
+
+/// The normal form of a soft (3/2-power) grazing in one dimension,
+/// x → μ + a x + b max(x, 0)^{3/2}, with the tangency of value −x. The parameter is μ.
+///
+/// Fixed points: x = μ/(1−a) while μ < 0, grazing at μ = 0, then
+/// μ = (1−a)x − b x^{3/2}. For b > 0 a fold at √x = 2(1−a)/(3b),
+/// μ = 4(1−a)³/(27b²). For b < 0 a flip where a + (3/2) b √x = −1.
+#[derive(Clone, Debug)]
+pub(crate) struct Grazing {
+    pub mu: f64,
+    pub a: f64,
+    pub b: f64,
+}
+
+impl Formula for Grazing {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = self.mu + self.a * x[0] + self.b * x[0].max(0.0).powf(1.5);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = self.a + 1.5 * self.b * x[0].max(0.0).sqrt();
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = 1.0;
+    }
+    fn tangency(&self, x: &[f64]) -> Option<f64> {
+        Some(-x[0])
+    }
+}
+
+/// The normal form of a hard (square-root) grazing (Nordmark 1991) in one dimension,
+/// x → μ + a x − b √max(x, 0): no fixed point near goes on smoothly past μ = 0.
+#[derive(Clone, Debug)]
+pub(crate) struct HardGrazing {
+    pub mu: f64,
+    pub a: f64,
+    pub b: f64,
+}
+
+impl Formula for HardGrazing {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = self.mu + self.a * x[0] - self.b * x[0].max(0.0).sqrt();
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = if x[0] > 0.0 {
+            self.a - 0.5 * self.b / x[0].sqrt()
+        } else {
+            self.a
+        };
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = 1.0;
+    }
+    fn tangency(&self, x: &[f64]) -> Option<f64> {
+        Some(-x[0])
+    }
+}
+
+/// The orbit of `start` thrown forward `periods` times.
+pub(crate) fn thrown(map: &mut impl StroboscopicMap, start: &[f64], periods: usize) -> Vec<f64> {
+    let mut x = start.to_vec();
+    for _ in 0..periods {
+        map.advance(&mut x).expect("the map can be followed");
+    }
+    x
+}

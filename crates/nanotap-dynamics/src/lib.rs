@@ -6,9 +6,12 @@
 //! else follows from it.
 
 mod adapted_norm;
+pub mod basin;
 mod birkhoff;
 mod block_average;
 mod block_cyclic;
+pub mod census;
+pub mod confidence;
 pub mod control;
 mod failure;
 pub mod lyapunov;
@@ -19,9 +22,14 @@ pub mod orbit;
 pub mod period;
 pub mod settle;
 pub mod shooting;
+pub mod starts;
+pub mod unstable;
 mod vector;
 
+pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
 pub use birkhoff::birkhoff_digits;
+pub use census::{Attractor, AttractorKind, Census, CensusOptions, Fate, TransientChaos, census};
+pub use confidence::{Fraction, Lifetime};
 pub use control::Control;
 pub use failure::MapFailure;
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
@@ -35,3 +43,5 @@ pub use settle::{Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict,
 pub use shooting::{
     DivergenceReason, ShootingError, ShootingOptions, close_orbit, close_orbit_from_points,
 };
+pub use starts::{StartBox, StartBoxError};
+pub use unstable::{OrbitSearch, find_orbits};

@@ -4,5 +4,7 @@
 mod systems;
 
 mod closing;
+mod counting;
 mod exponents;
 mod settling;
+mod slicing;

@@ -316,6 +316,24 @@ impl Formula for HardGrazing {
     }
 }
 
+/// x → r x − x³, 1 < r < 2: the fixed points ±√(r−1) attract with μ = 3 − 2r, and by
+/// symmetry each takes half of a symmetric box. Beyond |x| = √(r+1) all runs off.
+#[derive(Clone, Debug)]
+pub(crate) struct Cubic(pub f64);
+
+impl Formula for Cubic {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] * (self.0 - x[0] * x[0]);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = self.0 - 3.0 * x[0] * x[0];
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0];
+    }
+}
+
 /// The orbit of `start` thrown forward `periods` times.
 pub(crate) fn thrown(map: &mut impl StroboscopicMap, start: &[f64], periods: usize) -> Vec<f64> {
     let mut x = start.to_vec();

@@ -1,0 +1,297 @@
+//! Basins of attraction on a two-dimensional slice of initial states.
+//!
+//! A start is labelled as soon as it is inside a neighbourhood that contracts to a
+//! known attractor ([`crate::neighbourhood`], which says what that proves) and its
+//! next return confirms it. Attractors without such a neighbourhood (chaotic ones,
+//! tori) cannot capture a start that way: a start that reaches none within the
+//! budget is compared with the boxes that hold the strobe points of those
+//! attractors, and labelled if its last states stay in exactly one of them.
+//!
+//! Fails: that comparison is evidence, not proof (a transient may live inside the box
+//! of a chaotic attractor); an attractor not in the list leaves its basin unsettled;
+//! the label of a start within rounding of a basin boundary is a matter of chance.
+
+use crate::census::{Attractor, AttractorKind};
+use crate::failure::{MapFailure, advance};
+use crate::map::StroboscopicMap;
+use crate::neighbourhood::Neighbourhood;
+use crate::vector::norm;
+
+/// One axis of a slice: a coordinate and the values it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SliceAxis {
+    /// Which coordinate of the state.
+    pub coordinate: usize,
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// How many values, both ends included.
+    pub count: usize,
+}
+
+impl SliceAxis {
+    /// The `index`-th value.
+    pub fn value(&self, index: usize) -> f64 {
+        if self.count <= 1 {
+            return self.from;
+        }
+        let t = index as f64 / (self.count - 1) as f64;
+        self.from + (self.to - self.from) * t
+    }
+}
+
+/// A grid of initial states: two coordinates vary, the others stay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slice {
+    origin: Vec<f64>,
+    x: SliceAxis,
+    y: SliceAxis,
+}
+
+/// Why a basin could not be computed.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum BasinError {
+    /// An axis that does not fit.
+    #[error("bad slice: {0}")]
+    Slice(String),
+    /// The map cannot be followed on an attractor.
+    #[error("an attractor could not be followed")]
+    Map(#[from] MapFailure),
+}
+
+impl Slice {
+    /// The slice through `origin` (a full state) spanned by two axes. Points are
+    /// numbered row by row: index = iy · x.count + ix.
+    ///
+    /// # Errors
+    /// If an axis has no points, is not finite, or names a coordinate that the
+    /// origin lacks or that the other axis has.
+    pub fn new(origin: Vec<f64>, x: SliceAxis, y: SliceAxis) -> Result<Self, BasinError> {
+        for axis in [&x, &y] {
+            if axis.coordinate >= origin.len() {
+                return Err(BasinError::Slice(format!(
+                    "coordinate {} of a state of {} (they count from 0)",
+                    axis.coordinate,
+                    origin.len()
+                )));
+            }
+            if axis.count == 0 || !axis.from.is_finite() || !axis.to.is_finite() {
+                return Err(BasinError::Slice(format!(
+                    "{} points from {} to {}: one point at least, between finite numbers",
+                    axis.count, axis.from, axis.to
+                )));
+            }
+        }
+        if x.coordinate == y.coordinate {
+            return Err(BasinError::Slice(format!(
+                "both axes vary coordinate {}",
+                x.coordinate
+            )));
+        }
+        if origin.iter().any(|v| !v.is_finite()) {
+            return Err(BasinError::Slice("the origin is not finite".into()));
+        }
+        Ok(Self { origin, x, y })
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.x.count * self.y.count
+    }
+
+    /// Never true: an axis has one point at least.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Writes the state at a point to `out`.
+    pub fn state(&self, index: usize, out: &mut [f64]) {
+        out.copy_from_slice(&self.origin);
+        out[self.x.coordinate] = self.x.value(index % self.x.count);
+        out[self.y.coordinate] = self.y.value(index / self.x.count);
+    }
+
+    /// The axes, x then y.
+    pub fn axes(&self) -> (&SliceAxis, &SliceAxis) {
+        (&self.x, &self.y)
+    }
+}
+
+/// Where a start goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Label {
+    /// To the attractor of this index.
+    Attractor(u32),
+    /// To none of them within the budget.
+    Unsettled,
+    /// It left every bound.
+    Unbounded,
+    /// The map could not be followed.
+    Failed,
+}
+
+/// How long starts are followed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BasinOptions {
+    /// Periods after which a start is called unsettled.
+    pub max_periods: usize,
+    /// A state with an entry above this is unbounded.
+    pub bound: f64,
+}
+
+impl Default for BasinOptions {
+    fn default() -> Self {
+        Self {
+            max_periods: 5000,
+            bound: 1e8,
+        }
+    }
+}
+
+/// Last states of an unsettled start that must lie in an attractor's box.
+const LAST: usize = 64;
+/// Strobe points that the box of an attractor that is no orbit is drawn around.
+const CLOUD: usize = 4096;
+
+/// What the chunks of a basin share: ready to be cloned into any thread.
+#[derive(Clone, Debug)]
+pub struct Basins {
+    slice: Slice,
+    options: BasinOptions,
+    balls: Vec<(u32, Neighbourhood)>,
+    boxes: Vec<(u32, Vec<f64>, Vec<f64>)>,
+}
+
+impl Basins {
+    /// Prepares the attractors of a census (labels are their indices).
+    ///
+    /// # Errors
+    /// If the slice does not fit the map or an attractor cannot be followed.
+    pub fn new<M: StroboscopicMap>(
+        map: &M,
+        slice: Slice,
+        attractors: &[Attractor],
+        options: BasinOptions,
+    ) -> Result<Self, BasinError> {
+        let d = map.dimension();
+        if slice.origin.len() != d {
+            return Err(BasinError::Slice(format!(
+                "the origin has {} numbers, {d} are needed",
+                slice.origin.len()
+            )));
+        }
+        let mut map = map.clone();
+        let mut balls = Vec::new();
+        let mut boxes = Vec::new();
+        for (label, attractor) in attractors.iter().enumerate() {
+            let label = label as u32;
+            let ball = match &attractor.kind {
+                AttractorKind::Periodic(orbit) => Neighbourhood::around(&mut map, orbit)?,
+                _ => None,
+            };
+            if let Some(ball) = ball {
+                balls.push((label, ball));
+            } else {
+                let (low, high) = cloud(&mut map, &attractor.state)?;
+                boxes.push((label, low, high));
+            }
+        }
+        Ok(Self {
+            slice,
+            options,
+            balls,
+            boxes,
+        })
+    }
+
+    /// Number of points of the slice.
+    pub fn len(&self) -> usize {
+        self.slice.len()
+    }
+
+    /// Never true: a slice has one point at least.
+    pub fn is_empty(&self) -> bool {
+        self.slice.is_empty()
+    }
+
+    /// Labels of the points of a range of indices (cut at the end of the slice). A
+    /// pure function: chunks may be computed anywhere, in any order.
+    pub fn chunk<M: StroboscopicMap>(
+        &self,
+        map: &mut M,
+        range: std::ops::Range<usize>,
+    ) -> Vec<Label> {
+        let d = map.dimension();
+        let mut state = vec![0.0; d];
+        let mut scratch = vec![0.0; d];
+        (range.start..range.end.min(self.len()))
+            .map(|index| {
+                self.slice.state(index, &mut state);
+                self.label(map, &mut state, &mut scratch)
+                    .unwrap_or_else(|failure| match failure {
+                        MapFailure::NotFinite => Label::Unbounded,
+                        MapFailure::Refused(_) => Label::Failed,
+                    })
+            })
+            .collect()
+    }
+
+    fn label<M: StroboscopicMap>(
+        &self,
+        map: &mut M,
+        state: &mut [f64],
+        scratch: &mut [f64],
+    ) -> Result<Label, MapFailure> {
+        // Boxes that have held every one of the last states, as bits.
+        let mut inside = vec![true; self.boxes.len()];
+        for period in 0..=self.options.max_periods {
+            if period > 0 {
+                advance(map, state)?;
+            }
+            if norm(state) > self.options.bound {
+                return Ok(Label::Unbounded);
+            }
+            for (label, ball) in &self.balls {
+                if ball.contains(state) && ball.holds(map, state, scratch)? {
+                    return Ok(Label::Attractor(*label));
+                }
+            }
+            if period + LAST > self.options.max_periods {
+                for (flag, (_, low, high)) in inside.iter_mut().zip(&self.boxes) {
+                    *flag &= state
+                        .iter()
+                        .zip(low.iter().zip(high))
+                        .all(|(x, (l, h))| l <= x && x <= h);
+                }
+            }
+        }
+        let mut held = self.boxes.iter().zip(&inside).filter(|(_, f)| **f);
+        Ok(match (held.next(), held.next()) {
+            (Some(((label, ..), _)), None) => Label::Attractor(*label),
+            _ => Label::Unsettled,
+        })
+    }
+}
+
+/// The box around a stretch of an attractor, widened by a twentieth.
+fn cloud<M: StroboscopicMap>(
+    map: &mut M,
+    state: &[f64],
+) -> Result<(Vec<f64>, Vec<f64>), MapFailure> {
+    let mut x = state.to_vec();
+    let (mut low, mut high) = (x.clone(), x.clone());
+    for _ in 0..CLOUD {
+        advance(map, &mut x)?;
+        for (v, (l, h)) in x.iter().zip(low.iter_mut().zip(&mut high)) {
+            *l = l.min(*v);
+            *h = h.max(*v);
+        }
+    }
+    for (l, h) in low.iter_mut().zip(&mut high) {
+        let margin = 0.05 * (*h - *l);
+        *l -= margin;
+        *h += margin;
+    }
+    Ok((low, high))
+}

@@ -1,0 +1,222 @@
+//! The census, its fractions, its claims about chaos, and the list of unstable orbits.
+
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use nanotap_dynamics::{
+    AttractorKind, Census, CensusOptions, Control, Fate, LyapunovOptions, Neighbourhood,
+    OrbitSearch, SettleOptions, StartBox, census, find_orbits,
+};
+use rayon::ThreadPoolBuilder;
+
+use crate::systems::{Cubic, Focus, Formula, Henon, Logistic, OpenTent, System};
+
+fn starts(low: &[f64], high: &[f64], count: usize) -> Vec<Vec<f64>> {
+    StartBox::new(low.to_vec(), high.to_vec())
+        .unwrap()
+        .starts(1, count)
+}
+
+fn taken<F: Formula>(system: F, starts: &[Vec<f64>], options: &CensusOptions) -> Census {
+    census(&System(system), starts, options, &Control::default())
+}
+
+/// Two mirror-image attractors share a mirror-image box evenly; what starts beyond
+/// √(r+1) runs off: (2.5 − √2.5)/2.5 of [−2.5, 2.5] at r = 1.5.
+#[test]
+fn fractions_match_the_exact_basins() {
+    let result = taken(
+        Cubic(1.5),
+        &starts(&[-2.5], &[2.5], 1000),
+        &CensusOptions::default(),
+    );
+    assert_eq!(result.attractors.len(), 2);
+    let lost = 1.0 - 2.5f64.sqrt() / 2.5;
+    assert!((result.unbounded.estimate - lost).abs() < 2e-3);
+    for attractor in &result.attractors {
+        let AttractorKind::Periodic(orbit) = &attractor.kind else {
+            panic!()
+        };
+        assert!((orbit.states[0][0].abs() - 0.5f64.sqrt()).abs() < 1e-15);
+        let expected = 0.5 * (1.0 - lost);
+        assert!(attractor.fraction.low < expected && expected < attractor.fraction.high);
+    }
+    assert!(result.undecided.is_empty());
+    assert!(result.transient_chaos.is_none());
+}
+
+/// The same bits on one thread and on four, and with the pilots changed.
+#[test]
+fn the_result_does_not_depend_on_threads_or_pilots() {
+    let points = starts(&[-1.5, -0.5], &[1.5, 0.5], 60);
+    let on = |threads: usize, pilots: usize| {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let options = CensusOptions {
+            pilots,
+            ..CensusOptions::default()
+        };
+        pool.install(|| taken(Henon { a: 0.9, b: 0.3 }, &points, &options))
+    };
+    let one = on(1, 32);
+    assert_eq!(format!("{one:?}"), format!("{:?}", on(4, 32)));
+    let fewer = on(2, 5);
+    let counts =
+        |c: &Census| -> Vec<usize> { c.attractors.iter().map(|a| a.fraction.count).collect() };
+    assert_eq!(counts(&one), counts(&fewer));
+}
+
+/// Hénon's attractor: one chaotic attractor, no escape, the rest runs off.
+#[test]
+fn chaos_is_claimed_with_a_pooled_bound() {
+    let result = taken(
+        Henon { a: 1.4, b: 0.3 },
+        &starts(&[-0.5, -0.2], &[0.5, 0.2], 40),
+        &CensusOptions::default(),
+    );
+    assert_eq!(result.attractors.len(), 1);
+    let AttractorKind::Chaotic { spectrum, lifetime } = &result.attractors[0].kind else {
+        panic!()
+    };
+    let (largest, error) = spectrum.largest();
+    assert!((largest - 0.41922).abs() < 5.0 * error);
+    let watched: usize = result
+        .fates
+        .iter()
+        .map(|f| match f {
+            Fate::Attractor { periods, .. } => *periods,
+            _ => 0,
+        })
+        .sum();
+    assert_eq!(lifetime.escapes, 0);
+    assert!(lifetime.low > 0.2 * watched as f64 && lifetime.low < watched as f64 / 2.99);
+    assert!(result.transient_chaos.is_none());
+}
+
+/// Geometric lifetimes of mean 1/ln(s/2) = 1/ln 1.001 ≈ 1000.5: some escape, some
+/// wander, and nothing chaotic is called an attractor.
+#[test]
+fn transient_chaos_has_its_exact_lifetime() {
+    let options = CensusOptions {
+        settle: SettleOptions {
+            lyapunov: LyapunovOptions {
+                min_periods: 1500,
+                max_periods: 1500,
+                ..LyapunovOptions::default()
+            },
+            ..SettleOptions::default()
+        },
+        ..CensusOptions::default()
+    };
+    let result = taken(OpenTent(2.002), &starts(&[0.0], &[1.0], 400), &options);
+    assert_eq!(result.attractors.len(), 1);
+    let transient = result.transient_chaos.unwrap();
+    let exact = 1.0 / 1.001f64.ln();
+    assert!(
+        transient.lifetime.low < exact && exact < transient.lifetime.high,
+        "{transient:?}"
+    );
+    assert!((transient.lifetime.mean / exact - 1.0).abs() < 0.15);
+    assert!(transient.wandering.count > 0);
+    assert_eq!(
+        transient.destinations,
+        vec![(0, transient.lifetime.escapes)]
+    );
+    assert!((transient.spectrum.largest().0 - 2.002f64.ln()).abs() < 1e-12);
+}
+
+/// A slow focus is one periodic attractor, not a transient of some long kind.
+#[test]
+fn slow_decay_is_no_transient_chaos() {
+    let result = taken(
+        Focus {
+            radius: 0.999,
+            angle: 1.0,
+        },
+        &starts(&[-5.0, -5.0], &[5.0, 5.0], 50),
+        &CensusOptions::default(),
+    );
+    assert_eq!(result.attractors.len(), 1);
+    assert_eq!(result.attractors[0].fraction.count, 50);
+    assert!(result.transient_chaos.is_none());
+}
+
+#[test]
+fn a_cancelled_census_says_so_and_progress_is_heard() {
+    let cancel = AtomicBool::new(true);
+    let control = Control {
+        cancel: Some(&cancel),
+        progress: None,
+    };
+    let points = starts(&[0.0], &[1.0], 10);
+    let result = census(
+        &System(Logistic(3.2)),
+        &points,
+        &CensusOptions::default(),
+        &control,
+    );
+    assert!(result.cancelled);
+    assert_eq!(result.undecided.len(), 10);
+    let heard = Mutex::new(Vec::new());
+    let progress = |done, total| heard.lock().unwrap().push((done, total));
+    let control = Control {
+        cancel: None,
+        progress: Some(&progress),
+    };
+    let result = census(
+        &System(Logistic(3.2)),
+        &points,
+        &CensusOptions::default(),
+        &control,
+    );
+    assert!(!result.cancelled);
+    let mut heard = heard.into_inner().unwrap();
+    heard.sort_unstable();
+    assert_eq!(heard, (1..=10).map(|k| (k, 10)).collect::<Vec<_>>());
+}
+
+/// The logistic map at r = 4 has exactly 2, 1, 2, 3, 6 orbits of period 1 … 5
+/// (Moreau's necklace count of 2ⁿ points).
+#[test]
+fn every_orbit_of_the_full_logistic_map_is_found() {
+    let search = OrbitSearch {
+        max_period: 5,
+        ..OrbitSearch::default()
+    };
+    let points = starts(&[0.0], &[1.0], 200);
+    let orbits = find_orbits(
+        &System(Logistic(4.0)),
+        &points,
+        &search,
+        &Control::default(),
+    );
+    let counts: Vec<usize> = (1..=5)
+        .map(|n| orbits.iter().filter(|o| o.period == n).count())
+        .collect();
+    assert_eq!(counts, [2, 1, 2, 3, 6]);
+    // All multipliers are ±2ⁿ but that of the fixed point 0, which is 4.
+    for orbit in &orbits {
+        let expected = if orbit.scale() < 1e-12 {
+            4.0
+        } else {
+            2f64.powi(orbit.period as i32)
+        };
+        assert!((orbit.spectral_radius() / expected - 1.0).abs() < 1e-9);
+    }
+}
+
+/// The ball of the cubic map at x* = √(r−1) contracts where |f'| < 1, that is for
+/// x² > (r−1)/3 and x² < (r+1)/3; no larger ball may pass.
+#[test]
+fn neighbourhoods_stay_within_the_contracting_interval() {
+    let mut map = System(Cubic(1.5));
+    let orbit = nanotap_dynamics::close_orbit(&mut map, &[0.7], 1, &Default::default()).unwrap();
+    let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+    let half = ball.extents()[0];
+    let centre = 0.5f64.sqrt();
+    // |f'| ≤ 3/4, as the rate asks, holds within 0.159; halvings may lose a factor 4.
+    assert!(half > 0.159 / 4.0, "{half}");
+    assert!(centre - half > (0.5f64 / 3.0).sqrt() && centre + half < (2.5f64 / 3.0).sqrt());
+}

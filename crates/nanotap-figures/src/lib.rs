@@ -1,1 +1,53 @@
-//! placeholder
+//! Publication figures: one data model, written as SVG, PNG and PDF.
+//!
+//! A [`Figure`] holds [`Panel`]s in a grid; a panel has two [`Axis`] and layers ([`Line`],
+//! [`Points`], [`Markers`], [`Heatmap`] …). Sizes are those of the printed page. Nothing depends on
+//! the machine: the typeface travels with the program, letters are drawn as shapes in every format,
+//! and the same figure gives the same bytes.
+//!
+//! ```
+//! use nanotap_figures::{Axis, Figure, Line, Panel};
+//!
+//! let wave = (0..=200).map(|i| f64::from(i) / 200.0).map(|t| (t, (6.28 * t).sin()));
+//! let panel = Panel::new(Axis::linear("τ / T").tight(), Axis::linear("$W$"))
+//!     .with(Line::new(wave).label("tip"));
+//! let svg = Figure::single(panel).to_svg()?;
+//! assert!(svg.contains("aria-label=\"τ / T\""));
+//! # Ok::<(), nanotap_figures::FigureError>(())
+//! ```
+//!
+//! What is not finite, or not positive on a logarithmic axis, is a gap. A panel without anything to
+//! draw says "no data".
+
+mod axis;
+mod cloud;
+mod colour;
+mod draw;
+mod error;
+mod figure;
+mod font;
+mod layer;
+mod layout;
+mod legend;
+mod marks;
+mod panel;
+mod pdf;
+mod pixels;
+mod polyline;
+mod prepared;
+mod raster;
+mod scene;
+mod style;
+mod svg;
+mod text;
+pub mod ticks;
+
+pub use axis::Axis;
+pub use colour::{Colour, Colourmap, LINES, category};
+pub use error::FigureError;
+pub use figure::{DOUBLE_COLUMN, DPI, Figure, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
+pub use layer::{
+    Band, Bars, CategoryMap, Dash, Heatmap, Layer, Line, Markers, Note, Place, Points, Rule, Shape,
+    Side, Stems,
+};
+pub use panel::{Legend, Panel};

@@ -1,0 +1,331 @@
+//! Axes: labels, scales and ranges.
+
+use crate::error::FigureError;
+use crate::ticks::{self, Ticks};
+
+/// Numbers beyond this count as infinite: differences and logarithms stay safe.
+const LARGEST: f64 = 1e300;
+/// Share of the range left free on either side of the data.
+const PADDING: f64 = 0.04;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scale {
+    Linear,
+    Log,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Range {
+    Auto,
+    Tight,
+    Fixed(f64, f64),
+}
+
+/// One axis: its label with the unit, its scale and its range.
+///
+/// Labels are plain text ("Ω", "τ / T", "a₁") with a little markup: `_{…}` lowers and `^{…}` raises;
+/// between dollar signs letters are italic as variables are, and `_x` and `^x` need no braces
+/// (`"$a_1$ (nm)"`); a backslash takes the next character as it is.
+#[derive(Debug, Clone, PartialEq)]
+#[must_use]
+pub struct Axis {
+    pub(crate) label: String,
+    pub(crate) scale: Scale,
+    pub(crate) range: Range,
+    pub(crate) marks: Option<Vec<(f64, String)>>,
+}
+
+impl Axis {
+    /// A linear axis that holds all data with a little room around it.
+    pub fn linear(label: impl Into<String>) -> Axis {
+        Axis {
+            label: label.into(),
+            scale: Scale::Linear,
+            range: Range::Auto,
+            marks: None,
+        }
+    }
+
+    /// A logarithmic axis that holds all positive data; the rest are gaps.
+    pub fn log(label: impl Into<String>) -> Axis {
+        Axis {
+            scale: Scale::Log,
+            ..Axis::linear(label)
+        }
+    }
+
+    /// Runs from `from` to `to` whatever the data; backwards if `from > to`. Both must be finite,
+    /// different, and positive on a logarithmic axis, or the figure is refused.
+    pub fn range(mut self, from: f64, to: f64) -> Axis {
+        self.range = Range::Fixed(from, to);
+        self
+    }
+
+    /// Ends exactly where the data end.
+    pub fn tight(mut self) -> Axis {
+        self.range = Range::Tight;
+        self
+    }
+
+    /// Marks at the given values with the given words, instead of round numbers.
+    pub fn marks<S: Into<String>>(mut self, marks: impl IntoIterator<Item = (f64, S)>) -> Axis {
+        self.marks = Some(marks.into_iter().map(|(v, s)| (v, s.into())).collect());
+        self
+    }
+
+    /// Whether a value has a place on such an axis.
+    pub(crate) fn holds(&self, value: f64) -> bool {
+        value.is_finite()
+            && value.abs() <= LARGEST
+            && (self.scale == Scale::Linear || value >= 1.0 / LARGEST)
+    }
+
+    pub(crate) fn check(&self) -> Result<(), FigureError> {
+        let Range::Fixed(from, to) = self.range else {
+            return Ok(());
+        };
+        let refuse = |reason| {
+            Err(FigureError::Range {
+                axis: self.label.clone(),
+                from,
+                to,
+                reason,
+            })
+        };
+        if !(from.is_finite() && to.is_finite() && from.abs() <= LARGEST && to.abs() <= LARGEST) {
+            refuse("both ends must be finite and below 1e300 in size")
+        } else if self.scale == Scale::Log && from.min(to) < 1.0 / LARGEST {
+            refuse("a logarithmic axis needs ends above zero")
+        } else if indistinct(from.min(to), from.max(to)) {
+            refuse("its ends must differ by more than rounding")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The range to draw for data of the given extent.
+    pub(crate) fn view(&self, extent: Extent) -> View {
+        let log = self.scale == Scale::Log;
+        let (from, to) = match self.range {
+            Range::Fixed(from, to) => (from, to),
+            Range::Auto => extent.range(log, PADDING),
+            Range::Tight => extent.range(log, 0.0),
+        };
+        View { from, to, log }
+    }
+}
+
+/// Whether two ends are too near for a scale of floats between them.
+fn indistinct(low: f64, high: f64) -> bool {
+    high - low <= 1e-11 * low.abs().max(high.abs()) || high - low < 1e-290
+}
+
+/// How far the data of an axis reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extent {
+    /// Of data that want room around them.
+    soft: (f64, f64),
+    /// Of what the axis may end with: the feet of bars.
+    hard: (f64, f64),
+    /// Of maps: they fill the panel, and what lies beyond them is not shown.
+    whole: (f64, f64),
+}
+
+impl Extent {
+    pub(crate) const EMPTY: Extent = Extent {
+        soft: (f64::INFINITY, f64::NEG_INFINITY),
+        hard: (f64::INFINITY, f64::NEG_INFINITY),
+        whole: (f64::INFINITY, f64::NEG_INFINITY),
+    };
+
+    pub(crate) fn add(&mut self, value: f64) {
+        self.soft = (self.soft.0.min(value), self.soft.1.max(value));
+    }
+
+    pub(crate) fn add_edge(&mut self, value: f64) {
+        self.hard = (self.hard.0.min(value), self.hard.1.max(value));
+    }
+
+    pub(crate) fn add_map(&mut self, value: f64) {
+        self.whole = (self.whole.0.min(value), self.whole.1.max(value));
+    }
+
+    pub(crate) fn join(&mut self, other: Extent) {
+        for value in [other.soft.0, other.soft.1] {
+            if value.is_finite() {
+                self.add(value);
+            }
+        }
+        for value in [other.hard.0, other.hard.1] {
+            if value.is_finite() {
+                self.add_edge(value);
+            }
+        }
+        for value in [other.whole.0, other.whole.1] {
+            if value.is_finite() {
+                self.add_map(value);
+            }
+        }
+    }
+
+    fn range(self, log: bool, padding: f64) -> (f64, f64) {
+        if self.whole.0 < self.whole.1 {
+            return self.whole;
+        }
+        let low = self.soft.0.min(self.hard.0);
+        let high = self.soft.1.max(self.hard.1);
+        if low > high {
+            return if log { (1.0, 10.0) } else { (0.0, 1.0) };
+        }
+        if indistinct(low, high) {
+            return match (log, low == 0.0 || high.abs() < 1e-289) {
+                (true, _) => (low / 2.0, high * 2.0),
+                (false, true) => (-1.0, 1.0),
+                (false, false) => (low - 0.05 * low.abs(), high + 0.05 * high.abs()),
+            };
+        }
+        let below = if low < self.hard.0 { padding } else { 0.0 };
+        let above = if high > self.hard.1 { padding } else { 0.0 };
+        if log {
+            let ratio = (high.log10() - low.log10()).max(0.0);
+            (
+                low * 10f64.powf(-ratio * below),
+                high * 10f64.powf(ratio * above),
+            )
+        } else {
+            (low - below * (high - low), high + above * (high - low))
+        }
+    }
+}
+
+/// The part of an axis that is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct View {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) log: bool,
+}
+
+impl View {
+    /// Where a value lies: 0 at the start of the axis, 1 at its end; none if it has no place.
+    pub(crate) fn share(self, value: f64) -> Option<f64> {
+        if !value.is_finite() || (self.log && value <= 0.0) {
+            return None;
+        }
+        let share = if self.log {
+            (value.ln() - self.from.ln()) / (self.to.ln() - self.from.ln())
+        } else {
+            (value - self.from) / (self.to - self.from)
+        };
+        // Far outside is as good as anywhere outside; drawing needs finite places.
+        share.is_finite().then(|| share.clamp(-1e6, 1e6))
+    }
+
+    pub(crate) fn ticks(self, most: usize) -> Ticks {
+        let (low, high) = (self.from.min(self.to), self.from.max(self.to));
+        if self.log {
+            ticks::logarithmic(low, high, most)
+        } else {
+            ticks::linear(low, high, most)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(axis: &Axis, values: &[f64]) -> View {
+        let mut extent = Extent::EMPTY;
+        values
+            .iter()
+            .filter(|v| axis.holds(**v))
+            .for_each(|v| extent.add(*v));
+        axis.view(extent)
+    }
+
+    #[test]
+    fn ranges_without_width_are_widened() {
+        for values in [
+            &[3.0][..],
+            &[0.0, 0.0],
+            &[-1e-12],
+            &[1.0, 1.0 + 1e-13],
+            &[1e300],
+            &[],
+        ] {
+            for axis in [Axis::linear("x"), Axis::log("x"), Axis::linear("x").tight()] {
+                let v = view(&axis, values);
+                assert!(
+                    v.to > v.from && v.from.is_finite() && v.to.is_finite(),
+                    "{values:?} {v:?}"
+                );
+                assert!(!v.ticks(5).positions.is_empty(), "{values:?} {v:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn room_is_left_around_data_but_not_around_areas() {
+        assert_eq!(
+            view(&Axis::linear("x"), &[0.0, 1.0]),
+            View {
+                from: -0.04,
+                to: 1.04,
+                log: false
+            }
+        );
+        assert_eq!(
+            view(&Axis::linear("x").tight(), &[0.0, 1.0]),
+            View {
+                from: 0.0,
+                to: 1.0,
+                log: false
+            }
+        );
+        let mut extent = Extent::EMPTY;
+        extent.add_edge(0.0);
+        extent.add_edge(2.0);
+        extent.add(1.0);
+        assert_eq!(
+            Axis::linear("x").view(extent),
+            View {
+                from: 0.0,
+                to: 2.0,
+                log: false
+            }
+        );
+        extent.add_map(5.0);
+        extent.add_map(6.0);
+        assert_eq!(
+            Axis::linear("x").view(extent),
+            View {
+                from: 5.0,
+                to: 6.0,
+                log: false
+            }
+        );
+    }
+
+    #[test]
+    fn impossible_ranges_are_refused_with_a_reason() {
+        for (axis, words) in [
+            (Axis::linear("x").range(1.0, 1.0), "differ"),
+            (Axis::linear("x").range(f64::NAN, 1.0), "finite"),
+            (Axis::log("x").range(0.0, 1.0), "above zero"),
+        ] {
+            assert!(axis.check().unwrap_err().to_string().contains(words));
+        }
+        assert!(Axis::linear("x").range(2.0, -1.0).check().is_ok());
+    }
+
+    #[test]
+    fn shares() {
+        let log = Axis::log("x").range(1.0, 100.0).view(Extent::EMPTY);
+        assert!((log.share(10.0).unwrap() - 0.5).abs() < 1e-15);
+        assert_eq!(log.share(-1.0), None);
+        let backwards = Axis::linear("x").range(4.0, 0.0).view(Extent::EMPTY);
+        assert_eq!(backwards.share(3.0), Some(0.25));
+        assert_eq!(backwards.share(f64::NAN), None);
+    }
+}

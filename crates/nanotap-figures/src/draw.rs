@@ -1,0 +1,729 @@
+//! Panels drawn onto the page.
+
+use crate::cloud::Cloud;
+use crate::colour::Colour;
+use crate::layer::{CategoryMap, Heatmap, Layer, Line, Markers, Note, Place, Points, Shape, Side};
+use crate::layout::{self, Spot};
+use crate::legend;
+use crate::marks::Marks;
+use crate::polyline;
+use crate::prepared::{ColourBar, Frame, Prepared, category_colour, points_of};
+use crate::raster::Raster;
+use crate::scene::{Point, Rect, Scene, Segment, Stroke};
+use crate::style::{EDGE, INK, Style};
+use crate::text::{Across, MM_PER_POINT, PlacedWords, Upright, Words};
+
+/// Steps of a colour scale: a palette's worth.
+const STEPS: usize = 255;
+/// How far lines are followed beyond the box, so that their joints are not seen, mm.
+const BEYOND: f64 = 1.0;
+
+pub(crate) fn panel(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
+    let frame = prepared.frame(spot.rect);
+    scene.group("panel", &prepared.letter, |scene| {
+        let mut order: Vec<usize> = (0..prepared.panel.layers.len()).collect();
+        order.sort_by_key(|i| prepared.panel.layers[*i].depth());
+        if prepared.empty {
+            no_data(scene, spot.rect, style);
+        }
+        let mut bars = prepared.bars.iter();
+        for index in order {
+            let own = &prepared.panel.layers[index];
+            let bar = matches!(own, Layer::Heatmap(_))
+                .then(|| bars.next())
+                .flatten();
+            layer(
+                scene,
+                prepared,
+                &frame,
+                own,
+                prepared.colours[index],
+                bar,
+                style,
+            );
+        }
+        axes(scene, prepared, spot, style);
+        let mut edge = spot.rect.right;
+        for bar in &prepared.bars {
+            edge = colour_bar(scene, bar, spot.rect, edge, style);
+        }
+        headings(scene, prepared, spot, edge, style);
+    });
+}
+
+fn no_data(scene: &mut Scene, rect: Rect, style: &Style) {
+    let centre = Point::new(
+        f64::midpoint(rect.left, rect.right),
+        f64::midpoint(rect.top, rect.bottom),
+    );
+    let words = Words::set("no data", style.label, false);
+    scene.words(words.place(centre, Across::Centre, Upright::Middle, Colour::GREY));
+}
+
+fn layer(
+    scene: &mut Scene,
+    prepared: &Prepared,
+    frame: &Frame,
+    layer: &Layer,
+    colour: Colour,
+    bar: Option<&ColourBar>,
+    style: &Style,
+) {
+    match layer {
+        Layer::Line(line) => {
+            scene.group("line", &line.label, |s| draw_line(s, frame, line, colour))
+        }
+        Layer::Points(points) => {
+            scene.group("points", &points.label, |s| {
+                draw_points(s, frame, points, colour)
+            });
+        }
+        Layer::Markers(markers) => {
+            scene.group("markers", &markers.label, |s| {
+                draw_markers(s, frame, markers, colour)
+            });
+        }
+        Layer::Rule(rule) => scene.group("rule", &rule.label, |scene| {
+            let width = rule.width * MM_PER_POINT;
+            let stroke = Stroke {
+                dash: rule.dash.lengths(width),
+                ..Stroke::solid(width, colour)
+            };
+            let rect = frame.rect;
+            let ends = if rule.upright {
+                frame
+                    .across(rule.at)
+                    .map(|x| (Point::new(x, rect.bottom), Point::new(x, rect.top)))
+            } else {
+                frame
+                    .upright(rule.at)
+                    .map(|y| (Point::new(rect.left, y), Point::new(rect.right, y)))
+            };
+            if let Some((from, to)) = ends
+                && rect.contains(from)
+            {
+                scene.line(from, to, stroke);
+            }
+        }),
+        Layer::Band(band) => scene.group("band", &band.label, |scene| {
+            let mut outline = Vec::new();
+            for &(from, to) in &band.intervals {
+                outline.extend(
+                    band_area(frame, from, to, band.along_x)
+                        .into_iter()
+                        .flat_map(Rect::outline),
+                );
+            }
+            if !outline.is_empty() {
+                scene.fill(outline, colour, Some(frame.rect));
+            }
+        }),
+        Layer::Heatmap(map) => {
+            if let Some(bar) = bar {
+                scene.group("heatmap", &map.scale.label, |s| {
+                    draw_heatmap(s, frame, map, bar)
+                });
+            }
+        }
+        Layer::CategoryMap(map) => {
+            scene.group("categories", "", |s| draw_categories(s, frame, map));
+        }
+        Layer::Stems(stems) => scene.group("stems", &stems.label, |scene| {
+            let foot = frame
+                .upright(prepared.foot(layer))
+                .unwrap_or(frame.rect.bottom);
+            let tops: Vec<Point> = points_of(layer)
+                .iter()
+                .filter_map(|p| frame.place(*p))
+                .collect();
+            let lines: Vec<(Point, Point)> =
+                tops.iter().map(|p| (Point::new(p.x, foot), *p)).collect();
+            if !lines.is_empty() {
+                let stroke = Stroke::solid(0.8 * MM_PER_POINT, colour);
+                scene.stroke(legend::strokes(&lines), stroke, Some(frame.rect));
+            }
+            for top in tops.into_iter().filter(|p| frame.rect.contains(*p)) {
+                scene.fill(disc(top, 0.65), colour, None);
+            }
+        }),
+        Layer::Bars(bars) => scene.group("bars", &bars.label, |scene| {
+            let foot = frame
+                .upright(prepared.foot(layer))
+                .unwrap_or(frame.rect.bottom);
+            for &(x, y) in &bars.points {
+                let (Some(top), Some(left), Some(right)) = (
+                    frame.upright(y),
+                    frame.across(x - bars.width / 2.0),
+                    frame.across(x + bars.width / 2.0),
+                ) else {
+                    continue;
+                };
+                let area = Rect {
+                    left: left.min(right),
+                    right: left.max(right),
+                    top: top.min(foot),
+                    bottom: top.max(foot),
+                };
+                scene.fill(area.outline(), colour, Some(frame.rect));
+            }
+        }),
+        Layer::Note(note) => scene.group("note", "", |s| draw_note(s, frame, note, style)),
+    }
+}
+
+fn draw_line(scene: &mut Scene, frame: &Frame, line: &Line, colour: Colour) {
+    let width = line.width * MM_PER_POINT;
+    let points = line.points.iter().map(|p| frame.place(*p));
+    let parts = polyline::visible(points, frame.rect.grown(BEYOND));
+    if parts.is_empty() {
+        return;
+    }
+    let dash = line.dash.lengths(width);
+    let stroke = Stroke {
+        // Round ends let points between gaps show; dashes need cut ends to keep their lengths.
+        round: dash.is_empty(),
+        dash,
+        ..Stroke::solid(width, colour)
+    };
+    scene.stroke(polyline::segments(&parts), stroke, Some(frame.rect));
+}
+
+fn draw_points(scene: &mut Scene, frame: &Frame, points: &Points, colour: Colour) {
+    let radius = points.diameter / 2.0;
+    let bounds = frame.rect.grown(radius);
+    let visible: Vec<Point> = points
+        .points
+        .iter()
+        .filter_map(|p| frame.place(*p))
+        .filter(|p| bounds.contains(*p))
+        .collect();
+    if !visible.is_empty() {
+        scene.items.push(crate::scene::Item::Cloud(Cloud {
+            points: visible,
+            radius,
+            colour,
+            clip: frame.rect,
+        }));
+    }
+}
+
+fn draw_markers(scene: &mut Scene, frame: &Frame, markers: &Markers, colour: Colour) {
+    // A marker on the edge of the range must not be lost to rounding.
+    let bounds = frame.rect.grown(0.01);
+    for at in markers.points.iter().filter_map(|p| frame.place(*p)) {
+        if bounds.contains(at) {
+            marker(
+                scene,
+                at,
+                markers.shape,
+                markers.size,
+                colour,
+                markers.open,
+                markers.edge,
+            );
+        }
+    }
+}
+
+/// A circle.
+pub(crate) fn disc(centre: Point, radius: f64) -> Vec<Segment> {
+    // Four cubic arcs with the usual handle length come within 0.03 % of a circle.
+    let handle = 0.552_284_75 * radius;
+    let at = |x: f64, y: f64| Point::new(centre.x + x, centre.y + y);
+    vec![
+        Segment::Move(at(radius, 0.0)),
+        Segment::Cubic(at(radius, handle), at(handle, radius), at(0.0, radius)),
+        Segment::Cubic(at(-handle, radius), at(-radius, handle), at(-radius, 0.0)),
+        Segment::Cubic(at(-radius, -handle), at(-handle, -radius), at(0.0, -radius)),
+        Segment::Cubic(at(handle, -radius), at(radius, -handle), at(radius, 0.0)),
+        Segment::Close,
+    ]
+}
+
+/// A marker of the given size (mm); the shapes look equally large.
+pub(crate) fn marker(
+    scene: &mut Scene,
+    at: Point,
+    shape: Shape,
+    size: f64,
+    colour: Colour,
+    open: bool,
+    edge: bool,
+) {
+    let half = size / 2.0;
+    let p = |x: f64, y: f64| Point::new(at.x + x * half, at.y + y * half);
+    let polygon = |corners: &[(f64, f64)]| {
+        let mut segments: Vec<Segment> = corners
+            .iter()
+            .enumerate()
+            .map(|(i, &(x, y))| {
+                if i == 0 {
+                    Segment::Move(p(x, y))
+                } else {
+                    Segment::Line(p(x, y))
+                }
+            })
+            .collect();
+        segments.push(Segment::Close);
+        segments
+    };
+    let line = (0.18 * size).clamp(0.1, 0.4);
+    let outline = match shape {
+        Shape::Circle => disc(at, half),
+        Shape::Square => polygon(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)]),
+        Shape::Triangle => polygon(&[(0.0, -1.15), (1.05, 0.75), (-1.05, 0.75)]),
+        Shape::Diamond => polygon(&[(0.0, -1.25), (1.1, 0.0), (0.0, 1.25), (-1.1, 0.0)]),
+        Shape::Cross | Shape::Plus => {
+            let arms = if shape == Shape::Cross {
+                [(p(-0.8, -0.8), p(0.8, 0.8)), (p(-0.8, 0.8), p(0.8, -0.8))]
+            } else {
+                [(p(-1.1, 0.0), p(1.1, 0.0)), (p(0.0, -1.1), p(0.0, 1.1))]
+            };
+            if edge {
+                scene.stroke(
+                    legend::strokes(&arms),
+                    Stroke::solid(2.2 * line, Colour::WHITE),
+                    None,
+                );
+            }
+            scene.stroke(legend::strokes(&arms), Stroke::solid(line, colour), None);
+            return;
+        }
+    };
+    if edge {
+        scene.stroke(
+            outline.clone(),
+            Stroke::solid(3.0 * line, Colour::WHITE),
+            None,
+        );
+    }
+    if open {
+        scene.fill(outline.clone(), Colour::WHITE, None);
+        scene.stroke(outline, Stroke::solid(line, colour), None);
+    } else {
+        scene.fill(outline, colour, None);
+    }
+}
+
+fn band_area(frame: &Frame, from: f64, to: f64, along_x: bool) -> Option<Rect> {
+    if from.is_nan() || to.is_nan() {
+        return None;
+    }
+    let rect = frame.rect;
+    let (view, start, end) = if along_x {
+        (frame.x, rect.left, rect.right)
+    } else {
+        (frame.y, rect.bottom, rect.top)
+    };
+    // An end without a place (infinite, or below zero on a logarithmic axis) is the panel's edge.
+    let share = |value: f64| {
+        view.share(value).unwrap_or_else(|| {
+            let low = value == f64::NEG_INFINITY || value <= 0.0;
+            if low == (view.from < view.to) {
+                0.0
+            } else {
+                1.0
+            }
+        })
+    };
+    let at = |value: f64| start + share(value).clamp(0.0, 1.0) * (end - start);
+    let (a, b) = (at(from).min(at(to)), at(from).max(at(to)));
+    (b > a).then_some(if along_x {
+        Rect {
+            left: a,
+            right: b,
+            ..rect
+        }
+    } else {
+        Rect {
+            top: a,
+            bottom: b,
+            ..rect
+        }
+    })
+}
+
+fn draw_heatmap(scene: &mut Scene, frame: &Frame, map: &Heatmap, bar: &ColourBar) {
+    let palette: Vec<Colour> = (0..=STEPS)
+        .map(|i| map.map.at(i as f64 / STEPS as f64))
+        .collect();
+    let colour = |value: f64| {
+        if !bar.axis.holds(value) {
+            return Colour::WHITE.alpha(0.0);
+        }
+        let share = bar.view.share(value).unwrap_or(0.0).clamp(0.0, 1.0);
+        palette[(share * STEPS as f64).round() as usize]
+    };
+    let cells: Vec<Colour> = map.values.iter().map(|v| colour(*v)).collect();
+    grid(scene, frame, map.columns, &cells, map.x, map.y);
+}
+
+fn draw_categories(scene: &mut Scene, frame: &Frame, map: &CategoryMap) {
+    let palette: Vec<Colour> = (0..map.names.len())
+        .map(|i| category_colour(map, i))
+        .collect();
+    let cells: Vec<Colour> = map
+        .cells
+        .iter()
+        .map(|cell| {
+            cell.and_then(|c| palette.get(c).copied())
+                .unwrap_or(Colour::WHITE.alpha(0.0))
+        })
+        .collect();
+    grid(scene, frame, map.columns, &cells, map.x, map.y);
+}
+
+/// Draws cells given from the smallest x and y on.
+fn grid(
+    scene: &mut Scene,
+    frame: &Frame,
+    columns: usize,
+    cells: &[Colour],
+    x: (f64, f64),
+    y: (f64, f64),
+) {
+    let (Some(a), Some(b)) = (frame.place((x.0, y.0)), frame.place((x.1, y.1))) else {
+        return;
+    };
+    let mut rows: Vec<Vec<Colour>> = cells.chunks(columns).map(<[Colour]>::to_vec).collect();
+    // Pixels start at the top left, cells with the smallest y, which is mostly at the bottom.
+    if a.y > b.y {
+        rows.reverse();
+    }
+    if a.x > b.x {
+        rows.iter_mut().for_each(|row| row.reverse());
+    }
+    scene.items.push(crate::scene::Item::Raster(Raster {
+        rect: Rect {
+            left: a.x.min(b.x),
+            right: a.x.max(b.x),
+            top: a.y.min(b.y),
+            bottom: a.y.max(b.y),
+        },
+        clip: frame.rect,
+        columns,
+        rows: rows.len(),
+        pixels: rows.concat(),
+    }));
+}
+
+/// A place of a note on the page.
+pub(crate) fn note_point(frame: &Frame, place: Place) -> Option<Point> {
+    match place {
+        Place::Data(x, y) => frame.place((x, y)),
+        Place::Panel(x, y) if x.is_finite() && y.is_finite() => Some(Point::new(
+            frame.rect.left + x * frame.rect.width(),
+            frame.rect.bottom - y * frame.rect.height(),
+        )),
+        Place::Panel(..) => None,
+    }
+}
+
+/// The words of a note where they go: kept inside the panel if they start there.
+fn note_words(frame: &Frame, note: &Note, style: &Style) -> Option<PlacedWords> {
+    let at = note_point(frame, note.at)?;
+    let words = Words::set(&note.text, style.legend, false);
+    let gap = style.pad;
+    let (across, upright, dx, dy) = match note.side {
+        Side::Right => (Across::Left, Upright::Middle, gap, 0.0),
+        Side::Left => (Across::Right, Upright::Middle, -gap, 0.0),
+        Side::Above => (Across::Centre, Upright::Bottom, 0.0, -0.5 * gap),
+        Side::Below => (Across::Centre, Upright::Top, 0.0, gap),
+        Side::Centre => (Across::Centre, Upright::Middle, 0.0, 0.0),
+    };
+    let mut placed = words.place(
+        Point::new(at.x + dx, at.y + dy),
+        across,
+        upright,
+        note.colour,
+    );
+    let room = frame.rect.grown(-gap);
+    if frame.rect.contains(at) && placed.words.width <= room.width() {
+        placed.origin.x = placed
+            .origin
+            .x
+            .clamp(room.left, room.right - placed.words.width);
+        placed.origin.y = placed.origin.y.clamp(
+            room.top + placed.words.cap_height(),
+            room.bottom - placed.words.descent(),
+        );
+    }
+    Some(placed)
+}
+
+/// The box that a note's words fill.
+pub(crate) fn note_area(frame: &Frame, note: &Note, style: &Style) -> Option<Rect> {
+    let placed = note_words(frame, note, style)?;
+    (placed.words.width > 0.0).then(|| Rect {
+        left: placed.origin.x,
+        right: placed.origin.x + placed.words.width,
+        top: placed.origin.y - placed.words.cap_height(),
+        bottom: placed.origin.y + placed.words.descent(),
+    })
+}
+
+fn draw_note(scene: &mut Scene, frame: &Frame, note: &Note, style: &Style) {
+    if let (Some(from), Some(to)) = (
+        note_point(frame, note.at),
+        note.tip.and_then(|tip| note_point(frame, tip)),
+    ) {
+        arrow(scene, from, to, note.colour);
+    }
+    if let Some(placed) = note_words(frame, note, style) {
+        if !placed.words.runs.is_empty() {
+            // A white edge keeps the words readable over data.
+            let halo = Stroke {
+                round: true,
+                ..Stroke::solid(0.6, Colour::WHITE.alpha(0.8))
+            };
+            scene.stroke(placed.outline(), halo, None);
+        }
+        scene.words(placed);
+    }
+}
+
+fn arrow(scene: &mut Scene, from: Point, to: Point, colour: Colour) {
+    let length = from.distance(to);
+    if length < 1e-6 {
+        return;
+    }
+    let head = 1.5f64.min(length);
+    let (ux, uy) = ((to.x - from.x) / length, (to.y - from.y) / length);
+    let back = |along: f64, aside: f64| {
+        Point::new(
+            to.x - along * ux - aside * uy,
+            to.y - along * uy + aside * ux,
+        )
+    };
+    scene.line(
+        from,
+        back(0.8 * head, 0.0),
+        Stroke::solid(0.6 * MM_PER_POINT, colour),
+    );
+    scene.fill(
+        vec![
+            Segment::Move(to),
+            Segment::Line(back(head, 0.3 * head)),
+            Segment::Line(back(0.8 * head, 0.0)),
+            Segment::Line(back(head, -0.3 * head)),
+            Segment::Close,
+        ],
+        colour,
+        None,
+    );
+}
+
+/// The box, its marks, their words and the labels.
+fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
+    let rect = spot.rect;
+    scene.stroke(rect.outline(), Stroke::solid(style.axis, INK), None);
+    scene.group("axis-x", &prepared.panel.x.label, |scene| {
+        let mut beside = 0.0;
+        if prepared.marked(&prepared.panel.x) {
+            let marks = Marks::new(&prepared.panel.x, prepared.x, rect.width(), false, style);
+            let at = |share: f64| rect.left + share * rect.width();
+            let mut lines = mark_lines(&marks, style, |share, length| {
+                let x = at(share);
+                (
+                    Point::new(x, rect.bottom),
+                    Point::new(x, rect.bottom + length),
+                )
+            });
+            if !lines.is_empty() {
+                scene.stroke(
+                    std::mem::take(&mut lines),
+                    Stroke::solid(style.axis, INK),
+                    None,
+                );
+            }
+            if prepared.words_below {
+                let top = rect.bottom + style.mark + style.pad;
+                for (share, words) in marks.major {
+                    // Powers of ten stand taller than plain numbers: baselines agree nevertheless.
+                    let base = Point::new(at(share), top + 1.1 * words.cap_height());
+                    scene.words(words.place(base, Across::Centre, Upright::Baseline, INK));
+                }
+                if let Some(note) = marks.note {
+                    beside = note.width + style.gap;
+                    let base =
+                        rect.bottom + spot.sides.bottom_marks + style.pad + note.cap_height();
+                    scene.words(note.place(
+                        Point::new(rect.right, base),
+                        Across::Right,
+                        Upright::Baseline,
+                        INK,
+                    ));
+                }
+            }
+        }
+        if prepared.words_below {
+            let words = Words::set(&prepared.panel.x.label, style.label, false);
+            let base =
+                rect.bottom + spot.sides.bottom_marks + spot.sides.bottom_label - words.descent();
+            let room = if layout::shares_row(prepared, rect.width(), style) {
+                rect.right - beside
+            } else {
+                rect.right
+            };
+            let centre = f64::midpoint(rect.left, rect.right).min(room - words.width / 2.0);
+            scene.words(words.place(
+                Point::new(centre, base),
+                Across::Centre,
+                Upright::Baseline,
+                INK,
+            ));
+        }
+    });
+    scene.group("axis-y", &prepared.panel.y.label, |scene| {
+        if prepared.marked(&prepared.panel.y) {
+            let marks = Marks::new(&prepared.panel.y, prepared.y, rect.height(), true, style);
+            let at = |share: f64| rect.bottom - share * rect.height();
+            let lines = mark_lines(&marks, style, |share, length| {
+                let y = at(share);
+                (Point::new(rect.left, y), Point::new(rect.left - length, y))
+            });
+            if !lines.is_empty() {
+                scene.stroke(lines, Stroke::solid(style.axis, INK), None);
+            }
+            for (share, words) in marks.major {
+                let end = Point::new(rect.left - style.mark - style.pad, at(share));
+                scene.words(words.place(end, Across::Right, Upright::Middle, INK));
+            }
+            if let Some(note) = marks.note {
+                let corner = Point::new(rect.left, rect.top - style.pad);
+                scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
+            }
+        }
+        let words = Words::set(&prepared.panel.y.label, style.label, false);
+        let base = rect.left - spot.sides.left_marks - style.pad - words.descent();
+        let centre = f64::midpoint(rect.top, rect.bottom);
+        scene.words(words.place_upwards(
+            Point::new(base, centre),
+            Across::Centre,
+            Upright::Baseline,
+            INK,
+        ));
+    });
+}
+
+/// The small lines at an axis; `line` gives the ends for a share of the axis and a length.
+fn mark_lines(
+    marks: &Marks,
+    style: &Style,
+    line: impl Fn(f64, f64) -> (Point, Point),
+) -> Vec<Segment> {
+    let mut lines: Vec<(Point, Point)> = marks
+        .major
+        .iter()
+        .map(|(share, _)| line(*share, style.mark))
+        .collect();
+    lines.extend(
+        marks
+            .minor
+            .iter()
+            .map(|share| line(*share, style.minor_mark)),
+    );
+    legend::strokes(&lines)
+}
+
+/// Draws a colour bar right of `edge`; returns the new edge.
+fn colour_bar(scene: &mut Scene, bar: &ColourBar, panel: Rect, edge: f64, style: &Style) -> f64 {
+    let (gap, width) = layout::bar_shape(style);
+    let rect = Rect {
+        left: edge + gap,
+        right: edge + gap + width,
+        ..panel
+    };
+    let marks = Marks::new(bar.axis, bar.view, rect.height(), true, style);
+    let whole = layout::bar_width(&marks, &bar.axis.label, style);
+    scene.group("colour-bar", &bar.axis.label, |scene| {
+        let pixels = (0..=STEPS)
+            .rev()
+            .map(|i| bar.map.at(i as f64 / STEPS as f64))
+            .collect();
+        scene.items.push(crate::scene::Item::Raster(Raster {
+            rect,
+            clip: rect,
+            columns: 1,
+            rows: STEPS + 1,
+            pixels,
+        }));
+        scene.stroke(rect.outline(), Stroke::solid(style.axis, INK), None);
+        let at = |share: f64| rect.bottom - share * rect.height();
+        let lines = mark_lines(&marks, style, |share, length| {
+            let y = at(share);
+            (
+                Point::new(rect.right, y),
+                Point::new(rect.right + length, y),
+            )
+        });
+        if !lines.is_empty() {
+            scene.stroke(lines, Stroke::solid(style.axis, INK), None);
+        }
+        let left = rect.right + style.mark + style.pad;
+        for (share, words) in marks.major {
+            scene.words(words.place(
+                Point::new(left, at(share)),
+                Across::Left,
+                Upright::Middle,
+                INK,
+            ));
+        }
+        if let Some(note) = marks.note {
+            let corner = Point::new(rect.left, rect.top - style.pad);
+            scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
+        }
+        let words = Words::set(&bar.axis.label, style.label, false);
+        let base = edge + whole - words.descent();
+        let centre = f64::midpoint(rect.top, rect.bottom);
+        scene.words(words.place_upwards(
+            Point::new(base, centre),
+            Across::Centre,
+            Upright::Baseline,
+            INK,
+        ));
+    });
+    edge + whole
+}
+
+/// Legend, title and letter. `edge` is the right end of the colour bars.
+fn headings(scene: &mut Scene, prepared: &Prepared, spot: &Spot, edge: f64, style: &Style) {
+    let rect = spot.rect;
+    let marks = Marks::new(&prepared.panel.y, prepared.y, rect.height(), true, style);
+    let mut above = rect.top - style.pad;
+    if prepared.marked(&prepared.panel.y)
+        && let Some(note) = marks.note
+    {
+        above -= note.cap_height() + note.descent() + style.pad;
+    }
+    legend::draw(
+        scene,
+        prepared,
+        spot.stand,
+        rect,
+        above,
+        edge + 2.0 * style.pad,
+        style,
+    );
+    // Letters and titles of a row stand on one line, however much lies between them and their box.
+    let cap = Words::set("H", style.title, true).cap_height();
+    let base = rect.top - spot.sides.top + EDGE / 2.0 + cap;
+    if !prepared.panel.title.is_empty() {
+        let words = Words::set(&prepared.panel.title, style.title, false);
+        scene.words(words.place(
+            Point::new(rect.left, base),
+            Across::Left,
+            Upright::Baseline,
+            INK,
+        ));
+    }
+    if !prepared.letter.is_empty() {
+        let words = Words::set(&prepared.letter, style.title, true);
+        let outer = rect.left - spot.sides.left_marks - spot.sides.left_label + EDGE / 2.0;
+        // Left of the box, clear of the title, but on the page.
+        let left = outer
+            .min(rect.left - words.width - style.pad)
+            .max(EDGE / 2.0);
+        scene.words(words.place(Point::new(left, base), Across::Left, Upright::Baseline, INK));
+    }
+}

@@ -1,0 +1,380 @@
+//! The figure: panels in a grid, and the doors to every format.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::axis::Extent;
+use crate::draw;
+use crate::error::FigureError;
+use crate::layout::{self, Grid};
+use crate::panel::Panel;
+use crate::prepared::{Prepared, extents};
+use crate::scene::{Point, Rect, Scene};
+use crate::style::{EDGE, INK, Style};
+use crate::text::{Across, Upright, Words};
+use crate::{pdf, pixels, svg};
+
+/// Width of one column of a journal page, mm.
+pub const SINGLE_COLUMN: f64 = 86.0;
+/// Width of one and a half columns, mm.
+pub const ONE_AND_A_HALF_COLUMNS: f64 = 129.0;
+/// Width of two columns, mm.
+pub const DOUBLE_COLUMN: f64 = 178.0;
+
+/// Resolution of PNG files, dots per inch.
+pub const DPI: f64 = 300.0;
+
+/// Most pixels of a picture.
+const MOST_PIXELS: f64 = 2e8;
+
+/// Panels in a grid.
+///
+/// The same figure always gives the same bytes. Letters are shapes in every format, so that it looks
+/// the same on every machine.
+#[derive(Debug, Clone, PartialEq)]
+#[must_use]
+pub struct Figure {
+    rows: usize,
+    cols: usize,
+    width: f64,
+    height: Option<f64>,
+    widths: Vec<f64>,
+    heights: Vec<f64>,
+    title: String,
+    caption: String,
+    letters: bool,
+    share_x: bool,
+    text_scale: f64,
+    panels: Vec<Panel>,
+}
+
+impl Figure {
+    /// A figure of one column's width with `rows` × `cols` cells, still empty.
+    pub fn new(rows: usize, cols: usize) -> Figure {
+        Figure {
+            rows,
+            cols,
+            width: SINGLE_COLUMN,
+            height: None,
+            widths: Vec::new(),
+            heights: Vec::new(),
+            title: String::new(),
+            caption: String::new(),
+            letters: rows.saturating_mul(cols) > 1,
+            share_x: false,
+            text_scale: 1.0,
+            panels: Vec::new(),
+        }
+    }
+
+    /// A figure of a single panel, one column wide.
+    pub fn single(panel: Panel) -> Figure {
+        Figure::new(1, 1).with(panel)
+    }
+
+    /// Adds the panel of the next cell, row by row.
+    pub fn with(mut self, panel: Panel) -> Figure {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Width in mm, as printed ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`], [`DOUBLE_COLUMN`]).
+    pub fn width(mut self, mm: f64) -> Figure {
+        self.width = mm;
+        self
+    }
+
+    /// Height in mm; without it, panels are about two thirds as high as wide.
+    pub fn height(mut self, mm: f64) -> Figure {
+        self.height = Some(mm);
+        self
+    }
+
+    /// Relative widths of the columns.
+    pub fn column_widths(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
+        self.widths = shares.into_iter().collect();
+        self
+    }
+
+    /// Relative heights of the rows.
+    pub fn row_heights(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
+        self.heights = shares.into_iter().collect();
+        self
+    }
+
+    /// Words above the whole figure, and the title of the file.
+    pub fn title(mut self, title: impl Into<String>) -> Figure {
+        self.title = title.into();
+        self
+    }
+
+    /// Words below the whole figure, broken into lines.
+    pub fn caption(mut self, caption: impl Into<String>) -> Figure {
+        self.caption = caption.into();
+        self
+    }
+
+    /// Whether panels are lettered (a), (b) …: by default where there is more than one cell.
+    pub fn letters(mut self, letters: bool) -> Figure {
+        self.letters = letters;
+        self
+    }
+
+    /// Gives the panels of each column the same horizontal range, named below the lowest only.
+    pub fn share_x(mut self) -> Figure {
+        self.share_x = true;
+        self
+    }
+
+    /// Makes letters and marks `factor` times as large, as slides want them.
+    pub fn text_scale(mut self, factor: f64) -> Figure {
+        self.text_scale = factor;
+        self
+    }
+
+    /// Writes the figure in the format that the path's ending names: `.svg`, `.png` (300 dots per
+    /// inch) or `.pdf`. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// If the ending names no format, the figure cannot be drawn, or the file cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FigureError> {
+        let path = path.as_ref();
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let bytes = match ending.as_deref() {
+            Some("svg") => self.to_svg()?.into_bytes(),
+            Some("png") => self.to_png(DPI)?,
+            Some("pdf") => self.to_pdf()?,
+            _ => {
+                return Err(FigureError::UnknownEnding {
+                    path: path.to_path_buf(),
+                });
+            }
+        };
+        write_whole(path, &bytes).map_err(|source| FigureError::Write {
+            path: path.to_path_buf(),
+            source,
+        })
+    }
+
+    /// The figure as SVG. It may stand in an HTML page beside others.
+    ///
+    /// # Errors
+    /// If the figure cannot be drawn.
+    pub fn to_svg(&self) -> Result<String, FigureError> {
+        Ok(svg::write(&self.scene()?))
+    }
+
+    /// The figure as PNG of `dpi` dots per inch.
+    ///
+    /// # Errors
+    /// If the figure cannot be drawn, or not at this resolution.
+    pub fn to_png(&self, dpi: f64) -> Result<Vec<u8>, FigureError> {
+        let scene = self.scene()?;
+        let count = scene.width * scene.height * (dpi / 25.4).powi(2);
+        if !(10.0..=2400.0).contains(&dpi) || count > MOST_PIXELS {
+            return Err(FigureError::Resolution { dpi });
+        }
+        pixels::write(&scene, dpi).ok_or(FigureError::Resolution { dpi })
+    }
+
+    /// The figure as PDF of one page, to be included in a paper.
+    ///
+    /// # Errors
+    /// If the figure cannot be drawn.
+    pub fn to_pdf(&self) -> Result<Vec<u8>, FigureError> {
+        Ok(pdf::write(&self.scene()?))
+    }
+
+    fn check(&self) -> Result<(), FigureError> {
+        let cells = self.rows.saturating_mul(self.cols);
+        if !(1..=400).contains(&cells) || self.panels.len() > cells {
+            return Err(FigureError::Grid {
+                rows: self.rows,
+                cols: self.cols,
+                panels: self.panels.len(),
+            });
+        }
+        let sensible = |length: f64| (10.0..=2000.0).contains(&length);
+        if !sensible(self.width) || !sensible(self.full_height()) {
+            return Err(FigureError::Size {
+                width_mm: self.width,
+                height_mm: self.full_height(),
+            });
+        }
+        if !(0.2..=10.0).contains(&self.text_scale) {
+            return Err(FigureError::Length {
+                what: "a text scale (0.2 to 10)",
+                given: self.text_scale,
+            });
+        }
+        for (what, given, expected) in [
+            ("widths", &self.widths, self.cols),
+            ("heights", &self.heights, self.rows),
+        ] {
+            let right = given.len() == expected && given.iter().all(|s| s.is_finite() && *s > 0.0);
+            if !(given.is_empty() || right) {
+                return Err(FigureError::Ratios {
+                    what,
+                    given: given.clone(),
+                    expected,
+                });
+            }
+        }
+        self.panels.iter().try_for_each(Panel::check)
+    }
+
+    fn full_height(&self) -> f64 {
+        self.height.unwrap_or_else(|| {
+            let panel = 0.68 * self.width / self.cols.max(1) as f64;
+            panel.clamp(42.0, 90.0) * self.rows as f64
+        })
+    }
+
+    fn scene(&self) -> Result<Scene, FigureError> {
+        self.check()?;
+        let style = Style::scaled(self.text_scale);
+        let panels = self.prepared();
+        let mut scene = Scene {
+            width: self.width,
+            height: self.full_height(),
+            title: Words::set(&self.title, style.title, true).plain,
+            items: Vec::new(),
+        };
+        let mut area = Rect {
+            left: EDGE,
+            top: EDGE,
+            right: self.width - EDGE,
+            bottom: scene.height - EDGE,
+        };
+        if !self.title.is_empty() {
+            let words = Words::set(&self.title, style.title, true);
+            let centre = Point::new(self.width / 2.0, area.top);
+            area.top += words.cap_height() + words.descent() + 2.0 * style.pad;
+            scene.words(words.place(centre, Across::Centre, Upright::Top, INK));
+        }
+        let lines = wrapped(&self.caption, area.width(), &style);
+        if !lines.is_empty() {
+            area.bottom -= lines.len() as f64 * style.line() + style.pad;
+        }
+        for (number, line) in lines.into_iter().enumerate() {
+            let top = area.bottom + style.pad + (number as f64 + 0.2) * style.line();
+            let at = Point::new(area.left, top);
+            scene.words(line.place(at, Across::Left, Upright::Top, INK));
+        }
+        let shares = |given: &[f64], count: usize| {
+            if given.is_empty() {
+                vec![1.0; count]
+            } else {
+                given.to_vec()
+            }
+        };
+        let grid = Grid {
+            rows: self.rows,
+            cols: self.cols,
+            widths: &shares(&self.widths, self.cols),
+            heights: &shares(&self.heights, self.rows),
+            area,
+        };
+        let spots = layout::spots(&panels, &grid, &style)?;
+        for (panel, spot) in panels.iter().zip(&spots) {
+            draw::panel(&mut scene, panel, spot, &style);
+        }
+        Ok(scene)
+    }
+
+    fn prepared(&self) -> Vec<Prepared<'_>> {
+        let own: Vec<Extent> = self.panels.iter().map(|p| extents(p).0).collect();
+        self.panels
+            .iter()
+            .enumerate()
+            .map(|(index, panel)| {
+                let letter = panel.letter.clone().unwrap_or_else(|| {
+                    if self.letters {
+                        letter(index)
+                    } else {
+                        String::new()
+                    }
+                });
+                let mut x = own[index];
+                if self.share_x {
+                    own.iter()
+                        .skip(index % self.cols)
+                        .step_by(self.cols)
+                        .for_each(|e| x.join(*e));
+                }
+                let below = index + self.cols < self.panels.len();
+                Prepared::new(panel, letter, x, !(self.share_x && below))
+            })
+            .collect()
+    }
+}
+
+/// (a) … (z), (aa) …
+fn letter(index: usize) -> String {
+    let mut rest = index;
+    let mut name = String::new();
+    loop {
+        name.insert(0, char::from(b'a' + (rest % 26) as u8));
+        if rest < 26 {
+            return format!("({name})");
+        }
+        rest = rest / 26 - 1;
+    }
+}
+
+/// Breaks words into lines of at most `width` mm.
+fn wrapped(text: &str, width: f64, style: &Style) -> Vec<Words> {
+    let set = |line: &str| Words::set(line, style.legend, false);
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            // A line must not end between two dollar signs.
+            Some(line)
+                if line.matches('$').count() % 2 == 1
+                    || set(&format!("{line} {word}")).width <= width =>
+            {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_string()),
+        }
+    }
+    lines.iter().map(|line| set(line)).collect()
+}
+
+/// Writes under a temporary name in the same folder, then renames.
+fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.tmp", std::process::id()));
+    let temporary: PathBuf = path.with_file_name(name);
+    fs::write(&temporary, bytes)
+        .and_then(|()| fs::rename(&temporary, path))
+        .inspect_err(|_| {
+            // What is half written is of no use; that it may not be there is fine.
+            let _ = fs::remove_file(&temporary);
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_go_on_after_z() {
+        assert_eq!(letter(0), "(a)");
+        assert_eq!(letter(25), "(z)");
+        assert_eq!(letter(26), "(aa)");
+        assert_eq!(letter(27), "(ab)");
+    }
+
+    #[test]
+    fn captions_are_broken_into_lines_that_fit() {
+        let style = Style::scaled(1.0);
+        let lines = wrapped(&"word ".repeat(60), 80.0, &style);
+        assert!(lines.len() > 2 && lines.iter().all(|l| l.width <= 80.0));
+    }
+}

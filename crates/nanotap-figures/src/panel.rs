@@ -1,0 +1,141 @@
+//! One plot of a figure.
+
+use crate::axis::Axis;
+use crate::error::FigureError;
+use crate::layer::Layer;
+
+/// Where the legend stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Legend {
+    /// In a corner or at an edge where it hides no data, else above the panel.
+    #[default]
+    Auto,
+    /// Inside, top left.
+    TopLeft,
+    /// Inside, top right.
+    TopRight,
+    /// Inside, bottom left.
+    BottomLeft,
+    /// Inside, bottom right.
+    BottomRight,
+    /// Outside, in rows above the panel.
+    Above,
+    /// Outside, in a column right of the panel.
+    Right,
+    /// No legend.
+    Hidden,
+}
+
+/// Two axes and what is drawn between them.
+#[derive(Debug, Clone, PartialEq)]
+#[must_use]
+pub struct Panel {
+    pub(crate) title: String,
+    pub(crate) letter: Option<String>,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) layers: Vec<Layer>,
+    pub(crate) legend: Legend,
+}
+
+impl Panel {
+    /// An empty panel.
+    pub fn new(x: Axis, y: Axis) -> Panel {
+        Panel {
+            title: String::new(),
+            letter: None,
+            x,
+            y,
+            layers: Vec::new(),
+            legend: Legend::Auto,
+        }
+    }
+
+    /// Words above the panel.
+    pub fn title(mut self, title: impl Into<String>) -> Panel {
+        self.title = title.into();
+        self
+    }
+
+    /// The panel's letter, such as "(a)", instead of the one that the figure gives.
+    pub fn letter(mut self, letter: impl Into<String>) -> Panel {
+        self.letter = Some(letter.into());
+        self
+    }
+
+    /// Where the legend stands.
+    pub fn legend(mut self, legend: Legend) -> Panel {
+        self.legend = legend;
+        self
+    }
+
+    /// Adds a layer.
+    pub fn with(mut self, layer: impl Into<Layer>) -> Panel {
+        self.layers.push(layer.into());
+        self
+    }
+
+    /// Adds layers.
+    pub fn with_all<L: Into<Layer>>(mut self, layers: impl IntoIterator<Item = L>) -> Panel {
+        self.layers.extend(layers.into_iter().map(Into::into));
+        self
+    }
+
+    pub(crate) fn check(&self) -> Result<(), FigureError> {
+        self.x.check()?;
+        self.y.check()?;
+        self.layers
+            .iter()
+            .try_for_each(|layer| self.check_layer(layer))
+    }
+
+    fn check_layer(&self, layer: &Layer) -> Result<(), FigureError> {
+        match layer {
+            Layer::Line(l) => length("the line width (pt)", l.width),
+            Layer::Rule(l) => length("the line width (pt)", l.width),
+            Layer::Points(l) => length("the diameter of points (mm)", l.diameter),
+            Layer::Markers(l) => length("the size of markers (mm)", l.size),
+            Layer::Bars(l) => length("the width of bars", l.width),
+            Layer::Heatmap(l) => {
+                l.scale.check()?;
+                cells(l.columns, l.rows, l.values.len())?;
+                self.check_edges(l.x, l.y)
+            }
+            Layer::CategoryMap(l) => {
+                cells(l.columns, l.rows, l.cells.len())?;
+                let named = l.names.len();
+                match l.cells.iter().flatten().find(|c| **c >= named) {
+                    Some(&category) => Err(FigureError::Category { category, named }),
+                    None => self.check_edges(l.x, l.y),
+                }
+            }
+            Layer::Stems(_) | Layer::Band(_) | Layer::Note(_) => Ok(()),
+        }
+    }
+
+    /// The edges of a grid must make an axis.
+    fn check_edges(&self, x: (f64, f64), y: (f64, f64)) -> Result<(), FigureError> {
+        self.x.clone().range(x.0, x.1).check()?;
+        self.y.clone().range(y.0, y.1).check()
+    }
+}
+
+fn length(what: &'static str, given: f64) -> Result<(), FigureError> {
+    if given.is_finite() && given > 0.0 {
+        Ok(())
+    } else {
+        Err(FigureError::Length { what, given })
+    }
+}
+
+fn cells(columns: usize, rows: usize, given: usize) -> Result<(), FigureError> {
+    if columns.checked_mul(rows) == Some(given) && given > 0 {
+        Ok(())
+    } else {
+        Err(FigureError::Cells {
+            columns,
+            rows,
+            given,
+        })
+    }
+}

@@ -1,0 +1,184 @@
+//! What is on the page, in millimetres from its top left: the one thing that all formats draw.
+
+use crate::cloud::Cloud;
+use crate::colour::Colour;
+use crate::raster::Raster;
+use crate::text::PlacedWords;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Point {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+}
+
+impl Point {
+    pub(crate) const fn new(x: f64, y: f64) -> Point {
+        Point { x, y }
+    }
+
+    pub(crate) fn distance(self, other: Point) -> f64 {
+        (self.x - other.x).hypot(self.y - other.y)
+    }
+}
+
+/// A box with its edges, `left <= right` and `top <= bottom`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rect {
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) right: f64,
+    pub(crate) bottom: f64,
+}
+
+impl Rect {
+    pub(crate) fn width(self) -> f64 {
+        self.right - self.left
+    }
+
+    pub(crate) fn height(self) -> f64 {
+        self.bottom - self.top
+    }
+
+    /// The box with every edge moved outwards by `by`.
+    pub(crate) fn grown(self, by: f64) -> Rect {
+        Rect {
+            left: self.left - by,
+            top: self.top - by,
+            right: self.right + by,
+            bottom: self.bottom + by,
+        }
+    }
+
+    pub(crate) fn contains(self, p: Point) -> bool {
+        p.x >= self.left && p.x <= self.right && p.y >= self.top && p.y <= self.bottom
+    }
+
+    pub(crate) fn outline(self) -> Vec<Segment> {
+        vec![
+            Segment::Move(Point::new(self.left, self.top)),
+            Segment::Line(Point::new(self.right, self.top)),
+            Segment::Line(Point::new(self.right, self.bottom)),
+            Segment::Line(Point::new(self.left, self.bottom)),
+            Segment::Close,
+        ]
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Segment {
+    Move(Point),
+    Line(Point),
+    Quad(Point, Point),
+    Cubic(Point, Point, Point),
+    Close,
+}
+
+impl Segment {
+    pub(crate) fn map(self, mut f: impl FnMut(Point) -> Point) -> Segment {
+        match self {
+            Segment::Move(p) => Segment::Move(f(p)),
+            Segment::Line(p) => Segment::Line(f(p)),
+            Segment::Quad(a, p) => Segment::Quad(f(a), f(p)),
+            Segment::Cubic(a, b, p) => Segment::Cubic(f(a), f(b), f(p)),
+            Segment::Close => Segment::Close,
+        }
+    }
+}
+
+/// How a line is drawn. Lengths in mm.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stroke {
+    pub(crate) width: f64,
+    pub(crate) colour: Colour,
+    /// Lengths drawn and left out in turn; empty: unbroken.
+    pub(crate) dash: Vec<f64>,
+    /// Ends rounded instead of cut.
+    pub(crate) round: bool,
+}
+
+impl Stroke {
+    pub(crate) fn solid(width: f64, colour: Colour) -> Stroke {
+        Stroke {
+            width,
+            colour,
+            dash: Vec::new(),
+            round: false,
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Path {
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) fill: Option<Colour>,
+    pub(crate) stroke: Option<Stroke>,
+    /// Box outside which nothing is drawn.
+    pub(crate) clip: Option<Rect>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Item {
+    /// What follows up to its `Close` belongs together: a class, and words for it.
+    Open {
+        class: &'static str,
+        label: String,
+    },
+    Close,
+    Path(Path),
+    Words(PlacedWords),
+    Raster(Raster),
+    Cloud(Cloud),
+}
+
+/// A page.
+#[derive(Debug, Clone)]
+pub(crate) struct Scene {
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    pub(crate) title: String,
+    pub(crate) items: Vec<Item>,
+}
+
+impl Scene {
+    pub(crate) fn group(
+        &mut self,
+        class: &'static str,
+        label: &str,
+        draw: impl FnOnce(&mut Scene),
+    ) {
+        self.items.push(Item::Open {
+            class,
+            label: label.to_string(),
+        });
+        draw(self);
+        self.items.push(Item::Close);
+    }
+
+    pub(crate) fn fill(&mut self, segments: Vec<Segment>, colour: Colour, clip: Option<Rect>) {
+        self.items.push(Item::Path(Path {
+            segments,
+            fill: Some(colour),
+            stroke: None,
+            clip,
+        }));
+    }
+
+    pub(crate) fn stroke(&mut self, segments: Vec<Segment>, stroke: Stroke, clip: Option<Rect>) {
+        self.items.push(Item::Path(Path {
+            segments,
+            fill: None,
+            stroke: Some(stroke),
+            clip,
+        }));
+    }
+
+    pub(crate) fn line(&mut self, from: Point, to: Point, stroke: Stroke) {
+        self.stroke(vec![Segment::Move(from), Segment::Line(to)], stroke, None);
+    }
+
+    pub(crate) fn words(&mut self, words: PlacedWords) {
+        if !words.words.runs.is_empty() {
+            self.items.push(Item::Words(words));
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Sizes that every figure shares: what journals ask of lettering and lines at final size.
+
+use crate::colour::Colour;
+use crate::text::MM_PER_POINT;
+
+/// Sizes of letters, pt, and of everything that grows with them, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Style {
+    /// Numbers at the axes.
+    pub(crate) marks: f64,
+    /// Labels of the axes.
+    pub(crate) label: f64,
+    /// Legends, notes, captions.
+    pub(crate) legend: f64,
+    /// Panel letters and titles.
+    pub(crate) title: f64,
+    /// Length of marks at the axes, mm.
+    pub(crate) mark: f64,
+    pub(crate) minor_mark: f64,
+    /// Small and large distance between neighbours, mm.
+    pub(crate) pad: f64,
+    pub(crate) gap: f64,
+    /// Width of axes, mm.
+    pub(crate) axis: f64,
+}
+
+/// Colour of axes and their words.
+pub(crate) const INK: Colour = Colour::BLACK;
+/// Free edge of the page, mm.
+pub(crate) const EDGE: f64 = 0.8;
+
+impl Style {
+    /// The style with its letters `scale` times as large.
+    pub(crate) fn scaled(scale: f64) -> Style {
+        Style {
+            marks: 7.0 * scale,
+            label: 8.0 * scale,
+            legend: 7.0 * scale,
+            title: 8.0 * scale,
+            mark: 0.9 * scale,
+            minor_mark: 0.5 * scale,
+            pad: 0.8 * scale,
+            gap: 3.0 * scale,
+            axis: 0.5 * scale * MM_PER_POINT,
+        }
+    }
+
+    /// Distance from line to line of a legend or caption, mm.
+    pub(crate) fn line(&self) -> f64 {
+        1.3 * self.legend * MM_PER_POINT
+    }
+}

@@ -1,0 +1,49 @@
+//! What the user should know about a resolved case, beside its numbers.
+
+use std::fmt;
+
+/// How much a remark matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Severity {
+    /// An assumption made or a quantity inferred.
+    Note,
+    /// The model may not describe what is meant.
+    Warning,
+}
+
+/// One remark, a sentence in plain words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Remark {
+    /// Note or warning.
+    pub severity: Severity,
+    /// The sentence, without a full stop.
+    pub text: String,
+}
+
+impl Remark {
+    /// An assumption made or a quantity inferred.
+    pub fn note(text: impl Into<String>) -> Self {
+        Self {
+            severity: Severity::Note,
+            text: text.into(),
+        }
+    }
+
+    /// The model may not describe what is meant.
+    pub fn warning(text: impl Into<String>) -> Self {
+        Self {
+            severity: Severity::Warning,
+            text: text.into(),
+        }
+    }
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = match self.severity {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+        };
+        write!(f, "{word}: {}", self.text)
+    }
+}

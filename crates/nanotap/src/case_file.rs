@@ -12,18 +12,19 @@
 
 mod document;
 mod nearest;
+mod physical_tables;
 mod problem;
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
 
-use serde::Serialize;
-
 pub use document::{Document, Entry, Header, Value};
+pub use physical_tables::{PHYSICAL_KEYS, PhysicalTables};
 pub use problem::{CaseFileError, Place, Problem, Source};
 
 use crate::case::{Case, CosineTerm};
+use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::parameter::Parameter;
 use nearest::nearest;
 
@@ -32,108 +33,15 @@ pub const DEFAULT_MODES: usize = 3;
 /// No case file comes near; a larger file is something else.
 const LARGEST_FILE: u64 = 1 << 20;
 
-/// The tables of a physical case and their keys.
-pub const PHYSICAL_KEYS: [(&str, &[&str]); 5] = [
-    (
-        "cantilever",
-        &[
-            "k",
-            "f0",
-            "Q",
-            "f2",
-            "length",
-            "width",
-            "thickness",
-            "modulus",
-            "density",
-        ],
-    ),
-    ("tip", &["mass", "radius", "modulus", "poisson"]),
-    (
-        "sample",
-        &["stiffness", "damping", "modulus", "poisson", "indentation"],
-    ),
-    (
-        "drive",
-        &["frequency", "amplitude", "free_amplitude", "setpoint"],
-    ),
-    ("gap", &["tip", "beam"]),
-];
-
 /// What a case file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CaseFile {
     /// A dimensionless cantilever, every field checked.
     Dimensionless(Case),
     /// A one-degree-of-freedom oscillator with a stop, every field checked.
-    Oscillator(OscillatorFields),
+    Oscillator(Oscillator),
     /// A cantilever in physical units: its keys are checked, its quantities not yet.
     Physical(PhysicalTables),
-}
-
-/// The fields of m ẍ + c ẋ + k x = F cos ωt with a stop at x = gap.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct OscillatorFields {
-    /// Mass m > 0; 1 if not said.
-    pub mass: f64,
-    /// Spring k ≥ 0.
-    pub stiffness: f64,
-    /// Damper c ≥ 0.
-    pub damping: f64,
-    /// Forcing amplitude F ≥ 0.
-    pub forcing: f64,
-    /// Forcing frequency ω > 0.
-    pub omega: f64,
-    /// Where the stop stands; contact is x ≥ gap.
-    pub gap: f64,
-    /// What the mass meets there.
-    #[serde(flatten)]
-    pub stop: Stop,
-}
-
-/// What an oscillator hits.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Stop {
-    /// A spring and a damper, as in the paper's Fig. 1a.
-    #[serde(rename = "vibro_impact")]
-    Soft {
-        /// Spring of the stop, ≥ 0.
-        contact_stiffness: f64,
-        /// Damper of the stop, ≥ 0.
-        contact_damping: f64,
-    },
-    /// A rigid wall, as in the paper's Fig. 1b.
-    #[serde(rename = "impact")]
-    Rigid {
-        /// Rebound speed over impact speed, 0 to 1.
-        restitution: f64,
-    },
-}
-
-/// A physical case whose keys are known and whose quantities are still text.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PhysicalTables {
-    /// The file that the places point into.
-    pub source: Option<Source>,
-    /// `model.modes`, or the default.
-    pub modes: usize,
-    /// `model.cosine_term`, or the default.
-    pub cosine_term: CosineTerm,
-    /// The entries by table and key, those set beside the file already in place.
-    pub entries: BTreeMap<(&'static str, &'static str), Entry>,
-}
-
-impl PhysicalTables {
-    /// The entry `table.key`, if it was given.
-    pub fn get(&self, table: &'static str, key: &'static str) -> Option<&Entry> {
-        self.entries.get(&(table, key))
-    }
-
-    /// The problems found in these tables, as an error that points into the file.
-    pub fn error(&self, problems: Vec<Problem>) -> CaseFileError {
-        CaseFileError::all(self.source.clone(), problems)
-    }
 }
 
 impl CaseFile {
@@ -237,8 +145,17 @@ impl Kind {
                 .iter()
                 .map(|parameter| parameter.name())
                 .collect(),
-            Self::VibroImpact => [OSCILLATOR, &["contact_stiffness", "contact_damping"]].concat(),
-            Self::Impact => [OSCILLATOR, &["restitution"]].concat(),
+            Self::VibroImpact | Self::Impact => OscillatorParameter::ALL
+                .iter()
+                .filter(|parameter| match parameter {
+                    OscillatorParameter::Restitution => self == Self::Impact,
+                    OscillatorParameter::ContactStiffness | OscillatorParameter::ContactDamping => {
+                        self == Self::VibroImpact
+                    }
+                    _ => true,
+                })
+                .map(|parameter| parameter.name())
+                .collect(),
         }
     }
 
@@ -263,8 +180,6 @@ impl Kind {
         self.keys().into_iter().find(|known| *known == key)
     }
 }
-
-const OSCILLATOR: &[&str] = &["mass", "stiffness", "damping", "forcing", "omega", "gap"];
 
 /// The value of a key that need not be written.
 fn default_of(kind: Kind, key: &str) -> Option<f64> {
@@ -301,6 +216,7 @@ fn resolve(document: &Document, problems: &mut Vec<Problem>) -> Option<CaseFile>
         let (modes, cosine_term) = (modes(&known, problems), cosine_term(&known, problems));
         return Some(CaseFile::Physical(PhysicalTables {
             source: document.source.clone(),
+            headers: document.headers.clone(),
             modes: modes?,
             cosine_term: cosine_term?,
             entries: physical,
@@ -549,20 +465,36 @@ fn refuse_mix(
                 .help("write its numbers under [model]"),
         );
     }
-    for (name, entry) in known {
-        if !["modes", "cosine_term"].contains(name) {
-            problems.push(
-                Problem::new(
-                    entry.key_place.clone(),
-                    format!(
-                        "`{}` is dimensionless, but [{table}] makes this a physical case",
-                        entry.key
-                    ),
-                )
-                .label("dimensionless")
-                .help("a case is one or the other: drop this key, or the physical tables"),
-            );
-        }
+    // In the order of writing, which is that of the reader.
+    let mut foreign: Vec<&Entry> = known
+        .iter()
+        .filter(|(name, _)| !["modes", "cosine_term"].contains(name))
+        .map(|(_, entry)| *entry)
+        .collect();
+    foreign.sort_by_key(|entry| match &entry.key_place {
+        Place::Span(span) => span.start,
+        Place::Override(_) | Place::Whole => usize::MAX,
+    });
+    if let Some(first) = foreign.first() {
+        let others = match foreign.len() - 1 {
+            0 => String::from("is"),
+            1 => String::from("and one more key are"),
+            more => format!("and {more} more keys are"),
+        };
+        problems.push(
+            Problem::new(
+                first.key_place.clone(),
+                format!(
+                    "`{}` {others} dimensionless, but [{table}] makes this a physical case",
+                    first.key
+                ),
+            )
+            .label("dimensionless")
+            .help(
+                "a case is one or the other: with physical tables, [model] holds at most \
+                 modes and cosine_term",
+            ),
+        );
     }
 }
 
@@ -733,7 +665,7 @@ fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem
 }
 
 fn out_of_range(entry: &Entry, reason: &str) -> Problem {
-    let message = format!("`{}` = {} {reason}", entry.key, entry.written);
+    let message = format!("`{}` = {}: {reason}", entry.key, entry.written);
     Problem::new(entry.value_place.clone(), message).label("out of range")
 }
 
@@ -741,54 +673,53 @@ fn oscillator(
     kind: Kind,
     known: &BTreeMap<&'static str, &Entry>,
     problems: &mut Vec<Problem>,
-) -> Option<OscillatorFields> {
-    let mut field = |name: &'static str| -> Option<f64> {
-        let Some(entry) = known.get(name) else {
-            return default_of(kind, name);
-        };
-        let checked = number(entry).and_then(|value| {
-            oscillator_objection(name, value)
-                .map_or(Ok(value), |reason| Err(out_of_range(entry, reason)))
-        });
-        checked.map_err(|problem| problems.push(problem)).ok()
-    };
-    // Every field is looked at before the first gap ends it.
-    let [mass, stiffness, damping, forcing, omega, gap] =
-        ["mass", "stiffness", "damping", "forcing", "omega", "gap"].map(&mut field);
+) -> Option<Oscillator> {
     let stop = if kind == Kind::VibroImpact {
-        let [spring, damper] = ["contact_stiffness", "contact_damping"].map(&mut field);
-        spring
-            .zip(damper)
-            .map(|(contact_stiffness, contact_damping)| Stop::Soft {
-                contact_stiffness,
-                contact_damping,
-            })
+        Stop::Soft {
+            stiffness: 1.0,
+            damping: 0.0,
+        }
     } else {
-        field("restitution").map(|restitution| Stop::Rigid { restitution })
+        Stop::Rigid { restitution: 1.0 }
     };
-    Some(OscillatorFields {
-        mass: mass?,
-        stiffness: stiffness?,
-        damping: damping?,
-        forcing: forcing?,
-        omega: omega?,
-        gap: gap?,
-        stop: stop?,
-    })
-}
-
-/// What is wrong with a number of an oscillator, if anything.
-fn oscillator_objection(name: &str, value: f64) -> Option<&'static str> {
-    if !value.is_finite() {
-        return Some("must be a finite number");
+    // Valid, so that each value can be checked by itself.
+    let plain = Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.0,
+        forcing: 1.0,
+        omega: 1.0,
+        gap: 0.0,
+        stop,
+    };
+    let (mut oscillator, mut complete) = (plain, true);
+    for parameter in OscillatorParameter::ALL {
+        if plain.get(parameter).is_none() {
+            continue;
+        }
+        let name = parameter.name();
+        let checked = match (known.get(name), default_of(kind, name)) {
+            (Some(entry), _) => number(entry).and_then(|value| {
+                let alone = plain.with(parameter, value).validate();
+                alone
+                    .map(|()| value)
+                    .map_err(|error| out_of_range(entry, error.expected))
+            }),
+            (None, Some(value)) => Ok(value),
+            (None, None) => {
+                complete = false;
+                continue;
+            }
+        };
+        match checked {
+            Ok(value) => oscillator = oscillator.with(parameter, value),
+            Err(problem) => {
+                complete = false;
+                problems.push(problem);
+            }
+        }
     }
-    match name {
-        "gap" => None,
-        "mass" | "omega" if value <= 0.0 => Some("must be more than 0"),
-        "restitution" if !(0.0..=1.0).contains(&value) => Some("must lie between 0 and 1"),
-        _ if value < 0.0 => Some("must be 0 or more"),
-        _ => None,
-    }
+    complete.then_some(oscillator)
 }
 
 #[cfg(test)]

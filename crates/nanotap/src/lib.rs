@@ -4,8 +4,17 @@
 pub mod beam;
 pub mod case;
 pub mod case_file;
+pub mod convergence;
 pub mod exact_beam;
 pub mod galerkin;
+pub mod mode_table;
+pub mod model;
+pub mod observables;
+pub mod orbit;
+pub mod oscillator;
 pub mod parameter;
 pub mod physical;
+pub mod simulate;
 pub mod spectrum;
+pub mod strobe;
+pub mod subject;

@@ -21,7 +21,7 @@ use serde::Deserialize;
 
 use super::error::PhysicalError;
 use super::lever::BeamGeometry;
-use super::nearest::suggestion;
+use super::nearest::nearest;
 use super::quantity::{Kind, QuantityError};
 use super::sample::Elastic;
 
@@ -91,7 +91,7 @@ pub enum CatalogueError {
         /// The key.
         key: &'static str,
         /// What is wrong.
-        source: QuantityError,
+        source: Box<QuantityError>,
     },
     /// A quantity with an impossible value, or dimensions given in part.
     #[error("catalogue {origin}, {entry}.{key}: {reason}")]
@@ -263,16 +263,19 @@ fn unknown<'a>(
     let (names, aliases): (Vec<&str>, Vec<&Vec<String>>) = known
         .map(|(name, aliases)| (name.as_str(), aliases))
         .unzip();
-    let all: Vec<&str> = names
+    let candidates = names
         .iter()
         .copied()
-        .chain(aliases.into_iter().flatten().map(String::as_str))
-        .collect();
+        .chain(aliases.into_iter().flatten().map(String::as_str));
+    let suggestion = match nearest(name, candidates).first() {
+        Some(near) => format!("did you mean \"{near}\"?"),
+        None => format!("known are {}", names.join(", ")),
+    };
     PhysicalError::UnknownName {
         key: key.to_owned(),
         name: name.to_owned(),
         what,
-        suggestion: suggestion(name, &all),
+        suggestion,
     }
 }
 
@@ -298,7 +301,7 @@ impl EntryReader<'_> {
                 origin: self.origin.to_owned(),
                 entry: self.entry.to_owned(),
                 key,
-                source,
+                source: Box::new(source),
             })?;
         if value > 0.0 {
             Ok(value)

@@ -1,7 +1,7 @@
 //! The drive at the clamped end, and the gaps to the sample.
 
 use super::error::PhysicalError;
-use super::quantity::Kind;
+use super::quantity::{Kind, Quantity};
 use super::section::{Reader, Sections};
 
 /// Frequency of the drive.
@@ -43,17 +43,20 @@ pub struct Drive {
     pub setpoint: Option<Setpoint>,
 }
 
+pub(crate) const DRIVE_KEYS: &[&str] = &[
+    "frequency",
+    "frequency_ratio",
+    "amplitude",
+    "free_amplitude",
+    "setpoint",
+];
+
+pub(crate) const GAP_KEYS: &[&str] = &["tip", "beam"];
+
 impl Drive {
     /// The section `[drive]`.
     pub(crate) fn read(sections: &Sections) -> Result<Self, PhysicalError> {
-        const KEYS: &[&str] = &[
-            "frequency",
-            "frequency_ratio",
-            "amplitude",
-            "free_amplitude",
-            "setpoint",
-        ];
-        let reader = Reader::new(sections, "drive", KEYS)?;
+        let reader = Reader::new(sections, "drive", DRIVE_KEYS)?;
         reader.not_both("frequency", "frequency_ratio", "each gives the frequency")?;
         reader.not_both(
             "amplitude",
@@ -95,10 +98,10 @@ fn read_setpoint(reader: &Reader<'_>) -> Result<Option<Setpoint>, PhysicalError>
     let Some(text) = reader.text("setpoint") else {
         return Ok(None);
     };
-    if let Ok(amplitude) = Kind::Length.parse(text) {
-        if amplitude > 0.0 {
-            return Ok(Some(Setpoint::Amplitude(amplitude)));
-        }
+    let is_length = |read: Quantity| read.dimension == Kind::Length.dimension();
+    if text.parse::<Quantity>().is_ok_and(is_length) {
+        let amplitude = reader.positive("setpoint", Kind::Length)?;
+        return Ok(amplitude.map(Setpoint::Amplitude));
     }
     let ratio = reader.within(
         "setpoint",
@@ -123,7 +126,7 @@ pub struct Gaps {
 impl Gaps {
     /// The section `[gap]`.
     pub(crate) fn read(sections: &Sections) -> Result<Self, PhysicalError> {
-        let reader = Reader::new(sections, "gap", &["tip", "beam"])?;
+        let reader = Reader::new(sections, "gap", GAP_KEYS)?;
         Ok(Self {
             tip: reader.quantity("tip", Kind::Length)?,
             beam: reader.positive("beam", Kind::Length)?,

@@ -32,7 +32,7 @@ pub enum PhysicalError {
         /// `section.key`.
         key: String,
         /// What was expected and what was given.
-        source: QuantityError,
+        source: Box<QuantityError>,
     },
     /// A quantity with an impossible value.
     #[error("{key} = {value}: {reason}")]

@@ -8,6 +8,8 @@
 
 use std::f64::consts::TAU;
 
+use serde::Serialize;
+
 use super::error::PhysicalError;
 use super::quantity::Kind;
 use super::remark::Remark;
@@ -58,7 +60,7 @@ pub struct LeverData {
 }
 
 /// A lever with all that the model needs; SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lever {
     /// Static spring constant at the tip, k = 3EI/L³, in N/m.
     pub k: f64,

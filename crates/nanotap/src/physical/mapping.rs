@@ -4,13 +4,15 @@
 //! length g₀, time T = √(mL⁴/EI) = √(3mL/k), mass mL. The others follow, since
 //! EI/L³ = k/3 = mL/T²: force g₀k/3, energy g₀²k/3, stiffness k/3, damping mL/T.
 
+use serde::Serialize;
+
 use super::lever::Lever;
 use super::quantity::Kind;
 use crate::case::{Case, CosineTerm};
 use crate::parameter::Parameter;
 
 /// The SI value of the model's unit of each kind.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Scales {
     /// Deflections and gaps: g₀ in m.
     pub length: f64,
@@ -71,7 +73,7 @@ impl Scales {
 }
 
 /// The seven parameters as physical quantities; SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PhysicalParameters {
     /// Mass of the tip M, in kg: α1.
     pub tip_mass: f64,
@@ -135,7 +137,7 @@ impl PhysicalParameters {
 }
 
 /// One line of the mapping between physics and model.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MappingRow {
     /// The dimensionless parameter.
     pub parameter: Parameter,

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::catalogue::{self, Catalogue};
-use super::drive::{Drive, DriveFrequency, DriveStrength, Gaps, Setpoint};
+use super::drive::{self, Drive, DriveFrequency, DriveStrength, Gaps, Setpoint};
 use super::error::PhysicalError;
 use super::free_response::free_response;
 use super::lever::{self, Lever, LeverData};
@@ -11,14 +11,20 @@ use super::mapping::{MappingRow, PhysicalParameters, Scales, mapping_table};
 use super::nearest::suggestion;
 use super::quantity::Kind;
 use super::remark::Remark;
-use super::sample::Sample;
+use super::sample::{self, Sample};
 use super::section::{Reader, Sections};
-use super::tip::Tip;
+use super::tip::{self, Tip};
 use crate::case::{Case, CosineTerm};
 use crate::exact_beam;
 
-/// The sections of a physical case.
-pub const SECTIONS: &[&str] = &["cantilever", "tip", "sample", "drive", "gap"];
+/// The sections of a physical case with the keys that each may have.
+pub const SECTIONS: [(&str, &[&str]); 5] = [
+    ("cantilever", lever::KEYS),
+    ("tip", tip::KEYS),
+    ("sample", sample::KEYS),
+    ("drive", drive::DRIVE_KEYS),
+    ("gap", drive::GAP_KEYS),
+];
 
 /// Height of the tip where nothing tells it; tips of silicon levers are 10 to 15 µm high.
 const USUAL_TIP_HEIGHT: f64 = 10e-6;
@@ -81,10 +87,11 @@ impl PhysicalCase {
         cosine_term: CosineTerm,
         catalogue: &Catalogue,
     ) -> Result<Self, PhysicalError> {
-        if let Some(section) = sections.keys().find(|s| !SECTIONS.contains(&s.as_str())) {
+        let names = SECTIONS.map(|(name, _)| name);
+        if let Some(section) = sections.keys().find(|s| !names.contains(&s.as_str())) {
             return Err(PhysicalError::UnknownSection {
                 section: section.clone(),
-                suggestion: suggestion(section, SECTIONS),
+                suggestion: suggestion(section, &names),
             });
         }
         let reader = Reader::new(sections, "cantilever", lever::KEYS)?;

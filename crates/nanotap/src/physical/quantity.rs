@@ -13,6 +13,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::Serialize;
+
 use super::nearest::nearest;
 
 /// Elementary charge in coulomb, hence joules in one electronvolt; exact in the SI of 2019.
@@ -86,7 +88,8 @@ impl fmt::Display for Dimension {
 }
 
 /// What a quantity measures: fixes its dimension, its words in messages and its display unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// A plain number: quality factor, Poisson's ratio, setpoint ratio. Percent allowed.
     Number,

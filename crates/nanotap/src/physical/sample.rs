@@ -108,7 +108,7 @@ pub struct Sample {
     pub remarks: Vec<Remark>,
 }
 
-const KEYS: &[&str] = &[
+pub(crate) const KEYS: &[&str] = &[
     "material",
     "stiffness",
     "damping",
@@ -131,12 +131,12 @@ impl Sample {
         for key in ["material", "modulus", "poisson", "indentation"] {
             reader.not_both("stiffness", key, "the stiffness is either given or Hertz's")?;
         }
-        let (stiffness, hertz) = match reader.not_negative("stiffness", Kind::Stiffness)? {
-            Some(stiffness) => (stiffness, None),
-            None => {
-                let hertz = read_hertz(&reader, catalogue, tip, &mut remarks)?;
-                (hertz.stiffness(), Some(hertz))
-            }
+        let given = reader.not_negative("stiffness", Kind::Stiffness)?;
+        let (stiffness, hertz) = if let Some(stiffness) = given {
+            (stiffness, None)
+        } else {
+            let hertz = read_hertz(&reader, catalogue, tip, &mut remarks)?;
+            (hertz.stiffness(), Some(hertz))
         };
         let damper = reader.not_negative("damping", Kind::Damping)?;
         let tangent = reader.not_negative("loss_tangent", Kind::Number)?;
@@ -194,18 +194,15 @@ fn read_hertz(
             "Hertz's contact needs the tip's radius; give it, or sample.stiffness",
         )
     })?;
-    let indentation = match reader.positive("indentation", Kind::Length)? {
-        Some(indentation) => indentation,
-        None => {
-            let indentation = radius / 9.0;
-            remarks.push(Remark::note(format!(
-                "sample.indentation is not given: taken as a ninth of the tip's radius, {}, \
-                 as the paper does",
-                Kind::Length.format(indentation)
-            )));
-            indentation
-        }
-    };
+    let given = reader.positive("indentation", Kind::Length)?;
+    let indentation = given.unwrap_or(radius / 9.0);
+    if given.is_none() {
+        remarks.push(Remark::note(format!(
+            "sample.indentation is not given: taken as a ninth of the tip's radius, {}, as the \
+             paper does",
+            Kind::Length.format(indentation)
+        )));
+    }
     if indentation > 0.5 * radius {
         remarks.push(Remark::warning(format!(
             "the indentation of {} is more than half the tip's radius of {}: \

@@ -56,7 +56,7 @@ impl<'a> Reader<'a> {
             .map(|text| {
                 kind.parse(text).map_err(|source| PhysicalError::Quantity {
                     key: self.path(key),
-                    source,
+                    source: Box::new(source),
                 })
             })
             .transpose()

@@ -404,7 +404,7 @@ proptest! {
 
     #[test]
     fn nonsense_is_refused_without_a_panic(
-        section in prop::sample::select(SECTIONS.to_vec()),
+        (section, _) in prop::sample::select(SECTIONS.to_vec()),
         key in "[a-zA-Z_0-9]{0,12}",
         value in "\\PC{0,12}",
     ) {

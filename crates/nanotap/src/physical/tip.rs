@@ -71,7 +71,7 @@ pub struct Tip {
     pub elastic: Option<Elastic>,
 }
 
-const KEYS: &[&str] = &[
+pub(crate) const KEYS: &[&str] = &[
     "mass",
     "mass_ratio",
     "shape",

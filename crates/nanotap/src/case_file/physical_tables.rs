@@ -1,0 +1,131 @@
+//! The tables of a physical case as written, and the way into [`physical`](crate::physical).
+
+use std::collections::BTreeMap;
+
+use super::document::{Entry, Header, Value};
+use super::problem::{CaseFileError, Place, Problem, Source};
+use crate::case::CosineTerm;
+use crate::physical::{Catalogue, PhysicalCase, PhysicalError, Resolved, Sections};
+
+/// The tables of a physical case and their keys.
+pub const PHYSICAL_KEYS: [(&str, &[&str]); 5] = [
+    (
+        "cantilever",
+        &[
+            "lever",
+            "k",
+            "f0",
+            "f2",
+            "Q",
+            "length",
+            "width",
+            "thickness",
+            "modulus",
+            "density",
+        ],
+    ),
+    (
+        "tip",
+        &[
+            "mass",
+            "mass_ratio",
+            "shape",
+            "height",
+            "half_angle",
+            "density",
+            "radius",
+            "material",
+            "modulus",
+            "poisson",
+        ],
+    ),
+    (
+        "sample",
+        &[
+            "material",
+            "stiffness",
+            "damping",
+            "loss_tangent",
+            "modulus",
+            "poisson",
+            "indentation",
+        ],
+    ),
+    (
+        "drive",
+        &[
+            "frequency",
+            "frequency_ratio",
+            "amplitude",
+            "free_amplitude",
+            "setpoint",
+        ],
+    ),
+    ("gap", &["tip", "beam"]),
+];
+
+/// A physical case whose keys are known and whose quantities are still text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PhysicalTables {
+    /// The file that the places point into.
+    pub source: Option<Source>,
+    /// The headers of the file.
+    pub headers: Vec<Header>,
+    /// `model.modes`, or the default.
+    pub modes: usize,
+    /// `model.cosine_term`, or the default.
+    pub cosine_term: CosineTerm,
+    /// The entries by table and key, those set beside the file already in place.
+    pub entries: BTreeMap<(&'static str, &'static str), Entry>,
+}
+
+impl PhysicalTables {
+    /// The entry `table.key`, if it was given.
+    pub fn get(&self, table: &str, key: &str) -> Option<&Entry> {
+        let at = |(t, k): &&(&'static str, &'static str)| *t == table && *k == key;
+        self.entries
+            .keys()
+            .find(at)
+            .and_then(|found| self.entries.get(found))
+    }
+
+    /// Reads the quantities and resolves the case.
+    ///
+    /// # Errors
+    /// What is wrong with the quantities, pointing into the file.
+    pub fn resolve(&self, catalogue: &Catalogue) -> Result<Resolved, CaseFileError> {
+        PhysicalCase::from_sections(&self.sections(), self.modes, self.cosine_term, catalogue)
+            .and_then(|case| case.resolve())
+            .map_err(|error| CaseFileError::one(self.source.clone(), self.located(&error)))
+    }
+
+    fn sections(&self) -> Sections {
+        let mut sections = Sections::new();
+        for ((table, key), entry) in &self.entries {
+            let text = match &entry.value {
+                Value::Text(text) => text.clone(),
+                Value::Integer(integer) => integer.to_string(),
+                Value::Number(number) => number.to_string(),
+                // Refused before.
+                Value::Other(_) => continue,
+            };
+            sections
+                .entry((*table).to_owned())
+                .or_default()
+                .insert((*key).to_owned(), text);
+        }
+        sections
+    }
+
+    /// The error as a problem at the value that it speaks of, or at its table.
+    fn located(&self, error: &PhysicalError) -> Problem {
+        let place = error.key().and_then(|path| {
+            let (table, key) = path.split_once('.')?;
+            let value = self.get(table, key).map(|entry| entry.value_place.clone());
+            let header = || self.headers.iter().find(|header| header.name == table);
+            value.or_else(|| header().map(|header| header.place.clone()))
+        });
+        // An override is named by its own words already.
+        Problem::new(place.unwrap_or(Place::Whole), error.to_string())
+    }
+}

@@ -1,0 +1,75 @@
+//! Harmonics of tip deflection, slope and force, in closed form.
+
+use nanotap_flow::{Complex, Trajectory};
+use serde::Serialize;
+
+use crate::model::Model;
+
+/// One component of a periodic motion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Harmonic {
+    /// Frequency as a multiple of the drive's; not whole for a subharmonic motion.
+    pub order: f64,
+    /// Amplitude of the tip deflection.
+    pub tip: f64,
+    /// Its phase lag behind sin(order · Ωτ), degrees in (−180, 180].
+    pub tip_phase: f64,
+    /// Amplitude of the contact force.
+    pub force: f64,
+    /// Its phase lag, as for the tip.
+    pub force_phase: f64,
+    /// Amplitude of the slope at the tip; of a beam.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slope: Option<f64>,
+}
+
+/// The spectrum of a periodic motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spectrum {
+    /// Components at `j Ω/n`, `j = 1, 2, …`, of a motion of period `n`.
+    pub harmonics: Vec<Harmonic>,
+    /// Part of the tip deflection's power (variance) outside the drive's frequency, 0 … 1:
+    /// the paper's total harmonic distortion. From the exact variance, not a truncated sum.
+    pub thd: f64,
+    /// Phase lag of the tip deflection behind the drive, degrees in (−180, 180]; 90 at
+    /// the free resonance of a lever with high Q.
+    pub phase: f64,
+    /// Amplitude of the tip deflection at the drive's frequency.
+    pub first_harmonic: f64,
+}
+
+impl Spectrum {
+    /// The spectrum up to `orders` times the drive's frequency, of a trajectory that
+    /// holds exactly one repetition: `period` drive periods.
+    pub fn of(model: &Model, trajectory: &Trajectory, period: usize, orders: usize) -> Self {
+        let tip = trajectory.signal(&model.tip);
+        let force = trajectory.signal_by_regime(&model.force);
+        let slope = model.beam.as_ref().map(|beam| trajectory.signal(&beam.slope));
+        let base = std::f64::consts::TAU / (model.period() * period as f64);
+        let harmonics: Vec<Harmonic> = (1..=orders * period)
+            .map(|j| {
+                let omega = base * j as f64;
+                let (t, f) = (tip.fourier(omega), force.fourier(omega));
+                Harmonic {
+                    order: j as f64 / period as f64,
+                    tip: t.norm(),
+                    tip_phase: lag(t),
+                    force: f.norm(),
+                    force_phase: lag(f),
+                    slope: slope.as_ref().map(|s| s.fourier(omega).norm()),
+                }
+            })
+            .collect();
+        let first = tip.fourier(base * period as f64);
+        let mean = tip.mean();
+        let variance = tip.product_integral(&tip) / tip.duration() - mean * mean;
+        let thd = if variance > 0.0 { (1.0 - 0.5 * first.norm_sqr() / variance).clamp(0.0, 1.0) } else { 0.0 };
+        Self { harmonics, thd, phase: lag(first), first_harmonic: first.norm() }
+    }
+}
+
+/// The lag φ of `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
+fn lag(c: Complex) -> f64 {
+    let degrees = -(c * Complex::new(0.0, 1.0)).arg().to_degrees();
+    if degrees <= -180.0 { degrees + 360.0 } else { degrees }
+}

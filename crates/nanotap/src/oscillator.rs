@@ -1,0 +1,354 @@
+//! One-degree-of-freedom oscillators with a stop, the paper's Fig. 1:
+//! `m ẍ + c ẋ + k x = F cos ωt` with a stop at `x = gap`, either a further spring and
+//! damper (vibro-impact oscillator, Fig. 1a) or a rigid wall with a coefficient of
+//! restitution (impact oscillator, Fig. 1b), chatter and sticking included.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::sensitivity::SystemTangent;
+use nanotap_flow::{Drive, Exit, HarmonicVector, Output, Reset, Sticking, System};
+use serde::Serialize;
+
+use crate::model::{Model, ModelError, Powers, Product};
+
+/// The stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// A spring and a damper that act while `x ≥ gap`.
+    Soft {
+        /// The stop's spring, ≥ 0.
+        stiffness: f64,
+        /// The stop's damper, ≥ 0.
+        damping: f64,
+    },
+    /// A rigid wall: the velocity is reversed and multiplied by the coefficient of
+    /// restitution, 0 … 1.
+    Rigid {
+        /// The coefficient.
+        restitution: f64,
+    },
+}
+
+/// An oscillator with a stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Oscillator {
+    /// m > 0.
+    pub mass: f64,
+    /// k ≥ 0.
+    pub stiffness: f64,
+    /// c ≥ 0.
+    pub damping: f64,
+    /// F.
+    pub forcing: f64,
+    /// ω > 0.
+    pub omega: f64,
+    /// Where the stop stands.
+    pub gap: f64,
+    /// What the stop is.
+    pub stop: Stop,
+}
+
+/// A parameter of an oscillator that makes no sense.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key} = {value}: {expected}")]
+pub struct OscillatorError {
+    /// Its name.
+    pub key: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What would be right.
+    pub expected: &'static str,
+}
+
+/// A parameter of an oscillator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OscillatorParameter {
+    /// m.
+    Mass,
+    /// k.
+    Stiffness,
+    /// c.
+    Damping,
+    /// F.
+    Forcing,
+    /// ω.
+    Omega,
+    /// Where the stop stands.
+    Gap,
+    /// The soft stop's spring.
+    ContactStiffness,
+    /// The soft stop's damper.
+    ContactDamping,
+    /// The rigid stop's coefficient.
+    Restitution,
+}
+
+impl OscillatorParameter {
+    /// Every parameter.
+    pub const ALL: [Self; 9] = [
+        Self::Mass,
+        Self::Stiffness,
+        Self::Damping,
+        Self::Forcing,
+        Self::Omega,
+        Self::Gap,
+        Self::ContactStiffness,
+        Self::ContactDamping,
+        Self::Restitution,
+    ];
+
+    /// Its key in a case file.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mass => "mass",
+            Self::Stiffness => "stiffness",
+            Self::Damping => "damping",
+            Self::Forcing => "forcing",
+            Self::Omega => "omega",
+            Self::Gap => "gap",
+            Self::ContactStiffness => "contact_stiffness",
+            Self::ContactDamping => "contact_damping",
+            Self::Restitution => "restitution",
+        }
+    }
+}
+
+impl Oscillator {
+    /// The value of a parameter, `None` where this stop does not have it.
+    pub fn get(&self, parameter: OscillatorParameter) -> Option<f64> {
+        use OscillatorParameter as P;
+        match (parameter, self.stop) {
+            (P::Mass, _) => Some(self.mass),
+            (P::Stiffness, _) => Some(self.stiffness),
+            (P::Damping, _) => Some(self.damping),
+            (P::Forcing, _) => Some(self.forcing),
+            (P::Omega, _) => Some(self.omega),
+            (P::Gap, _) => Some(self.gap),
+            (P::ContactStiffness, Stop::Soft { stiffness, .. }) => Some(stiffness),
+            (P::ContactDamping, Stop::Soft { damping, .. }) => Some(damping),
+            (P::Restitution, Stop::Rigid { restitution }) => Some(restitution),
+            _ => None,
+        }
+    }
+
+    /// The same oscillator with one parameter changed (unchanged where this stop does
+    /// not have it).
+    #[must_use]
+    pub fn with(mut self, parameter: OscillatorParameter, value: f64) -> Self {
+        use OscillatorParameter as P;
+        match (parameter, &mut self.stop) {
+            (P::Mass, _) => self.mass = value,
+            (P::Stiffness, _) => self.stiffness = value,
+            (P::Damping, _) => self.damping = value,
+            (P::Forcing, _) => self.forcing = value,
+            (P::Omega, _) => self.omega = value,
+            (P::Gap, _) => self.gap = value,
+            (P::ContactStiffness, Stop::Soft { stiffness, .. }) => *stiffness = value,
+            (P::ContactDamping, Stop::Soft { damping, .. }) => *damping = value,
+            (P::Restitution, Stop::Rigid { restitution }) => *restitution = value,
+            _ => {}
+        }
+        self
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`OscillatorError`] for the first one that makes no sense.
+    pub fn validate(&self) -> Result<(), OscillatorError> {
+        use OscillatorParameter as P;
+        for parameter in P::ALL {
+            let Some(value) = self.get(parameter) else { continue };
+            let (right, expected) = match parameter {
+                P::Mass | P::Omega => (value > 0.0, "a positive, finite number is needed"),
+                P::Stiffness | P::Damping | P::ContactStiffness | P::ContactDamping => {
+                    (value >= 0.0, "a finite number of at least 0 is needed")
+                }
+                P::Restitution => ((0.0..=1.0).contains(&value), "a number from 0 to 1 is needed"),
+                P::Forcing | P::Gap => (true, "a finite number is needed"),
+            };
+            if !(right && value.is_finite() && value.abs() <= 1e12) {
+                return Err(OscillatorError { key: parameter.name(), value, expected });
+            }
+        }
+        Ok(())
+    }
+
+    /// Its model: tip is `x`, gap is `gap − x`.
+    ///
+    /// # Errors
+    /// When a parameter makes no sense or an undamped regime is driven at resonance.
+    pub fn model(&self) -> Result<Model, ModelError> {
+        self.validate()?;
+        let drive = Drive::single(self.omega)?;
+        let free = self.regime(0, 0.0, 0.0, &drive)?;
+        let gap = self.gap_output();
+        let (regimes, exits) = match self.stop {
+            Stop::Soft { stiffness, damping } => {
+                let contact = self.regime(1, stiffness, damping, &drive)?;
+                let exits = vec![vec![Exit::new(gap.clone(), 1)], vec![Exit::new(gap.scaled(-1.0), 0)]];
+                (vec![free, contact], exits)
+            }
+            Stop::Rigid { restitution } => self.rigid(restitution, free, &gap, &drive)?,
+        };
+        let system = Arc::new(System::new(drive, regimes, exits)?);
+        Ok(self.outputs(system, gap))
+    }
+
+    fn regime(
+        &self,
+        index: usize,
+        stiffness: f64,
+        damping: f64,
+        drive: &Drive,
+    ) -> Result<nanotap_flow::Regime, ModelError> {
+        let (k, c) = (self.stiffness + stiffness, self.damping + damping);
+        let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -k / self.mass, -c / self.mass]);
+        let lower = |v: f64| DVector::from_vec(vec![0.0, v / self.mass]);
+        let forcing = HarmonicVector::zeros(2, 1)
+            .with_tone(0, &DVector::zeros(2), &lower(self.forcing))
+            .with_constant(&lower(stiffness * self.gap));
+        Ok(nanotap_flow::Regime::new(index, matrix, forcing, drive)?)
+    }
+
+    /// Flight with impacts, and sticking, in which the wall carries the spring and the
+    /// drive until they would pull the mass away.
+    fn rigid(
+        &self,
+        restitution: f64,
+        free: nanotap_flow::Regime,
+        gap: &Output,
+        drive: &Drive,
+    ) -> Result<(Vec<nanotap_flow::Regime>, Vec<Vec<Exit>>), ModelError> {
+        let bounce = |r: f64| Reset {
+            matrix: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, -r]),
+            offset: HarmonicVector::zeros(2, 1),
+        };
+        // The gap's acceleration in flight is minus the pressing force over the mass.
+        let acceleration = gap
+            .rate(free.matrix(), free.forcing(), drive)
+            .rate(free.matrix(), free.forcing(), drive);
+        let still = nanotap_flow::Regime::new(1, DMatrix::zeros(2, 2), HarmonicVector::zeros(2, 1), drive)?;
+        let impact = Exit::new(gap.clone(), 0)
+            .with_reset(bounce(restitution))
+            .with_sticking(Sticking { regime: 1, reset: bounce(0.0) });
+        let release = Exit::new(acceleration.scaled(-1.0), 0).as_release();
+        Ok((vec![free, still], vec![vec![impact], vec![release]]))
+    }
+
+    fn gap_output(&self) -> Output {
+        Output::linear(RowDVector::from_row_slice(&[-1.0, 0.0]), 1).with_constant(self.gap)
+    }
+
+    fn outputs(&self, system: Arc<System>, gap: Output) -> Model {
+        let speed = Output::linear(RowDVector::from_row_slice(&[0.0, 1.0]), 1);
+        let tip = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
+        let drive = Output::linear(RowDVector::zeros(2), 1).with_tone(0, 0.0, self.forcing);
+        let zero = gap.scaled(0.0);
+        // The soft stop pushes with its spring and damper, the wall with whatever keeps
+        // the mass still; the impulses of impacts are not forces.
+        let force = match self.stop {
+            Stop::Soft { stiffness, damping } => gap.scaled(-stiffness).plus(damping, &speed),
+            Stop::Rigid { .. } => drive.plus(-self.stiffness, &tip),
+        };
+        let product = |weight, a: &Output, b: &Output| Product { weight, a: a.clone(), b: b.clone() };
+        let power = |contact_stiffness: f64, contact_damping: f64| Powers {
+            drive: vec![product(1.0, &drive, &speed)],
+            beam: vec![product(self.damping, &speed, &speed)],
+            sample: vec![product(contact_damping, &speed, &speed)],
+            stored: vec![
+                product(0.5 * self.mass, &speed, &speed),
+                product(0.5 * self.stiffness, &tip, &tip),
+                product(0.5 * contact_stiffness, &gap, &gap),
+            ],
+        };
+        let (contact_stiffness, contact_damping, impact_loss) = match self.stop {
+            Stop::Soft { stiffness, damping } => (stiffness, damping, 0.0),
+            Stop::Rigid { restitution: r } => (0.0, 0.0, 0.5 * self.mass * (1.0 - r * r)),
+        };
+        Model {
+            contact: vec![false, true],
+            tip: tip.clone(),
+            force: vec![zero, force],
+            power: vec![power(0.0, 0.0), power(contact_stiffness, contact_damping)],
+            impact_loss,
+            beam: None,
+            gap,
+            system,
+        }
+    }
+
+    /// The derivative of the model's system with respect to one parameter, zero where
+    /// this stop does not have it.
+    ///
+    /// # Errors
+    /// As [`Oscillator::model`].
+    pub fn tangent(&self, model: &Model, parameter: OscillatorParameter) -> Result<SystemTangent, ModelError> {
+        use OscillatorParameter as P;
+        let mut tangent = SystemTangent::zeros(&model.system);
+        // (k, c, constant force, drive) of each moving regime, and their derivatives.
+        let (soft_k, soft_c) = match self.stop {
+            Stop::Soft { stiffness, damping } => (stiffness, damping),
+            Stop::Rigid { .. } => (0.0, 0.0),
+        };
+        let moving = if matches!(self.stop, Stop::Soft { .. }) { 2 } else { 1 };
+        for r in 0..moving {
+            let inside = if r == 1 { 1.0 } else { 0.0 };
+            let (k, c) = (self.stiffness + inside * soft_k, self.damping + inside * soft_c);
+            let held = inside * soft_k * self.gap;
+            let m = self.mass;
+            let [dk, dc, dheld, df] = match parameter {
+                P::Mass => [-k / m, -c / m, -held / m, -self.forcing / m],
+                P::Stiffness => [1.0, 0.0, 0.0, 0.0],
+                P::Damping => [0.0, 1.0, 0.0, 0.0],
+                P::Forcing => [0.0, 0.0, 0.0, 1.0],
+                P::Gap => [0.0, 0.0, inside * soft_k, 0.0],
+                P::ContactStiffness => [inside, 0.0, inside * self.gap, 0.0],
+                P::ContactDamping => [0.0, inside, 0.0, 0.0],
+                P::Omega | P::Restitution => [0.0; 4],
+            };
+            let regime = &mut tangent.regimes[r];
+            regime.matrix = DMatrix::from_row_slice(2, 2, &[0.0, 0.0, -dk / m, -dc / m]);
+            let lower = |v: f64| DVector::from_vec(vec![0.0, v / m]);
+            regime.forcing = HarmonicVector::zeros(2, 1)
+                .with_tone(0, &DVector::zeros(2), &lower(df))
+                .with_constant(&lower(dheld));
+        }
+        match (parameter, self.stop) {
+            (P::Omega, _) => tangent.log_period = -1.0 / self.omega,
+            (P::Gap, Stop::Soft { .. }) => {
+                tangent.guards[0][0].constant = 1.0;
+                tangent.guards[1][0].constant = -1.0;
+            }
+            (P::Gap, Stop::Rigid { .. }) => tangent.guards[0][0].constant = 1.0,
+            (P::Restitution, Stop::Rigid { .. }) => {
+                tangent.resets[0][0] = Some(Reset {
+                    matrix: DMatrix::from_row_slice(2, 2, &[0.0, 0.0, 0.0, -1.0]),
+                    offset: HarmonicVector::zeros(2, 1),
+                });
+            }
+            _ => {}
+        }
+        if let (Stop::Rigid { .. }, true) = (self.stop, moving == 1) {
+            self.release_tangent(&mut tangent, parameter);
+        }
+        Ok(tangent)
+    }
+
+    /// The release guard −g̈ = (F cos ωt − k x − c ẋ)/m moves with the parameters.
+    fn release_tangent(&self, tangent: &mut SystemTangent, parameter: OscillatorParameter) {
+        use OscillatorParameter as P;
+        let m = self.mass;
+        let [dk, dc, df] = match parameter {
+            P::Mass => [-self.stiffness / m, -self.damping / m, -self.forcing / m],
+            P::Stiffness => [1.0, 0.0, 0.0],
+            P::Damping => [0.0, 1.0, 0.0],
+            P::Forcing => [0.0, 0.0, 1.0],
+            _ => return,
+        };
+        tangent.guards[1][0] =
+            Output::linear(RowDVector::from_row_slice(&[-dk / m, -dc / m]), 1).with_tone(0, 0.0, df / m);
+    }
+}

@@ -1,0 +1,200 @@
+//! What is studied: a cantilever or a one-degree-of-freedom oscillator, under one
+//! interface of named parameters.
+
+use serde::Serialize;
+
+use nanotap_dynamics::{MapFamily, StroboscopicMap};
+use nanotap_flow::sensitivity::SystemTangent;
+use nanotap_flow::{Flow, FlowError};
+
+use crate::case::Case;
+use crate::model::{Model, ModelError, cantilever_tangent};
+use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
+use crate::parameter::Parameter;
+use crate::strobe::Strobe;
+use nalgebra::DMatrix;
+
+/// A case of any kind.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Subject {
+    /// The cantilever.
+    Cantilever(Case),
+    /// An oscillator with a stop.
+    Oscillator(Oscillator),
+}
+
+/// A parameter of a [`Subject`] that can be varied continuously.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Key {
+    /// Of the cantilever.
+    Cantilever(Parameter),
+    /// Of an oscillator.
+    Oscillator(OscillatorParameter),
+}
+
+impl Key {
+    /// Its key in a case file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cantilever(parameter) => parameter.name(),
+            Self::Oscillator(parameter) => parameter.name(),
+        }
+    }
+
+    /// How a figure's axis writes it.
+    pub fn symbol(self) -> &'static str {
+        use OscillatorParameter as P;
+        match self {
+            Self::Cantilever(parameter) => parameter.symbol(),
+            Self::Oscillator(parameter) => match parameter {
+                P::Mass => "m",
+                P::Stiffness => "k",
+                P::Damping => "c",
+                P::Forcing => "F",
+                P::Omega => "ω",
+                P::Gap => "gap",
+                P::ContactStiffness => "k₁",
+                P::ContactDamping => "c₁",
+                P::Restitution => "r",
+            },
+        }
+    }
+}
+
+/// A name that is no parameter of the subject.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no parameter `{given}` here; there are {known}{hint}")]
+pub struct UnknownKey {
+    /// What was asked for.
+    pub given: String,
+    /// What there is.
+    pub known: String,
+    /// The nearest one, as a question.
+    pub hint: String,
+}
+
+impl Subject {
+    /// Its parameters.
+    pub fn keys(&self) -> Vec<Key> {
+        match self {
+            Self::Cantilever(_) => Parameter::ALL.map(Key::Cantilever).to_vec(),
+            Self::Oscillator(oscillator) => OscillatorParameter::ALL
+                .into_iter()
+                .filter(|p| oscillator.get(*p).is_some())
+                .map(Key::Oscillator)
+                .collect(),
+        }
+    }
+
+    /// The parameter called `name` (readable aliases included).
+    ///
+    /// # Errors
+    /// [`UnknownKey`] with what there is and the nearest name.
+    pub fn key(&self, name: &str) -> Result<Key, UnknownKey> {
+        if let Self::Cantilever(_) = self {
+            if let Ok(parameter) = name.parse::<Parameter>() {
+                return Ok(Key::Cantilever(parameter));
+            }
+        }
+        let keys = self.keys();
+        if let Some(key) = keys.iter().find(|k| k.name() == name) {
+            return Ok(*key);
+        }
+        let known: Vec<&str> = keys.iter().map(|k| k.name()).collect();
+        let nearest = known
+            .iter()
+            .map(|k| (strsim::damerau_levenshtein(k, name), *k))
+            .min()
+            .filter(|(distance, _)| *distance <= 3);
+        let hint = nearest.map_or_else(String::new, |(_, k)| format!(" (did you mean `{k}`?)"));
+        Err(UnknownKey { given: name.to_owned(), known: known.join(", "), hint })
+    }
+
+    /// The value of a parameter; NaN where the subject does not have it.
+    pub fn get(&self, key: Key) -> f64 {
+        match (self, key) {
+            (Self::Cantilever(case), Key::Cantilever(p)) => case.get(p),
+            (Self::Oscillator(oscillator), Key::Oscillator(p)) => oscillator.get(p).unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        }
+    }
+
+    /// The same subject with one parameter changed.
+    #[must_use]
+    pub fn with(&self, key: Key, value: f64) -> Self {
+        match (self, key) {
+            (Self::Cantilever(case), Key::Cantilever(p)) => Self::Cantilever(case.clone().with(p, value)),
+            (Self::Oscillator(oscillator), Key::Oscillator(p)) => Self::Oscillator(oscillator.with(p, value)),
+            _ => self.clone(),
+        }
+    }
+
+    /// Its model.
+    ///
+    /// # Errors
+    /// When it makes no sense or cannot be solved in closed form.
+    pub fn model(&self) -> Result<Model, ModelError> {
+        match self {
+            Self::Cantilever(case) => Model::cantilever(case),
+            Self::Oscillator(oscillator) => oscillator.model(),
+        }
+    }
+
+    /// The derivative of its system with respect to one parameter.
+    ///
+    /// # Errors
+    /// As [`Subject::model`].
+    pub fn tangent(&self, model: &Model, key: Key) -> Result<SystemTangent, ModelError> {
+        match (self, key) {
+            (Self::Cantilever(case), Key::Cantilever(p)) => cantilever_tangent(case, model, p),
+            (Self::Oscillator(oscillator), Key::Oscillator(p)) => oscillator.tangent(model, p),
+            _ => Ok(SystemTangent::zeros(&model.system)),
+        }
+    }
+
+    /// Whether its stop is rigid: contact is an instant there.
+    pub fn has_rigid_stop(&self) -> bool {
+        matches!(self, Self::Oscillator(Oscillator { stop: Stop::Rigid { .. }, .. }))
+    }
+}
+
+/// A subject with one free parameter.
+#[derive(Clone, Debug)]
+pub struct Family {
+    /// The subject; the value of its free parameter does not matter.
+    pub subject: Subject,
+    /// The free parameter.
+    pub key: Key,
+}
+
+impl MapFamily for Family {
+    type Map = Strobe;
+    type Error = ModelError;
+
+    fn at(&self, parameter: f64) -> Result<Strobe, ModelError> {
+        Ok(Strobe::new(&self.subject.with(self.key, parameter).model()?))
+    }
+
+    fn advance_with_derivatives(
+        &self,
+        parameter: f64,
+        map: &mut Strobe,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivative: &mut [f64],
+    ) -> Result<(), <Strobe as StroboscopicMap>::Error> {
+        let subject = self.subject.with(self.key, parameter);
+        let tangent = subject
+            .model()
+            .and_then(|model| subject.tangent(&model, self.key))
+            .map_err(|_| FlowError::NotFinite { what: "the derivative of the system" })?;
+        let mut flow = Flow::new(std::sync::Arc::clone(map.flow().system()));
+        flow.start(state, 0.0)?;
+        let mut derivatives = DMatrix::zeros(state.len(), 1);
+        flow.run_period_with_sensitivities(&[tangent], jacobian, &mut derivatives)?;
+        flow.state(state);
+        derivative.copy_from_slice(derivatives.as_slice());
+        Ok(())
+    }
+}

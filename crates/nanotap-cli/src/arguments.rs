@@ -55,6 +55,10 @@ pub(crate) struct CaseArguments {
     /// Set a key of the case, as in omega=20 or sample.stiffness="20 N/m"; may be repeated
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
+
+    /// Levers and materials beside the built-in ones (TOML); may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub(crate) catalogue: Vec<PathBuf>,
 }
 
 /// Where data go.
@@ -63,6 +67,14 @@ pub(crate) struct OutArgument {
     /// Write the data to this file; its ending decides the format
     #[arg(long, value_name = "PATH")]
     pub(crate) out: Option<PathBuf>,
+}
+
+/// Where a picture goes.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct PlotArgument {
+    /// Draw the result into this file (.svg, .png or .pdf)
+    #[arg(long, value_name = "PATH")]
+    pub(crate) plot: Option<PathBuf>,
 }
 
 #[cfg(test)]

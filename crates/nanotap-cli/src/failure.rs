@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use nanotap::case::CaseError;
 use nanotap::case_file::{CaseFileError, Place, Problem, Source};
+use nanotap::physical::CatalogueError;
+use nanotap_figures::FigureError;
 
 use crate::style;
 
@@ -52,6 +54,30 @@ impl From<CaseError> for Failure {
         Self::request(
             error.to_string(),
             "change it in the case file or with --set",
+        )
+    }
+}
+
+impl From<FigureError> for Failure {
+    fn from(error: FigureError) -> Self {
+        match error {
+            FigureError::UnknownEnding { path } => Self::request(
+                format!(
+                    "{}: the ending says no format that can be drawn",
+                    path.display()
+                ),
+                "end the name in .svg, .png or .pdf",
+            ),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<CatalogueError> for Failure {
+    fn from(error: CatalogueError) -> Self {
+        Self::request(
+            error.to_string(),
+            "mend the catalogue, or leave --catalogue away",
         )
     }
 }

@@ -1,9 +1,14 @@
 //! `nanotap case`: the case, checked and resolved.
 
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
 use clap::Args;
 use nanotap::case::{Case, CosineTerm};
-use nanotap::case_file::{self, CaseFile, OscillatorFields, Stop};
+use nanotap::case_file::{self, CaseFile};
+use nanotap::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::parameter::Parameter;
+use nanotap::physical::{Kind, Resolved, Severity};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument};
@@ -21,12 +26,78 @@ pub(crate) struct Arguments {
     out: OutArgument,
 }
 
-/// The JSON of a dimensionless case.
+/// The JSON of a cantilever.
 #[derive(Serialize)]
-struct Resolved<'a> {
+struct Cantilever<'a> {
     kind: &'static str,
     #[serde(flatten)]
     case: &'a Case,
+    period: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    physical: Option<Physical>,
+}
+
+/// The physical quantities behind a case, in SI, frequencies in Hz.
+#[derive(Serialize)]
+struct Physical {
+    k: f64,
+    f0: f64,
+    #[serde(rename = "Q")]
+    quality_factor: f64,
+    beam_mass: f64,
+    tip_mass: f64,
+    drive_amplitude: f64,
+    drive_frequency: f64,
+    free_amplitude: f64,
+    free_phase_degrees: f64,
+    setpoint: Option<f64>,
+    contact_stiffness: f64,
+    contact_damping: f64,
+    tip_gap: f64,
+    beam_gap: f64,
+    length_unit: f64,
+    time_unit: f64,
+    force_unit: f64,
+    energy_unit: f64,
+}
+
+impl Physical {
+    fn of(resolved: &Resolved) -> Self {
+        let Resolved {
+            lever,
+            parameters,
+            scales,
+            ..
+        } = resolved;
+        Self {
+            k: lever.k,
+            f0: lever.f0,
+            quality_factor: lever.quality_factor,
+            beam_mass: lever.beam_mass,
+            tip_mass: parameters.tip_mass,
+            drive_amplitude: parameters.drive_amplitude,
+            drive_frequency: parameters.drive_frequency,
+            free_amplitude: resolved.free_amplitude,
+            free_phase_degrees: resolved.free_phase,
+            setpoint: resolved.setpoint,
+            contact_stiffness: parameters.contact_stiffness,
+            contact_damping: parameters.contact_damping,
+            tip_gap: parameters.tip_gap,
+            beam_gap: scales.length,
+            length_unit: scales.length,
+            time_unit: scales.time,
+            force_unit: scales.force,
+            energy_unit: scales.energy,
+        }
+    }
+}
+
+/// The JSON of an oscillator, its keys those of the case file.
+#[derive(Serialize)]
+struct OscillatorDocument {
+    kind: &'static str,
+    #[serde(flatten)]
+    values: BTreeMap<&'static str, f64>,
     period: f64,
 }
 
@@ -34,38 +105,76 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let title = super::title(&arguments.case);
     match super::case_file(&arguments.case)? {
         CaseFile::Dimensionless(case) => {
-            if let Some(path) = &arguments.out.out {
-                file::ending(path, &["toml"])?;
-                file::write(path, case_file::to_toml(&case).as_bytes())?;
-            }
-            if case.cosine_term == CosineTerm::Printed {
-                output.note("the cosine term of Eq. (14) is taken as printed, without its Ω");
-            }
-            if case.alpha2 == 0.0 {
-                output.note("drive_amplitude is 0: nothing drives the beam");
-            }
-            let resolved = Resolved {
+            write_out(&arguments.out, &case)?;
+            remark(&case, output);
+            let document = Cantilever {
                 kind: "cantilever",
                 case: &case,
                 period: case.period(),
+                physical: None,
             };
-            output.result(&resolved, |resolved| cantilever(&title, resolved))
+            output.result(&document, |_| cantilever(&title, &case))
         }
-        CaseFile::Oscillator(fields) => {
+        CaseFile::Physical(tables) => {
+            let resolved = super::resolve(&tables, &arguments.case)?;
+            write_out(&arguments.out, &resolved.case)?;
+            for remark in &resolved.remarks {
+                match remark.severity {
+                    Severity::Note => output.note(&remark.text),
+                    Severity::Warning => output.warning(&remark.text),
+                }
+            }
+            remark(&resolved.case, output);
+            let document = Cantilever {
+                kind: "cantilever",
+                case: &resolved.case,
+                period: resolved.case.period(),
+                physical: Some(Physical::of(&resolved)),
+            };
+            output.result(&document, |_| physical(&title, &resolved))
+        }
+        CaseFile::Oscillator(given) => {
             if let Some(path) = &arguments.out.out {
                 return Err(Failure::request(
                     format!("--out {}: an oscillator is not written out", path.display()),
                     "leave --out away, or take --json",
                 ));
             }
-            output.result(&fields, |fields| oscillator(&title, fields))
+            let values = OscillatorParameter::ALL
+                .into_iter()
+                .filter_map(|parameter| Some((parameter.name(), given.get(parameter)?)))
+                .collect();
+            let kind = match given.stop {
+                Stop::Soft { .. } => "vibro_impact",
+                Stop::Rigid { .. } => "impact",
+            };
+            let document = OscillatorDocument {
+                kind,
+                values,
+                period: TAU / given.omega,
+            };
+            output.result(&document, |_| oscillator(&title, &given))
         }
-        CaseFile::Physical(_) => Err(super::physical_not_yet(&arguments.case)),
     }
 }
 
-fn cantilever(title: &str, resolved: &Resolved<'_>) -> String {
-    let case = resolved.case;
+/// Writes the dimensionless case where `--out` says.
+fn write_out(out: &OutArgument, case: &Case) -> Result<(), Failure> {
+    let Some(path) = &out.out else { return Ok(()) };
+    file::ending(path, &["toml"])?;
+    file::write(path, case_file::to_toml(case).as_bytes())
+}
+
+fn remark(case: &Case, output: &Output) {
+    if case.cosine_term == CosineTerm::Printed {
+        output.note("the cosine term of Eq. (14) is taken as printed, without its Ω");
+    }
+    if case.alpha2 == 0.0 {
+        output.note("drive_amplitude is 0: nothing drives the beam");
+    }
+}
+
+fn cantilever(title: &str, case: &Case) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("key", Align::Left),
@@ -83,71 +192,123 @@ fn cantilever(title: &str, resolved: &Resolved<'_>) -> String {
             parameter.meaning(),
         ]);
     }
+    let heading = format!(
+        "{title}: a dimensionless cantilever, {}",
+        number::counted(case.modes, "mode", "modes")
+    );
+    let period = number::significant(case.period(), 7);
     format!(
-        "{}\n\n{}\n  drive period 2π/Ω = {}\n",
-        style::bold(&format!(
-            "{title}: a dimensionless cantilever, {}",
-            number::counted(case.modes, "mode", "modes")
-        )),
-        table.render(),
-        number::significant(resolved.period, 7),
+        "{}\n\n{}\n  drive period 2π/Ω = {period}\n",
+        style::bold(&heading),
+        table.render()
     )
 }
 
-fn oscillator(title: &str, fields: &OscillatorFields) -> String {
+fn physical(title: &str, resolved: &Resolved) -> String {
+    let Resolved {
+        case,
+        lever,
+        scales,
+        ..
+    } = resolved;
+    let mut given = Table::new([("", Align::Left), ("", Align::Left), ("", Align::Left)]);
+    given.row([
+        "k",
+        &Kind::Stiffness.format(lever.k),
+        "spring constant at the tip",
+    ]);
+    given.row([
+        "f0",
+        &Kind::Frequency.format(lever.f0),
+        "first resonance, with the tip",
+    ]);
+    given.row([
+        "Q",
+        &number::significant(lever.quality_factor, 4),
+        "quality factor",
+    ]);
+    given.row([
+        "mL",
+        &Kind::Mass.format(lever.beam_mass),
+        "mass of the beam",
+    ]);
+    let free = Kind::Length.format(resolved.free_amplitude);
+    let phase = format!(
+        "free amplitude of the tip, {:.1}° behind the base",
+        resolved.free_phase
+    );
+    given.row(["A0", &free, &phase]);
+    if let Some(setpoint) = resolved.setpoint {
+        let ratio = number::significant(setpoint, 4);
+        given.row(["A/A0", &ratio, "setpoint"]);
+    }
+    given.row([
+        "g0",
+        &Kind::Length.format(scales.length),
+        "gap of the beam, the unit of length",
+    ]);
+    given.row([
+        "T",
+        &format!("{:.4e} s", scales.time),
+        "unit of time, √(mL⁴/(EI))",
+    ]);
+    let mut mapping = Table::new([
+        ("", Align::Left),
+        ("key", Align::Left),
+        ("value", Align::Point),
+        ("is", Align::Left),
+        ("of", Align::Left),
+        ("", Align::Left),
+    ]);
+    for row in resolved.mapping() {
+        mapping.row([
+            row.parameter.symbol(),
+            row.parameter.name(),
+            &number::significant(row.value, 6),
+            row.formula,
+            row.quantity,
+            &row.kind.format(row.si),
+        ]);
+    }
+    let heading = format!(
+        "{title}: a physical cantilever, {}",
+        number::counted(case.modes, "mode", "modes")
+    );
+    format!(
+        "{}\n\n{}\n{}",
+        style::bold(&heading),
+        given.render(),
+        mapping.render()
+    )
+}
+
+fn oscillator(title: &str, oscillator: &Oscillator) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("key", Align::Left),
         ("value", Align::Point),
         ("meaning", Align::Left),
     ]);
-    let mut row = |symbol: &str, key: &str, value: f64, meaning: &str| {
-        table.row([symbol, key, &number::chosen(value), meaning]);
-    };
-    row("m", "mass", fields.mass, "mass");
-    row("k", "stiffness", fields.stiffness, "spring");
-    row("c", "damping", fields.damping, "damper");
-    row(
-        "F",
-        "forcing",
-        fields.forcing,
-        "amplitude of the force F cos ωt",
-    );
-    row("ω", "omega", fields.omega, "frequency of the force");
-    row(
-        "g",
-        "gap",
-        fields.gap,
-        "where the stop stands; contact at x ≥ g",
-    );
-    let what = match fields.stop {
-        Stop::Soft {
-            contact_stiffness,
-            contact_damping,
-        } => {
-            row(
-                "kc",
-                "contact_stiffness",
-                contact_stiffness,
-                "spring of the stop",
-            );
-            row(
-                "cc",
-                "contact_damping",
-                contact_damping,
-                "damper of the stop",
-            );
-            "an oscillator with a soft stop"
-        }
-        Stop::Rigid { restitution } => {
-            row(
-                "r",
-                "restitution",
-                restitution,
-                "speed after an impact over speed before",
-            );
-            "an oscillator with a rigid stop"
-        }
+    for parameter in OscillatorParameter::ALL {
+        let Some(value) = oscillator.get(parameter) else {
+            continue;
+        };
+        let (symbol, meaning) = match parameter {
+            OscillatorParameter::Mass => ("m", "mass"),
+            OscillatorParameter::Stiffness => ("k", "spring"),
+            OscillatorParameter::Damping => ("c", "damper"),
+            OscillatorParameter::Forcing => ("F", "amplitude of the force F cos ωt"),
+            OscillatorParameter::Omega => ("ω", "frequency of the force"),
+            OscillatorParameter::Gap => ("g", "where the stop stands; contact at x ≥ g"),
+            OscillatorParameter::ContactStiffness => ("kc", "spring of the stop"),
+            OscillatorParameter::ContactDamping => ("cc", "damper of the stop"),
+            OscillatorParameter::Restitution => ("r", "speed after an impact over speed before"),
+        };
+        table.row([symbol, parameter.name(), &number::chosen(value), meaning]);
+    }
+    let what = match oscillator.stop {
+        Stop::Soft { .. } => "an oscillator with a soft stop",
+        Stop::Rigid { .. } => "an oscillator with a rigid stop",
     };
     format!(
         "{}\n\n{}",

@@ -1,10 +1,12 @@
 //! The commands, one a file.
 
 mod case;
+mod modes;
 
 use clap::Subcommand;
 use nanotap::case::Case;
-use nanotap::case_file::CaseFile;
+use nanotap::case_file::{CaseFile, PhysicalTables};
+use nanotap::physical::{Catalogue, Resolved, Severity};
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -15,12 +17,15 @@ use crate::output::Output;
 pub(crate) enum Command {
     /// Check a case and show it resolved
     Case(case::Arguments),
+    /// Mode shapes and frequencies, in free flight and in contact
+    Modes(modes::Arguments),
 }
 
 /// Runs `command`.
 pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
     match command {
         Command::Case(arguments) => case::run(arguments, output),
+        Command::Modes(arguments) => modes::run(arguments, output),
     }
 }
 
@@ -37,10 +42,29 @@ fn title(arguments: &CaseArguments) -> String {
     )
 }
 
-/// The cantilever that the arguments describe.
-fn cantilever(arguments: &CaseArguments, command: &str) -> Result<Case, Failure> {
+/// A physical case resolved with the built-in catalogue and those that the arguments add.
+fn resolve(tables: &PhysicalTables, arguments: &CaseArguments) -> Result<Resolved, Failure> {
+    let mut catalogue = Catalogue::builtin()?;
+    for path in &arguments.catalogue {
+        catalogue.extend_from_file(path)?;
+    }
+    Ok(tables.resolve(&catalogue)?)
+}
+
+/// The dimensionless cantilever that the arguments describe, for `command`. What puts a
+/// physical case in doubt is said; its notes are `nanotap case`'s.
+fn cantilever(arguments: &CaseArguments, command: &str, output: &Output) -> Result<Case, Failure> {
     match case_file(arguments)? {
         CaseFile::Dimensionless(case) => Ok(case),
+        CaseFile::Physical(tables) => {
+            let resolved = resolve(&tables, arguments)?;
+            for remark in &resolved.remarks {
+                if remark.severity == Severity::Warning {
+                    output.warning(&remark.text);
+                }
+            }
+            Ok(resolved.case)
+        }
         CaseFile::Oscillator(_) => Err(Failure::request(
             format!(
                 "{}: `{command}` needs a cantilever; this is an oscillator",
@@ -48,14 +72,5 @@ fn cantilever(arguments: &CaseArguments, command: &str) -> Result<Case, Failure>
             ),
             "an oscillator has one degree of freedom and no beam modes",
         )),
-        CaseFile::Physical(_) => Err(physical_not_yet(arguments)),
     }
-}
-
-fn physical_not_yet(arguments: &CaseArguments) -> Failure {
-    Failure::Failed(format!(
-        "{}: its keys are right, but physical units are not resolved by this version; \
-         give alpha1 … alpha6 and omega under [model]",
-        title(arguments)
-    ))
 }

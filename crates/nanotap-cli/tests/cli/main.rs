@@ -1,5 +1,7 @@
 //! The program from outside: exit codes, words, JSON and files.
 
 mod case;
+mod modes;
+mod physical;
 mod terminal;
 mod util;

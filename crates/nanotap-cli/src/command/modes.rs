@@ -1,0 +1,140 @@
+//! `nanotap modes`: mode shapes and frequencies, in free flight and in contact.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use nanotap::beam::Modes;
+use nanotap::case::Case;
+use nanotap::mode_table::{self, ModeTable, ModeTableError, damping_ratio};
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::table::{Align, Table};
+use crate::{file, number, style};
+
+/// Points along the beam in the table of mode shapes.
+const POINTS: usize = 201;
+
+/// Mode shapes and frequencies, in free flight and in contact.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let case = super::cantilever(&arguments.case, "nanotap modes", output)?;
+    let table = ModeTable::new(&case).map_err(|error| match error {
+        ModeTableError::Case(error) => Failure::from(error),
+        ModeTableError::Spectrum(error) => Failure::Failed(error.to_string()),
+    })?;
+    let beam = Modes::new(case.modes).map_err(|error| Failure::Failed(error.to_string()))?;
+    if let Some(path) = &arguments.out.out {
+        file::ending(path, &["csv"])?;
+        file::write(path, shapes(&beam).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        mode_table::shapes_figure(&beam).write(path)?;
+    }
+    let title = super::title(&arguments.case);
+    output.result(&table, |table| text(&title, &case, table))
+}
+
+/// The mode shapes φ_j(ξ) as CSV, a row a point.
+fn shapes(beam: &Modes) -> String {
+    let names: Vec<String> = beam
+        .iter()
+        .map(|mode| format!("phi{}", mode.number))
+        .collect();
+    let mut csv = format!("xi,{}\n", names.join(","));
+    for point in 0..POINTS {
+        let xi = point as f64 / (POINTS - 1) as f64;
+        let _ = write!(csv, "{xi}");
+        for value in beam.shapes(xi).iter() {
+            let _ = write!(csv, ",{value}");
+        }
+        csv.push('\n');
+    }
+    csv
+}
+
+fn text(title: &str, case: &Case, table: &ModeTable) -> String {
+    let mut text = style::bold(&format!(
+        "{title}: {} of the cantilever, tip mass α₁ = {}",
+        number::counted(case.modes, "mode", "modes"),
+        number::chosen(case.alpha1),
+    ));
+    text.push('\n');
+    let regimes = [
+        (
+            "free flight".to_owned(),
+            &table.free,
+            &table.exact_free,
+            &table.free_eigenvalues,
+        ),
+        (
+            format!("in contact, α₄ = {}", number::chosen(case.alpha4)),
+            &table.contact,
+            &table.exact_contact,
+            &table.contact_eigenvalues,
+        ),
+    ];
+    for (name, galerkin, exact, eigenvalues) in regimes {
+        let _ = write!(
+            text,
+            "\n  {name}\n{}",
+            frequencies(galerkin, exact, eigenvalues.as_deref())
+        );
+    }
+    text.push_str(
+        "\n  Galerkin: these modes of the bare beam, undamped; exact: the beam itself.\n",
+    );
+    text
+}
+
+fn frequencies(galerkin: &[f64], exact: &[f64], eigenvalues: Option<&[[f64; 2]]>) -> String {
+    // Where each mode oscillates there is one eigenvalue a mode, and it stands in its row.
+    let paired = eigenvalues.filter(|list| list.len() == galerkin.len());
+    let mut table = Table::new([
+        ("mode", Align::Right),
+        ("Ω Galerkin", Align::Point),
+        ("Ω exact", Align::Point),
+        ("difference", Align::Point),
+        ("Ω damped", Align::Point),
+        ("damping ζ", Align::Point),
+    ]);
+    for (index, (galerkin, exact)) in galerkin.iter().zip(exact).enumerate() {
+        let mut row = vec![
+            (index + 1).to_string(),
+            number::significant(*galerkin, 7),
+            number::significant(*exact, 7),
+            number::percent(galerkin / exact - 1.0),
+        ];
+        if let Some(eigenvalue) = paired.map(|list| list[index]) {
+            row.push(number::significant(eigenvalue[1], 7));
+            row.push(number::significant(damping_ratio(eigenvalue), 4));
+        }
+        table.row(row);
+    }
+    let mut text = table.render();
+    match eigenvalues {
+        None => {
+            text.push_str("  damped: eigenvalues too close to critical damping to tell apart\n");
+        }
+        Some(list) if paired.is_none() => {
+            text.push_str("  overdamped: not every mode oscillates; the eigenvalues are\n");
+            let mut table = Table::new([("Re λ", Align::Point), ("Im λ", Align::Point)]);
+            for [re, im] in list {
+                table.row([number::significant(*re, 7), number::significant(*im, 7)]);
+            }
+            text.push_str(&table.render());
+        }
+        Some(_) => {}
+    }
+    text
+}

@@ -1,0 +1,92 @@
+//! Physical cases at the terminal.
+
+use crate::util::{Folder, case};
+
+/// An FM-class lever on a stiff spring.
+const LEVER: &str = "\
+[cantilever]
+k = \"2.8 N/m\"
+f0 = \"75 kHz\"
+Q = 200
+
+[sample]
+stiffness = \"20 N/m\"
+damping = \"1e-6 N s/m\"
+
+[drive]
+frequency = \"65.7 kHz\"
+amplitude = \"1 nm\"
+
+[gap]
+tip = \"0 nm\"
+beam = \"10 um\"
+";
+
+#[test]
+fn both_worlds_are_shown() {
+    let json = case(LEVER, &["--json"]).json();
+    // α4 = 3 K1/k, α2 = f/g0 and α5 = g1/g0, whatever else the lever is.
+    let near = |key: &str, expected: f64| {
+        let value = json[key].as_f64().unwrap();
+        assert!(
+            (value - expected).abs() <= 1e-12 * expected.abs().max(1.0),
+            "{key} = {value}"
+        );
+    };
+    near("alpha4", 3.0 * 20.0 / 2.8);
+    near("alpha2", 1e-9 / 10e-6);
+    near("alpha5", 0.0);
+    // The bare beam's first mode is at Ω = 3.5160 (β₁ = 1.8751), here at 75 kHz.
+    let omega = json["omega"].as_f64().unwrap();
+    assert!((omega - 65.7 / 75.0 * 3.516015).abs() < 1e-5, "{omega}");
+    let physical = &json["physical"];
+    assert_eq!(physical["contact_stiffness"].as_f64(), Some(20.0));
+    assert!((physical["drive_frequency"].as_f64().unwrap() / 65.7e3 - 1.0).abs() < 1e-12);
+
+    let text = case(LEVER, &[]).stdout;
+    for words in [
+        "a physical cantilever",
+        "2.8 N/m",
+        "75 kHz",
+        "alpha4",
+        "20 N/m",
+    ] {
+        assert!(text.contains(words), "{words}:\n{text}");
+    }
+}
+
+#[test]
+fn a_physical_case_written_out_is_its_dimensionless_self() {
+    let folder = Folder::new();
+    folder.write("lever.toml", LEVER);
+    let written = folder
+        .run(&["case", "lever.toml", "--out", "plain.toml", "--json"])
+        .json();
+    let again = folder.run(&["case", "plain.toml", "--json"]).json();
+    for key in [
+        "alpha1", "alpha2", "alpha3", "alpha4", "alpha5", "alpha6", "omega", "modes",
+    ] {
+        assert_eq!(written[key], again[key], "{key}");
+    }
+}
+
+#[test]
+fn wrong_quantities_are_pointed_at() {
+    case(LEVER.replace("20 N/m", "20 kHz"), &[]).refused(&["case.toml:7:13", "20 kHz", "N/m"]);
+    case(LEVER.replace("Q = 200", ""), &[]).refused(&["case.toml:1:", "cantilever.Q"]);
+    case(LEVER, &["--set", "sample.stiffness=-3 N/m"])
+        .refused(&["--set sample.stiffness=-3 N/m", "sample.stiffness"]);
+    case(LEVER.replace("f0 =", "fo ="), &[]).refused(&["`fo`", "did you mean `f0`?"]);
+    case(LEVER, &["--set", "omega=2"]).refused(&["`omega` is dimensionless"]);
+    case(LEVER, &["--catalogue", "none.toml"]).refused(&["none.toml"]);
+}
+
+#[test]
+fn modes_of_a_lever() {
+    let folder = Folder::new();
+    folder.write("lever.toml", LEVER);
+    let json = folder
+        .run(&["modes", "lever.toml", "--json", "--set", "modes=4"])
+        .json();
+    assert_eq!(json["free"].as_array().unwrap().len(), 4);
+}

@@ -4,7 +4,8 @@
 //! (λ²M + λC + K)u = 0 with M = 1 + α1 ppᵀ, C = α3 + α6 ppᵀ, K = diag(κ) + α4 ppᵀ is a
 //! diagonal problem changed by one rank: u_j = p_j/D_j(λ) with D_j = λ² + α3λ + κ_j, and
 //! λ solves the scalar characteristic equation of [`TipLoad`]'s beam. That costs O(N²)
-//! for all pairs and loses no digits at any N.
+//! for all pairs and loses no digits at any N. (A tip mass far above the beam's costs the
+//! lowest frequency's digits in proportion: relative errors are about ε(1 + 4α1).)
 
 mod secular;
 
@@ -17,8 +18,9 @@ use crate::beam::Modes;
 use crate::case::Case;
 use crate::galerkin::{Galerkin, Regime};
 
-/// Smallest [`Spectrum::separation`] that is accepted. Errors of modal coordinates grow
-/// like the rounding error over the separation; here four digits are lost.
+/// Smallest [`Spectrum::separation`] that is accepted. What is put together from modal
+/// coordinates is in error by about the rounding error over the separation; at this one
+/// four digits are lost.
 const LEAST_SEPARATION: f64 = 1e-4;
 
 /// Separation below which uᵀ(2λM + C)u is taken as a product instead of a sum.

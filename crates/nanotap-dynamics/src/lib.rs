@@ -7,11 +7,15 @@
 
 mod adapted_norm;
 pub mod basin;
+pub mod bifurcation;
 mod birkhoff;
 mod block_average;
 mod block_cyclic;
+mod branch_solver;
+pub mod branch_switching;
 pub mod census;
 pub mod confidence;
+pub mod continuation;
 pub mod control;
 mod failure;
 pub mod lyapunov;
@@ -27,9 +31,16 @@ pub mod unstable;
 mod vector;
 
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
+pub use bifurcation::{Bifurcation, BifurcationKind};
 pub use birkhoff::birkhoff_digits;
+pub use branch_solver::OrbitTangency;
+pub use branch_switching::switch_at_flip;
 pub use census::{Attractor, AttractorKind, Census, CensusOptions, Fate, TransientChaos, census};
 pub use confidence::{Fraction, Lifetime};
+pub use continuation::{
+    Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions, Direction,
+    continue_orbit,
+};
 pub use control::Control;
 pub use failure::MapFailure;
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};

@@ -3,6 +3,7 @@
 
 mod systems;
 
+mod branching;
 mod closing;
 mod counting;
 mod exponents;

@@ -1,0 +1,408 @@
+//! Bifurcations along a branch: what crosses zero, and where exactly.
+//!
+//! | kind | test function |
+//! |---|---|
+//! | fold | the parameter's component of the tangent |
+//! | crossing | Π(μ − 1), where no fold explains its sign |
+//! | flip | Π(μ + 1) |
+//! | Neimark–Sacker | Π_{i<j}(μ_i μ_j − 1), where the pair is complex |
+//! | grazing | an extremum of a switching function, followed from point to point |
+//!
+//! Products are replaced by their sign times the smallest factor, which has the same
+//! zeros and does not over- or underflow. A sign change between neighbouring points
+//! is narrowed down along the arc, the orbit solved anew by Newton at every trial, to
+//! a bracket of 1e-12 of the parameter or rounding.
+//!
+//! Fails: two zeros of one function between neighbouring points cancel and are
+//! missed (shorter steps find them); an extremum is followed by the time at which it
+//! happens, so a grazing is missed if its time jumps by more than the distance to
+//! the next extremum within a 256th of a step; multipliers that nearly coincide on
+//! the circle are known to the square root of rounding only, and so is the point.
+
+use nalgebra::Complex;
+
+use crate::branch_solver::{BranchSolver, Node, OrbitTangency};
+use crate::map::MapFamily;
+use crate::multipliers::Multipliers;
+use crate::orbit::PeriodicOrbit;
+use crate::vector::dot;
+
+/// What happens at a bifurcation point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BifurcationKind {
+    /// Two orbits meet and vanish (saddle-node): a multiplier +1, the branch turns.
+    Fold,
+    /// Another branch of the same period crosses (pitchfork, transcritical): a
+    /// multiplier +1, the branch goes on.
+    Crossing,
+    /// Period doubling: a multiplier −1.
+    Flip,
+    /// A complex pair on the unit circle: a torus is born or dies.
+    NeimarkSacker {
+        /// Angle of the pair, in (0, π).
+        angle: f64,
+    },
+    /// An extremum of a switching function touches zero: a contact is born or dies.
+    Grazing {
+        /// When, in drive periods from the orbit's first state.
+        time: f64,
+    },
+}
+
+/// A located bifurcation point.
+#[derive(Clone, Debug)]
+pub struct Bifurcation {
+    /// What happens.
+    pub kind: BifurcationKind,
+    /// Where.
+    pub parameter: f64,
+    /// Width of the last bracket in the parameter.
+    pub uncertainty: f64,
+    /// The orbit there. At a fold or crossing its error estimate is large: the
+    /// parameter alone does not determine it.
+    pub orbit: PeriodicOrbit,
+    /// Index of the branch point before it, in the direction of travel.
+    pub after_point: usize,
+    /// The solution, for switching branches.
+    pub(crate) node: Node,
+}
+
+/// The signs that are watched, at one point.
+#[derive(Clone, Debug)]
+pub(crate) struct Tests {
+    pub(crate) fold: f64,
+    pub(crate) crossing: f64,
+    pub(crate) flip: f64,
+    pub(crate) neimark_sacker: f64,
+    pub(crate) tangencies: Vec<OrbitTangency>,
+}
+
+impl Tests {
+    pub(crate) fn new<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Option<Self> {
+        let multipliers = Multipliers::of_product(&node.jacobians).ok()?.values;
+        Some(Self {
+            fold: node.slope,
+            crossing: plus_one(&multipliers),
+            flip: minus_one(&multipliers),
+            neimark_sacker: pair_on_circle(&multipliers).0,
+            tangencies: solver.tangencies(node).ok()?,
+        })
+    }
+}
+
+/// Π(1 − μ), as sign times smallest factor.
+fn plus_one(multipliers: &[Complex<f64>]) -> f64 {
+    real_product(multipliers, -1.0)
+}
+
+/// Π(1 + μ), as sign times smallest factor.
+fn minus_one(multipliers: &[Complex<f64>]) -> f64 {
+    real_product(multipliers, 1.0)
+}
+
+fn real_product(multipliers: &[Complex<f64>], sign: f64) -> f64 {
+    let mut negative = false;
+    let mut smallest = f64::INFINITY;
+    for m in multipliers {
+        let factor = 1.0 + sign * m;
+        // A pair contributes |factor|² > 0.
+        negative ^= m.im == 0.0 && factor.re < 0.0;
+        smallest = smallest.min(factor.norm());
+    }
+    if negative { -smallest } else { smallest }
+}
+
+/// Π_{i<j}(μ_i μ_j − 1) as sign times smallest factor, and the pair with the
+/// smallest factor among those that are complex conjugates.
+fn pair_on_circle(multipliers: &[Complex<f64>]) -> (f64, Option<(Complex<f64>, f64)>) {
+    let mut negative = false;
+    let mut smallest = f64::INFINITY;
+    let mut pair = None;
+    let mut pair_factor = f64::INFINITY;
+    for (i, a) in multipliers.iter().enumerate() {
+        for b in &multipliers[i + 1..] {
+            let conjugates = a.im != 0.0 && (a - b.conj()).norm() <= 1e-9 * a.norm();
+            let factor = if conjugates {
+                Complex::new(a.norm_sqr() - 1.0, 0.0)
+            } else {
+                a * b - 1.0
+            };
+            // Products that are not real come in conjugate couples: positive.
+            let real = conjugates || (a.im == 0.0 && b.im == 0.0);
+            negative ^= real && factor.re < 0.0;
+            smallest = smallest.min(factor.norm());
+            if conjugates && factor.norm() < pair_factor {
+                pair_factor = factor.norm();
+                pair = Some((if a.im > 0.0 { *a } else { *b }, factor.re));
+            }
+        }
+    }
+    if !smallest.is_finite() {
+        return (1.0, None);
+    }
+    (if negative { -smallest } else { smallest }, pair)
+}
+
+/// A zero between two nodes.
+struct Zero {
+    at: f64,
+    node: Node,
+    uncertainty: f64,
+    value: f64,
+}
+
+/// Narrows down the sign change of `test` between two steps along the tangent of
+/// `from`: regula falsi (Illinois) with a bisection at every third trial. `None` if
+/// the orbit is lost on the way, or if what changes sign jumps instead of vanishing.
+fn narrow<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    from: &Node,
+    span: (f64, f64),
+    values: (f64, f64),
+    mut test: impl FnMut(&BranchSolver<'_, F>, &Node, f64) -> Option<f64>,
+) -> Option<Zero> {
+    let (mut low, mut high) = span;
+    let mut weights = values;
+    let mut ends = (f64::NAN, f64::NAN);
+    let mut best: Option<Zero> = None;
+    for trial in 0..100 {
+        let at = if trial % 3 == 2 {
+            0.5 * (low + high)
+        } else {
+            let t = weights.0 / (weights.0 - weights.1);
+            low + (high - low) * t.clamp(0.001, 0.999)
+        };
+        if !(at > low && at < high) {
+            break;
+        }
+        // Where branches cross the bordered system is singular: try beside it.
+        let beside = at + 1e-3 * (high - at);
+        let Some((at, node)) = [at, beside]
+            .into_iter()
+            .find_map(|at| Some((at, solver.along(from, at).ok()?)))
+        else {
+            break;
+        };
+        let value = test(solver, &node, at)?;
+        let parameter = node.parameter;
+        if best.as_ref().is_none_or(|b| value.abs() <= b.value.abs()) {
+            best = Some(Zero {
+                at,
+                node,
+                uncertainty: 0.0,
+                value,
+            });
+        }
+        if value == 0.0 {
+            ends = (parameter, parameter);
+            break;
+        }
+        if (value > 0.0) == (values.0 > 0.0) {
+            (low, ends.0) = (at, parameter);
+            weights = (value, 0.5 * weights.1);
+        } else {
+            (high, ends.1) = (at, parameter);
+            weights = (0.5 * weights.0, value);
+        }
+        let size = parameter.abs().max(solver.parameter_scale);
+        let fine = (ends.1 - ends.0).abs() <= 1e-13 * size;
+        let width = high - low;
+        if width <= 1e-14 * span.1 || fine && width <= 1e-9 * (span.1 - span.0) {
+            break;
+        }
+    }
+    let size = values.0.abs().max(values.1.abs());
+    best.filter(|zero| zero.value.abs() <= 1e-6 * size)
+        .map(|zero| Zero {
+            uncertainty: (ends.1 - ends.0).abs(),
+            ..zero
+        })
+}
+
+/// The step along the tangent of `from` at which the difference of the states `m`
+/// periods apart reverses: the branch has run into an orbit of period `m`.
+pub(crate) fn collapse<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    from: &Node,
+    to: &Node,
+    step: f64,
+    m: usize,
+) -> Option<(f64, f64)> {
+    let d = solver.d;
+    let gap = |node: &Node| -> Vec<f64> {
+        (0..d)
+            .map(|i| node.points[i] - node.points[m * d + i])
+            .collect()
+    };
+    let reference = gap(from);
+    let square = dot(&reference, &reference);
+    let last = dot(&reference, &gap(to)) / square;
+    if last.is_nan() || last >= 0.0 {
+        return None;
+    }
+    let zero = narrow(solver, from, (0.0, step), (1.0, last), |_, node, _| {
+        Some(dot(&reference, &gap(node)) / square)
+    });
+    // Both branches meet there, so the corrector may fail: interpolate.
+    Some(zero.map_or_else(
+        || {
+            let t = 1.0 / (1.0 - last);
+            (
+                t * step,
+                from.parameter + t * (to.parameter - from.parameter),
+            )
+        },
+        |z| (z.at, z.node.parameter),
+    ))
+}
+
+/// All bifurcations between two neighbouring nodes, in order along the arc.
+pub(crate) fn between<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    a: &Node,
+    tests_a: &Tests,
+    tests_b: &Tests,
+    step: f64,
+    after_point: usize,
+) -> Vec<Bifurcation> {
+    let mut zeros: Vec<(BifurcationKind, Zero)> = Vec::new();
+    let whole = (0.0, step);
+    let changes = |x: f64, y: f64| x * y < 0.0;
+    if changes(tests_a.fold, tests_b.fold) {
+        let zero = narrow(
+            solver,
+            a,
+            whole,
+            (tests_a.fold, tests_b.fold),
+            |_, node, _| Some(node.slope),
+        );
+        zeros.extend(zero.map(|z| (BifurcationKind::Fold, z)));
+    } else if changes(tests_a.crossing, tests_b.crossing) {
+        let zero = narrow(
+            solver,
+            a,
+            whole,
+            (tests_a.crossing, tests_b.crossing),
+            |_, node, _| of_multipliers(node, plus_one),
+        );
+        zeros.extend(zero.map(|z| (BifurcationKind::Crossing, z)));
+    }
+    if changes(tests_a.flip, tests_b.flip) {
+        let zero = narrow(
+            solver,
+            a,
+            whole,
+            (tests_a.flip, tests_b.flip),
+            |_, node, _| of_multipliers(node, minus_one),
+        );
+        zeros.extend(zero.map(|z| (BifurcationKind::Flip, z)));
+    }
+    if changes(tests_a.neimark_sacker, tests_b.neimark_sacker) {
+        let zero = narrow(
+            solver,
+            a,
+            whole,
+            (tests_a.neimark_sacker, tests_b.neimark_sacker),
+            |_, node, _| of_multipliers(node, |m| pair_on_circle(m).0),
+        );
+        zeros.extend(zero.and_then(|z| {
+            let multipliers = Multipliers::of_product(&z.node.jacobians).ok()?.values;
+            // A real pair of product 1 (a neutral saddle) is no bifurcation.
+            let (pair, factor) = pair_on_circle(&multipliers).1?;
+            (factor.abs() <= 1e-6).then(|| {
+                let angle = pair.im.atan2(pair.re);
+                (BifurcationKind::NeimarkSacker { angle }, z)
+            })
+        }));
+    }
+    grazings(solver, a, tests_a, tests_b, (0.0, step), 8, &mut zeros);
+    zeros.sort_by(|(_, x), (_, y)| x.at.total_cmp(&y.at));
+    zeros
+        .into_iter()
+        .filter_map(|(kind, zero)| {
+            Some(Bifurcation {
+                kind,
+                parameter: zero.node.parameter,
+                uncertainty: zero.uncertainty,
+                orbit: solver.orbit(&zero.node).ok()?,
+                after_point,
+                node: zero.node,
+            })
+        })
+        .collect()
+}
+
+fn of_multipliers(node: &Node, test: impl Fn(&[Complex<f64>]) -> f64) -> Option<f64> {
+    Some(test(&Multipliers::of_product(&node.jacobians).ok()?.values))
+}
+
+/// Shortest way round from time `a` to time `b` on an orbit of period `n`.
+fn time_shift(a: f64, b: f64, n: f64) -> f64 {
+    let shift = (b - a).rem_euclid(n);
+    if shift > 0.5 * n { shift - n } else { shift }
+}
+
+/// The tangency nearest to a time.
+fn nearest(tangencies: &[OrbitTangency], time: f64, n: f64) -> Option<(usize, f64)> {
+    tangencies
+        .iter()
+        .map(|t| time_shift(time, t.time, n))
+        .enumerate()
+        .min_by(|(_, x), (_, y)| x.abs().total_cmp(&y.abs()))
+}
+
+/// Tangencies whose value changes sign between steps `span.0` and `span.1` from `a`.
+/// Extrema are matched with each other's nearest in time; if the numbers of negative
+/// ones differ and no match says why, the span is halved, `depth` times at most.
+fn grazings<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    a: &Node,
+    first: &Tests,
+    last: &Tests,
+    span: (f64, f64),
+    depth: usize,
+    zeros: &mut Vec<(BifurcationKind, Zero)>,
+) {
+    let n = solver.n as f64;
+    let mut found = 0;
+    for (i, t) in first.tangencies.iter().enumerate() {
+        let Some((j, shift)) = nearest(&last.tangencies, t.time, n) else {
+            continue;
+        };
+        let u = last.tangencies[j];
+        let mutual = nearest(&first.tangencies, u.time, n).is_some_and(|(k, _)| k == i);
+        if !mutual || t.value * u.value >= 0.0 {
+            continue;
+        }
+        let zero = narrow(solver, a, span, (t.value, u.value), |solver, node, at| {
+            let fraction = (at - span.0) / (span.1 - span.0);
+            let tangencies = solver.tangencies(node).ok()?;
+            let (k, _) = nearest(&tangencies, t.time + shift * fraction, n)?;
+            Some(tangencies[k].value)
+        });
+        if let Some(zero) = zero {
+            let time = solver.tangencies(&zero.node).ok().and_then(|list| {
+                list.iter()
+                    .min_by(|x, y| x.value.abs().total_cmp(&y.value.abs()))
+                    .map(|x| x.time)
+            });
+            found += 1;
+            let kind = BifurcationKind::Grazing {
+                time: time.unwrap_or(t.time),
+            };
+            zeros.push((kind, zero));
+        }
+    }
+    let negative = |tests: &Tests| tests.tangencies.iter().filter(|t| t.value < 0.0).count();
+    if found == 0 && depth > 0 && negative(first) != negative(last) {
+        let middle = 0.5 * (span.0 + span.1);
+        let Ok(node) = solver.along(a, middle) else {
+            return;
+        };
+        let Some(tests) = Tests::new(solver, &node) else {
+            return;
+        };
+        grazings(solver, a, first, &tests, (span.0, middle), depth - 1, zeros);
+        grazings(solver, a, &tests, last, (middle, span.1), depth - 1, zeros);
+    }
+}

@@ -1,0 +1,293 @@
+//! One point of a branch: the bordered Newton corrector and the tangent.
+//!
+//! Unknown are all strobe points and the parameter. The border is a plane in
+//! (x_0, λ), measured in units of a state scale and a parameter scale; the tangent
+//! follows from (DP − 1, ∂P/∂λ) with the previous tangent as border, so its
+//! orientation carries over.
+
+use nalgebra::DMatrix;
+
+use crate::block_cyclic::BlockCyclic;
+use crate::failure::{MapFailure, advance_with_tangencies, finite};
+use crate::map::MapFamily;
+use crate::orbit::PeriodicOrbit;
+use crate::shooting::{Segments, ShootingError};
+use crate::vector::{distance, dot, norm};
+
+/// Newton steps after which a corrector gives up: the caller shortens its step.
+const ITERATIONS: usize = 12;
+
+/// A tangency somewhere on an orbit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrbitTangency {
+    /// When, in drive periods from the first state of the orbit: 0 ≤ time < period.
+    pub time: f64,
+    /// Value of the switching function there.
+    pub value: f64,
+}
+
+/// A solution with its tangent.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub(crate) parameter: f64,
+    pub(crate) points: Vec<f64>,
+    pub(crate) jacobians: Vec<DMatrix<f64>>,
+    pub(crate) residual: f64,
+    /// Derivative of all points with respect to scaled arclength.
+    pub(crate) tangent: Vec<f64>,
+    /// Derivative of the parameter with respect to scaled arclength.
+    pub(crate) slope: f64,
+    pub(crate) iterations: usize,
+}
+
+/// Why there is no point where one was looked for.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(crate) enum CorrectorFailure {
+    #[error(transparent)]
+    Map(#[from] MapFailure),
+    #[error("the corrector did not converge")]
+    NoConvergence,
+    #[error("the bordered system is singular")]
+    Singular,
+}
+
+/// Work space and scales for branches of one period.
+pub(crate) struct BranchSolver<'a, F: MapFamily> {
+    pub(crate) family: &'a F,
+    pub(crate) d: usize,
+    pub(crate) n: usize,
+    pub(crate) state_scale: f64,
+    pub(crate) parameter_scale: f64,
+    /// Residual, in units of the orbit's scale, that a stalled corrector may have.
+    tolerance: f64,
+    points: Vec<f64>,
+    residuals: Vec<f64>,
+    derivatives: Vec<f64>,
+    jacobians: Vec<DMatrix<f64>>,
+    step: Vec<f64>,
+    state: Vec<f64>,
+    system: BlockCyclic,
+}
+
+impl<'a, F: MapFamily> BranchSolver<'a, F> {
+    pub(crate) fn new(
+        family: &'a F,
+        d: usize,
+        n: usize,
+        state_scale: f64,
+        parameter_scale: f64,
+        tolerance: f64,
+    ) -> Self {
+        Self {
+            family,
+            d,
+            n,
+            state_scale,
+            parameter_scale,
+            tolerance,
+            points: vec![0.0; n * d],
+            residuals: vec![0.0; n * d],
+            derivatives: vec![0.0; n * d],
+            jacobians: vec![DMatrix::zeros(d, d); n],
+            step: vec![0.0; n * d],
+            state: vec![0.0; d],
+            system: BlockCyclic::new(d, n),
+        }
+    }
+
+    fn evaluate(&mut self, parameter: f64) -> Result<f64, MapFailure> {
+        let (d, n) = (self.d, self.n);
+        let mut map = self.family.at(parameter).map_err(MapFailure::refused)?;
+        for k in 0..n {
+            self.state.copy_from_slice(&self.points[k * d..(k + 1) * d]);
+            self.family
+                .advance_with_derivatives(
+                    parameter,
+                    &mut map,
+                    &mut self.state,
+                    &mut self.jacobians[k],
+                    &mut self.derivatives[k * d..(k + 1) * d],
+                )
+                .map_err(MapFailure::refused)?;
+            finite(&self.state)?;
+            finite(self.jacobians[k].as_slice())?;
+            let next = (k + 1) % n;
+            for i in 0..d {
+                self.residuals[k * d + i] = self.state[i] - self.points[next * d + i];
+            }
+        }
+        finite(&self.derivatives)?;
+        Ok(norm(&self.residuals))
+    }
+
+    /// Scaled scalar product of two directions in (x_0, λ).
+    pub(crate) fn product(&self, a: &[f64], slope_a: f64, b: &[f64], slope_b: f64) -> f64 {
+        let d = self.d;
+        dot(&a[..d], &b[..d]) / (self.state_scale * self.state_scale)
+            + slope_a * slope_b / (self.parameter_scale * self.parameter_scale)
+    }
+
+    /// The bordering row that measures the component along a direction.
+    fn row(&self, tangent: &[f64], slope: f64) -> (Vec<f64>, f64) {
+        let square = self.state_scale * self.state_scale;
+        (
+            tangent[..self.d].iter().map(|t| t / square).collect(),
+            slope / (self.parameter_scale * self.parameter_scale),
+        )
+    }
+
+    /// The solution at a given parameter near `points`; its tangent points towards
+    /// larger parameters if `rising`.
+    pub(crate) fn at_parameter(
+        &mut self,
+        points: &[f64],
+        parameter: f64,
+        rising: bool,
+    ) -> Result<Node, CorrectorFailure> {
+        let row = vec![0.0; self.d];
+        let sign = if rising { 1.0 } else { -1.0 };
+        self.correct(points, parameter, &row, 1.0, &row, sign)
+    }
+
+    /// The solution a scaled arclength `step` along the tangent of `from`.
+    pub(crate) fn along(&mut self, from: &Node, step: f64) -> Result<Node, CorrectorFailure> {
+        let points: Vec<f64> = from
+            .points
+            .iter()
+            .zip(&from.tangent)
+            .map(|(x, t)| x + step * t)
+            .collect();
+        let parameter = from.parameter + step * from.slope;
+        let (row, corner) = self.row(&from.tangent, from.slope);
+        self.correct(&points, parameter, &row, corner, &row, corner)
+    }
+
+    /// As [`Self::along`], but onto the plane of this parameter, oriented as `from`.
+    pub(crate) fn onto_parameter(
+        &mut self,
+        from: &Node,
+        parameter: f64,
+    ) -> Result<Node, CorrectorFailure> {
+        let step = (parameter - from.parameter) / from.slope;
+        let points: Vec<f64> = from
+            .points
+            .iter()
+            .zip(&from.tangent)
+            .map(|(x, t)| x + step * t)
+            .collect();
+        let plane = vec![0.0; self.d];
+        let (row, corner) = self.row(&from.tangent, from.slope);
+        self.correct(&points, parameter, &plane, 1.0, &row, corner)
+    }
+
+    /// Newton in the plane `row`·(x_0, λ) = its value at the prediction; the tangent
+    /// has a positive component along the orientation.
+    fn correct(
+        &mut self,
+        points: &[f64],
+        parameter: f64,
+        row: &[f64],
+        corner: f64,
+        orientation: &[f64],
+        orientation_corner: f64,
+    ) -> Result<Node, CorrectorFailure> {
+        self.points.copy_from_slice(points);
+        let mut parameter = parameter;
+        let mut residual = self.evaluate(parameter)?;
+        let scale = self.state_scale.max(norm(points));
+        let mut iterations = 0;
+        while residual > 0.0 {
+            if iterations == ITERATIONS {
+                return Err(CorrectorFailure::NoConvergence);
+            }
+            iterations += 1;
+            self.system
+                .factor(&self.jacobians, &self.residuals, Some(&self.derivatives));
+            let change = self
+                .system
+                .solve_bordered(row, corner, 0.0, true, &mut self.step)
+                .ok_or(CorrectorFailure::Singular)?;
+            for (x, s) in self.points.iter_mut().zip(&self.step) {
+                *x += s;
+            }
+            parameter += change;
+            if !parameter.is_finite() || self.points.iter().any(|v| !v.is_finite()) {
+                return Err(CorrectorFailure::Singular);
+            }
+            let before = residual;
+            residual = self.evaluate(parameter)?;
+            let stalled = residual > 0.5 * before;
+            let small = before <= self.tolerance * scale;
+            if stalled && small {
+                break;
+            }
+            if residual > before {
+                return Err(CorrectorFailure::NoConvergence);
+            }
+        }
+        self.system
+            .factor(&self.jacobians, &self.residuals, Some(&self.derivatives));
+        let mut tangent = vec![0.0; self.n * self.d];
+        let slope = self
+            .system
+            .solve_bordered(orientation, orientation_corner, 1.0, false, &mut tangent)
+            .ok_or(CorrectorFailure::Singular)?;
+        let length = self.product(&tangent, slope, &tangent, slope).sqrt();
+        if !(length.is_finite() && length > 0.0) {
+            return Err(CorrectorFailure::Singular);
+        }
+        for t in &mut tangent {
+            *t /= length;
+        }
+        Ok(Node {
+            parameter,
+            points: self.points.clone(),
+            jacobians: self.jacobians.clone(),
+            residual,
+            tangent,
+            slope: slope / length,
+            iterations,
+        })
+    }
+
+    /// Every tangency of an orbit, in order of time.
+    pub(crate) fn tangencies(&self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
+        let mut map = self
+            .family
+            .at(node.parameter)
+            .map_err(MapFailure::refused)?;
+        let mut found = Vec::new();
+        let mut state = vec![0.0; self.d];
+        let mut one = Vec::new();
+        for k in 0..self.n {
+            state.copy_from_slice(&node.points[k * self.d..(k + 1) * self.d]);
+            one.clear();
+            advance_with_tangencies(&mut map, &mut state, &mut one)?;
+            found.extend(one.iter().map(|t| OrbitTangency {
+                time: k as f64 + t.phase,
+                value: t.value,
+            }));
+        }
+        Ok(found)
+    }
+
+    /// The orbit of a node, with multipliers and error estimate.
+    pub(crate) fn orbit(&self, node: &Node) -> Result<PeriodicOrbit, ShootingError> {
+        let mut segments = Segments::new(self.d, self.n);
+        segments.points.copy_from_slice(&node.points);
+        segments.jacobians.clone_from_slice(&node.jacobians);
+        segments.scale = self.state_scale.max(norm(&node.points));
+        // At a fold the orbit is not determined by the parameter: say so.
+        let error = segments
+            .error_estimate()
+            .unwrap_or(f64::INFINITY)
+            .max(node.residual);
+        segments.into_orbit(node.residual, error)
+    }
+
+    /// Scaled distance of two nodes in (all points, λ).
+    pub(crate) fn separation(&self, a: &Node, b: &Node) -> f64 {
+        (distance(&a.points, &b.points) / self.state_scale)
+            .max((a.parameter - b.parameter).abs() / self.parameter_scale)
+    }
+}

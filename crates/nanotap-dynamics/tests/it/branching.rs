@@ -1,0 +1,363 @@
+//! Continuation, bifurcation points and branch switching, against closed forms.
+
+use nanotap_dynamics::{
+    BifurcationKind, Branch, BranchEnd, ContinuationError, ContinuationOptions, Control, DMatrix,
+    Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability, close_orbit, continue_orbit,
+    switch_at_flip,
+};
+
+use crate::systems::{
+    Cubic, DelayedLogistic, Family, Formula, Grazing, HardGrazing, Henon, Logistic,
+};
+
+fn orbit_at<F: MapFamily>(
+    family: &F,
+    parameter: f64,
+    guess: &[f64],
+    period: usize,
+) -> PeriodicOrbit {
+    let mut map = family.at(parameter).unwrap();
+    close_orbit(&mut map, guess, period, &ShootingOptions::default()).unwrap()
+}
+
+fn branch<F: MapFamily>(
+    family: &F,
+    parameter: f64,
+    guess: &[f64],
+    period: usize,
+    to: f64,
+    range: (f64, f64),
+) -> Branch {
+    let orbit = orbit_at(family, parameter, guess, period);
+    let direction = if to > parameter {
+        Direction::Increasing
+    } else {
+        Direction::Decreasing
+    };
+    let options = ContinuationOptions::over(range.0, range.1);
+    continue_orbit(
+        family,
+        parameter,
+        &orbit,
+        direction,
+        &options,
+        &Control::default(),
+    )
+    .unwrap()
+}
+
+fn parameters(branch: &Branch, wanted: fn(&BifurcationKind) -> bool) -> Vec<f64> {
+    branch
+        .bifurcations
+        .iter()
+        .filter(|b| wanted(&b.kind))
+        .map(|b| b.parameter)
+        .collect()
+}
+
+fn near(found: &[f64], exact: &[f64], tolerance: f64) {
+    assert_eq!(found.len(), exact.len(), "{found:?} {exact:?}");
+    for (f, e) in found.iter().zip(exact) {
+        assert!((f - e).abs() < tolerance, "{found:?} {exact:?}");
+    }
+}
+
+const FOLD: fn(&BifurcationKind) -> bool = |k| *k == BifurcationKind::Fold;
+const FLIP: fn(&BifurcationKind) -> bool = |k| *k == BifurcationKind::Flip;
+const CROSSING: fn(&BifurcationKind) -> bool = |k| *k == BifurcationKind::Crossing;
+const GRAZING: fn(&BifurcationKind) -> bool = |k| matches!(k, BifurcationKind::Grazing { .. });
+const TORUS: fn(&BifurcationKind) -> bool = |k| matches!(k, BifurcationKind::NeimarkSacker { .. });
+
+const HENON: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
+
+/// Downwards from a = 0.2: round the fold at a = −(1−b)²/4 and up the unstable side,
+/// which runs off to infinity as a → 0.
+#[test]
+fn the_henon_fixed_point_turns_at_its_fold() {
+    let orbit = orbit_at(&HENON, 0.2, &[0.8, 0.2], 1);
+    let options = ContinuationOptions {
+        bound: 50.0,
+        ..ContinuationOptions::over(-1.0, 1.2)
+    };
+    let b = continue_orbit(
+        &HENON,
+        0.2,
+        &orbit,
+        Direction::Decreasing,
+        &options,
+        &Control::default(),
+    )
+    .unwrap();
+    near(&parameters(&b, FOLD), &[-0.7 * 0.7 / 4.0], 1e-12);
+    assert!(matches!(b.end, BranchEnd::LeftDomain));
+    let last = b.points.last().unwrap();
+    let exact = (-0.7 - (0.49 + 4.0 * last.parameter).sqrt()) / (2.0 * last.parameter);
+    assert!((last.orbit.states[0][0] / exact - 1.0).abs() < 1e-9);
+    let unstable = Stability::Unstable {
+        unstable_dimension: 1,
+    };
+    assert_eq!(last.orbit.stability, unstable);
+    // Every point solves μ² + 2 a x μ − b = 0.
+    for p in &b.points {
+        let x = p.orbit.states[0][0];
+        for m in &p.orbit.multipliers {
+            let residual = m * m + m * 2.0 * p.parameter * x - 0.3;
+            assert!(residual.norm() < 1e-12 * (1.0 + m.norm_sqr()));
+        }
+    }
+}
+
+/// a = 3(1−b)²/4 for the first flip, (1−b)² + (1+b)²/4 for the second.
+#[test]
+fn henon_flips_and_its_doubled_branch() {
+    let b = branch(&HENON, 0.2, &[0.8, 0.2], 1, 1.2, (0.0, 1.2));
+    near(&parameters(&b, FLIP), &[0.3675], 1e-12);
+    assert!(b.bifurcations[0].uncertainty < 1e-11);
+    let options = ContinuationOptions::over(0.0, 1.2);
+    let doubled =
+        switch_at_flip(&HENON, &b.bifurcations[0], &options, &Control::default()).unwrap();
+    assert_eq!(doubled.period, 2);
+    assert!(matches!(doubled.end, BranchEnd::RangeEnd));
+    near(&parameters(&doubled, FLIP), &[0.49 + 1.69 / 4.0], 1e-11);
+    assert!(doubled.points[1].orbit.is_stable());
+    assert!(!doubled.points.last().unwrap().orbit.is_stable());
+}
+
+const LOGISTIC: Family<Logistic> = Family(Logistic);
+
+/// Doubled twice: 3, 1 + √6, and 3.5440903596 (the period-4 orbit's flip).
+#[test]
+fn the_logistic_cascade() {
+    let options = ContinuationOptions::over(2.0, 4.0);
+    let first = branch(&LOGISTIC, 2.5, &[0.6], 1, 4.0, (2.0, 4.0));
+    near(&parameters(&first, FLIP), &[3.0], 1e-12);
+    let second = switch_at_flip(
+        &LOGISTIC,
+        &first.bifurcations[0],
+        &options,
+        &Control::default(),
+    )
+    .unwrap();
+    near(&parameters(&second, FLIP), &[1.0 + 6f64.sqrt()], 1e-11);
+    let third = switch_at_flip(
+        &LOGISTIC,
+        &second.bifurcations[0],
+        &options,
+        &Control::default(),
+    )
+    .unwrap();
+    assert_eq!(third.period, 4);
+    near(&parameters(&third, FLIP), &[3.5440903596], 1e-9);
+}
+
+/// The period-3 window opens in a fold at 1 + √8; followed down from its stable side
+/// the branch comes back up unstable.
+#[test]
+fn the_period_three_window_opens_in_a_fold() {
+    let b = branch(&LOGISTIC, 3.835, &[0.5], 3, 3.0, (3.5, 4.0));
+    near(&parameters(&b, FOLD), &[1.0 + 8f64.sqrt()], 1e-11);
+    let last = b.points.last().unwrap();
+    assert_eq!(last.parameter, 4.0);
+    assert!((last.orbit.spectral_radius() - 8.0).abs() < 1e-9);
+    assert_eq!(b.period, 3);
+}
+
+/// Followed down, the period-2 branch runs into the fixed point at r = 3.
+#[test]
+fn a_doubled_branch_ends_where_it_was_born() {
+    let b = branch(&LOGISTIC, 3.3, &[0.8], 2, 2.0, (2.5, 3.5));
+    let BranchEnd::Collapsed { period, parameter } = b.end else {
+        panic!("{:?}", b.end)
+    };
+    assert_eq!(period, 1);
+    assert!((parameter - 3.0).abs() < 1e-6, "{parameter}");
+    assert!(b.bifurcations.is_empty(), "{:?}", b.bifurcations);
+}
+
+/// The origin of the logistic map is crossed at r = 1, that of the cubic map meets a
+/// pitchfork at r = 1: a multiplier +1 without a fold.
+#[test]
+fn crossings_are_no_folds() {
+    let b = branch(&LOGISTIC, 0.4, &[0.0], 1, 2.0, (0.1, 2.0));
+    near(&parameters(&b, CROSSING), &[1.0], 1e-12);
+    assert!(parameters(&b, FOLD).is_empty());
+    let b = branch(&Family(Cubic), 0.4, &[0.0], 1, 2.0, (0.1, 2.0));
+    near(&parameters(&b, CROSSING), &[1.0], 1e-12);
+}
+
+/// The delayed logistic map: a = 2, multipliers e^{±iπ/3}.
+#[test]
+fn the_torus_is_born_at_its_exact_place() {
+    let b = branch(
+        &Family(DelayedLogistic),
+        1.5,
+        &[0.3, 0.3],
+        1,
+        3.0,
+        (1.4, 2.6),
+    );
+    near(&parameters(&b, TORUS), &[2.0], 1e-12);
+    let BifurcationKind::NeimarkSacker { angle } = b.bifurcations[0].kind else {
+        panic!()
+    };
+    assert!((angle - std::f64::consts::FRAC_PI_3).abs() < 1e-11);
+    assert_eq!(b.bifurcations.len(), 1);
+}
+
+/// Two uncoupled real directions with multipliers λ and 1/(2 − λ)… whose product
+/// passes 1 while neither is complex: a neutral saddle, no bifurcation.
+#[derive(Clone, Debug)]
+struct NeutralSaddle(f64);
+
+impl Formula for NeutralSaddle {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = 2.0 * x[0];
+        out[1] = self.0 * x[1];
+    }
+    fn jacobian(&self, _x: &[f64], out: &mut DMatrix<f64>) {
+        out.fill(0.0);
+        out[(0, 0)] = 2.0;
+        out[(1, 1)] = self.0;
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = 0.0;
+        out[1] = x[1];
+    }
+}
+
+#[test]
+fn a_neutral_saddle_is_no_bifurcation() {
+    let b = branch(&Family(NeutralSaddle), 0.3, &[0.0, 0.0], 1, 0.8, (0.2, 0.8));
+    assert!(b.bifurcations.is_empty(), "{:?}", b.bifurcations);
+    assert!(matches!(b.end, BranchEnd::RangeEnd));
+}
+
+const A: f64 = 0.4;
+
+/// Grazing at μ = 0 and the fold it brings at μ = 4(1−a)³/(27b²), beside each other.
+#[test]
+fn a_soft_grazing_and_its_fold() {
+    let family = Family(|mu| Grazing { mu, a: A, b: 1.5 });
+    let b = branch(&family, -0.2, &[-0.3], 1, 1.0, (-0.3, 0.3));
+    near(&parameters(&b, GRAZING), &[0.0], 1e-12);
+    let exact = 4.0 * (1.0 - A).powi(3) / (27.0 * 1.5 * 1.5);
+    near(&parameters(&b, FOLD), &[exact], 1e-11);
+    // Back down past μ = 0 on the unstable side, without another grazing.
+    assert!(matches!(b.end, BranchEnd::RangeEnd));
+    let last = b.points.last().unwrap();
+    assert!(last.parameter < -0.299 && !last.orbit.is_stable());
+    let x: f64 = last.orbit.states[0][0];
+    assert!((last.parameter - ((1.0 - A) * x - 1.5 * x.powf(1.5))).abs() < 1e-12);
+}
+
+/// With b < 0 the contact brings a flip, at √x = −2(1 + a)/(3b).
+#[test]
+fn a_soft_grazing_and_its_flip() {
+    let family = Family(|mu| Grazing { mu, a: A, b: -3.0 });
+    let b = branch(&family, -0.2, &[-0.3], 1, 1.0, (-0.3, 0.5));
+    near(&parameters(&b, GRAZING), &[0.0], 1e-12);
+    let x = (2.0 * (1.0 + A) / 9.0f64).powi(2);
+    near(
+        &parameters(&b, FLIP),
+        &[(1.0 - A) * x + 3.0 * x.powf(1.5)],
+        1e-11,
+    );
+}
+
+/// A hard grazing is found from the side where the orbit is smooth.
+#[test]
+fn a_hard_grazing_is_located() {
+    let family = Family(|mu| HardGrazing { mu, a: A, b: 1.0 });
+    let b = branch(&family, -0.2, &[-0.3], 1, 1.0, (-0.3, 0.3));
+    near(&parameters(&b, GRAZING), &[0.0], 1e-9);
+}
+
+/// x → x + (1 − x² − λ²)/4: the fixed points form a circle in (λ, x).
+#[derive(Clone, Debug)]
+struct Isola(f64);
+
+impl Formula for Isola {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] + 0.25 * (1.0 - x[0] * x[0] - self.0 * self.0);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = 1.0 - 0.5 * x[0];
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = -0.5 * self.0;
+    }
+}
+
+#[test]
+fn an_isola_closes() {
+    let b = branch(&Family(Isola), 0.1, &[1.0], 1, 1.0, (-2.0, 2.0));
+    assert!(matches!(b.end, BranchEnd::Closed), "{:?}", b.end);
+    near(&parameters(&b, FOLD), &[1.0, -1.0], 1e-12);
+    for p in &b.points {
+        let radius = p.orbit.states[0][0].hypot(p.parameter);
+        assert!((radius - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn bad_options_and_starts_are_refused() {
+    let orbit = orbit_at(&LOGISTIC, 2.5, &[0.6], 1);
+    let start = |parameter: f64, options: &ContinuationOptions| {
+        continue_orbit(
+            &LOGISTIC,
+            parameter,
+            &orbit,
+            Direction::Increasing,
+            options,
+            &Control::default(),
+        )
+    };
+    let good = ContinuationOptions::over(2.0, 3.0);
+    assert!(matches!(
+        start(5.0, &good),
+        Err(ContinuationError::BadOptions(_))
+    ));
+    assert!(matches!(
+        start(f64::NAN, &good),
+        Err(ContinuationError::BadOptions(_))
+    ));
+    for bad in [
+        ContinuationOptions {
+            range: (3.0, 2.0),
+            ..good.clone()
+        },
+        ContinuationOptions {
+            min_step: 0.0,
+            ..good.clone()
+        },
+        ContinuationOptions {
+            max_step: 1e-5,
+            ..good.clone()
+        },
+        ContinuationOptions {
+            state_scale: Some(-1.0),
+            ..good.clone()
+        },
+        ContinuationOptions {
+            max_angle: f64::NAN,
+            ..good.clone()
+        },
+    ] {
+        assert!(matches!(
+            start(2.5, &bad),
+            Err(ContinuationError::BadOptions(_))
+        ));
+    }
+    let b = branch(&HENON, 0.2, &[0.8, 0.2], 1, -1.0, (-1.0, 1.2));
+    assert!(matches!(
+        switch_at_flip(
+            &HENON,
+            &b.bifurcations[0],
+            &ContinuationOptions::over(-1.0, 1.0),
+            &Control::default()
+        ),
+        Err(ContinuationError::NotAFlip)
+    ));
+}

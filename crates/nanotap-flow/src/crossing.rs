@@ -116,7 +116,7 @@ impl Search<'_> {
                     return Some(crossing);
                 }
             }
-            if let Some(reach) = certain_crossing(&jet) {
+            if let Some(reach) = certain_crossing(&jet, self.noise) {
                 return self.polish(s, jet, s + reach);
             }
             if let Some(distance) = self.unresolved_tangency(&jet) {
@@ -381,8 +381,9 @@ fn step_from_surface(jet: &Jet) -> f64 {
     h * (1.0 - 1e-9)
 }
 
-/// A reach within which the signal falls through zero exactly once, for certain.
-fn certain_crossing(jet: &Jet) -> Option<f64> {
+/// A reach within which the signal falls through zero exactly once, for certain and
+/// by more than rounding.
+fn certain_crossing(jet: &Jet, noise: f64) -> Option<f64> {
     let (g, v, c, b) = (jet.value, jet.rate, jet.curvature, jet.third);
     if v >= 0.0 {
         return None;
@@ -397,10 +398,10 @@ fn certain_crossing(jet: &Jet) -> Option<f64> {
     if slope >= 0.0 {
         return None;
     }
-    let reach = (root - 2.0 * excess / slope) * (1.0 + 1e-12);
+    let reach = (root - 2.0 * (excess + 4.0 * noise) / slope) * (1.0 + 1e-12);
     let upper = g + reach * (v + reach * (0.5 * c + b * reach / 6.0));
     let steepest = v + reach * (c + 0.5 * b * reach);
-    (upper < 0.0 && steepest < 0.0).then_some(reach)
+    (upper < -4.0 * noise && steepest < 0.0).then_some(reach)
 }
 
 /// The zero of `g + vh + ½ch²` nearest to `h = 0` (a Newton step where there is none).

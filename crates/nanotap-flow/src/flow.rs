@@ -309,7 +309,7 @@ impl Flow {
         self.state(&mut state);
         let pressed = -acceleration.at(system.drive(), &state, self.phase);
         self.state = state;
-        let fastest = self.signal.fastest();
+        let fastest = self.signal.fastest().max(std::f64::consts::TAU / system.drive().period());
         // Flights last about 2|ġ|/a; a must keep its sign for far longer than that.
         pressed > 0.0 && -crossing.rate * fastest <= CHATTER_RESOLUTION * pressed
     }

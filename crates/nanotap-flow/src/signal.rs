@@ -206,6 +206,12 @@ impl Signal {
         value + self.powers.iter().map(|term| term.derivative(0, s)).sum::<f64>()
     }
 
+    /// The value at `s` with an error far below double precision's (about 1e-28 of
+    /// the terms' size before it is rounded): which side of zero a tangency lies on.
+    pub fn accurate_at(&self, s: f64) -> f64 {
+        crate::double_double::signal_value(self, s)
+    }
+
     /// The `order`-th derivative at `s = 0`.
     pub fn derivative_at_start(&self, order: u32) -> f64 {
         let mut value = if order == 0 { self.constant } else { 0.0 };

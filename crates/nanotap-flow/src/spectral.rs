@@ -313,6 +313,9 @@ fn invariant_subspace(
     real: bool,
 ) -> Option<DMatrix<Complex>> {
     let n = matrix.nrows();
+    if group.len() == n {
+        return Some(DMatrix::identity(n, n));
+    }
     let size = Complex::new(group.len() as f64, 0.0);
     let mut mean = group.iter().sum::<Complex>() / size;
     if real {

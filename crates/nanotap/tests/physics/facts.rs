@@ -1,0 +1,168 @@
+//! Known orbits and invariants. Numbers without another source are those of the
+//! project's model notes, found there by an independent program.
+
+use nanotap::case::{Case, CosineTerm};
+use nanotap::model::Model;
+use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap_flow::Trajectory;
+use proptest::prelude::*;
+
+fn at(omega: f64) -> Case {
+    Case { omega, ..Case::paper() }
+}
+
+fn settled(case: &Case) -> OrbitReport {
+    orbit(&Model::cantilever(case).unwrap(), &OrbitOptions::default()).unwrap()
+}
+
+fn modulus([re, im]: [f64; 2]) -> f64 {
+    re.hypot(im)
+}
+
+/// N = 3, Eq. (26), α1 = 0.1, Ω = 3: state, multipliers, switches.
+#[test]
+fn period_one_at_omega_3() {
+    let report = settled(&at(3.0));
+    assert_eq!((report.period, report.stable), (1, true));
+    let expected = [0.04867449626, -4.170932009e-4, 3.895611e-5, -0.02693553697, 3.208938387e-3, 3.311213241e-3];
+    for (got, expected) in report.state.iter().zip(expected) {
+        assert!((got - expected).abs() < 6e-12, "{got} {expected}");
+    }
+    for (pair, expected) in [0.868606, 0.831596, 0.826539].iter().enumerate() {
+        for k in [2 * pair, 2 * pair + 1] {
+            assert!((modulus(report.multipliers[k]) - expected).abs() < 1e-6);
+        }
+    }
+    let times: Vec<f64> = report.events.iter().map(|e| e.tau).collect();
+    assert_eq!(times.len(), 2);
+    for (got, expected) in times.iter().zip([1.3556791576, 1.8300415203]) {
+        assert!((got - expected).abs() < 1e-10, "{got} {expected}");
+    }
+    assert!(report.observables.energy_balance.residual.abs() < 1e-11);
+    assert!(report.determinant_defect < 1e-10, "{}", report.determinant_defect);
+}
+
+/// N = 3, Eq. (26), α1 = 0.1, Ω = 4.1: range of the gap, largest multiplier.
+#[test]
+fn period_one_at_omega_4_1() {
+    let report = settled(&at(4.1));
+    let [low, high] = report.observables.gap_range;
+    assert!((low + 0.40724).abs() < 1e-5 && (high - 1.18168).abs() < 1e-5, "{low} {high}");
+    assert!((modulus(report.multipliers[0]) - 0.895782).abs() < 1e-6);
+}
+
+/// N = 3, Ω = 20, α1 = 0.1: one period-1, W in [−0.41706, 1.75832] by sampling a period
+/// (the true maximum lies 2e-5 higher, between two of those samples).
+#[test]
+fn period_one_at_omega_20() {
+    let report = settled(&at(20.0));
+    assert_eq!(report.period, 1);
+    assert!((report.observables.tip_min + 0.41706).abs() < 1e-5);
+    assert!((report.observables.tip_max - 1.75832).abs() < 3e-5, "{}", report.observables.tip_max);
+    // Extrema come from roots of the rate: no dense sample exceeds them, and the densest
+    // comes as near as its spacing allows.
+    let model = Model::cantilever(&at(20.0)).unwrap();
+    let tip = report.trajectory.signal(&model.tip);
+    let samples = 20_000;
+    let highest = (0..samples)
+        .map(|i| tip.at(model.period() * f64::from(i) / f64::from(samples)).unwrap())
+        .fold(f64::NEG_INFINITY, f64::max);
+    assert!((0.0..1e-7).contains(&(report.observables.tip_max - highest + 1e-15)));
+}
+
+/// N = 1, Ω = 20: half of peak to peak is 0.1447.
+#[test]
+fn single_mode_at_omega_20() {
+    let report = settled(&at(20.0).with_modes(1));
+    assert!((report.observables.amplitude - 0.1447).abs() < 1e-4);
+}
+
+/// At Ω = 2.6 the period-1 orbit exists and is unstable, μ = −1.392.
+#[test]
+fn unstable_period_one_at_omega_2_6() {
+    let model = Model::cantilever(&at(2.6)).unwrap();
+    let report = orbit(&model, &OrbitOptions { period: Some(1), ..OrbitOptions::default() }).unwrap();
+    assert!(!report.stable);
+    assert!((report.multipliers[0][0] + 1.392).abs() < 1e-3 && report.multipliers[0][1] == 0.0);
+}
+
+/// Undamped bilinear frequency at α5 = 0: 2ω₁ω₂/(ω₁ + ω₂) = 4.351246 for N = 1,
+/// α1 = 0.1, α4 = 20. A drive of amplitude 1e-9 leaves a free oscillation of it.
+#[test]
+fn bilinear_frequency_of_one_mode() {
+    let case = Case { modes: 1, alpha2: 1e-9, omega: 0.05, ..Case::paper_eq24() };
+    let model = Model::cantilever(&case).unwrap();
+    let trajectory = Trajectory::record(&model.system, &[0.0, 1.0], 1).unwrap();
+    let starts: Vec<f64> = trajectory.events().iter().filter(|e| e.to == 1).map(|e| e.time).collect();
+    let cycles = (starts.len() - 1) as f64;
+    let frequency = std::f64::consts::TAU * cycles / (starts[starts.len() - 1] - starts[0]);
+    assert!((frequency - 4.351246).abs() < 1e-6, "{frequency}");
+}
+
+/// A lever that never meets the sample moves as the base-excited free beam: tip over
+/// base amplitude 2.878087 at Ω = 2.6 without tip mass, up to the modes left out.
+#[test]
+fn free_lever_moves_as_the_exact_beam() {
+    let case = Case { modes: 20, alpha1: 0.0, alpha3: 1e-9, alpha5: 5.0, ..Case::paper() };
+    let model = Model::cantilever(&case).unwrap();
+    let report = orbit(&model, &OrbitOptions { period: Some(1), state: Some(vec![0.0; 40]), ..OrbitOptions::default() });
+    let report = report.unwrap();
+    assert_eq!(report.events.len(), 0);
+    // W is relative to the base: the tip's absolute amplitude is one base amplitude more.
+    let gain = report.observables.amplitude / case.alpha2 + 1.0;
+    assert!((gain - 2.878087).abs() < 1e-5, "{gain}");
+}
+
+/// The printed Eq. (14) is another drive: the motion differs, its balance closes.
+#[test]
+fn printed_cosine_term_balances_its_energy_too() {
+    let case = Case { cosine_term: CosineTerm::Printed, ..at(3.0) };
+    let (printed, corrected) = (settled(&case), settled(&at(3.0)));
+    assert!((printed.state[0] - corrected.state[0]).abs() > 1e-5);
+    assert!(printed.observables.energy_balance.residual.abs() < 1e-11);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Whatever the parameters: energy balances over any run, the determinant of the
+    /// map follows Liouville's formula, and with α5 = 0 doubling α2 and the state
+    /// doubles everything.
+    #[test]
+    fn invariants_hold_for_random_cases(
+        modes in 1usize..8,
+        alpha1 in 0.0..0.5_f64,
+        alpha3 in 0.01..0.5_f64,
+        alpha4 in 0.1..100.0_f64,
+        alpha6 in 0.0..3.0_f64,
+        omega in 0.5..25.0_f64,
+    ) {
+        let case = Case { modes, alpha1, alpha3, alpha4, alpha6, omega, ..Case::paper() };
+        let model = Model::cantilever(&case).unwrap();
+        let start = vec![0.0; 2 * modes];
+        let run = Trajectory::record(&model.system, &start, 12).unwrap();
+        let seen = nanotap::observables::Observables::of(&model, &run).unwrap();
+        prop_assert!(seen.energy_balance.residual.abs() < 1e-11, "{:?}", seen.energy_balance);
+
+        let doubled = Model::cantilever(&Case { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
+        let twice = Trajectory::record(&doubled.system, &start, 4).unwrap();
+        for (a, b) in run.events().iter().zip(twice.events()) {
+            prop_assert!((a.time - b.time).abs() < 1e-9);
+        }
+
+        let mut flow = nanotap_flow::Flow::new(model.system.clone());
+        let state = run.state_at(run.end()).unwrap();
+        flow.start(&state, 0.0).unwrap();
+        let mut jacobian = nalgebra::DMatrix::zeros(2 * modes, 2 * modes);
+        flow.run_period_with_jacobian(&mut jacobian).unwrap();
+        let period = Trajectory::record(&model.system, &state, 1).unwrap();
+        let trace: f64 = (0..2)
+            .map(|r| model.system.regimes()[r].matrix().trace() * period.time_in(r))
+            .sum();
+        // log|det| by LU of the scaled matrix loses about the digits of its condition.
+        let determinant = jacobian.determinant().abs();
+        if determinant > 1e-12 {
+            prop_assert!((determinant.ln() - trace).abs() < 1e-7 * (1.0 + trace.abs()));
+        }
+    }
+}

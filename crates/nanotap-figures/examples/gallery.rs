@@ -339,7 +339,7 @@ fn four_panels() -> Figure {
             Panel::new(Axis::linear("$a_1$"), Axis::linear("$a_2$"))
                 .with(Points::new(chaos).diameter(0.1).colour(Colour::BLUE))
                 .with(Note::new(
-                    Place::Panel(0.03, 0.07),
+                    Place::Panel(0.03, 0.5),
                     "$λ_1$ = 0.42 per period",
                 )),
         )

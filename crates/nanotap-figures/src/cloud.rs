@@ -1,7 +1,7 @@
 //! Very many equal dots, drawn as pixels so that a hundred thousand of them stay small on disk.
 
 use crate::colour::Colour;
-use crate::raster::Raster;
+use crate::raster::{EMBEDDED_DPI, Raster, shaded};
 use crate::scene::{Path, Point, Rect, Segment, Stroke};
 
 /// Equal dots on the page, mm.
@@ -15,9 +15,8 @@ pub(crate) struct Cloud {
 
 /// Up to so many dots, vector formats hold each one.
 const VECTOR_LIMIT: usize = 3000;
-/// Steps of opacity at the edge of a dot: enough to look smooth, few enough to compress well.
-const LEVELS: f64 = 15.0;
-/// Dots are placed to this part of a pixel.
+/// Dots are placed to this part of a pixel; where pixels are so small that nobody sees it, to whole
+/// pixels, because equal dots compress better.
 const PARTS: usize = 4;
 
 impl Cloud {
@@ -56,7 +55,8 @@ impl Cloud {
         let columns = ((bounds.right * scale).floor() as isize + reach - left + 1) as usize;
         let rows = ((bounds.bottom * scale).floor() as isize + reach - top + 1) as usize;
 
-        let stamps = Stamps::new(radius, reach);
+        let parts = if dpi < EMBEDDED_DPI { PARTS } else { 1 };
+        let stamps = Stamps::new(radius, reach, parts);
         let opacity = self.colour.opacity();
         let opaque = self.colour.a == 255;
         let mut coverage = vec![0f32; columns * rows];
@@ -80,10 +80,7 @@ impl Cloud {
         }
         let pixels = coverage
             .iter()
-            .map(|&c| {
-                let level = (f64::from(c) * LEVELS).round() / LEVELS;
-                self.colour.alpha(level)
-            })
+            .map(|&c| shaded(self.colour, f64::from(c)))
             .collect();
         Some(Raster {
             rect: Rect {
@@ -119,16 +116,17 @@ impl Cloud {
 /// A dot's pixels, for each part of a pixel in which its centre may lie.
 struct Stamps {
     side: usize,
+    parts: usize,
     weights: Vec<Vec<f32>>,
 }
 
 impl Stamps {
-    fn new(radius: f64, reach: isize) -> Stamps {
+    fn new(radius: f64, reach: isize, parts: usize) -> Stamps {
         let side = (2 * reach + 1) as usize;
-        let part = |k: usize| (k as f64 + 0.5) / PARTS as f64;
-        let mut weights = Vec::with_capacity(PARTS * PARTS);
-        for row in 0..PARTS {
-            for column in 0..PARTS {
+        let part = |k: usize| (k as f64 + 0.5) / parts as f64;
+        let mut weights = Vec::with_capacity(parts * parts);
+        for row in 0..parts {
+            for column in 0..parts {
                 let centre = Point::new(reach as f64 + part(column), reach as f64 + part(row));
                 weights.push(
                     (0..side * side)
@@ -137,12 +135,16 @@ impl Stamps {
                 );
             }
         }
-        Stamps { side, weights }
+        Stamps {
+            side,
+            parts,
+            weights,
+        }
     }
 
     fn at(&self, x: f64, y: f64) -> &[f32] {
-        let part = |v: f64| ((v * PARTS as f64) as usize).min(PARTS - 1);
-        &self.weights[part(y) * PARTS + part(x)]
+        let part = |v: f64| ((v * self.parts as f64) as usize).min(self.parts - 1);
+        &self.weights[part(y) * self.parts + part(x)]
     }
 }
 

@@ -70,17 +70,17 @@ fn layer(
     style: &Style,
 ) {
     match layer {
-        Layer::Line(line) => {
-            scene.group("line", &line.label, |s| draw_line(s, frame, line, colour))
-        }
+        Layer::Line(line) => scene.group("line", &line.label, |s| {
+            draw_line(s, frame, line, colour);
+        }),
         Layer::Points(points) => {
             scene.group("points", &points.label, |s| {
-                draw_points(s, frame, points, colour)
+                draw_points(s, frame, points, colour);
             });
         }
         Layer::Markers(markers) => {
             scene.group("markers", &markers.label, |s| {
-                draw_markers(s, frame, markers, colour)
+                draw_markers(s, frame, markers, colour);
             });
         }
         Layer::Rule(rule) => scene.group("rule", &rule.label, |scene| {
@@ -121,7 +121,7 @@ fn layer(
         Layer::Heatmap(map) => {
             if let Some(bar) = bar {
                 scene.group("heatmap", &map.scale.label, |s| {
-                    draw_heatmap(s, frame, map, bar)
+                    draw_heatmap(s, frame, map, bar);
                 });
             }
         }
@@ -391,7 +391,9 @@ fn grid(
         rows.reverse();
     }
     if a.x > b.x {
-        rows.iter_mut().for_each(|row| row.reverse());
+        for row in &mut rows {
+            row.reverse();
+        }
     }
     scene.items.push(crate::scene::Item::Raster(Raster {
         rect: Rect {

@@ -97,6 +97,8 @@ impl Line {
 /// formats hold them as pixels of 600 dots per inch (up to 3000 dots as vectors).
 #[derive(Debug, Clone, PartialEq)]
 #[must_use]
+// Every kind of layer calls its points so.
+#[allow(clippy::struct_field_names)]
 pub struct Points {
     pub(crate) points: Vec<(f64, f64)>,
     pub(crate) diameter: f64,

@@ -11,7 +11,6 @@ use crate::colour::Colour;
 use crate::pixels;
 use crate::raster::{EMBEDDED_DPI, Raster};
 use crate::scene::{Item, Path, Point, Rect, Scene, Segment};
-use crate::svg::HEAVY_PATH;
 use crate::text::MM_PER_POINT;
 
 const CATALOG: i32 = 1;
@@ -118,7 +117,7 @@ impl Page {
     fn item(&mut self, item: &Item) {
         match item {
             Item::Open { .. } | Item::Close => {}
-            Item::Path(path) if path.segments.len() > HEAVY_PATH => {
+            Item::Path(path) if path.is_heavy() => {
                 if let Some(raster) = pixels::path_raster(path, EMBEDDED_DPI) {
                     self.raster(raster);
                 }

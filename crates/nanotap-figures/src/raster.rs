@@ -9,6 +9,14 @@ use crate::scene::Rect;
 /// combined with halftones.
 pub(crate) const EMBEDDED_DPI: f64 = 600.0;
 
+/// Steps of opacity at edges: enough to look smooth, few enough to compress well.
+const LEVELS: f64 = 15.0;
+
+/// The colour with an opacity from 0 to 1, in few steps.
+pub(crate) fn shaded(colour: Colour, opacity: f64) -> Colour {
+    colour.alpha((opacity * LEVELS).round() / LEVELS)
+}
+
 /// A picture of pixels stretched over a box.
 #[derive(Debug, Clone)]
 pub(crate) struct Raster {

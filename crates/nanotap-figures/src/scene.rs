@@ -116,6 +116,14 @@ pub(crate) struct Path {
     pub(crate) clip: Option<Rect>,
 }
 
+impl Path {
+    /// Whether vector formats should rather hold the path as pixels: long lines that no thinning
+    /// shortened are scribble that fills the panel.
+    pub(crate) fn is_heavy(&self) -> bool {
+        self.segments.len() > 30_000 && self.fill.is_none() && self.clip.is_some()
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(crate) enum Item {
     /// What follows up to its `Close` belongs together: a class, and words for it.

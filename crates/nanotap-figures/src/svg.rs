@@ -16,9 +16,6 @@ use crate::raster::{EMBEDDED_DPI, Raster};
 use crate::scene::{Item, Path, Point, Rect, Scene, Segment};
 use crate::text::PlacedWords;
 
-/// Paths of more segments than this are embedded as pixels.
-pub(crate) const HEAVY_PATH: usize = 30_000;
-
 /// Stands for the page's own prefix of identifiers until the whole page is known.
 const PREFIX: char = '\u{1}';
 
@@ -29,10 +26,10 @@ pub(crate) fn write(scene: &Scene) -> String {
     }
     let mut svg = String::new();
     let (width, height) = (number(scene.width), number(scene.height));
-    let _ = write!(
+    let _ = writeln!(
         svg,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" \
-         width=\"{width}mm\" height=\"{height}mm\" viewBox=\"0 0 {width} {height}\" role=\"img\">\n"
+         width=\"{width}mm\" height=\"{height}mm\" viewBox=\"0 0 {width} {height}\" role=\"img\">"
     );
     if !scene.title.is_empty() {
         let _ = writeln!(svg, "<title>{}</title>", escaped(&scene.title));
@@ -102,7 +99,7 @@ impl Page {
                 self.body.push_str(">\n");
             }
             Item::Close => self.body.push_str("</g>\n"),
-            Item::Path(path) if path.segments.len() > HEAVY_PATH => {
+            Item::Path(path) if path.is_heavy() => {
                 if let Some(raster) = pixels::path_raster(path, EMBEDDED_DPI) {
                     self.raster(&raster);
                 }
@@ -254,7 +251,7 @@ fn decimal(units: i64, places: u32) -> String {
     if size >= one || size == 0 {
         let _ = write!(text, "{}", size / one);
     }
-    if size % one != 0 {
+    if !size.is_multiple_of(one) {
         let rest = format!("{:0width$}", size % one, width = places as usize);
         text.push('.');
         text.push_str(rest.trim_end_matches('0'));

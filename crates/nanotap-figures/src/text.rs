@@ -305,18 +305,21 @@ fn unicode_script(character: char) -> Option<(char, Script)> {
 mod tests {
     use super::*;
 
+    /// Lowered letters after "_", raised ones after "^", italic ones after "*".
     fn show(source: &str) -> String {
-        parse(source)
-            .iter()
-            .map(|l| {
-                let script = match l.script {
-                    Script::Normal => "",
-                    Script::Sub => "_",
-                    Script::Super => "^",
-                };
-                format!("{script}{}{}", if l.italic { "*" } else { "" }, l.character)
-            })
-            .collect()
+        let mut shown = String::new();
+        for letter in parse(source) {
+            match letter.script {
+                Script::Normal => {}
+                Script::Sub => shown.push('_'),
+                Script::Super => shown.push('^'),
+            }
+            if letter.italic {
+                shown.push('*');
+            }
+            shown.push(letter.character);
+        }
+        shown
     }
 
     #[test]

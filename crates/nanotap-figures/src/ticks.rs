@@ -68,10 +68,12 @@ impl Decimal {
 
 /// Numbers of the first and the last multiple of `step` in a range, ends included.
 fn multiples(low: f64, high: f64, step: Decimal) -> (i64, i64) {
-    let width = step.value();
+    let (low, high) = (low / step.value(), high / step.value());
+    // A mark at the very end counts, also where the quotient carries the rounding of large numbers.
+    let slack = |end: f64| 1e-9 + 4.0 * f64::EPSILON * end.abs();
     (
-        (low / width - 1e-9).ceil() as i64,
-        (high / width + 1e-9).floor() as i64,
+        (low - slack(low)).ceil() as i64,
+        (high + slack(high)).floor() as i64,
     )
 }
 
@@ -391,7 +393,7 @@ mod tests {
                     } else {
                         (1.0, note.clone())
                     };
-                    (factor, number(&rest.replace(' ', "").replace('+', "")))
+                    (factor, number(&rest.replace([' ', '+'], "")))
                 }
                 None => (number(note.trim_start_matches('×')), 0.0),
             };

@@ -194,15 +194,36 @@ fn long_lines_are_short_on_disk() {
     assert!(svg.len() < 30_000, "{}", svg.len());
     // A trajectory that fills the panel cannot be thinned: pixels keep it small.
     let mut random = pseudo_random(1);
-    let scribble: Vec<(f64, f64)> = (0..200_000).map(|_| (random(), random())).collect();
-    let svg = Figure::single(plain(Line::new(scribble).width(0.2)))
-        .to_svg()
-        .unwrap();
+    let mut at = (0.0, 0.0);
+    let wander = (0..60_000).map(|_| {
+        at = (0.99 * at.0 + random() - 0.5, 0.99 * at.1 + random() - 0.5);
+        at
+    });
+    let figure = Figure::single(plain(Line::new(wander).width(0.2)));
+    let svg = figure.to_svg().unwrap();
     assert!(
-        svg.contains("<image") && svg.len() < 2_000_000,
+        svg.contains("<image") && svg.len() < 500_000,
         "{}",
         svg.len()
     );
+}
+
+#[test]
+fn very_many_bands_are_all_drawn() {
+    let bands = (0..20_000).map(|i| (f64::from(i), f64::from(i) + 0.5));
+    let panel = Panel::new(
+        Axis::linear("x").range(0.0, 20_000.0),
+        Axis::linear("y").range(0.0, 1.0),
+    )
+    .with(Band::x(bands).colour(Colour::BLACK))
+    .with(Markers::new([(0.0, 0.0)]));
+    let figure = Figure::single(panel);
+    let svg = figure.to_svg().unwrap();
+    assert_eq!(path_data(group(&svg, "band")).matches('m').count(), 20_000);
+    let (_, _, pixels) = decoded(&figure.to_png(150.0).unwrap());
+    // Half of the area is shaded: finer than pixels, it looks grey.
+    let grey = pixels.iter().filter(|p| (90..170).contains(&p[0])).count();
+    assert!(grey > pixels.len() / 2, "{grey}");
 }
 
 #[test]

@@ -234,7 +234,7 @@ pub fn census<M: StroboscopicMap>(
         .iter()
         .map(|n| n.relaxation(widest(starts)))
         .fold(0.0, f64::max);
-    assemble(outcomes, orbits, relaxation, transient_spectrum, control)
+    assemble(&outcomes, orbits, relaxation, transient_spectrum, control)
 }
 
 /// Largest side of the box around the starts.
@@ -290,7 +290,7 @@ fn outcome(
                 periods,
             };
         }
-        Some(Arrival::Settled(settled)) => settled,
+        Some(Arrival::Settled(settled)) => *settled,
     };
     let Settled {
         verdict,
@@ -326,7 +326,7 @@ struct Group {
 }
 
 fn assemble(
-    outcomes: Vec<Outcome>,
+    outcomes: &[Outcome],
     orbits: Vec<PeriodicOrbit>,
     relaxation: f64,
     transient_spectrum: Option<LyapunovSpectrum>,
@@ -341,7 +341,7 @@ fn assemble(
             members: Vec::new(),
         })
         .collect();
-    let escapes = Escapes::count(&outcomes, relaxation);
+    let escapes = Escapes::count(outcomes, relaxation);
     let chaos_lasts = escapes.chaos_lasts();
     let mut undecided = Vec::new();
     let mut unbounded = 0;
@@ -420,7 +420,7 @@ fn assemble(
             periods: periods_of(&outcomes[k]),
         };
     }
-    for (fate, outcome) in fates.iter_mut().zip(&outcomes) {
+    for (fate, outcome) in fates.iter_mut().zip(outcomes) {
         if matches!(outcome, Outcome::Unbounded) {
             *fate = Fate::Unbounded;
         }

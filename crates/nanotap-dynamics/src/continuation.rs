@@ -477,7 +477,7 @@ fn shortest_collapse<F: MapFamily>(
     step: f64,
 ) -> Option<(usize, f64, f64)> {
     let n = solver.n;
-    (1..n).filter(|m| n % m == 0).find_map(|m| {
+    (1..n).filter(|m| n.is_multiple_of(*m)).find_map(|m| {
         let (at, parameter) = collapse(solver, from, to, step, m)?;
         Some((m, at, parameter))
     })

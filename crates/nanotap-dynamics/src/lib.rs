@@ -17,7 +17,9 @@ pub mod census;
 pub mod confidence;
 pub mod continuation;
 pub mod control;
+pub mod diagram;
 mod failure;
+pub mod locus;
 pub mod lyapunov;
 pub mod map;
 pub mod multipliers;
@@ -42,7 +44,9 @@ pub use continuation::{
     continue_orbit,
 };
 pub use control::Control;
+pub use diagram::{Diagram, DiagramBranch, DiagramOptions, assemble_diagram};
 pub use failure::MapFailure;
+pub use locus::{Locus, LocusOptions, LocusPoint, TwoParameterFamily, trace_locus};
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
 pub use map::{MapFamily, StroboscopicMap, Tangency};
 pub use multipliers::{MultiplierError, Multipliers, Stability};

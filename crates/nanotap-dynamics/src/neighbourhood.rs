@@ -231,7 +231,7 @@ fn sample_direction(sample: usize, direction: &mut [f64]) {
     let d = direction.len();
     if sample < 2 * d {
         direction.fill(0.0);
-        direction[sample / 2] = if sample % 2 == 0 { 1.0 } else { -1.0 };
+        direction[sample / 2] = if sample.is_multiple_of(2) { 1.0 } else { -1.0 };
         return;
     }
     let mut counter = (sample as u64) << 24;

@@ -206,7 +206,7 @@ pub enum UndecidedReason {
 /// Follows the motion from `start` until it can be named, within the budgets.
 pub fn settle<M: StroboscopicMap>(map: &mut M, start: &[f64], options: &SettleOptions) -> Settled {
     match arrive(map, start, &[], options) {
-        Arrival::Settled(settled) => settled,
+        Arrival::Settled(settled) => *settled,
         // No neighbourhood was given, so none can have been entered.
         Arrival::Entered { periods, .. } => Settled {
             verdict: Verdict::Undecided {
@@ -227,7 +227,7 @@ pub(crate) enum Arrival {
         index: usize,
         periods: usize,
     },
-    Settled(Settled),
+    Settled(Box<Settled>),
 }
 
 pub(crate) fn arrive<M: StroboscopicMap>(
@@ -246,11 +246,11 @@ pub(crate) fn arrive<M: StroboscopicMap>(
             .map(|v| format!("{v} is not finite"))
     };
     if let Some(reason) = bad {
-        return Arrival::Settled(Settled {
+        return Arrival::Settled(Box::new(Settled {
             verdict: undecided(UndecidedReason::BadStart(reason), None),
             periods: 0,
             state: start.to_vec(),
-        });
+        }));
     }
     let mut run = Run::new(start, known, options);
     let verdict = match run.follow(map) {
@@ -270,11 +270,11 @@ pub(crate) fn arrive<M: StroboscopicMap>(
             None,
         ),
     };
-    Arrival::Settled(Settled {
+    Arrival::Settled(Box::new(Settled {
         verdict,
         periods: run.periods,
         state: run.state,
-    })
+    }))
 }
 
 fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Verdict {

@@ -335,7 +335,7 @@ impl Segments {
         let residual = norm(&self.residuals);
         let error = self.error_estimate();
         let reach = error.map(|e| 100.0 * e);
-        for m in (1..n).filter(|m| n % m == 0) {
+        for m in (1..n).filter(|m| n.is_multiple_of(*m)) {
             let apart = (0..n)
                 .map(|k| {
                     let later = (k + m) % n;

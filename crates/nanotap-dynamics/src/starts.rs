@@ -104,9 +104,9 @@ impl StartBox {
 
 fn next_prime(after: u64) -> u64 {
     let mut candidate = after + 1;
-    while (2..)
+    while (2..candidate)
         .take_while(|f| f * f <= candidate)
-        .any(|f| candidate % f == 0)
+        .any(|f| candidate.is_multiple_of(f))
     {
         candidate += 1;
     }

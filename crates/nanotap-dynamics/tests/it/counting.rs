@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use nanotap_dynamics::{
     AttractorKind, Census, CensusOptions, Control, Fate, LyapunovOptions, Neighbourhood,
-    OrbitSearch, SettleOptions, StartBox, census, find_orbits,
+    OrbitSearch, SettleOptions, ShootingOptions, StartBox, census, find_orbits,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -212,7 +212,8 @@ fn every_orbit_of_the_full_logistic_map_is_found() {
 #[test]
 fn neighbourhoods_stay_within_the_contracting_interval() {
     let mut map = System(Cubic(1.5));
-    let orbit = nanotap_dynamics::close_orbit(&mut map, &[0.7], 1, &Default::default()).unwrap();
+    let orbit =
+        nanotap_dynamics::close_orbit(&mut map, &[0.7], 1, &ShootingOptions::default()).unwrap();
     let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
     let half = ball.extents()[0];
     let centre = 0.5f64.sqrt();

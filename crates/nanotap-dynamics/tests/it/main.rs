@@ -9,3 +9,4 @@ mod counting;
 mod exponents;
 mod settling;
 mod slicing;
+mod tracing;

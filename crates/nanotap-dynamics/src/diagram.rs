@@ -1,0 +1,226 @@
+//! The whole picture of branches, assembled by itself.
+//!
+//! Every seed orbit (from a census at one parameter value or several) is followed
+//! both ways; at each flip the doubled branch is followed, down to a given depth;
+//! where a branch runs into one of shorter period, that one becomes a seed. An orbit
+//! that lies on a branch already there is not followed again.
+//!
+//! Fails by omission: isolated branches that no seed lies on are not found.
+
+use crate::bifurcation::BifurcationKind;
+use crate::branch_switching::switch_at_flip;
+use crate::continuation::{
+    Branch, BranchEnd, ContinuationError, ContinuationOptions, Direction, continue_orbit,
+};
+use crate::control::Control;
+use crate::map::MapFamily;
+use crate::orbit::PeriodicOrbit;
+use crate::shooting::{ShootingOptions, close_orbit_from_points};
+
+/// How a diagram is assembled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiagramOptions {
+    /// How each branch is followed.
+    pub continuation: ContinuationOptions,
+    /// Doublings to follow from each seed: 0 for none.
+    pub doublings: usize,
+    /// Branches after which assembly stops.
+    pub max_branches: usize,
+}
+
+/// A branch of the diagram, with where it came from.
+#[derive(Clone, Debug)]
+pub struct DiagramBranch {
+    /// The branch, one way.
+    pub branch: Branch,
+    /// Index of the branch that it left at a flip, if it did.
+    pub parent: Option<usize>,
+    /// Doublings between it and a seed.
+    pub depth: usize,
+}
+
+/// All branches, and what could not be followed.
+#[derive(Clone, Debug, Default)]
+pub struct Diagram {
+    /// Each seed gives two, one each way; each flip gives one.
+    pub branches: Vec<DiagramBranch>,
+    /// Seeds and flips that could not be followed: the parameter and the reason.
+    pub failures: Vec<(f64, String)>,
+}
+
+/// Assembles the diagram from seeds: orbits with their parameter values.
+pub fn assemble_diagram<F: MapFamily>(
+    family: &F,
+    seeds: &[(f64, PeriodicOrbit)],
+    options: &DiagramOptions,
+    control: &Control<'_>,
+) -> Diagram {
+    let mut diagram = Diagram::default();
+    let mut waiting: Vec<(f64, PeriodicOrbit, usize)> = seeds
+        .iter()
+        .rev()
+        .map(|(parameter, orbit)| (*parameter, orbit.clone(), 0))
+        .collect();
+    while let Some((parameter, orbit, depth)) = waiting.pop() {
+        if control.is_cancelled() || diagram.branches.len() >= options.max_branches {
+            break;
+        }
+        if diagram.holds(family, parameter, &orbit) {
+            continue;
+        }
+        for direction in [Direction::Increasing, Direction::Decreasing] {
+            let followed = continue_orbit(
+                family,
+                parameter,
+                &orbit,
+                direction,
+                &options.continuation,
+                control,
+            );
+            diagram.take(
+                family,
+                followed,
+                parameter,
+                None,
+                depth,
+                options,
+                control,
+                &mut waiting,
+            );
+        }
+    }
+    diagram
+}
+
+impl Diagram {
+    /// Adds a branch, then what leaves it.
+    fn take<F: MapFamily>(
+        &mut self,
+        family: &F,
+        followed: Result<Branch, ContinuationError>,
+        parameter: f64,
+        parent: Option<usize>,
+        depth: usize,
+        options: &DiagramOptions,
+        control: &Control<'_>,
+        waiting: &mut Vec<(f64, PeriodicOrbit, usize)>,
+    ) {
+        let branch = match followed {
+            Ok(branch) => branch,
+            Err(error) => {
+                self.failures.push((parameter, error.to_string()));
+                return;
+            }
+        };
+        if let Some(seed) = met(family, &branch) {
+            waiting.push((seed.0, seed.1, depth));
+        }
+        let flips: Vec<_> = branch
+            .bifurcations
+            .iter()
+            .filter(|b| b.kind == BifurcationKind::Flip)
+            .cloned()
+            .collect();
+        let index = self.branches.len();
+        self.branches.push(DiagramBranch {
+            branch,
+            parent,
+            depth,
+        });
+        if depth >= options.doublings {
+            return;
+        }
+        for flip in flips {
+            if control.is_cancelled() || self.branches.len() >= options.max_branches {
+                return;
+            }
+            // A few points tell whether the doubled branch is there already.
+            let glimpse = ContinuationOptions {
+                max_points: 3,
+                ..options.continuation.clone()
+            };
+            match switch_at_flip(family, &flip, &glimpse, control) {
+                Ok(short) => {
+                    let known = short
+                        .points
+                        .last()
+                        .is_some_and(|p| self.holds(family, p.parameter, &p.orbit));
+                    if known {
+                        continue;
+                    }
+                }
+                Err(error) => {
+                    self.failures.push((flip.parameter, error.to_string()));
+                    continue;
+                }
+            }
+            let doubled = switch_at_flip(family, &flip, &options.continuation, control);
+            self.take(
+                family,
+                doubled,
+                flip.parameter,
+                Some(index),
+                depth + 1,
+                options,
+                control,
+                waiting,
+            );
+        }
+    }
+
+    /// True if an orbit lies on a branch of the diagram: between two points around
+    /// its parameter, Newton from the interpolated states closes the same orbit.
+    pub fn holds<F: MapFamily>(&self, family: &F, parameter: f64, orbit: &PeriodicOrbit) -> bool {
+        let Ok(mut map) = family.at(parameter) else {
+            return false;
+        };
+        let same_period = self
+            .branches
+            .iter()
+            .filter(|b| b.branch.period == orbit.period);
+        for pair in same_period.flat_map(|b| b.branch.points.windows(2)) {
+            let (a, b) = (&pair[0], &pair[1]);
+            let t = (parameter - a.parameter) / (b.parameter - a.parameter);
+            if !(-1e-6..=1.000_001).contains(&t) {
+                continue;
+            }
+            let guess: Vec<f64> = a
+                .orbit
+                .flat()
+                .iter()
+                .zip(&b.orbit.flat())
+                .map(|(x, y)| x + t * (y - x))
+                .collect();
+            let closed = close_orbit_from_points(
+                &mut map,
+                &guess,
+                orbit.period,
+                &ShootingOptions::default(),
+            );
+            if closed.is_ok_and(|c| c.is_same_as(orbit)) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// The orbit of shorter period that a branch ran into, beside the meeting.
+fn met<F: MapFamily>(family: &F, branch: &Branch) -> Option<(f64, PeriodicOrbit)> {
+    let BranchEnd::Collapsed { period, .. } = branch.end else {
+        return None;
+    };
+    let last = branch.points.last()?;
+    let (n, d) = (branch.period, last.orbit.dimension());
+    let copies = n / period;
+    let mut points = vec![0.0; period * d];
+    for (k, state) in last.orbit.states.iter().enumerate() {
+        for (i, v) in state.iter().enumerate() {
+            points[k % period * d + i] += v / copies as f64;
+        }
+    }
+    let mut map = family.at(last.parameter).ok()?;
+    let orbit =
+        close_orbit_from_points(&mut map, &points, period, &ShootingOptions::default()).ok()?;
+    (orbit.period == period).then_some((last.parameter, orbit))
+}

@@ -1,0 +1,278 @@
+//! Loci in two parameters and assembled diagrams.
+
+use std::convert::Infallible;
+
+use nanotap_dynamics::{
+    Bifurcation, BifurcationKind, BranchEnd, CensusOptions, ContinuationOptions, Control, DMatrix,
+    DiagramOptions, Direction, Locus, LocusOptions, MapFamily, ShootingOptions, StartBox,
+    TwoParameterFamily, assemble_diagram, census, close_orbit, continue_orbit, trace_locus,
+};
+
+use crate::systems::{Family, Formula, Grazing, Henon, Logistic, System};
+
+/// A family in two parameters with its second derivative.
+struct Plane<F> {
+    make: fn(f64, f64) -> F,
+    second: fn(&F, &[f64], &mut [f64]),
+}
+
+impl<F: Formula> TwoParameterFamily for Plane<F> {
+    type Map = System<F>;
+    type Error = Infallible;
+
+    fn at(&self, first: f64, second: f64) -> Result<System<F>, Infallible> {
+        Ok(System((self.make)(first, second)))
+    }
+
+    fn advance_with_derivatives(
+        &self,
+        _parameters: [f64; 2],
+        map: &mut System<F>,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: [&mut [f64]; 2],
+    ) -> Result<(), Infallible> {
+        use nanotap_dynamics::StroboscopicMap;
+        let [first, second] = derivatives;
+        map.0.derivative(state, first);
+        (self.second)(&map.0, state, second);
+        map.advance_with_jacobian(state, jacobian)
+    }
+}
+
+const HENON: Plane<Henon> = Plane {
+    make: |a, b| Henon { a, b },
+    second: |_, x, out| {
+        out[0] = 0.0;
+        out[1] = x[0];
+    },
+};
+
+fn first_of<F: MapFamily>(
+    family: &F,
+    parameter: f64,
+    guess: &[f64],
+    direction: Direction,
+    range: (f64, f64),
+    wanted: fn(&BifurcationKind) -> bool,
+) -> Bifurcation {
+    let mut map = family.at(parameter).unwrap();
+    let orbit = close_orbit(&mut map, guess, 1, &ShootingOptions::default()).unwrap();
+    let options = ContinuationOptions::over(range.0, range.1);
+    let branch = continue_orbit(
+        family,
+        parameter,
+        &orbit,
+        direction,
+        &options,
+        &Control::default(),
+    );
+    branch
+        .unwrap()
+        .bifurcations
+        .into_iter()
+        .find(|b| wanted(&b.kind))
+        .unwrap()
+}
+
+fn check(locus: &Locus, second: (f64, f64), exact: impl Fn(f64) -> f64, tolerance: f64) {
+    assert!(locus.points.len() > 20);
+    for p in &locus.points {
+        let e = exact(p.second);
+        assert!(
+            (p.first - e).abs() < tolerance,
+            "{} {} {e}",
+            p.second,
+            p.first
+        );
+    }
+    let (low, high) = locus
+        .points
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
+            (l.min(p.second), h.max(p.second))
+        });
+    assert_eq!((low, high), second, "{:?}", locus.ends);
+    assert!(locus.ends.iter().all(|e| matches!(e, BranchEnd::RangeEnd)));
+}
+
+/// The Hénon map's fold a = −(1−b)²/4 and flip a = 3(1−b)²/4, for all b.
+#[test]
+fn henon_folds_and_flips_follow_their_parabolas() {
+    let family: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
+    let options = LocusOptions::over((-1.0, 1.5), (-0.2, 0.6));
+    let fold = first_of(
+        &family,
+        0.2,
+        &[0.8, 0.2],
+        Direction::Decreasing,
+        (-0.5, 0.3),
+        |k| *k == BifurcationKind::Fold,
+    );
+    let locus = trace_locus(&HENON, &fold, 0.3, &options, &Control::default()).unwrap();
+    check(&locus, (-0.2, 0.6), |b| -(1.0 - b).powi(2) / 4.0, 1e-11);
+    let flip = first_of(
+        &family,
+        0.2,
+        &[0.8, 0.2],
+        Direction::Increasing,
+        (0.0, 0.6),
+        |k| *k == BifurcationKind::Flip,
+    );
+    let locus = trace_locus(&HENON, &flip, 0.3, &options, &Control::default()).unwrap();
+    check(
+        &locus,
+        (-0.2, 0.6),
+        |b| 3.0 * (1.0 - b).powi(2) / 4.0,
+        1e-11,
+    );
+}
+
+/// The grazing normal form in (μ, b): the fold μ = 4(1−a)³/(27b²); the grazing μ = 0.
+#[test]
+fn soft_grazing_loci() {
+    let plane: Plane<Grazing> = Plane {
+        make: |mu, b| Grazing { mu, a: 0.4, b },
+        second: |_, x, out| out[0] = x[0].max(0.0).powf(1.5),
+    };
+    let family: Family<Grazing> = Family(|mu| Grazing { mu, a: 0.4, b: 1.5 });
+    let options = LocusOptions::over((-0.3, 0.3), (0.8, 3.0));
+    let start = |wanted| {
+        first_of(
+            &family,
+            -0.2,
+            &[-0.3],
+            Direction::Increasing,
+            (-0.3, 0.3),
+            wanted,
+        )
+    };
+    let fold = start(|k| *k == BifurcationKind::Fold);
+    let locus = trace_locus(&plane, &fold, 1.5, &options, &Control::default()).unwrap();
+    check(
+        &locus,
+        (0.8, 3.0),
+        |b| 4.0 * 0.6f64.powi(3) / (27.0 * b * b),
+        1e-11,
+    );
+    let grazing = start(|k| matches!(k, BifurcationKind::Grazing { .. }));
+    let locus = trace_locus(&plane, &grazing, 1.5, &options, &Control::default()).unwrap();
+    check(&locus, (0.8, 3.0), |_| 0.0, 1e-12);
+}
+
+/// x → a x (1 − y) + c, y → x: det = a x = 1 on the Neimark–Sacker curve, so x = 1/a
+/// and, from x = a x (1 − x) + c, c = 2/a − 1.
+#[derive(Clone, Debug)]
+struct Shifted(f64, f64);
+
+impl Formula for Shifted {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = self.0 * x[0] * (1.0 - x[1]) + self.1;
+        out[1] = x[0];
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = self.0 * (1.0 - x[1]);
+        out[(0, 1)] = -self.0 * x[0];
+        out[(1, 0)] = 1.0;
+        out[(1, 1)] = 0.0;
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] * (1.0 - x[1]);
+        out[1] = 0.0;
+    }
+}
+
+#[test]
+fn a_neimark_sacker_locus() {
+    let plane: Plane<Shifted> = Plane {
+        make: Shifted,
+        second: |_, _, out| {
+            out[0] = 1.0;
+            out[1] = 0.0;
+        },
+    };
+    let family: Family<Shifted> = Family(|a| Shifted(a, 0.0));
+    let point = first_of(
+        &family,
+        1.6,
+        &[0.3, 0.3],
+        Direction::Increasing,
+        (1.4, 2.6),
+        |k| matches!(k, BifurcationKind::NeimarkSacker { .. }),
+    );
+    let options = LocusOptions::over((1.2, 3.0), (-0.2, 0.3));
+    let locus = trace_locus(&plane, &point, 0.0, &options, &Control::default()).unwrap();
+    check(&locus, (-0.2, 0.3), |c| 2.0 / (1.0 + c), 1e-11);
+}
+
+#[test]
+fn boxes_that_do_not_hold_the_start_are_refused() {
+    let family: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
+    let flip = first_of(
+        &family,
+        0.2,
+        &[0.8, 0.2],
+        Direction::Increasing,
+        (0.0, 0.6),
+        |k| *k == BifurcationKind::Flip,
+    );
+    for (first, second) in [
+        ((0.5, 1.0), (0.0, 1.0)),
+        ((0.0, 1.0), (0.3, 0.3)),
+        ((1.0, 0.0), (0.0, 1.0)),
+    ] {
+        let options = LocusOptions::over(first, second);
+        assert!(trace_locus(&HENON, &flip, 0.3, &options, &Control::default()).is_err());
+    }
+}
+
+/// From a census at r = 3.2 (one period-2 attractor): the doubled branch, the fixed
+/// point it was born from, and two more doublings, each once.
+#[test]
+fn the_logistic_diagram_assembles_from_one_attractor() {
+    let family: Family<Logistic> = Family(Logistic);
+    let starts = StartBox::new(vec![0.0], vec![1.0]).unwrap().starts(1, 10);
+    let found = census(
+        &System(Logistic(3.2)),
+        &starts,
+        &CensusOptions::default(),
+        &Control::default(),
+    );
+    let nanotap_dynamics::AttractorKind::Periodic(orbit) = &found.attractors[0].kind else {
+        panic!()
+    };
+    let options = DiagramOptions {
+        continuation: ContinuationOptions::over(1.2, 3.6),
+        doublings: 3,
+        max_branches: 100,
+    };
+    // The same orbit twice: followed once.
+    let seeds = vec![(3.2, orbit.clone()), (3.2, orbit.clone())];
+    let diagram = assemble_diagram(&family, &seeds, &options, &Control::default());
+    assert!(diagram.failures.is_empty(), "{:?}", diagram.failures);
+    let mut periods: Vec<usize> = diagram.branches.iter().map(|b| b.branch.period).collect();
+    periods.sort_unstable();
+    // Two halves of period 2 and of period 1, then 4, 8 and 16.
+    assert_eq!(periods, [1, 1, 2, 2, 4, 8, 16]);
+    let mut flips: Vec<f64> = diagram
+        .branches
+        .iter()
+        .flat_map(|b| &b.branch.bifurcations)
+        .filter(|b| b.kind == BifurcationKind::Flip)
+        .map(|b| b.parameter)
+        .collect();
+    flips.sort_by(f64::total_cmp);
+    // 3, 1 + √6, 3.5440903596, 3.5644072661, 3.5687594195 (Briggs 1991's cascade).
+    let known = [
+        3.0,
+        1.0 + 6f64.sqrt(),
+        3.5440903596,
+        3.5644072661,
+        3.5687594195,
+    ];
+    assert_eq!(flips.len(), known.len(), "{flips:?}");
+    for (f, k) in flips.iter().zip(known) {
+        assert!((f - k).abs() < 2e-10, "{f} {k}");
+    }
+}

@@ -16,6 +16,8 @@
 //! # Ok::<(), nanotap_figures::FigureError>(())
 //! ```
 //!
+//! The typeface is Noto Sans (SIL Open Font License 1.1), from the notosans crate.
+//!
 //! What is not finite, or not positive on a logarithmic axis, is a gap. A panel without anything to
 //! draw says "no data".
 

@@ -5,7 +5,11 @@ use std::process::ExitCode;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use nanotap::case::CaseError;
 use nanotap::case_file::{CaseFileError, Place, Problem, Source};
+use nanotap::fixed_step_run::FixedStepError;
+use nanotap::model::{FlowError, ModelError};
+use nanotap::orbit::OrbitError;
 use nanotap::physical::CatalogueError;
+use nanotap::simulate::SimulateError;
 use nanotap_figures::FigureError;
 
 use crate::style;
@@ -55,6 +59,61 @@ impl From<CaseError> for Failure {
             error.to_string(),
             "change it in the case file or with --set",
         )
+    }
+}
+
+impl From<ModelError> for Failure {
+    fn from(error: ModelError) -> Self {
+        match error {
+            ModelError::Case(error) => error.into(),
+            ModelError::Oscillator(error) => Self::request(
+                error.to_string(),
+                "change it in the case file or with --set",
+            ),
+            ModelError::Flow(error @ FlowError::Resonance { .. }) => {
+                Self::request(error.to_string(), "change it in the case file or with --set")
+            }
+            ModelError::Flow(error) => Self::Failed(error.to_string()),
+        }
+    }
+}
+
+impl From<SimulateError> for Failure {
+    fn from(error: SimulateError) -> Self {
+        match error {
+            SimulateError::State { .. } | SimulateError::StateValue { .. } => {
+                Self::request(error.to_string(), "count the numbers after --state")
+            }
+            SimulateError::NoPeriods => {
+                Self::request(error.to_string(), "give --periods 1 or more")
+            }
+            SimulateError::Flow(error) => Self::Failed(error.to_string()),
+        }
+    }
+}
+
+impl From<FixedStepError> for Failure {
+    fn from(error: FixedStepError) -> Self {
+        match error {
+            FixedStepError::Simulate(SimulateError::Flow(FlowError::Shape { .. })) => {
+                Self::request(error.to_string(), "give --steps 1 or more")
+            }
+            FixedStepError::Simulate(error) => error.into(),
+            FixedStepError::Rigid => {
+                Self::request(error.to_string(), "leave --method away: the exact flow runs it")
+            }
+            FixedStepError::Overflow { .. } => Self::Failed(error.to_string()),
+        }
+    }
+}
+
+impl From<OrbitError> for Failure {
+    fn from(error: OrbitError) -> Self {
+        match error {
+            OrbitError::NoPeriod => Self::request(error.to_string(), "give --period 1 or more"),
+            OrbitError::Start(error) => error.into(),
+            other => Self::Failed(other.to_string()),
+        }
     }
 }
 

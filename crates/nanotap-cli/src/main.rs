@@ -6,8 +6,11 @@ mod arguments;
 mod command;
 mod failure;
 mod file;
+mod motion;
 mod number;
 mod output;
+mod series;
+mod studied;
 mod style;
 mod table;
 

@@ -27,6 +27,9 @@ pub struct Convergence {
     /// The orbits, for figures.
     #[serde(skip)]
     pub orbits: Vec<Option<OrbitReport>>,
+    /// The models, one a number of modes.
+    #[serde(skip)]
+    pub models: Vec<Model>,
 }
 
 /// The motion with one number of modes.
@@ -67,17 +70,39 @@ pub fn convergence(
 ) -> Result<Convergence, ModelError> {
     let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
     let mut motions = Vec::new();
-    for modes in 1..=largest {
-        let model = Model::cantilever(&case.clone().with_modes(modes))?;
-        let guess = OrbitOptions { state: carried(orbits.last(), modes), ..options.clone() };
-        let found = orbit(&model, &guess).or_else(|_| orbit(&model, &OrbitOptions { state: None, ..guess }));
+    let models: Vec<Model> = (1..=largest)
+        .map(|modes| Model::cantilever(&case.clone().with_modes(modes)))
+        .collect::<Result<_, _>>()?;
+    for (modes, model) in (1..).zip(&models) {
+        let guess = OrbitOptions {
+            state: carried(orbits.last(), modes),
+            ..options.clone()
+        };
+        let found = orbit(model, &guess).or_else(|_| {
+            orbit(
+                model,
+                &OrbitOptions {
+                    state: None,
+                    ..guess
+                },
+            )
+        });
         motions.push(motion(modes, found.as_ref().map_err(ToString::to_string)));
         orbits.push(found.ok());
     }
-    let difference = differences(&orbits, case);
+    let difference = differences(&orbits, &models);
     let enough = enough(&difference, tolerance);
     let verdict = verdict(enough, &difference, largest, tolerance);
-    Ok(Convergence { modes: (1..=largest).collect(), difference, motions, enough, tolerance, verdict, orbits })
+    Ok(Convergence {
+        modes: (1..=largest).collect(),
+        difference,
+        motions,
+        enough,
+        tolerance,
+        verdict,
+        orbits,
+        models,
+    })
 }
 
 /// The state of the motion with one mode less, the new mode at rest: a guess near which
@@ -116,25 +141,28 @@ fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
     }
 }
 
-fn tip_series(report: &OrbitReport, case: &Case, modes: usize) -> Option<Vec<f64>> {
-    let model = Model::cantilever(&case.clone().with_modes(modes)).ok()?;
+fn tip_series(report: &OrbitReport, model: &Model) -> Option<Vec<f64>> {
     let tip = report.trajectory.signal(&model.tip);
     let length = report.trajectory.end();
-    (0..COMPARED_POINTS).map(|i| tip.at(length * i as f64 / COMPARED_POINTS as f64)).collect()
+    (0..COMPARED_POINTS)
+        .map(|i| tip.at(length * i as f64 / COMPARED_POINTS as f64))
+        .collect()
 }
 
-fn differences(orbits: &[Option<OrbitReport>], case: &Case) -> Vec<Option<f64>> {
+fn differences(orbits: &[Option<OrbitReport>], models: &[Model]) -> Vec<Option<f64>> {
     let best = orbits.last().and_then(Option::as_ref);
-    let reference = best.and_then(|o| tip_series(o, case, orbits.len()));
+    let reference = best
+        .zip(models.last())
+        .and_then(|(o, model)| tip_series(o, model));
     orbits
         .iter()
-        .enumerate()
-        .map(|(i, o)| {
+        .zip(models)
+        .map(|(o, model)| {
             let (report, best, reference) = (o.as_ref()?, best?, reference.as_ref()?);
             if report.period != best.period {
                 return None;
             }
-            let series = tip_series(report, case, i + 1)?;
+            let series = tip_series(report, model)?;
             // The same motion may have been found a few drive periods on.
             let shift = COMPARED_POINTS / best.period;
             let distance = |k: usize| {
@@ -150,18 +178,30 @@ fn differences(orbits: &[Option<OrbitReport>], case: &Case) -> Vec<Option<f64>> 
 
 fn enough(difference: &[Option<f64>], tolerance: f64) -> Option<usize> {
     let within = |d: &Option<f64>| d.is_some_and(|d| d <= tolerance);
-    let first = difference.iter().rposition(|d| !within(d)).map_or(0, |last| last + 1);
+    let first = difference
+        .iter()
+        .rposition(|d| !within(d))
+        .map_or(0, |last| last + 1);
     // The last entry is the reference itself and proves nothing.
     (first + 1 < difference.len()).then_some(first + 1)
 }
 
-fn verdict(enough: Option<usize>, difference: &[Option<f64>], largest: usize, tolerance: f64) -> String {
+fn verdict(
+    enough: Option<usize>,
+    difference: &[Option<f64>],
+    largest: usize,
+    tolerance: f64,
+) -> String {
     let percent = 100.0 * tolerance;
     match (enough, difference.last()) {
         (_, None | Some(None)) => {
             format!("no orbit was found with {largest} modes, so nothing can be compared")
         }
-        (Some(n), _) => format!("{n} modes are enough: from there on the tip moves within {percent} % of {largest} modes"),
-        (None, _) => format!("{largest} modes are not shown to be enough at {percent} %: take more"),
+        (Some(n), _) => format!(
+            "{n} modes are enough: from there on the tip moves within {percent} % of {largest} modes"
+        ),
+        (None, _) => {
+            format!("{largest} modes are not shown to be enough at {percent} %: take more")
+        }
     }
 }

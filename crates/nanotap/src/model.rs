@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::sensitivity::{RegimeTangent, SystemTangent};
-use nanotap_flow::{Drive, Exit, FlowError, HarmonicVector, Output, SpectralBasis, System};
+pub use nanotap_flow::FlowError;
+use nanotap_flow::{Drive, Exit, HarmonicVector, Output, SpectralBasis, System};
 
 use crate::beam::Modes;
 use crate::case::{Case, CaseError, CosineTerm};
@@ -166,6 +167,20 @@ impl Model {
     /// Dimension of the state.
     pub fn dimension(&self) -> usize {
         self.system.dimension()
+    }
+
+    /// Speed of the tip displacement, Ẇ (the oscillator's ẋ).
+    pub fn tip_rate(&self) -> Output {
+        // The state holds the velocities, so that every regime says the same.
+        let free = &self.system.regimes()[0];
+        self.tip.rate(free.matrix(), free.forcing(), self.system.drive())
+    }
+
+    /// Displacement of the tip at which it touches: −(α2 sin Ωτ + α5) for the cantilever,
+    /// which moves up from the sample; where the stop stands for an oscillator.
+    pub fn surface(&self) -> Output {
+        let towards = if self.beam.is_some() { -1.0 } else { 1.0 };
+        self.tip.plus(towards, &self.gap)
     }
 
     /// The drive period.

@@ -3,9 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use nanotap_dynamics::{
-    Control, LyapunovSpectrum, PeriodicOrbit, SettleOptions, StroboscopicMap, UndecidedReason, Verdict, settle,
-};
+pub use nanotap_dynamics::SettleOptions;
+use nanotap_dynamics::{LyapunovSpectrum, PeriodicOrbit, StroboscopicMap, Verdict, settle};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Trajectory};
 use serde::Serialize;
@@ -31,7 +30,13 @@ pub struct SimulateOptions {
 
 impl Default for SimulateOptions {
     fn default() -> Self {
-        Self { periods: 50, transient: None, state: None, strobe: 1, settle: SettleOptions::default() }
+        Self {
+            periods: 50,
+            transient: None,
+            state: None,
+            strobe: 1,
+            settle: SettleOptions::default(),
+        }
     }
 }
 
@@ -47,6 +52,14 @@ pub enum SimulateError {
         expected: usize,
         /// What the numbers are.
         layout: &'static str,
+    },
+    /// A number of the starting state is none.
+    #[error("number {number} of the state is {value}; a finite number is needed")]
+    StateValue {
+        /// Which, from 1.
+        number: usize,
+        /// What was given.
+        value: f64,
     },
     /// Nothing to record.
     #[error("at least one period must be recorded, 0 were asked for")]
@@ -115,6 +128,8 @@ pub struct Simulation {
     pub periods: usize,
     /// Drive periods thrown away first.
     pub transient: usize,
+    /// The state at the end of the transient, where the recording starts.
+    pub start: Vec<f64>,
     /// What the motion was found to be, followed on from the end of the transient.
     pub classification: Classification,
     /// Its minimal period in drive periods, if periodic.
@@ -173,6 +188,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     Ok(Simulation {
         periods: options.periods,
         transient,
+        start: state,
         classification: named.classification,
         period: named.orbit.as_ref().map(|o| o.period),
         evidence: named.evidence,
@@ -193,25 +209,42 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 /// [`SimulateError::State`] when its length does not fit.
 pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
     let n = model.dimension();
-    let Some(state) = state else { return Ok(vec![0.0; n]) };
+    let Some(state) = state else {
+        return Ok(vec![0.0; n]);
+    };
     if state.len() != n {
         let layout = if model.beam.is_some() {
             "the modal amplitudes a_1 … a_N, then their rates"
         } else {
             "x, then its rate"
         };
-        return Err(SimulateError::State { found: state.len(), expected: n, layout });
+        return Err(SimulateError::State {
+            found: state.len(),
+            expected: n,
+            layout,
+        });
+    }
+    if let Some((k, &value)) = state.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        return Err(SimulateError::StateValue {
+            number: k + 1,
+            value,
+        });
     }
     Ok(state.to_vec())
 }
 
 /// Runs until the motion has been named and, if it goes to a periodic orbit, has
 /// arrived there to rounding.
-fn measured_transient(map: &mut Strobe, state: &mut Vec<f64>, options: &SettleOptions) -> Result<usize, SimulateError> {
+fn measured_transient(
+    map: &mut Strobe,
+    state: &mut Vec<f64>,
+    options: &SettleOptions,
+) -> Result<usize, SimulateError> {
     let settled = settle(map, state, options);
     let mut periods = settled.periods;
     state.copy_from_slice(&settled.state);
-    let (Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. }) = &settled.verdict else {
+    let (Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. }) = &settled.verdict
+    else {
         return Ok(periods);
     };
     let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
@@ -220,7 +253,12 @@ fn measured_transient(map: &mut Strobe, state: &mut Vec<f64>, options: &SettleOp
         let distance = orbit
             .states
             .iter()
-            .map(|x| x.iter().zip(&*state).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+            .map(|x| {
+                x.iter()
+                    .zip(&*state)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max)
+            })
             .fold(f64::INFINITY, f64::min);
         if distance <= near {
             break;
@@ -247,7 +285,11 @@ struct Record {
     trajectory: Trajectory,
 }
 
-fn record(model: &Model, state: &[f64], options: &SimulateOptions) -> Result<Record, SimulateError> {
+fn record(
+    model: &Model,
+    state: &[f64],
+    options: &SimulateOptions,
+) -> Result<Record, SimulateError> {
     let (periods_per_second, evaluations_per_period) = speed(model, state, options.periods)?;
     let mut flow = Flow::new(Arc::clone(&model.system));
     flow.start(state, 0.0)?;
@@ -280,7 +322,14 @@ fn record(model: &Model, state: &[f64], options: &SimulateOptions) -> Result<Rec
     let (Some(trajectory), Some(observables)) = (first, observables) else {
         return Err(SimulateError::NoPeriods);
     };
-    Ok(Record { strobe, events, observables, periods_per_second, evaluations_per_period, trajectory })
+    Ok(Record {
+        strobe,
+        events,
+        observables,
+        periods_per_second,
+        evaluations_per_period,
+        trajectory,
+    })
 }
 
 /// Speed of the bare propagation and gap evaluations a period.
@@ -298,22 +347,32 @@ fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), Sim
 
 /// The contacts of a recording, their times shifted by `offset`.
 pub fn contact_events(model: &Model, trajectory: &Trajectory, offset: f64) -> Vec<ContactEvent> {
-    let drive = model.system.drive();
     trajectory
         .events()
         .iter()
         .filter_map(|e| {
             let kind = if begins_contact(model, e.from, e.to) {
-                if e.from == e.to { ContactEventKind::Impact } else { ContactEventKind::ContactStart }
+                if e.from == e.to {
+                    ContactEventKind::Impact
+                } else {
+                    ContactEventKind::ContactStart
+                }
             } else if model.contact[e.from] && !model.contact[e.to] {
                 ContactEventKind::ContactEnd
             } else {
                 return None;
             };
             // The guard's rate points into the regime left; the gap's has one sign.
-            let gap_rate = if model.contact[e.from] { -e.rate } else { e.rate };
-            debug_assert!(drive.period() > 0.0);
-            Some(ContactEvent { tau: offset + e.time, kind, gap_rate })
+            let gap_rate = if model.contact[e.from] {
+                -e.rate
+            } else {
+                e.rate
+            };
+            Some(ContactEvent {
+                tau: offset + e.time,
+                kind,
+                gap_rate,
+            })
         })
         .collect()
 }
@@ -336,7 +395,10 @@ impl Named {
     pub fn of(verdict: &Verdict) -> Self {
         let exponent = |s: &LyapunovSpectrum| {
             let (value, error) = s.largest();
-            format!("largest exponent {value:.4} ± {error:.4} per period over {} periods", s.periods)
+            format!(
+                "largest exponent {value:.4} ± {error:.4} per period over {} periods",
+                s.periods
+            )
         };
         let periodic = |orbit: &PeriodicOrbit| {
             format!(
@@ -347,12 +409,22 @@ impl Named {
             )
         };
         let (classification, orbit, spectrum, evidence) = match verdict {
-            Verdict::Periodic(orbit) => (Classification::Periodic, Some(orbit), None, periodic(orbit)),
-            Verdict::TransientChaos { orbit, spectrum, lasted } => (
+            Verdict::Periodic(orbit) => {
+                (Classification::Periodic, Some(orbit), None, periodic(orbit))
+            }
+            Verdict::TransientChaos {
+                orbit,
+                spectrum,
+                lasted,
+            } => (
                 Classification::Periodic,
                 Some(orbit),
                 Some(spectrum),
-                format!("chaotic for about {lasted} periods ({}), then: {}", exponent(spectrum), periodic(orbit)),
+                format!(
+                    "chaotic for about {lasted} periods ({}), then: {}",
+                    exponent(spectrum),
+                    periodic(orbit)
+                ),
             ),
             Verdict::QuasiPeriodic(torus) => (
                 Classification::QuasiPeriodic,
@@ -376,23 +448,24 @@ impl Named {
                     chaos.lifetime_above
                 ),
             ),
-            Verdict::Unbounded => {
-                (Classification::Unbounded, None, None, "the motion left every bound".to_owned())
-            }
-            Verdict::Undecided { reason, spectrum } => {
-                let orbit = match reason {
-                    UndecidedReason::OnOrbitThatDoesNotAttract(orbit) => Some(orbit.as_ref()),
-                    _ => None,
-                };
-                let _ = orbit;
-                (Classification::Undecided, None, spectrum.as_ref(), reason.to_string())
-            }
+            Verdict::Unbounded => (
+                Classification::Unbounded,
+                None,
+                None,
+                "the motion left every bound".to_owned(),
+            ),
+            Verdict::Undecided { reason, spectrum } => (
+                Classification::Undecided,
+                None,
+                spectrum.as_ref(),
+                reason.to_string(),
+            ),
         };
-        Self { classification, orbit: orbit.cloned(), spectrum: spectrum.cloned(), evidence }
+        Self {
+            classification,
+            orbit: orbit.cloned(),
+            spectrum: spectrum.cloned(),
+            evidence,
+        }
     }
-}
-
-/// Nothing to report, nothing to stop: the control of a short piece of work.
-pub fn uncontrolled() -> Control<'static> {
-    Control::default()
 }

@@ -1,7 +1,10 @@
 //! The commands, one a file.
 
 mod case;
+mod convergence;
 mod modes;
+mod orbit;
+mod simulate;
 
 use clap::Subcommand;
 use nanotap::case::Case;
@@ -19,6 +22,12 @@ pub(crate) enum Command {
     Case(case::Arguments),
     /// Mode shapes and frequencies, in free flight and in contact
     Modes(modes::Arguments),
+    /// One run: its steady state, or how it gets there
+    Simulate(simulate::Arguments),
+    /// A periodic orbit by Newton, stable or not
+    Orbit(orbit::Arguments),
+    /// The same motion with N = 1 … K modes: how many are enough
+    Convergence(convergence::Arguments),
 }
 
 /// Runs `command`.
@@ -26,16 +35,19 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
     match command {
         Command::Case(arguments) => case::run(arguments, output),
         Command::Modes(arguments) => modes::run(arguments, output),
+        Command::Simulate(arguments) => simulate::run(arguments, output),
+        Command::Orbit(arguments) => orbit::run(arguments, output),
+        Command::Convergence(arguments) => convergence::run(arguments, output),
     }
 }
 
 /// The case file that the arguments name, with what they set.
-fn case_file(arguments: &CaseArguments) -> Result<CaseFile, Failure> {
+pub(crate) fn case_file(arguments: &CaseArguments) -> Result<CaseFile, Failure> {
     Ok(CaseFile::load(arguments.file.as_deref(), &arguments.set)?)
 }
 
 /// What the case is called in a heading: its file, or that it was typed.
-fn title(arguments: &CaseArguments) -> String {
+pub(crate) fn title(arguments: &CaseArguments) -> String {
     arguments.file.as_ref().map_or_else(
         || "the case that was typed".to_owned(),
         |file| file.display().to_string(),
@@ -43,7 +55,7 @@ fn title(arguments: &CaseArguments) -> String {
 }
 
 /// A physical case resolved with the built-in catalogue and those that the arguments add.
-fn resolve(tables: &PhysicalTables, arguments: &CaseArguments) -> Result<Resolved, Failure> {
+pub(crate) fn resolve(tables: &PhysicalTables, arguments: &CaseArguments) -> Result<Resolved, Failure> {
     let mut catalogue = Catalogue::builtin()?;
     for path in &arguments.catalogue {
         catalogue.extend_from_file(path)?;

@@ -2,6 +2,7 @@
 
 mod case;
 mod modes;
+mod motions;
 mod physical;
 mod terminal;
 mod util;

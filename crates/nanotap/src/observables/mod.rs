@@ -18,7 +18,8 @@ use crate::model::Model;
 /// Observables of a recorded motion, in the model's own units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Observables {
-    /// Length of time observed, in drive periods.
+    /// Length of time observed, in drive periods (a run says it as `periods`).
+    #[serde(skip)]
     pub periods: f64,
     /// Greatest tip displacement W.
     pub tip_max: f64,

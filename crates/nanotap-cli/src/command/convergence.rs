@@ -1,0 +1,159 @@
+//! `nanotap convergence`: the same motion with N = 1 … K modes, and a verdict on enough.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use nanotap::beam::MAX_MODES;
+use nanotap::convergence::{Convergence, convergence};
+use nanotap::motion_figure::convergence_figure;
+use nanotap::orbit::OrbitOptions;
+use nanotap::subject::Subject;
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::studied::Studied;
+use crate::table::{Align, Table};
+use crate::{file, motion, number, style};
+
+/// The same motion with N = 1 … K modes: how many are enough.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// Largest number of modes
+    #[arg(long, value_name = "K", default_value_t = 10)]
+    largest: usize,
+
+    /// Difference of the tip deflection, as a part of the amplitude, that is small enough
+    #[arg(
+        long,
+        value_name = "D",
+        default_value_t = 0.01,
+        allow_negative_numbers = true
+    )]
+    tolerance: f64,
+
+    /// Period of the orbit to compare; without it, the motion where a run from rest settles
+    #[arg(long, value_name = "N")]
+    period: Option<usize>,
+
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if !(2..=MAX_MODES).contains(&arguments.largest) {
+        return Err(Failure::request(
+            format!("--largest {}: nothing to compare", arguments.largest),
+            format!("give a number of modes from 2 to {MAX_MODES}"),
+        ));
+    }
+    if !(arguments.tolerance > 0.0 && arguments.tolerance.is_finite()) {
+        return Err(Failure::request(
+            format!(
+                "--tolerance {}: no difference is that small",
+                arguments.tolerance
+            ),
+            "give a positive part of the amplitude, as in --tolerance 0.01",
+        ));
+    }
+    if let Some(path) = &arguments.out.out {
+        file::ending(path, &["csv"])?;
+    }
+    let studied = Studied::of(&arguments.case, output)?;
+    let Subject::Cantilever(case) = &studied.subject else {
+        return Err(Failure::request(
+            format!(
+                "{}: `nanotap convergence` needs a cantilever; this is an oscillator",
+                studied.title
+            ),
+            "an oscillator has one degree of freedom and no beam modes",
+        ));
+    };
+    let options = OrbitOptions {
+        period: arguments.period,
+        ..OrbitOptions::default()
+    };
+    let result = convergence(case, arguments.largest, arguments.tolerance, &options)?;
+    if let Some(path) = &arguments.out.out {
+        file::write(path, csv(&result).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        convergence_figure(&result, &studied.units()).write(path)?;
+    }
+    output.result(&result, |result| text(&studied, result))
+}
+
+fn csv(result: &Convergence) -> String {
+    let mut csv =
+        String::from("modes,difference,period,tip_max,tip_min,contact_fraction,spectral_radius\n");
+    let cell = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+    for (motion, difference) in result.motions.iter().zip(&result.difference) {
+        let _ = writeln!(
+            csv,
+            "{},{},{},{},{},{},{}",
+            motion.modes,
+            cell(*difference),
+            motion.period.map_or_else(String::new, |n| n.to_string()),
+            cell(motion.tip_max),
+            cell(motion.tip_min),
+            cell(motion.contact_fraction),
+            cell(motion.spectral_radius),
+        );
+    }
+    csv
+}
+
+fn text(studied: &Studied, result: &Convergence) -> String {
+    let heading = format!(
+        "{}: how many modes at Ω = {}",
+        studied.title,
+        number::significant(studied.omega(), 6)
+    );
+    let mut table = Table::new([
+        ("modes", Align::Right),
+        ("difference", Align::Point),
+        ("motion", Align::Left),
+        ("W max", Align::Point),
+        ("W min", Align::Point),
+        ("contact (%)", Align::Point),
+        ("largest |μ|", Align::Point),
+    ]);
+    let digits =
+        |value: Option<f64>, n| value.map_or_else(String::new, |v| number::significant(v, n));
+    for (motion, difference) in result.motions.iter().zip(&result.difference) {
+        let what = match (motion.period, &motion.reason) {
+            (Some(n), _) => format!("period {n}"),
+            (None, Some(_)) => "no orbit".to_owned(),
+            (None, None) => motion.classification.name().to_owned(),
+        };
+        table.row([
+            motion.modes.to_string(),
+            digits(difference.filter(|d| *d > 0.0), 3),
+            what,
+            digits(motion.tip_max, 6),
+            digits(motion.tip_min, 6),
+            digits(motion.contact_fraction.map(|c| 100.0 * c), 4),
+            digits(motion.spectral_radius, 6),
+        ]);
+    }
+    let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
+    text.push_str(&motion::paragraph(&format!(
+        "difference: greatest of the tip deflection over the orbit to that with {} modes, as a part of its \
+         amplitude",
+        result.modes.len()
+    )));
+    for missing in result.motions.iter().filter(|m| m.reason.is_some()).take(1) {
+        let reason = missing.reason.as_deref().unwrap_or_default();
+        text.push_str(&motion::paragraph(&format!(
+            "N = {}: {reason}",
+            missing.modes
+        )));
+    }
+    let _ = write!(text, "\n  {}\n", style::bold(&result.verdict));
+    text
+}

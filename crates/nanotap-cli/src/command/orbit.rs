@@ -1,0 +1,158 @@
+//! `nanotap orbit`: a periodic orbit by Newton, stable or not.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use nanotap::model::Model;
+use nanotap::motion_figure::orbit_figure;
+use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::time_series;
+use serde::Serialize;
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::motion::{self, PhysicalMotion};
+use crate::output::Output;
+use crate::studied::Studied;
+use crate::table::{Align, Table};
+use crate::{file, number, series, style};
+
+/// A periodic orbit by Newton, stable or not.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// Its period in drive periods; without it, that of the motion where a run settles
+    #[arg(long, value_name = "N")]
+    period: Option<usize>,
+
+    /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
+    state: Option<Vec<f64>>,
+
+    /// Harmonics of the drive frequency to tell
+    #[arg(long, value_name = "H", default_value_t = 20)]
+    harmonics: usize,
+
+    /// Samples a drive period in --out
+    #[arg(long, value_name = "S", default_value_t = 200)]
+    resolution: usize,
+
+    /// Write the harmonics to this file (.csv)
+    #[arg(long, value_name = "PATH")]
+    harmonics_out: Option<std::path::PathBuf>,
+
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    orbit: &'a OrbitReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    physical: Option<PhysicalMotion>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if arguments.resolution == 0 {
+        return Err(Failure::request(
+            "--resolution 0: nothing would be written",
+            "give at least 1 sample a period",
+        ));
+    }
+    for path in arguments.out.out.iter().chain(&arguments.harmonics_out) {
+        file::ending(path, &["csv"])?;
+    }
+    let studied = Studied::of(&arguments.case, output)?;
+    let model = studied.model()?;
+    let options = OrbitOptions {
+        period: arguments.period,
+        state: arguments.state.clone(),
+        harmonics: arguments.harmonics,
+        ..OrbitOptions::default()
+    };
+    let found = orbit(&model, &options)?;
+    if let Some(asked) = arguments.period.filter(|n| *n != found.period) {
+        output.note(&format!(
+            "an orbit of period {asked} was asked for; Newton closed one that repeats every {} already",
+            number::counted(found.period, "period", "periods")
+        ));
+    }
+    if let Some(path) = &arguments.out.out {
+        series::write(
+            path,
+            &model,
+            &found.state,
+            found.period,
+            arguments.resolution,
+            &studied.units(),
+        )?;
+    }
+    if let Some(path) = &arguments.harmonics_out {
+        file::write(path, harmonics_csv(&found).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        orbit_figure(&model, &found, &studied.units()).write(path)?;
+    }
+    motion::warn(&found.observables, output);
+    let physical = PhysicalMotion::of(&found.observables, studied.resolved.as_ref());
+    let document = Document {
+        orbit: &found,
+        physical,
+    };
+    output.result(&document, |_| text(&studied, &model, &found))
+}
+
+fn harmonics_csv(orbit: &OrbitReport) -> String {
+    let beam = orbit.spectrum.harmonics.iter().any(|h| h.slope.is_some());
+    let mut csv = String::from("order,tip,tip_lag_degrees,force,force_lag_degrees");
+    csv.push_str(if beam { ",slope\n" } else { "\n" });
+    for h in &orbit.spectrum.harmonics {
+        let _ = write!(
+            csv,
+            "{},{},{},{},{}",
+            h.order, h.tip, h.tip_phase, h.force, h.force_phase
+        );
+        if let Some(slope) = h.slope {
+            let _ = write!(csv, ",{slope}");
+        }
+        csv.push('\n');
+    }
+    csv
+}
+
+fn text(studied: &Studied, model: &Model, orbit: &OrbitReport) -> String {
+    let units = studied.units();
+    let heading = format!("{}: {}", studied.title, studied.summary());
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    let verdict = format!("a period-{} orbit, {}", orbit.period, orbit.stability);
+    let _ = writeln!(text, "  {}", style::bold(&verdict));
+    text.push_str(&motion::paragraph(&format!(
+        "Newton closed it to {:.1e}; it is known to {:.1e}; its multipliers agree with the trace formula to {:.1e}",
+        orbit.residual, orbit.error, orbit.determinant_defect
+    )));
+    let _ = writeln!(text, "\n  {}", style::bold("state at drive phase 0"));
+    let mut table = Table::new([("", Align::Left), ("", Align::Point)]);
+    for (name, value) in time_series::state_names(model).iter().zip(&orbit.state) {
+        table.row([name.clone(), number::significant(*value, 12)]);
+    }
+    text.push_str(&table.render());
+    text.push('\n');
+    text.push_str(&motion::observables(
+        &orbit.observables,
+        &units,
+        model.beam.is_some(),
+    ));
+    text.push('\n');
+    text.push_str(&motion::energy(&orbit.observables, &units));
+    text.push('\n');
+    text.push_str(&motion::spectrum(&orbit.spectrum, orbit.period, &units));
+    text.push('\n');
+    text.push_str(&motion::multipliers(&orbit.multipliers));
+    text
+}

@@ -1,0 +1,346 @@
+//! What is said of a motion: observables, energy, spectrum, multipliers. Shared by every
+//! command that shows motions.
+
+use std::fmt::Write as _;
+
+use nanotap::observables::{Observables, Spectrum};
+use nanotap::physical::{Kind, Resolved};
+use nanotap::simulate::Classification;
+use nanotap::units::Units;
+use serde::Serialize;
+
+use crate::output::Output;
+use crate::table::{Align, Table};
+use crate::{number, style};
+
+/// The state that a run starts from, as somebody types it.
+pub(crate) fn parse_state(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!(
+            "`{text}` is no finite number; write the state as 0.1,-0.02,0.3"
+        )),
+    }
+}
+
+/// A motion in the words and units of the laboratory.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct PhysicalMotion {
+    /// Greatest, least and half of peak to peak of the tip deflection, m.
+    tip_max: f64,
+    tip_min: f64,
+    amplitude: f64,
+    mean_deflection: f64,
+    /// Greatest and mean force of the sample on the tip, N.
+    #[serde(rename = "F_max")]
+    peak_force: f64,
+    mean_force: f64,
+    /// Time in contact in one drive period, s.
+    contact_time: f64,
+    /// Energy that the sample takes in one drive period, J.
+    #[serde(rename = "E_dis")]
+    dissipation: f64,
+    /// Power of the drive, W.
+    drive_power: f64,
+    /// Speed at which contacts begin, m/s.
+    impact_speed: f64,
+    /// Drive frequency, Hz.
+    frequency: f64,
+}
+
+impl PhysicalMotion {
+    /// `o` in SI, if the case is physical.
+    pub(crate) fn of(o: &Observables, resolved: Option<&Resolved>) -> Option<Self> {
+        let resolved = resolved?;
+        let scales = &resolved.scales;
+        let period = resolved.case.period() * scales.time;
+        Some(Self {
+            tip_max: o.tip_max * scales.length,
+            tip_min: o.tip_min * scales.length,
+            amplitude: o.amplitude * scales.length,
+            mean_deflection: o.mean_deflection * scales.length,
+            peak_force: o.peak_force * scales.force,
+            mean_force: o.mean_force * scales.force,
+            contact_time: o.contact_fraction * period,
+            dissipation: o.energy_balance.sample_damping / o.periods * scales.energy,
+            drive_power: o.energy_balance.drive_work / o.periods * scales.energy / period,
+            impact_speed: o.impact_speed * scales.velocity,
+            frequency: resolved.case.omega * scales.frequency,
+        })
+    }
+}
+
+/// The heading: what the motion is.
+pub(crate) fn verdict(classification: Classification, period: Option<usize>) -> String {
+    match period {
+        Some(1) => "periodic: it repeats every drive period".to_owned(),
+        Some(n) => format!("periodic: it repeats every {n} drive periods"),
+        None => classification.name().to_owned(),
+    }
+}
+
+/// Words wrapped to the width of a page, each line indented by two.
+pub(crate) fn paragraph(words: &str) -> String {
+    const WIDTH: usize = 92;
+    let mut text = String::new();
+    let mut line = String::from(" ");
+    for word in words.split_whitespace() {
+        if line.chars().count() + word.chars().count() >= WIDTH {
+            let _ = writeln!(text, "{line}");
+            line = String::from(" ");
+        }
+        line.push(' ');
+        line.push_str(word);
+    }
+    let _ = writeln!(text, "{line}");
+    text
+}
+
+/// Tip, gap, contact and force.
+pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String {
+    let mut table = Table::new([
+        ("", Align::Left),
+        ("", Align::Left),
+        ("", Align::Left),
+        ("", Align::Left),
+    ]);
+    let si = |kind: Kind, value: f64| {
+        units
+            .si(kind)
+            .map_or_else(String::new, |u| kind.format(u * value))
+    };
+    let si_range = |kind: Kind, low: f64, high: f64| {
+        units.si(kind).map_or_else(String::new, |u| {
+            format!("{} … {}", kind.format(u * low), kind.format(u * high))
+        })
+    };
+    let range = |low: f64, high: f64| {
+        format!(
+            "{} … {}",
+            number::significant(low, 6),
+            number::significant(high, 6)
+        )
+    };
+    let tip = if beam {
+        "tip deflection W"
+    } else {
+        "displacement x"
+    };
+    table.row([
+        tip,
+        &range(o.tip_min, o.tip_max),
+        &si_range(Kind::Length, o.tip_min, o.tip_max),
+        &format!("mean {}", number::significant(o.mean_deflection, 4)),
+    ]);
+    table.row([
+        "amplitude",
+        &number::significant(o.amplitude, 6),
+        &si(Kind::Length, o.amplitude),
+        "half of peak to peak",
+    ]);
+    table.row([
+        "gap",
+        &range(o.gap_range[0], o.gap_range[1]),
+        &si_range(Kind::Length, o.gap_range[0], o.gap_range[1]),
+        "",
+    ]);
+    if o.contacts_per_period > 0.0 || o.contact_fraction > 0.0 {
+        let grazing = match o.grazing_contacts {
+            0 => String::new(),
+            n => format!(", {n} of them grazing"),
+        };
+        table.row([
+            "contact",
+            &format!(
+                "{} % of the time",
+                number::significant(100.0 * o.contact_fraction, 4)
+            ),
+            "",
+            &format!(
+                "{} a period{grazing}",
+                number::significant(o.contacts_per_period, 3)
+            ),
+        ]);
+        table.row([
+            "speed of approach",
+            &number::significant(o.impact_speed, 5),
+            &si(Kind::Velocity, o.impact_speed),
+            "greatest at which a contact begins",
+        ]);
+        table.row([
+            "force on the tip",
+            &format!("up to {}", number::significant(o.peak_force, 6)),
+            &si(Kind::Force, o.peak_force),
+            &format!("mean {}", number::significant(o.mean_force, 4)),
+        ]);
+    } else {
+        table.row(["contact", "none", "", ""]);
+    }
+    if let Some(clearance) = &o.beam_clearance {
+        let place = if clearance.xi > 0.999 {
+            "at the tip".to_owned()
+        } else {
+            format!("at ξ = {}", number::significant(clearance.xi, 3))
+        };
+        table.row([
+            "beam clearance",
+            &number::significant(clearance.height, 5),
+            &si(Kind::Length, clearance.height),
+            &format!("least height of the beam, {place}"),
+        ]);
+    }
+    if let Some([low, high]) = o.slope_range {
+        table.row([
+            "slope at the tip",
+            &range(low, high),
+            "",
+            "what an optical lever reads",
+        ]);
+    }
+    table.render()
+}
+
+/// What the drive feeds in and what takes it.
+pub(crate) fn energy(o: &Observables, units: &Units) -> String {
+    let balance = &o.energy_balance;
+    let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
+    let mut row = |name: &str, value: f64, note: String| {
+        let value = value / o.periods;
+        let si = units
+            .si(Kind::Energy)
+            .map_or_else(String::new, |u| Kind::Energy.format(u * value));
+        table.row([
+            name.to_owned(),
+            number::significant(value, 6),
+            format!("{si}{note}"),
+        ]);
+    };
+    row("drive work", balance.drive_work, String::new());
+    row("beam damping", -balance.beam_damping, String::new());
+    row("sample damping", -balance.sample_damping, String::new());
+    row("stored", -balance.stored, String::new());
+    let mut text = format!(
+        "  {}\n{}",
+        style::bold("energy a drive period"),
+        table.render()
+    );
+    let _ = writeln!(
+        text,
+        "  the sum closes to {} of the energy moved",
+        number::significant(balance.residual.abs(), 2)
+    );
+    text
+}
+
+/// Phase, distortion and the first harmonics.
+pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> String {
+    const SHOWN: usize = 8;
+    let mut text = format!(
+        "  {}\n  phase {}° behind the drive, distortion (THD) {} %\n",
+        style::bold("harmonics of the tip deflection and of the force"),
+        number::significant(spectrum.phase, 6),
+        number::significant(100.0 * spectrum.thd, 4),
+    );
+    let symbol = if matches!(units, Units::Si(_)) {
+        "tip (SI)"
+    } else {
+        ""
+    };
+    let mut table = Table::new([
+        ("order", Align::Point),
+        ("tip", Align::Point),
+        (symbol, Align::Left),
+        ("lag (°)", Align::Point),
+        ("force", Align::Point),
+        ("lag (°)", Align::Point),
+    ]);
+    // Of a subharmonic motion the strongest, otherwise the first.
+    let strongest = spectrum.harmonics.iter().map(|h| h.tip).fold(0.0, f64::max);
+    let shown = spectrum
+        .harmonics
+        .iter()
+        .filter(|h| period == 1 || h.tip >= 1e-3 * strongest)
+        .take(SHOWN.max(2 * period));
+    for h in shown.take(2 * SHOWN) {
+        let si = units
+            .si(Kind::Length)
+            .map_or_else(String::new, |u| Kind::Length.format(u * h.tip));
+        // The lag of nothing is noise.
+        let lag = |amplitude: f64, lag: f64| {
+            if amplitude > 0.0 {
+                format!("{lag:.2}")
+            } else {
+                String::new()
+            }
+        };
+        table.row([
+            number::chosen((h.order * 1e6).round() / 1e6),
+            number::significant(h.tip, 5),
+            si,
+            lag(h.tip, h.tip_phase),
+            number::significant(h.force, 5),
+            lag(h.force, h.force_phase),
+        ]);
+    }
+    text.push_str(&table.render());
+    text
+}
+
+/// Floquet multipliers.
+pub(crate) fn multipliers(multipliers: &[[f64; 2]]) -> String {
+    const SHOWN: usize = 8;
+    let mut table = Table::new([
+        ("|μ|", Align::Point),
+        ("Re μ", Align::Point),
+        ("Im μ", Align::Point),
+    ]);
+    for [re, im] in multipliers.iter().take(SHOWN) {
+        table.row([
+            number::significant(re.hypot(*im), 7),
+            number::significant(*re, 7),
+            number::significant(*im, 7),
+        ]);
+    }
+    let mut text = format!(
+        "  {}\n{}",
+        style::bold("Floquet multipliers"),
+        table.render()
+    );
+    if multipliers.len() > SHOWN {
+        let _ = writeln!(text, "  and {} smaller", multipliers.len() - SHOWN);
+    }
+    text
+}
+
+/// Lyapunov exponents in one line.
+pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
+    let list: Vec<String> = exponents
+        .iter()
+        .enumerate()
+        .map(|(k, value)| match errors.and_then(|e| e.get(k)) {
+            Some(error) => format!("{value:.4} ± {error:.4}"),
+            None => format!("{value:.4}"),
+        })
+        .collect();
+    list.join(", ")
+}
+
+/// Says what puts the motion in doubt: another part of the beam than the tip would touch.
+pub(crate) fn warn(o: &Observables, output: &Output) {
+    let Some(clearance) = o.beam_clearance.as_ref().filter(|c| c.touches()) else {
+        return;
+    };
+    let place = if clearance.xi > 0.999 {
+        "the end of the beam itself".to_owned()
+    } else {
+        format!(
+            "the beam at ξ = {} of its length",
+            number::significant(clearance.xi, 3)
+        )
+    };
+    output.warning(&format!(
+        "{place} would pass through the sample (height {} g₀): the model, in which only the tip touches, \
+         does not hold for this motion (the paper's Fig. 2f)",
+        number::significant(clearance.height, 4)
+    ));
+}

@@ -1,0 +1,52 @@
+//! Time series as CSV.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nanotap::model::Model;
+use nanotap::physical::Kind;
+use nanotap::time_series;
+use nanotap::units::Units;
+
+use crate::failure::Failure;
+use crate::file;
+
+/// Writes `periods` drive periods from `start`, `resolution` rows each and the very end.
+/// Of a physical case, columns in SI follow the model's own.
+pub(crate) fn write(
+    path: &Path,
+    model: &Model,
+    start: &[f64],
+    periods: usize,
+    resolution: usize,
+    units: &Units,
+) -> Result<(), Failure> {
+    let mut csv = time_series::columns(model).join(",");
+    // The columns beside which the model's own stand, by their index.
+    let si: Vec<(usize, f64)> = [
+        ("time_s", 0, Kind::Time),
+        ("tip_m", 1, Kind::Length),
+        ("tip_rate_m_per_s", 2, Kind::Velocity),
+        ("gap_m", 3, Kind::Length),
+        ("force_N", 4, Kind::Force),
+    ]
+    .into_iter()
+    .filter_map(|(name, column, kind)| {
+        let unit = units.si(kind)?;
+        let _ = write!(csv, ",{name}");
+        Some((column, unit))
+    })
+    .collect();
+    csv.push('\n');
+    time_series::sample(model, start, periods, resolution, |row| {
+        for (column, value) in row.iter().enumerate() {
+            let _ = write!(csv, "{}{value}", if column == 0 { "" } else { "," });
+        }
+        for (column, unit) in &si {
+            let _ = write!(csv, ",{}", row[*column] * unit);
+        }
+        csv.push('\n');
+    })
+    .map_err(|error| Failure::Failed(error.to_string()))?;
+    file::write(path, csv.as_bytes())
+}

@@ -1,0 +1,94 @@
+//! A motion as a table, a row an instant: for files and for Python.
+
+use std::sync::Arc;
+
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Flow, FlowError, Output};
+
+use crate::model::Model;
+
+/// The columns of [`sample`], in order: `tau`, `tip` (W or x), `tip_rate`, `gap`, `force`,
+/// `contact` (1 in contact, else 0), then the state (`a1 … aN, v1 … vN`, or `x, v`).
+pub fn columns(model: &Model) -> Vec<String> {
+    let mut names: Vec<String> = ["tau", "tip", "tip_rate", "gap", "force", "contact"]
+        .map(str::to_owned)
+        .to_vec();
+    names.extend(state_names(model));
+    names
+}
+
+/// What the numbers of a state are called.
+pub fn state_names(model: &Model) -> Vec<String> {
+    if model.beam.is_none() {
+        return vec!["x".to_owned(), "v".to_owned()];
+    }
+    let n = model.dimension() / 2;
+    (0..2 * n)
+        .map(|i| format!("{}{}", if i < n { "a" } else { "v" }, i % n + 1))
+        .collect()
+}
+
+/// Hands `periods` drive periods from the state `start` at drive phase 0 to `row`,
+/// `resolution` equally spaced instants each and the very end; memory is that of one
+/// period.
+///
+/// # Errors
+/// When the flow fails.
+pub fn sample(
+    model: &Model,
+    start: &[f64],
+    periods: usize,
+    resolution: usize,
+    mut row: impl FnMut(&[f64]),
+) -> Result<(), FlowError> {
+    let outputs = Outputs::new(model);
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(start, 0.0)?;
+    let mut state = vec![0.0; model.dimension()];
+    for period in 0..periods {
+        let mut recorder = Recorder::default();
+        flow.run_period(&mut recorder)?;
+        let trajectory = recorder.finish(Arc::clone(&model.system));
+        let last = usize::from(period + 1 == periods);
+        for k in 0..resolution + last {
+            let phase = model.period() * k as f64 / resolution as f64;
+            let Some(segment) = trajectory.segment_at(phase) else {
+                continue;
+            };
+            let Some(at) = trajectory.state_at(phase) else {
+                continue;
+            };
+            state.copy_from_slice(&at);
+            let tau = period as f64 * model.period() + phase;
+            row(&outputs.row(model, segment.regime, &state, phase, tau));
+        }
+    }
+    Ok(())
+}
+
+struct Outputs {
+    tip_rate: Output,
+}
+
+impl Outputs {
+    fn new(model: &Model) -> Self {
+        Self {
+            tip_rate: model.tip_rate(),
+        }
+    }
+
+    fn row(&self, model: &Model, regime: usize, state: &[f64], phase: f64, tau: f64) -> Vec<f64> {
+        let at = |output: &Output| output.at(model.system.drive(), state, phase);
+        let contact = if model.contact[regime] { 1.0 } else { 0.0 };
+        let mut row = vec![
+            tau,
+            at(&model.tip),
+            at(&self.tip_rate),
+            at(&model.gap),
+            at(&model.force[regime]),
+            contact,
+        ];
+        row.extend_from_slice(state);
+        row
+    }
+}

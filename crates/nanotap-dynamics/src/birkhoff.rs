@@ -16,7 +16,9 @@ use crate::map::StroboscopicMap;
 
 /// Digits to which the weighted averages over two consecutive stretches of
 /// `periods` periods agree, relative to the spread of the motion: the worst
-/// coordinate, at most 16. `state` is replaced by where the run ends.
+/// coordinate or square of a coordinate, at most 16. The squares are there for motions
+/// whose amplitude still drifts: a slow spiral has the averages of a torus, but not
+/// its mean squares. `state` is replaced by where the run ends.
 ///
 /// # Errors
 /// When the map cannot be followed.
@@ -29,7 +31,7 @@ pub fn birkhoff_digits<M: StroboscopicMap>(
     // Small deviations from one state of the motion, so that a mean far from zero
     // costs no digits. Sums: weighted over each stretch, and the range.
     let origin = state.to_vec();
-    let mut sums = [vec![0.0; d], vec![0.0; d]];
+    let mut sums = [vec![0.0; 2 * d], vec![0.0; 2 * d]];
     let mut weights = [0.0, 0.0];
     let mut low = vec![0.0f64; d];
     let mut high = vec![0.0f64; d];
@@ -41,6 +43,7 @@ pub fn birkhoff_digits<M: StroboscopicMap>(
             for i in 0..d {
                 let deviation = state[i] - origin[i];
                 sum[i] += weight * deviation;
+                sum[d + i] += weight * deviation * deviation;
                 low[i] = low[i].min(deviation);
                 high[i] = high[i].max(deviation);
             }
@@ -55,8 +58,10 @@ pub fn birkhoff_digits<M: StroboscopicMap>(
         if spread <= 1e-9 * widest {
             continue;
         }
-        let difference = (sums[0][i] / weights[0] - sums[1][i] / weights[1]).abs();
-        digits = digits.min(-(difference / spread).max(1e-16).log10());
+        for (k, unit) in [(i, spread), (d + i, spread * spread)] {
+            let difference = (sums[0][k] / weights[0] - sums[1][k] / weights[1]).abs();
+            digits = digits.min(-(difference / unit).max(1e-16).log10());
+        }
     }
     Ok(digits)
 }

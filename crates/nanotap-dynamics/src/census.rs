@@ -1,6 +1,6 @@
 //! Which attractors there are, and what part of a box of starts goes to each.
 //!
-//! 1. Pilot starts are settled one by one ([`crate::settle`]); orbits that are the
+//! 1. Pilot starts are settled one by one ([`mod@crate::settle`]); orbits that are the
 //!    same up to a cyclic shift, within their own error estimates, are merged.
 //! 2. Around each stable orbit a contracting neighbourhood is found
 //!    ([`crate::neighbourhood`]). A neighbourhood that a pilot with another fate

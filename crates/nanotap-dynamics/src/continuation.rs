@@ -54,7 +54,7 @@ impl ContinuationOptions {
             range: (from.min(to), from.max(to)),
             initial_step: 2e-3,
             min_step: 1e-10,
-            max_step: 1e-2,
+            max_step: 3e-2,
             max_angle: 0.2,
             max_points: 5000,
             bound: 1e8,
@@ -117,7 +117,9 @@ pub enum BranchEnd {
     Collapsed {
         /// Period of the other branch.
         period: usize,
-        /// Where they meet.
+        /// Where they meet, extrapolated from the last points: about as exact as the
+        /// square of the last step. Where it matters, follow the other branch, whose
+        /// flip is located exactly.
         parameter: f64,
     },
     /// A state outgrew the bound.
@@ -325,8 +327,11 @@ pub(crate) fn follow<F: MapFamily>(
         };
         let index = branch.points.len() - 1;
         let taken = projection(solver, &node, &next);
-        if let Some((m, at, parameter)) = shortest_collapse(solver, &node, &next, taken) {
+        if let Some((m, at, mut parameter)) = shortest_collapse(solver, &node, &next, taken) {
             // What happens before the meeting still counts.
+            if let Ok(near) = solver.along(&node, 0.9 * at) {
+                parameter = meeting(solver, &node, &near, m).unwrap_or(parameter);
+            }
             if let Ok(near) = solver.along(&node, 0.99 * at)
                 && let Some(near_tests) = Tests::new(solver, &near)
             {
@@ -481,6 +486,20 @@ fn shortest_collapse<F: MapFamily>(
         let (at, parameter) = collapse(solver, from, to, step, m)?;
         Some((m, at, parameter))
     })
+}
+
+/// Where the difference f of states `m` periods apart vanishes, from two nodes on one
+/// side: beside a flip (or any symmetric birth) the parameter is even in f.
+fn meeting<F: MapFamily>(
+    solver: &BranchSolver<'_, F>,
+    far: &Node,
+    near: &Node,
+    m: usize,
+) -> Option<f64> {
+    let d = solver.d;
+    let gap = |node: &Node| distance(&node.points[..d], &node.points[m * d..(m + 1) * d]);
+    let ratio = (gap(near) / gap(far)).powi(2);
+    (ratio < 0.25).then(|| (near.parameter - ratio * far.parameter) / (1.0 - ratio))
 }
 
 /// True if `node` is the first node again, in any phase and in the same direction.

@@ -3,11 +3,11 @@
 //! A frame of d tangent vectors is carried along, orthonormalised after every
 //! period (Benettin et al. 1980); the logarithms of the stretch factors average to
 //! the exponents, in natural logarithm per period. Error bars come from block
-//! averages ([`crate::block_average`]), which follow the correlations of the motion.
+//! averages (`block_average.rs`), which follow the correlations of the motion.
 //!
 //! Fails: exponents of a finite stretch say nothing of what the motion does later;
-//! positive ones for thousands of periods may be a transient ([`crate::settle`] and
-//! [`crate::census`] look for the escape). Near zero, convergence is like 1/T with
+//! positive ones for thousands of periods may be a transient ([`mod@crate::settle`] and
+//! [`mod@crate::census`] look for the escape). Near zero, convergence is like 1/T with
 //! no random scatter, so a bar may understate the error by up to about
 //! log(stretch)/T. A singular Jacobian counts as a stretch of the smallest positive
 //! number.

@@ -1,6 +1,6 @@
 //! A neighbourhood of a stable orbit from which every motion goes to that orbit.
 //!
-//! It is a ball of the adapted norm ([`crate::adapted_norm`]) around one strobe
+//! It is a ball of the adapted norm (`adapted_norm.rs`) around one strobe
 //! point x*. If the Jacobian of the return map Pⁿ has operator norm at most q < 1 at
 //! *every* point of the ball, the mean value theorem (the ball is convex and Pⁿ is
 //! C¹) gives ‖Pⁿ(x) − x*‖ ≤ q ‖x − x*‖: the ball maps into itself and everything in

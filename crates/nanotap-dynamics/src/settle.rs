@@ -16,7 +16,7 @@
 //!   and then the run escaped to a periodic orbit;
 //! - chaotic: positive by more than five standard errors to the end. One run of T
 //!   periods without escape says that the mean lifetime is above T/3 at 95 %
-//!   (exponential lifetimes: e⁻³ ≈ 0.05) and no more; [`crate::census`] pools runs;
+//!   (exponential lifetimes: e⁻³ ≈ 0.05) and no more; [`mod@crate::census`] pools runs;
 //! - quasi-periodic: the largest exponent is zero within its error, no orbit up to
 //!   the longest period tried closes, and Birkhoff averages converge as on a torus;
 //! - undecided: anything else, with the numbers.

@@ -12,7 +12,7 @@
 //! Fails, with a typed reason: where no descent is possible (a residual minimum that
 //! is no orbit, a map that refuses), and near a multiplier +1 (fold), where the
 //! orbit is not isolated to rounding. Newton finds *an* orbit near the guess, not
-//! necessarily the one that the motion tends to: [`crate::settle`] checks that.
+//! necessarily the one that the motion tends to: [`mod@crate::settle`] checks that.
 
 use nalgebra::DMatrix;
 

@@ -93,6 +93,13 @@ fn birkhoff_digits_tell_a_torus_from_chaos() {
     });
     let mut x = thrown(&mut torus, &[0.3, 0.1], 200);
     assert!(birkhoff_digits(&mut torus, &mut x, 4000).unwrap() > 12.0);
+    // A spiral that loses 1e-7 of its size per turn is no torus yet.
+    let mut spiral = System(Focus {
+        radius: 1.0 - 1e-7,
+        angle: golden,
+    });
+    let digits = birkhoff_digits(&mut spiral, &mut [3.0, 0.0], 4000).unwrap();
+    assert!(digits < 4.0, "{digits}");
     let mut chaos = System(Henon { a: 1.4, b: 0.3 });
     let mut x = thrown(&mut chaos, &[0.1, 0.1], 200);
     assert!(birkhoff_digits(&mut chaos, &mut x, 4000).unwrap() < 4.0);

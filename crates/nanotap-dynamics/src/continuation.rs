@@ -253,6 +253,10 @@ pub(crate) fn check(
     Ok(())
 }
 
+/// Scaled step at which a branch that keeps slipping onto one of shorter period is
+/// taken to have met it.
+const SHORTEST_MEETING: f64 = 1e-6;
+
 /// Why a trial step was not taken.
 enum Rejected {
     Corrector(CorrectorFailure),
@@ -311,6 +315,17 @@ pub(crate) fn follow<F: MapFamily>(
                 continue;
             }
         };
+        if let Some(m) = slipped(solver, &node, &next) {
+            step *= 0.5;
+            if step < SHORTEST_MEETING.max(options.min_step) {
+                branch.end = BranchEnd::Collapsed {
+                    period: m,
+                    parameter: node.parameter,
+                };
+                break;
+            }
+            continue;
+        }
         if norm(&next.points) > options.bound {
             branch.end = BranchEnd::LeftDomain;
             break;
@@ -486,6 +501,14 @@ fn shortest_collapse<F: MapFamily>(
         let (at, parameter) = collapse(solver, from, to, step, m)?;
         Some((m, at, parameter))
     })
+}
+
+/// The divisor of the period whose branch Newton has slipped onto: the difference of
+/// states that many periods apart has all but vanished within one step.
+fn slipped<F: MapFamily>(solver: &BranchSolver<'_, F>, from: &Node, to: &Node) -> Option<usize> {
+    let (n, d) = (solver.n, solver.d);
+    let gap = |node: &Node, m: usize| distance(&node.points[..d], &node.points[m * d..(m + 1) * d]);
+    (1..n).find(|&m| n.is_multiple_of(m) && gap(to, m) <= 1e-3 * gap(from, m))
 }
 
 /// Where the difference f of states `m` periods apart vanishes, from two nodes on one

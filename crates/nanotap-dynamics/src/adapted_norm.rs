@@ -9,8 +9,8 @@
 //! Fails (returns `None`) if the spectral radius is not below 1, or so near it that
 //! H is not positive definite in rounding.
 
+use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{DMatrix, SymmetricEigen};
 
 /// The norm ‖δ‖_H = |Lᵀδ|, H = L Lᵀ.
 #[derive(Clone, Debug)]
@@ -18,6 +18,7 @@ pub(crate) struct AdaptedNorm {
     d: usize,
     /// Lᵀ, row major: row i has its first nonzero entry at column i.
     upper: Vec<f64>,
+    upper_matrix: DMatrix<f64>,
     /// L⁻ᵀ.
     inverse: DMatrix<f64>,
     /// Factor by which the linear map contracts this norm at least.
@@ -58,6 +59,7 @@ impl AdaptedNorm {
         Some(Self {
             d,
             upper: upper.transpose().as_slice().to_vec(),
+            upper_matrix: upper,
             inverse,
             rate,
         })
@@ -96,15 +98,16 @@ impl AdaptedNorm {
         }
     }
 
-    /// Operator norm of a matrix in this norm.
-    pub(crate) fn operator_norm(&self, matrix: &DMatrix<f64>) -> f64 {
-        let upper = DMatrix::from_row_slice(self.d, self.d, &self.upper);
-        let image = upper * matrix * &self.inverse;
-        let gram = image.transpose() * image;
-        if gram.iter().any(|v| !v.is_finite()) {
-            return f64::INFINITY;
+    /// True if a matrix has an operator norm of at most `rate` in this norm: the
+    /// matrix rate² − BᵀB, B = Lᵀ A L⁻ᵀ, has a Cholesky factor.
+    pub(crate) fn is_contracted_by(&self, matrix: &DMatrix<f64>, rate: f64) -> bool {
+        let image = &self.upper_matrix * matrix * &self.inverse;
+        let mut slack = image.transpose() * image;
+        slack.neg_mut();
+        for i in 0..self.d {
+            slack[(i, i)] += rate * rate;
         }
-        SymmetricEigen::new(gram).eigenvalues.max().max(0.0).sqrt()
+        slack.iter().all(|v| v.is_finite()) && slack.cholesky().is_some()
     }
 }
 
@@ -119,7 +122,9 @@ mod tests {
         let m = DMatrix::from_row_slice(2, 2, &[0.9, 700.0, 0.0, 0.85]);
         let norm = AdaptedNorm::new(&m, 0.9).unwrap();
         assert!((norm.rate() - 0.95).abs() < 1e-15);
-        assert!(norm.operator_norm(&m) <= 0.95 + 1e-9);
+        assert!(norm.is_contracted_by(&m, 0.95 + 1e-9));
+        // No norm of a matrix is below its spectral radius.
+        assert!(!norm.is_contracted_by(&m, 0.89));
         let x = [0.3, -0.2];
         let y = [0.9 * 0.3 - 700.0 * 0.2, -0.85 * 0.2];
         let zero = [0.0, 0.0];

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use nanotap::attractors::AttractorsError;
 use nanotap::case::CaseError;
 use nanotap::case_file::{CaseFileError, Place, Problem, Source};
 use nanotap::fixed_step_run::FixedStepError;
@@ -70,9 +71,10 @@ impl From<ModelError> for Failure {
                 error.to_string(),
                 "change it in the case file or with --set",
             ),
-            ModelError::Flow(error @ FlowError::Resonance { .. }) => {
-                Self::request(error.to_string(), "change it in the case file or with --set")
-            }
+            ModelError::Flow(error @ FlowError::Resonance { .. }) => Self::request(
+                error.to_string(),
+                "change it in the case file or with --set",
+            ),
             ModelError::Flow(error) => Self::Failed(error.to_string()),
         }
     }
@@ -99,9 +101,10 @@ impl From<FixedStepError> for Failure {
                 Self::request(error.to_string(), "give --steps 1 or more")
             }
             FixedStepError::Simulate(error) => error.into(),
-            FixedStepError::Rigid => {
-                Self::request(error.to_string(), "leave --method away: the exact flow runs it")
-            }
+            FixedStepError::Rigid => Self::request(
+                error.to_string(),
+                "leave --method away: the exact flow runs it",
+            ),
             FixedStepError::Overflow { .. } => Self::Failed(error.to_string()),
         }
     }
@@ -113,6 +116,21 @@ impl From<OrbitError> for Failure {
             OrbitError::NoPeriod => Self::request(error.to_string(), "give --period 1 or more"),
             OrbitError::Start(error) => error.into(),
             other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<AttractorsError> for Failure {
+    fn from(error: AttractorsError) -> Self {
+        match error {
+            AttractorsError::NoStarts => {
+                Self::request(error.to_string(), "give --starts 1 or more")
+            }
+            AttractorsError::Box(_) | AttractorsError::Dimension { .. } => {
+                Self::request(error.to_string(), "change it with --box")
+            }
+            AttractorsError::Motion(error) => error.into(),
+            AttractorsError::Orbit(error) => error.into(),
         }
     }
 }

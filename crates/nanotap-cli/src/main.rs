@@ -9,10 +9,12 @@ mod file;
 mod motion;
 mod number;
 mod output;
+mod progress;
 mod series;
 mod studied;
 mod style;
 mod table;
+mod threads;
 
 use std::process::ExitCode;
 

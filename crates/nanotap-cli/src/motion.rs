@@ -325,8 +325,9 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
     list.join(", ")
 }
 
-/// Says what puts the motion in doubt: another part of the beam than the tip would touch.
-pub(crate) fn warn(o: &Observables, output: &Output) {
+/// Says what puts the motion in doubt: another part of the beam than the tip would touch, in
+/// `which` motion, if there are several.
+pub(crate) fn warn(o: &Observables, which: &str, output: &Output) {
     let Some(clearance) = o.beam_clearance.as_ref().filter(|c| c.touches()) else {
         return;
     };
@@ -339,7 +340,7 @@ pub(crate) fn warn(o: &Observables, output: &Output) {
         )
     };
     output.warning(&format!(
-        "{place} would pass through the sample (height {} g₀): the model, in which only the tip touches, \
+        "{which}{place} would pass through the sample (height {} g₀): the model, in which only the tip touches, \
          does not hold for this motion (the paper's Fig. 2f)",
         number::significant(clearance.height, 4)
     ));

@@ -20,6 +20,11 @@ impl Output {
         Self { json, quiet }
     }
 
+    /// Whether remarks and progress are left out.
+    pub(crate) fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// Prints a result: as the one JSON document where that was asked for, else the
     /// text that `text` makes.
     pub(crate) fn result<R: Serialize>(

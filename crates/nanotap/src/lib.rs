@@ -1,6 +1,8 @@
 //! Tapping-mode atomic force microscopy, exactly: beam modes, Galerkin matrices,
 //! contact laws, observables and experiments.
 
+pub mod attractor_figure;
+pub mod attractors;
 pub mod beam;
 pub mod case;
 pub mod case_file;
@@ -8,6 +10,7 @@ pub mod convergence;
 pub mod exact_beam;
 pub mod fixed_step_run;
 pub mod galerkin;
+pub mod lyapunov;
 pub mod mode_table;
 pub mod model;
 pub mod motion_figure;
@@ -18,7 +21,10 @@ pub mod parameter;
 pub mod physical;
 pub mod simulate;
 pub mod spectrum;
+pub mod start_box;
 pub mod strobe;
 pub mod subject;
 pub mod time_series;
 pub mod units;
+
+pub use nanotap_dynamics::control;

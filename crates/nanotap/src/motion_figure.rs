@@ -207,6 +207,11 @@ fn contact_intervals(model: &Model, trajectory: &Trajectory, periods: f64) -> Ve
     intervals
 }
 
+/// A motion in the plane of tip displacement and rate, in the model's own units.
+pub fn portrait(model: &Model, trajectory: &Trajectory) -> Vec<(f64, f64)> {
+    View::new(model, trajectory, &Units::Model).portrait(trajectory.end() / model.period())
+}
+
 /// What a motion is, in few words: "period 4", "chaotic".
 fn words(classification: Classification, period: Option<usize>) -> String {
     period.map_or_else(

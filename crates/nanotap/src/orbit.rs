@@ -1,8 +1,8 @@
 //! A periodic orbit by Newton, with its stability and what can be read off it.
 
 use nanotap_dynamics::{
-    Complex, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions, Stability, Verdict, close_orbit,
-    close_orbit_from_points, settle,
+    Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
+    Stability, Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
 };
 use nanotap_flow::{FlowError, Trajectory};
 use serde::Serialize;
@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::model::Model;
 use crate::observables::{Observables, Spectrum};
 use crate::simulate::{ContactEvent, Named, SimulateError, contact_events, starting_state};
+use crate::start_box::default_box;
 use crate::strobe::Strobe;
 
 /// How to look for an orbit.
@@ -54,8 +55,19 @@ pub enum OrbitError {
     /// Newton found nothing.
     #[error(transparent)]
     Newton(#[from] ShootingError),
+    /// There may be none.
+    #[error(
+        "no orbit of period {period} was found, neither near the motion nor from starts all over the box \
+         of states; say --state to look near one"
+    )]
+    NotFound {
+        /// The period asked for.
+        period: usize,
+    },
     /// The run settles on something that is not periodic.
-    #[error("the run from this start is not periodic ({evidence}); say --period to look for an orbit of that period")]
+    #[error(
+        "the run from this start is not periodic ({evidence}); say --period to look for an orbit of that period"
+    )]
     NotPeriodic {
         /// What it is.
         evidence: String,
@@ -108,13 +120,15 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Orbit
     let mut map = Strobe::new(model);
     let found = match (options.period, &options.state) {
         (Some(period), Some(_)) => close_orbit(&mut map, &start, period, &options.shooting)?,
-        (period, _) => settled(&mut map, &start, period, options)?,
+        (period, _) => settled(model, &mut map, &start, period, options)?,
     };
     report(model, &found, options.harmonics)
 }
 
-/// The orbit where a run from `start` settles, or the one of the asked period near its end.
+/// The orbit where a run from `start` settles, or one of the asked period: near its end, or
+/// anywhere.
 fn settled(
+    model: &Model,
     map: &mut Strobe,
     start: &[f64],
     period: Option<usize>,
@@ -127,9 +141,43 @@ fn settled(
         }
     }
     match period {
-        None => Err(OrbitError::NotPeriodic { evidence: Named::of(&end.verdict).evidence }),
-        Some(period) => near_recurrence(map, &end.state, period, &options.shooting),
+        None => Err(OrbitError::NotPeriodic {
+            evidence: Named::of(&end.verdict).evidence,
+        }),
+        Some(period) => near_recurrence(map, &end.state, period, &options.shooting)
+            .ok()
+            .filter(|orbit| orbit.period == period)
+            .map_or_else(|| searched(model, map, period, options), Ok),
     }
+}
+
+/// Starts in the default box from which Newton is tried.
+const SEARCHED_STARTS: usize = 64;
+/// Periods run from each of them in search of near returns.
+const SEARCHED_PERIODS: usize = 256;
+
+/// An orbit of just this period, the least unstable one that Newton finds from starts all
+/// over the default box; failing that, what it finds from where the run ended.
+fn searched(
+    model: &Model,
+    map: &mut Strobe,
+    period: usize,
+    options: &OrbitOptions,
+) -> Result<PeriodicOrbit, OrbitError> {
+    let starts = default_box(model)
+        .map(|b| b.starts(1, SEARCHED_STARTS))
+        .unwrap_or_default();
+    let search = OrbitSearch {
+        max_period: period,
+        run: SEARCHED_PERIODS.max(8 * period),
+        shooting: options.shooting.clone(),
+        ..OrbitSearch::default()
+    };
+    let found = find_orbits(map, &starts, &search, &Control::default());
+    found
+        .into_iter()
+        .find(|orbit| orbit.period == period)
+        .ok_or(OrbitError::NotFound { period })
 }
 
 /// States looked at for a near return.
@@ -151,10 +199,12 @@ fn near_recurrence(
         map.advance(&mut next)?;
         states.push(next);
     }
-    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let distance =
+        |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
     let mut order: Vec<usize> = (0..RECURRENCE_PERIODS).collect();
     order.sort_by(|&a, &b| {
-        distance(&states[a], &states[a + period]).total_cmp(&distance(&states[b], &states[b + period]))
+        distance(&states[a], &states[a + period])
+            .total_cmp(&distance(&states[b], &states[b + period]))
     });
     let mut last = None;
     let mut smaller = None;
@@ -177,7 +227,11 @@ fn near_recurrence(
 ///
 /// # Errors
 /// When the flow along it fails.
-pub fn report(model: &Model, orbit: &PeriodicOrbit, harmonics: usize) -> Result<OrbitReport, OrbitError> {
+pub fn report(
+    model: &Model,
+    orbit: &PeriodicOrbit,
+    harmonics: usize,
+) -> Result<OrbitReport, OrbitError> {
     let start = orbit.states.first().cloned().unwrap_or_default();
     let trajectory = Trajectory::record(&model.system, &start, orbit.period)?;
     let observables = Observables::of(model, &trajectory).ok_or(OrbitError::NoPeriod)?;
@@ -187,7 +241,11 @@ pub fn report(model: &Model, orbit: &PeriodicOrbit, harmonics: usize) -> Result<
         states: orbit.states.clone(),
         residual: orbit.residual,
         error: orbit.error,
-        multipliers: orbit.multipliers.iter().map(|m: &Complex<f64>| [m.re, m.im]).collect(),
+        multipliers: orbit
+            .multipliers
+            .iter()
+            .map(|m: &Complex<f64>| [m.re, m.im])
+            .collect(),
         stable: orbit.is_stable(),
         stability: match orbit.stability {
             Stability::Stable => "stable",
@@ -216,7 +274,9 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
         .events()
         .iter()
         .filter_map(|e| {
-            let exit = model.system.exits()[e.from].iter().find(|x| x.target == e.to)?;
+            let exit = model.system.exits()[e.from]
+                .iter()
+                .find(|x| x.target == e.to)?;
             let reset = exit.reset.as_ref()?;
             Some(2.0 * reset.matrix.determinant().abs().ln())
         })

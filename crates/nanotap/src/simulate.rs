@@ -332,6 +332,31 @@ fn record(
     })
 }
 
+/// What can be read off `periods` drive periods from `state` at drive phase 0.
+///
+/// # Errors
+/// When the flow fails or nothing is to be recorded.
+pub fn observe(model: &Model, state: &[f64], periods: usize) -> Result<Observables, SimulateError> {
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(state, 0.0)?;
+    let mut observables: Option<Observables> = None;
+    let mut done = 0;
+    while done < periods {
+        let block = BLOCK.min(periods - done);
+        let mut recorder = Recorder::default();
+        for _ in 0..block {
+            flow.run_period(&mut recorder)?;
+        }
+        let trajectory = recorder.finish(Arc::clone(&model.system));
+        if let Some(next) = Observables::of(model, &trajectory) {
+            observables =
+                Some(observables.map_or_else(|| next.clone(), |so_far| so_far.joined(&next)));
+        }
+        done += block;
+    }
+    observables.ok_or(SimulateError::NoPeriods)
+}
+
 /// Speed of the bare propagation and gap evaluations a period.
 fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), SimulateError> {
     let mut flow = Flow::new(Arc::clone(&model.system));

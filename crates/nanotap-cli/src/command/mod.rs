@@ -1,7 +1,9 @@
 //! The commands, one a file.
 
+mod attractors;
 mod case;
 mod convergence;
+mod lyapunov;
 mod modes;
 mod orbit;
 mod simulate;
@@ -26,6 +28,10 @@ pub(crate) enum Command {
     Simulate(simulate::Arguments),
     /// A periodic orbit by Newton, stable or not
     Orbit(orbit::Arguments),
+    /// Every motion that coexists: a census from many seeded starts
+    Attractors(attractors::Arguments),
+    /// Lyapunov spectrum with error bars, and a Poincaré section
+    Lyapunov(lyapunov::Arguments),
     /// The same motion with N = 1 … K modes: how many are enough
     Convergence(convergence::Arguments),
 }
@@ -37,6 +43,8 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Modes(arguments) => modes::run(arguments, output),
         Command::Simulate(arguments) => simulate::run(arguments, output),
         Command::Orbit(arguments) => orbit::run(arguments, output),
+        Command::Attractors(arguments) => attractors::run(arguments, output),
+        Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
         Command::Convergence(arguments) => convergence::run(arguments, output),
     }
 }

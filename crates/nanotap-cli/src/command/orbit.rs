@@ -99,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.plot.plot {
         orbit_figure(&model, &found, &studied.units()).write(path)?;
     }
-    motion::warn(&found.observables, output);
+    motion::warn(&found.observables, "", output);
     let physical = PhysicalMotion::of(&found.observables, studied.resolved.as_ref());
     let document = Document {
         orbit: &found,

@@ -156,7 +156,7 @@ fn exact(
     if let Some(path) = &arguments.plot.plot {
         simulation_figure(model, &run, &studied.units()).write(path)?;
     }
-    motion::warn(&run.observables, output);
+    motion::warn(&run.observables, "", output);
     let physical = PhysicalMotion::of(&run.observables, studied.resolved.as_ref());
     let document = Document {
         run: &run,

@@ -1,6 +1,7 @@
 //! The program from outside: exit codes, words, JSON and files.
 
 mod case;
+mod existing_motions;
 mod modes;
 mod motions;
 mod physical;

@@ -408,6 +408,6 @@ fn what_makes_no_sense_is_refused_with_a_remedy() {
             "--set",
             "omega=3.5160152685",
         ],
-        &["undamped", "Ω"],
+        &["undamped mode", "add damping"],
     );
 }

@@ -1,0 +1,345 @@
+//! `nanotap attractors`: a census of every motion that coexists.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use nanotap::attractor_figure::attractors_figure;
+use nanotap::attractors::{AttractorReport, Attractors, AttractorsOptions, attractors};
+use nanotap::model::Model;
+use nanotap::simulate::SettleOptions;
+use nanotap::start_box::box_with;
+use nanotap::time_series;
+use nanotap::units::Units;
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::studied::Studied;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{file, motion, number, progress, style};
+
+/// Every motion that coexists: a census from many seeded starts.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// Starts, spread evenly over a box of states
+    #[arg(long, value_name = "S", default_value_t = 256)]
+    starts: usize,
+
+    /// Seed of the starts: the same seed gives the same answer on any number of threads
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    seed: u64,
+
+    /// A side of the box, as in a1=-1:1 or v2=-4:4; may be repeated; the other sides are
+    /// derived from the linear response to the drive
+    #[arg(long = "box", value_name = "COORDINATE=LOW:HIGH", allow_hyphen_values = true, value_parser = parse_side)]
+    sides: Vec<(String, f64, f64)>,
+
+    /// Longest period looked for
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    max_period: usize,
+
+    /// Also list unstable orbits up to this period (4 if no number is given)
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4", default_value_t = 0, hide_default_value = true)]
+    unstable: usize,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+fn parse_side(text: &str) -> Result<(String, f64, f64), String> {
+    let wrong = || format!("`{text}` is no side of a box; write it as a1=-1:1");
+    let (name, interval) = text.split_once('=').ok_or_else(wrong)?;
+    let (low, high) = interval.split_once(':').ok_or_else(wrong)?;
+    let end = |text: &str| {
+        text.trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|v| v.is_finite())
+            .ok_or_else(wrong)
+    };
+    Ok((name.trim().to_owned(), end(low)?, end(high)?))
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if arguments.max_period == 0 {
+        return Err(Failure::request(
+            "--max-period 0: no motion has that period",
+            "give at least 1",
+        ));
+    }
+    if let Some(path) = &arguments.out.out {
+        file::ending(path, &["csv"])?;
+    }
+    let studied = Studied::of(&arguments.case, output)?;
+    let model = studied.model()?;
+    let start_box = box_with(&model, &arguments.sides).map_err(|error| {
+        Failure::request(
+            format!("--box: {error}"),
+            "name coordinates as in --box a1=-1:1",
+        )
+    })?;
+    let options = AttractorsOptions {
+        starts: arguments.starts,
+        seed: arguments.seed,
+        start_box: Some(start_box),
+        settle: SettleOptions {
+            max_period: arguments.max_period,
+            ..SettleOptions::default()
+        },
+        unstable: arguments.unstable,
+        ..AttractorsOptions::default()
+    };
+    let found = progress::watched(output, "starts", |control| {
+        arguments
+            .threads
+            .install(|| attractors(&model, &options, control))
+    })???;
+    if let Some(path) = &arguments.out.out {
+        file::write(path, csv(&model, &found).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        attractors_figure(&model, &found, &studied.units()).write(path)?;
+    }
+    if found.cancelled {
+        output.warning("stopped before all starts were done: the fractions are of what was done");
+    }
+    for (k, attractor) in found.attractors.iter().enumerate() {
+        let of_orbit = attractor.orbit.as_ref().map(|orbit| &orbit.observables);
+        let wandering = attractor
+            .wandering
+            .as_ref()
+            .map(|wandering| &wandering.observables);
+        for observables in of_orbit.into_iter().chain(wandering) {
+            motion::warn(observables, &format!("attractor {}: ", k + 1), output);
+        }
+    }
+    output.result(&found, |found| text(&studied, found))
+}
+
+/// A row a strobe point of each attractor (of one that does not repeat, one point).
+fn csv(model: &Model, found: &Attractors) -> String {
+    let mut csv = format!(
+        "attractor,classification,period,fraction,point,{}\n",
+        time_series::state_names(model).join(",")
+    );
+    for (k, attractor) in found.attractors.iter().enumerate() {
+        let period = attractor
+            .orbit
+            .as_ref()
+            .map_or_else(String::new, |o| o.period.to_string());
+        let states = match (&attractor.orbit, &attractor.wandering) {
+            (Some(orbit), _) => orbit.states.clone(),
+            (None, Some(wandering)) => vec![wandering.state.clone()],
+            (None, None) => Vec::new(),
+        };
+        for (point, state) in states.iter().enumerate() {
+            let numbers: Vec<String> = state.iter().map(f64::to_string).collect();
+            let _ = writeln!(
+                csv,
+                "{},{},{period},{},{point},{}",
+                k + 1,
+                attractor.classification.name(),
+                attractor.share.fraction,
+                numbers.join(",")
+            );
+        }
+    }
+    csv
+}
+
+fn text(studied: &Studied, found: &Attractors) -> String {
+    let units = studied.units();
+    let heading = format!(
+        "{}: {}, {} from seed {}",
+        studied.title,
+        studied.summary(),
+        number::counted(found.starts, "start", "starts"),
+        found.seed
+    );
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    if found.attractors.is_empty() {
+        text.push_str("  no attractor was shown\n");
+    } else {
+        text.push_str(&table(&found.attractors, &units));
+        text.push('\n');
+    }
+    for (k, attractor) in found.attractors.iter().enumerate() {
+        text.push_str(&motion::paragraph(&format!(
+            "{}: {}",
+            k + 1,
+            attractor.evidence
+        )));
+        if attractor.orbit.is_none() {
+            text.push_str(&motion::paragraph(&format!(
+                "Lyapunov exponents per drive period: {}",
+                motion::exponents(&attractor.lyapunov, attractor.lyapunov_errors.as_deref())
+            )));
+        }
+    }
+    if let Some(chaos) = &found.transient_chaos {
+        let to: Vec<String> = chaos
+            .destinations
+            .iter()
+            .map(|(k, count)| format!("{count} to attractor {}", k + 1))
+            .collect();
+        let _ = writeln!(
+            text,
+            "\n  {}",
+            style::bold("transient chaos: it is no attractor")
+        );
+        text.push_str(&motion::paragraph(&format!(
+            "mean lifetime {:.0} drive periods (95 %: {:.0} … {:.0}) from {} escapes ({}); {} still wander \
+             ({} % of the starts); exponents {}",
+            chaos.lifetime,
+            chaos.lifetime_interval[0],
+            chaos.lifetime_interval[1],
+            chaos.escapes,
+            to.join(", "),
+            number::counted(chaos.wandering.count, "start", "starts"),
+            number::significant(100.0 * chaos.wandering.fraction, 3),
+            motion::exponents(&chaos.lyapunov, Some(&chaos.lyapunov_errors)),
+        )));
+    }
+    if found.unbounded.count > 0 {
+        text.push_str(&motion::paragraph(&format!(
+            "{} left every bound",
+            number::counted(found.unbounded.count, "start", "starts")
+        )));
+    }
+    undecided(&mut text, found);
+    if let Some(orbits) = &found.unstable {
+        let _ = writeln!(
+            text,
+            "\n  {}",
+            style::bold("unstable orbits (a list that is never proved complete)")
+        );
+        let mut table = Table::new([
+            ("period", Align::Right),
+            ("|μ|", Align::Point),
+            ("unstable directions", Align::Right),
+            ("tip", Align::Left),
+            ("contact (%)", Align::Point),
+        ]);
+        for orbit in orbits {
+            let moduli = || orbit.multipliers.iter().map(|[re, im]| re.hypot(*im));
+            table.row([
+                orbit.period.to_string(),
+                number::significant(moduli().fold(0.0, f64::max), 6),
+                moduli().filter(|m| *m > 1.0).count().to_string(),
+                tip(orbit.observables.tip_min, orbit.observables.tip_max, &units),
+                number::significant(100.0 * orbit.observables.contact_fraction, 4),
+            ]);
+        }
+        text.push_str(&table.render());
+    }
+    let sides: Vec<String> = found
+        .sides
+        .iter()
+        .map(|s| {
+            format!(
+                "{} {} … {}",
+                s.coordinate,
+                number::significant(s.lower, 3),
+                number::significant(s.upper, 3)
+            )
+        })
+        .collect();
+    let _ = writeln!(text);
+    text.push_str(&motion::paragraph(&format!(
+        "fractions are of the box of starts, with 95 % intervals: {}",
+        sides.join(", ")
+    )));
+    text
+}
+
+fn table(attractors: &[AttractorReport], units: &Units) -> String {
+    let mut table = Table::new([
+        ("", Align::Right),
+        ("motion", Align::Left),
+        ("starts (%)", Align::Point),
+        ("95 %", Align::Left),
+        ("λ₁", Align::Point),
+        ("tip", Align::Left),
+        ("contact (%)", Align::Point),
+        ("contacts/period", Align::Point),
+    ]);
+    for (k, attractor) in attractors.iter().enumerate() {
+        let what = attractor.orbit.as_ref().map_or_else(
+            || attractor.classification.name().to_owned(),
+            |o| format!("period {}", o.period),
+        );
+        let observables = attractor
+            .orbit
+            .as_ref()
+            .map(|o| &o.observables)
+            .or(attractor.wandering.as_ref().map(|w| &w.observables));
+        let percent = |part: f64| number::significant(100.0 * part, 3);
+        let [low, high] = attractor.share.fraction_interval;
+        table.row([
+            (k + 1).to_string(),
+            what,
+            percent(attractor.share.fraction),
+            format!("{} … {}", percent(low), percent(high)),
+            attractor
+                .lyapunov
+                .first()
+                .map_or_else(String::new, |l| number::significant(*l, 3)),
+            observables.map_or_else(String::new, |o| tip(o.tip_min, o.tip_max, units)),
+            observables.map_or_else(String::new, |o| percent(o.contact_fraction)),
+            observables.map_or_else(String::new, |o| {
+                number::significant(o.contacts_per_period, 3)
+            }),
+        ]);
+    }
+    table.render()
+}
+
+fn tip(low: f64, high: f64, units: &Units) -> String {
+    let kind = nanotap::physical::Kind::Length;
+    units.si(kind).map_or_else(
+        || {
+            format!(
+                "{} … {}",
+                number::significant(low, 5),
+                number::significant(high, 5)
+            )
+        },
+        |unit| format!("{} … {}", kind.format(unit * low), kind.format(unit * high)),
+    )
+}
+
+/// Starts without a verdict, those with one reason together.
+fn undecided(text: &mut String, found: &Attractors) {
+    const SHOWN: usize = 5;
+    if found.undecided.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        text,
+        "\n  {}",
+        style::bold(&format!(
+            "undecided: {}",
+            number::counted(found.undecided.len(), "start", "starts")
+        ))
+    );
+    for start in found.undecided.iter().take(SHOWN) {
+        text.push_str(&motion::paragraph(&format!(
+            "start {}: {}",
+            start.start, start.reason
+        )));
+    }
+    if found.undecided.len() > SHOWN {
+        text.push_str(&motion::paragraph(&format!(
+            "and {} more (--json has all)",
+            found.undecided.len() - SHOWN
+        )));
+    }
+}

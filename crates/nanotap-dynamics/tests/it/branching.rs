@@ -265,12 +265,19 @@ fn a_soft_grazing_and_its_flip() {
     );
 }
 
-/// A hard grazing is found from the side where the orbit is smooth.
+/// A hard grazing is found from the side where the orbit is smooth, whether the orbit
+/// goes on beyond with a vertical tangent (b > 0) or turns back in a corner (b < 0).
 #[test]
 fn a_hard_grazing_is_located() {
-    let family = Family(|mu| HardGrazing { mu, a: A, b: 1.0 });
-    let b = branch(&family, -0.2, &[-0.3], 1, 1.0, (-0.3, 0.3));
-    near(&parameters(&b, GRAZING), &[0.0], 1e-9);
+    for strength in [1.0, -1.0] {
+        let family: Family<HardGrazing> = if strength > 0.0 {
+            Family(|mu| HardGrazing { mu, a: A, b: 1.0 })
+        } else {
+            Family(|mu| HardGrazing { mu, a: A, b: -1.0 })
+        };
+        let b = branch(&family, -0.2, &[-0.3], 1, 1.0, (-0.3, 0.3));
+        near(&parameters(&b, GRAZING), &[0.0], 1e-9);
+    }
 }
 
 /// x → x + (1 − x² − λ²)/4: the fixed points form a circle in (λ, x).

@@ -3,10 +3,12 @@
 
 pub mod attractor_figure;
 pub mod attractors;
+pub mod basin;
 pub mod beam;
 pub mod case;
 pub mod case_file;
 pub mod convergence;
+pub mod dataset;
 pub mod exact_beam;
 pub mod fixed_step_run;
 pub mod galerkin;
@@ -24,6 +26,7 @@ pub mod spectrum;
 pub mod start_box;
 pub mod strobe;
 pub mod subject;
+pub mod sweep;
 pub mod time_series;
 pub mod units;
 

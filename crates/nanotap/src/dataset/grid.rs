@@ -1,0 +1,151 @@
+//! The grid of chunks that all computed variables of a dataset share.
+
+use std::ops::Range;
+
+/// A dimension that is cut into chunks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Axis {
+    /// Its name in the dataset.
+    pub name: String,
+    /// Number of entries, 1 at least.
+    pub length: usize,
+    /// Entries a chunk, 1 at least; the last chunk may have fewer.
+    pub chunk: usize,
+}
+
+impl Axis {
+    /// An axis; a chunk is no longer than the axis and neither is empty.
+    pub fn new(name: impl Into<String>, length: usize, chunk: usize) -> Self {
+        let length = length.max(1);
+        Self {
+            name: name.into(),
+            length,
+            chunk: chunk.clamp(1, length),
+        }
+    }
+
+    /// Number of chunks along it.
+    pub fn chunks(&self) -> usize {
+        self.length.div_ceil(self.chunk)
+    }
+}
+
+/// The axes, slowest first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grid {
+    /// The axes.
+    pub axes: Vec<Axis>,
+}
+
+/// One chunk of a grid: a range of entries along each axis.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// The chunk's index among all chunks, row-major.
+    pub chunk: usize,
+    /// Its place along each axis, in chunks.
+    pub place: Vec<usize>,
+    /// Its entries along each axis.
+    pub ranges: Vec<Range<usize>>,
+}
+
+impl Block {
+    /// Number of entries.
+    pub fn len(&self) -> usize {
+        self.ranges.iter().map(ExactSizeIterator::len).product()
+    }
+
+    /// Never true: a chunk has one entry at least.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The entries (an index along each axis), row-major.
+    pub fn entries(&self) -> impl Iterator<Item = Vec<usize>> + '_ {
+        (0..self.len()).map(|flat| self.entry(flat))
+    }
+
+    /// The `flat`-th entry, row-major.
+    pub fn entry(&self, mut flat: usize) -> Vec<usize> {
+        let mut entry = vec![0; self.ranges.len()];
+        for (slot, range) in entry.iter_mut().zip(&self.ranges).rev() {
+            *slot = range.start + flat % range.len();
+            flat /= range.len();
+        }
+        entry
+    }
+}
+
+impl Grid {
+    /// Number of entries over all axes.
+    pub fn entries(&self) -> usize {
+        self.axes.iter().map(|a| a.length).product()
+    }
+
+    /// Number of chunks.
+    pub fn chunks(&self) -> usize {
+        self.axes.iter().map(Axis::chunks).product()
+    }
+
+    /// Entries of a full chunk.
+    pub fn chunk_entries(&self) -> usize {
+        self.axes.iter().map(|a| a.chunk).product()
+    }
+
+    /// The `chunk`-th chunk, row-major.
+    pub fn block(&self, chunk: usize) -> Block {
+        let mut rest = chunk;
+        let mut place = vec![0; self.axes.len()];
+        for (slot, axis) in place.iter_mut().zip(&self.axes).rev() {
+            *slot = rest % axis.chunks();
+            rest /= axis.chunks();
+        }
+        let ranges = place
+            .iter()
+            .zip(&self.axes)
+            .map(|(p, a)| p * a.chunk..((p + 1) * a.chunk).min(a.length))
+            .collect();
+        Block {
+            chunk,
+            place,
+            ranges,
+        }
+    }
+
+    /// Where the `index`-th entry of `block` (row-major) stands in a full chunk.
+    pub(crate) fn slot(&self, block: &Block, index: usize) -> usize {
+        block
+            .entry(index)
+            .iter()
+            .zip(block.ranges.iter().zip(&self.axes))
+            .fold(0, |slot, (e, (r, a))| slot * a.chunk + (e - r.start))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Every entry of the grid lies in exactly one block, and slots do not collide.
+        #[test]
+        fn blocks_tile_the_grid(
+            sizes in proptest::collection::vec((1usize..8, 1usize..5), 1..4)
+        ) {
+            let axes = sizes.iter().enumerate()
+                .map(|(i, (length, chunk))| Axis::new(format!("d{i}"), *length, *chunk));
+            let grid = Grid { axes: axes.collect() };
+            let mut seen = std::collections::BTreeSet::new();
+            for chunk in 0..grid.chunks() {
+                let block = grid.block(chunk);
+                let mut slots = std::collections::BTreeSet::new();
+                for (index, entry) in block.entries().enumerate() {
+                    prop_assert!(seen.insert(entry));
+                    let slot = grid.slot(&block, index);
+                    prop_assert!(slot < grid.chunk_entries() && slots.insert(slot));
+                }
+            }
+            prop_assert_eq!(seen.len(), grid.entries());
+        }
+    }
+}

@@ -1,0 +1,618 @@
+//! One dataset on disk.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde_json::{Map, Value, json};
+
+use super::attributes::differences;
+use super::error::StoreError;
+use super::grid::{Axis, Block, Grid};
+use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
+use super::zarr;
+
+/// The folder of markers, one a finished chunk. Zarr readers look at metadata only and
+/// never see it.
+const MARKERS: &str = ".chunks";
+/// The ending of files that are being written.
+const TEMPORARY: &str = "tmp";
+/// The attribute that says which axes are cut how, and which arrays are computed.
+const LAYOUT: &str = "chunk_layout";
+/// The attribute by which xarray knows coordinates that label no dimension.
+const COORDINATES: &str = "coordinates";
+
+/// One dataset on disk.
+///
+/// A chunk is finished when its marker, `.chunks/<index>`, is there and names the length
+/// and the CRC-32 of the chunk's file of every variable as they are. Markers are looked
+/// at when the store is opened.
+#[derive(Debug)]
+pub struct Store {
+    path: PathBuf,
+    schema: Schema,
+    metadata: String,
+    finished: Vec<AtomicBool>,
+}
+
+impl Store {
+    /// The store at `path`, made now if there is none.
+    ///
+    /// # Errors
+    /// When something else stands there, when it was made with other attributes, or when
+    /// the file system refuses.
+    pub fn create_or_resume(path: &Path, schema: Schema) -> Result<Self, StoreError> {
+        let documents = documents(&schema);
+        let metadata = consolidated(&documents);
+        match fs::metadata(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(StoreError::io("look at", path)(error)),
+            Ok(found) if !found.is_dir() => {
+                return Err(StoreError::Occupied {
+                    path: path.into(),
+                    what: "a file".into(),
+                });
+            }
+            Ok(_) => refuse_strangers(path, &metadata, &documents)?,
+        }
+        for (name, document) in &documents {
+            write_if_other(&path.join(name), document.as_bytes())?;
+        }
+        for coordinate in &schema.coordinates {
+            let name = zarr::chunk_name(&[], coordinate.dimensions.len());
+            let file = path.join(&coordinate.name).join(name);
+            write_if_other(&file, &zarr::encode(&coordinate.values))?;
+        }
+        make_folder(&path.join(MARKERS))?;
+        // Last, because a folder with this document counts as a store.
+        write_if_other(&path.join(zarr::CONSOLIDATED), metadata.as_bytes())?;
+        Ok(Self::with(path, schema, metadata))
+    }
+
+    /// The store at `path`, whatever made it.
+    ///
+    /// # Errors
+    /// When there is none, or it is not one of nanotap's.
+    pub fn open(path: &Path) -> Result<Self, StoreError> {
+        let document = path.join(zarr::CONSOLIDATED);
+        let refuse = |what: &str| StoreError::NotAStore {
+            path: path.into(),
+            what: what.into(),
+        };
+        let metadata = match fs::read_to_string(&document) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Err(refuse(if path.exists() {
+                    "it has no .zmetadata"
+                } else {
+                    "it is not there"
+                }));
+            }
+            Err(error) => return Err(StoreError::io("read", &document)(error)),
+        };
+        let parsed: Value = serde_json::from_str(&metadata)
+            .map_err(|error| refuse(&format!("its .zmetadata is no JSON: {error}")))?;
+        let schema = schema_of(path, &parsed["metadata"])?
+            .ok_or_else(|| refuse("its .zmetadata was not written by nanotap"))?;
+        Ok(Self::with(path, schema, metadata))
+    }
+
+    fn with(path: &Path, schema: Schema, metadata: String) -> Self {
+        let chunks = schema.grid.chunks();
+        let mut store = Self {
+            path: path.into(),
+            schema,
+            metadata,
+            finished: Vec::new(),
+        };
+        store.finished = (0..chunks)
+            .map(|chunk| AtomicBool::new(store.is_whole(chunk)))
+            .collect();
+        store
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What it holds.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    /// All its metadata, as text: equal for stores whose chunks fit together.
+    pub fn metadata(&self) -> &str {
+        &self.metadata
+    }
+
+    /// Number of chunks.
+    pub fn chunks(&self) -> usize {
+        self.finished.len()
+    }
+
+    /// Whether a chunk is finished.
+    pub fn is_finished(&self, chunk: usize) -> bool {
+        self.finished
+            .get(chunk)
+            .is_some_and(|f| f.load(Ordering::Acquire))
+    }
+
+    /// Number of chunks that are not finished.
+    pub fn missing(&self) -> usize {
+        (0..self.chunks()).filter(|c| !self.is_finished(*c)).count()
+    }
+
+    /// Whether the marker and every file of a chunk are there and fit together.
+    fn is_whole(&self, chunk: usize) -> bool {
+        let Ok(marker) = fs::read_to_string(self.marker(chunk)) else {
+            return false;
+        };
+        let block = self.schema.grid.block(chunk);
+        let mut lines = marker.lines();
+        self.schema.variables.iter().all(|variable| {
+            let file = fs::read(self.file(variable, &block));
+            file.is_ok_and(|bytes| lines.next() == Some(&marker_line(&variable.name, &bytes)))
+        }) && lines.next().is_none()
+    }
+
+    fn marker(&self, chunk: usize) -> PathBuf {
+        self.path.join(MARKERS).join(chunk.to_string())
+    }
+
+    fn file(&self, variable: &Variable, block: &Block) -> PathBuf {
+        self.path
+            .join(&variable.name)
+            .join(zarr::chunk_name(&block.place, variable.tail.len()))
+    }
+
+    /// Writes a finished chunk: `columns` has the values of each variable, in order, for
+    /// the block's entries row-major.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    ///
+    /// # Panics
+    /// When a column has the wrong length or kind: a mistake of the caller.
+    pub fn write_chunk(&self, block: &Block, columns: &[Values]) -> Result<(), StoreError> {
+        assert_eq!(columns.len(), self.schema.variables.len());
+        let mut files = Vec::with_capacity(columns.len());
+        for (variable, column) in self.schema.variables.iter().zip(columns) {
+            let stride = variable.stride();
+            assert_eq!(
+                (column.len(), column.kind()),
+                (block.len() * stride, variable.kind)
+            );
+            files.push(zarr::encode(&padded(
+                &self.schema.grid,
+                block,
+                column,
+                stride,
+            )));
+        }
+        self.write_files(block, &files)
+    }
+
+    fn write_files(&self, block: &Block, files: &[Vec<u8>]) -> Result<(), StoreError> {
+        let mut marker = String::new();
+        for (variable, bytes) in self.schema.variables.iter().zip(files) {
+            write_whole(&self.file(variable, block), bytes)?;
+            marker.push_str(&marker_line(&variable.name, bytes));
+            marker.push('\n');
+        }
+        write_whole(&self.marker(block.chunk), marker.as_bytes())?;
+        self.finished[block.chunk].store(true, Ordering::Release);
+        Ok(())
+    }
+
+    /// Takes a finished chunk over from a store of the same metadata, byte for byte.
+    ///
+    /// # Errors
+    /// When a file cannot be read or written.
+    pub(super) fn take_chunk(&self, from: &Self, chunk: usize) -> Result<(), StoreError> {
+        let block = self.schema.grid.block(chunk);
+        let mut files = Vec::new();
+        for variable in &self.schema.variables {
+            let file = from.file(variable, &block);
+            files.push(fs::read(&file).map_err(StoreError::io("read", &file))?);
+        }
+        self.write_files(&block, &files)
+    }
+
+    /// The values of a variable (by its place in the schema) in a finished chunk, for
+    /// the block's entries row-major.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is damaged.
+    pub fn read_chunk(&self, block: &Block, variable: usize) -> Result<Values, StoreError> {
+        let variable = &self.schema.variables[variable];
+        let path = self.file(variable, block);
+        let bytes = fs::read(&path).map_err(StoreError::io("read", &path))?;
+        let (grid, stride) = (&self.schema.grid, variable.stride());
+        let full = zarr::decode(&bytes, variable.kind, grid.chunk_entries() * stride)
+            .map_err(|what| StoreError::Damaged { path, what })?;
+        Ok(match full {
+            Values::Real(v) => Values::Real(unpadded(grid, block, &v, stride)),
+            Values::Whole(v) => Values::Whole(unpadded(grid, block, &v, stride)),
+            Values::Code(v) => Values::Code(unpadded(grid, block, &v, stride)),
+            Values::Text(v) => Values::Text(unpadded(grid, block, &v, stride)),
+        })
+    }
+
+    /// Refuses a store with chunks missing.
+    ///
+    /// # Errors
+    /// [`StoreError::Unfinished`].
+    pub fn require_all(&self) -> Result<(), StoreError> {
+        match self.missing() {
+            0 => Ok(()),
+            missing => Err(StoreError::Unfinished {
+                path: self.path.clone(),
+                missing,
+                total: self.chunks(),
+            }),
+        }
+    }
+
+    /// Once every chunk is finished: removes what killed runs left half-written. Returns
+    /// whether every chunk is.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn tidy(&self) -> Result<bool, StoreError> {
+        if self.missing() > 0 {
+            return Ok(false);
+        }
+        let arrays = self.schema.variables.iter().map(|v| v.name.as_str());
+        let coordinates = self.schema.coordinates.iter().map(|c| c.name.as_str());
+        for name in arrays.chain(coordinates).chain([MARKERS, ""]) {
+            let folder = self.path.join(name);
+            let listing = fs::read_dir(&folder).map_err(StoreError::io("list", &folder))?;
+            for file in listing.flatten().map(|entry| entry.path()) {
+                if is_temporary(&file) {
+                    // Another process may just have renamed or removed it.
+                    let _ = fs::remove_file(file);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+fn marker_line(name: &str, bytes: &[u8]) -> String {
+    format!("{name} {} {:08x}", bytes.len(), crc32fast::hash(bytes))
+}
+
+/// A column as it stands in a full chunk; entries beyond the end of the axes are missing.
+fn padded(grid: &Grid, block: &Block, column: &Values, stride: usize) -> Values {
+    let full = grid.chunk_entries() * stride;
+    match column {
+        Values::Real(v) => Values::Real(spread(grid, block, v, stride, vec![f64::NAN; full])),
+        Values::Whole(v) => Values::Whole(spread(grid, block, v, stride, vec![0; full])),
+        Values::Code(v) => Values::Code(spread(grid, block, v, stride, vec![0; full])),
+        Values::Text(v) => Values::Text(spread(grid, block, v, stride, vec![String::new(); full])),
+    }
+}
+
+fn spread<T: Clone>(
+    grid: &Grid,
+    block: &Block,
+    from: &[T],
+    stride: usize,
+    mut to: Vec<T>,
+) -> Vec<T> {
+    for (index, values) in from.chunks_exact(stride.max(1)).enumerate() {
+        let slot = grid.slot(block, index) * stride;
+        to[slot..slot + stride].clone_from_slice(values);
+    }
+    to
+}
+
+fn unpadded<T: Clone>(grid: &Grid, block: &Block, full: &[T], stride: usize) -> Vec<T> {
+    (0..block.len())
+        .flat_map(|index| {
+            let slot = grid.slot(block, index) * stride;
+            full[slot..slot + stride].iter().cloned()
+        })
+        .collect()
+}
+
+/// All metadata documents by their names in the store, `.zmetadata` excepted.
+fn documents(schema: &Schema) -> Vec<(String, String)> {
+    let mut root = schema.attributes.clone();
+    let axes: Vec<Value> = schema
+        .grid
+        .axes
+        .iter()
+        .map(|a| json!([a.name, a.length, a.chunk]))
+        .collect();
+    let names: Vec<&str> = schema.variables.iter().map(|v| v.name.as_str()).collect();
+    root.insert(
+        LAYOUT.into(),
+        json!({ "axes": axes, "variables": names })
+            .to_string()
+            .into(),
+    );
+    let beside: Vec<&str> = schema
+        .coordinates
+        .iter()
+        .filter(|c| c.dimensions.as_slice() != [c.name.clone()])
+        .map(|c| c.name.as_str())
+        .collect();
+    if !beside.is_empty() {
+        root.insert(COORDINATES.into(), beside.join(" ").into());
+    }
+    let mut all = vec![
+        (zarr::GROUP.to_owned(), zarr::group()),
+        (zarr::ATTRIBUTES.to_owned(), Value::Object(root)),
+    ];
+    let grid = &schema.grid.axes;
+    for variable in &schema.variables {
+        let tail = || variable.tail.iter().map(|(_, length)| *length);
+        let shape: Vec<usize> = grid.iter().map(|a| a.length).chain(tail()).collect();
+        let chunks: Vec<usize> = grid.iter().map(|a| a.chunk).chain(tail()).collect();
+        let dimensions = grid
+            .iter()
+            .map(|a| &a.name)
+            .chain(variable.tail.iter().map(|(name, _)| name));
+        let name = &variable.name;
+        all.push((
+            format!("{name}/{}", zarr::ARRAY),
+            zarr::array(&shape, &chunks, variable.kind),
+        ));
+        all.push((
+            format!("{name}/{}", zarr::ATTRIBUTES),
+            zarr::attributes(dimensions.map(String::as_str), &variable.attributes),
+        ));
+    }
+    for coordinate in &schema.coordinates {
+        let shape: Vec<usize> = coordinate
+            .dimensions
+            .iter()
+            .map(|d| length_of(schema, d))
+            .collect();
+        let name = &coordinate.name;
+        let kind = coordinate.values.kind();
+        all.push((
+            format!("{name}/{}", zarr::ARRAY),
+            zarr::array(&shape, &shape, kind),
+        ));
+        all.push((
+            format!("{name}/{}", zarr::ATTRIBUTES),
+            zarr::attributes(
+                coordinate.dimensions.iter().map(String::as_str),
+                &coordinate.attributes,
+            ),
+        ));
+    }
+    all.into_iter()
+        .map(|(name, document)| (name, pretty(&document)))
+        .collect()
+}
+
+fn length_of(schema: &Schema, dimension: &str) -> usize {
+    let axes = schema.grid.axes.iter().map(|a| (&a.name, a.length));
+    let tails = schema
+        .variables
+        .iter()
+        .flat_map(|v| v.tail.iter().map(|(name, length)| (name, *length)));
+    axes.chain(tails)
+        .find(|(name, _)| *name == dimension)
+        .map_or(1, |(_, length)| length)
+}
+
+fn consolidated(documents: &[(String, String)]) -> String {
+    let parsed: Map<String, Value> = documents
+        .iter()
+        .map(|(name, text)| (name.clone(), serde_json::from_str(text).unwrap_or_default()))
+        .collect();
+    pretty(&json!({ "zarr_consolidated_format": 1, "metadata": parsed }))
+}
+
+fn pretty(document: &Value) -> String {
+    serde_json::to_string_pretty(document).unwrap_or_default() + "\n"
+}
+
+/// Refuses a folder that is a store of other attributes, or no store at all.
+fn refuse_strangers(
+    path: &Path,
+    metadata: &str,
+    documents: &[(String, String)],
+) -> Result<(), StoreError> {
+    match fs::read_to_string(path.join(zarr::CONSOLIDATED)) {
+        Ok(there) if there == metadata => return Ok(()),
+        Ok(there) => return Err(mismatch(path, &there, metadata)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(StoreError::io("read", path)(error)),
+    }
+    // Without that document it may be a store whose making was cut short.
+    let listing = fs::read_dir(path).map_err(StoreError::io("list", path))?;
+    for entry in listing.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let first = |document: &str| document.split('/').next() == Some(&name);
+        let ours = name == MARKERS
+            || is_temporary(&entry.path())
+            || documents.iter().any(|(document, _)| first(document));
+        if !ours {
+            let what = format!("a folder with `{name}` in it");
+            return Err(StoreError::Occupied {
+                path: path.into(),
+                what,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The refusal of a store whose metadata differ.
+pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
+    let root = |text: &str| {
+        let all: Value = serde_json::from_str(text).unwrap_or_default();
+        all["metadata"][zarr::ATTRIBUTES].clone()
+    };
+    let mut differences = differences(&root(there), &root(here));
+    // How it is cut into chunks follows from the rest.
+    if differences.iter().any(|d| !d.starts_with(LAYOUT)) {
+        differences.retain(|d| !d.starts_with(LAYOUT));
+    }
+    if differences.is_empty() {
+        differences.push("its variables are not those of this version".into());
+    }
+    StoreError::Mismatch {
+        path: path.into(),
+        differences,
+    }
+}
+
+/// The schema that consolidated metadata describe; `None` if they are not ours.
+fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreError> {
+    let Some(root) = documents[zarr::ATTRIBUTES].as_object() else {
+        return Ok(None);
+    };
+    let Some(layout) = root.get(LAYOUT).and_then(Value::as_str) else {
+        return Ok(None);
+    };
+    let layout: Value = serde_json::from_str(layout).unwrap_or_default();
+    let mut axes = Vec::new();
+    for axis in layout["axes"].as_array().into_iter().flatten() {
+        let (Some(name), Some(length), Some(chunk)) =
+            (axis[0].as_str(), axis[1].as_u64(), axis[2].as_u64())
+        else {
+            return Ok(None);
+        };
+        axes.push(Axis::new(name, length as usize, chunk as usize));
+    }
+    let mut attributes = root.clone();
+    attributes.remove(LAYOUT);
+    attributes.remove(COORDINATES);
+    let mut schema = Schema {
+        grid: Grid { axes },
+        variables: Vec::new(),
+        coordinates: Vec::new(),
+        attributes,
+    };
+    let names = layout["variables"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str);
+    for name in names {
+        let Some(array) = ArrayDocument::of(documents, name) else {
+            return Ok(None);
+        };
+        let skip = schema.grid.axes.len();
+        let tail = array
+            .dimensions
+            .into_iter()
+            .zip(array.shape)
+            .skip(skip)
+            .collect();
+        schema.variables.push(Variable {
+            name: name.into(),
+            kind: array.kind,
+            tail,
+            attributes: array.attributes,
+        });
+    }
+    for name in documents
+        .as_object()
+        .into_iter()
+        .flatten()
+        .filter_map(|(key, _)| key.strip_suffix("/.zarray"))
+    {
+        if schema.index_of(name).is_some() {
+            continue;
+        }
+        let Some(array) = ArrayDocument::of(documents, name) else {
+            return Ok(None);
+        };
+        let file = path
+            .join(name)
+            .join(zarr::chunk_name(&[], array.shape.len()));
+        let bytes = fs::read(&file).map_err(StoreError::io("read", &file))?;
+        let values = zarr::decode(&bytes, array.kind, array.shape.iter().product())
+            .map_err(|what| StoreError::Damaged { path: file, what })?;
+        schema.coordinates.push(Coordinate {
+            name: name.into(),
+            dimensions: array.dimensions,
+            values,
+            attributes: array.attributes,
+        });
+    }
+    Ok(Some(schema))
+}
+
+/// What the two documents of an array say.
+struct ArrayDocument {
+    shape: Vec<usize>,
+    kind: Kind,
+    dimensions: Vec<String>,
+    attributes: Attributes,
+}
+
+impl ArrayDocument {
+    fn of(documents: &Value, name: &str) -> Option<Self> {
+        let array = &documents[format!("{name}/{}", zarr::ARRAY)];
+        let numbers = |value: &Value| {
+            value
+                .as_array()?
+                .iter()
+                .map(|n| n.as_u64().map(|n| n as usize))
+                .collect::<Option<Vec<_>>>()
+        };
+        let mut attributes = documents[format!("{name}/{}", zarr::ATTRIBUTES)]
+            .as_object()?
+            .clone();
+        let dimensions = attributes.remove("_ARRAY_DIMENSIONS")?;
+        let dimensions = dimensions
+            .as_array()?
+            .iter()
+            .map(|d| d.as_str().map(Into::into))
+            .collect::<Option<Vec<_>>>()?;
+        Some(Self {
+            shape: numbers(&array["shape"])?,
+            kind: zarr::kind(array["dtype"].as_str()?)?,
+            dimensions,
+            attributes,
+        })
+    }
+}
+
+fn make_folder(path: &Path) -> Result<(), StoreError> {
+    fs::create_dir_all(path).map_err(StoreError::io("make the folder", path))
+}
+
+fn is_temporary(path: &Path) -> bool {
+    let hidden = path
+        .file_name()
+        .is_some_and(|n| n.to_string_lossy().starts_with('.'));
+    hidden && path.extension().is_some_and(|e| e == TEMPORARY)
+}
+
+fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    if fs::read(path).is_ok_and(|there| there == bytes) {
+        Ok(())
+    } else {
+        write_whole(path, bytes)
+    }
+}
+
+/// Writes a file under a temporary name and renames it: it is there whole or not at all.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    if let Some(folder) = path.parent() {
+        make_folder(folder)?;
+    }
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let temporary = path.with_file_name(format!(".{name}.{}.{TEMPORARY}", std::process::id()));
+    let written = fs::File::create(&temporary)
+        .and_then(|mut file| file.write_all(bytes))
+        .and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|error| {
+        let _ = fs::remove_file(&temporary);
+        StoreError::io("write", path)(error)
+    })
+}

@@ -1,0 +1,97 @@
+//! A dataset as a table: a row an entry of the grid.
+
+use std::fmt::Write as _;
+
+use super::error::StoreError;
+use super::schema::{Coordinate, Schema, Values, Variable};
+use super::store::Store;
+
+/// Hands `sink` the table as CSV, piece by piece: the coordinates, then every variable
+/// that has no further dimension. Codes are written as the words of their
+/// `flag_meanings`; what is not a number is left empty.
+///
+/// # Errors
+/// When a chunk is missing or cannot be read, or when `sink` refuses.
+pub fn csv<E: From<StoreError>>(
+    store: &Store,
+    mut sink: impl FnMut(&str) -> Result<(), E>,
+) -> Result<(), E> {
+    store.require_all()?;
+    let schema = store.schema();
+    let labels = labels(schema);
+    let columns: Vec<usize> = (0..schema.variables.len())
+        .filter(|v| schema.variables[*v].tail.is_empty())
+        .collect();
+    let names = labels.iter().map(|(name, ..)| *name);
+    let variables = columns.iter().map(|v| schema.variables[*v].name.as_str());
+    sink(&(names.chain(variables).collect::<Vec<_>>().join(",") + "\n"))?;
+    for chunk in 0..store.chunks() {
+        let block = schema.grid.block(chunk);
+        let mut values = Vec::with_capacity(columns.len());
+        for column in &columns {
+            values.push((
+                &schema.variables[*column],
+                store.read_chunk(&block, *column)?,
+            ));
+        }
+        let mut rows = String::new();
+        for (flat, entry) in block.entries().enumerate() {
+            let mut cells: Vec<String> = labels
+                .iter()
+                .map(|(_, axis, values)| cell(values, entry[*axis]))
+                .collect();
+            cells.extend(
+                values
+                    .iter()
+                    .map(|(variable, values)| named(variable, values, flat)),
+            );
+            let _ = writeln!(rows, "{}", cells.join(","));
+        }
+        sink(&rows)?;
+    }
+    Ok(())
+}
+
+/// The coordinates along the axes of the grid: name, axis, values.
+fn labels(schema: &Schema) -> Vec<(&str, usize, &Values)> {
+    let mut labels = Vec::new();
+    for (axis, dimension) in schema.grid.axes.iter().enumerate() {
+        let mut along: Vec<&Coordinate> = schema
+            .coordinates
+            .iter()
+            .filter(|c| c.dimensions.as_slice() == std::slice::from_ref(&dimension.name))
+            .collect();
+        // The axis itself before what else is known along it.
+        along.sort_by_key(|c| c.name != dimension.name);
+        labels.extend(
+            along
+                .into_iter()
+                .map(|c| (c.name.as_str(), axis, &c.values)),
+        );
+    }
+    labels
+}
+
+fn named(variable: &Variable, values: &Values, index: usize) -> String {
+    let meanings = variable
+        .attributes
+        .get("flag_meanings")
+        .and_then(|m| m.as_str());
+    match (values, meanings) {
+        (Values::Code(codes), Some(meanings)) => {
+            let code = usize::from(codes[index]);
+            meanings.split(' ').nth(code).unwrap_or_default().to_owned()
+        }
+        _ => cell(values, index),
+    }
+}
+
+fn cell(values: &Values, index: usize) -> String {
+    match values {
+        Values::Real(v) if v[index].is_nan() => String::new(),
+        Values::Real(v) => v[index].to_string(),
+        Values::Whole(v) => v[index].to_string(),
+        Values::Code(v) => v[index].to_string(),
+        Values::Text(v) => v[index].clone(),
+    }
+}

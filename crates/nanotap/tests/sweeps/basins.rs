@@ -1,0 +1,229 @@
+//! Basins on slices.
+
+use nanotap::basin::{Basin, BasinError, BasinOptions, SliceRange, figure, shares};
+use nanotap::case::Case;
+use nanotap::dataset::{Share, Store, Values, Work};
+use nanotap::strobe::Strobe;
+use nanotap::subject::Subject;
+use nanotap_dynamics::{Control, SettleOptions, Verdict, settle};
+use std::sync::atomic::AtomicBool;
+
+use crate::folder::{Folder, assert_same};
+
+fn bistable() -> Subject {
+    Subject::Cantilever(Case {
+        omega: 20.0,
+        alpha1: 0.0,
+        ..Case::paper()
+    })
+}
+
+fn slice(nx: usize, ny: usize) -> BasinOptions {
+    let x = SliceRange::parse(&format!("a1=-1:1:{nx}")).unwrap();
+    let y = SliceRange::parse(&format!("v1=-4:4:{ny}")).unwrap();
+    BasinOptions {
+        starts: 24,
+        ..BasinOptions::new(x, y)
+    }
+}
+
+fn computed(
+    subject: &Subject,
+    options: &BasinOptions,
+    path: &std::path::Path,
+    threads: usize,
+) -> Store {
+    let basin = Basin::new(subject, options, &Control::default()).unwrap();
+    let store = Store::create_or_resume(path, basin.schema().clone()).unwrap();
+    let control = Control::default();
+    basin
+        .compute(
+            &store,
+            &Work {
+                share: Share::WHOLE,
+                threads,
+                control,
+            },
+        )
+        .unwrap();
+    store
+}
+
+/// Ω = 20, α1 = 0: a period-1 and a period-4 coexist. Every point's label must be where a
+/// plain run from that very state settles.
+#[test]
+fn labels_are_where_runs_settle() {
+    let folder = Folder::new();
+    let store = computed(&bistable(), &slice(14, 12), &folder.join("a"), 2);
+    let found = shares(&store).unwrap();
+    let mut periods: Vec<_> = found.attractors.iter().map(|a| a.period.unwrap()).collect();
+    periods.sort_unstable();
+    assert_eq!(periods, [1, 4]);
+    let sum: f64 = found.attractors.iter().map(|a| a.fraction).sum();
+    assert!(
+        (sum + found.unsettled - 1.0).abs() < 1e-12 && found.unsettled < 0.02,
+        "{found:?}"
+    );
+    assert!(
+        found.attractors.iter().all(|a| a.fraction > 0.02),
+        "{found:?}"
+    );
+
+    let mut map = Strobe::new(&bistable().model().unwrap());
+    let (mut checked, mut wrong) = (0, 0);
+    for chunk in 0..store.chunks() {
+        let block = store.schema().grid.block(chunk);
+        let Values::Whole(labels) = store.read_chunk(&block, 0).unwrap() else {
+            panic!()
+        };
+        for (entry, label) in block.entries().zip(labels) {
+            let (v1, a1) = (
+                -4.0 + 8.0 * entry[0] as f64 / 11.0,
+                -1.0 + 2.0 * entry[1] as f64 / 13.0,
+            );
+            let settled = settle(
+                &mut map,
+                &[a1, 0.0, 0.0, v1, 0.0, 0.0],
+                &SettleOptions::default(),
+            );
+            let Verdict::Periodic(orbit) = settled.verdict else {
+                continue;
+            };
+            let Ok(index) = usize::try_from(label) else {
+                continue;
+            };
+            checked += 1;
+            wrong += usize::from(found.attractors[index].period != Some(orbit.period));
+        }
+    }
+    assert!(checked > 150 && wrong == 0, "{wrong} of {checked}");
+    let svg = figure(&store).unwrap().to_svg().unwrap();
+    assert!(svg.contains("period 1") && svg.contains("period 4"));
+}
+
+#[test]
+fn bytes_do_not_depend_on_threads_or_stops() {
+    let folder = Folder::new();
+    let (subject, options) = (bistable(), slice(9, 40));
+    let whole = folder.join("whole");
+    computed(&subject, &options, &whole, 1);
+    let path = folder.join("stopped");
+    let basin = Basin::new(&subject, &options, &Control::default()).unwrap();
+    let store = Store::create_or_resume(&path, basin.schema().clone()).unwrap();
+    let cancel = AtomicBool::new(false);
+    let progress =
+        |done: usize, _: usize| cancel.store(done > 4, std::sync::atomic::Ordering::Relaxed);
+    let control = Control {
+        cancel: Some(&cancel),
+        progress: Some(&progress),
+    };
+    assert!(
+        basin
+            .compute(
+                &store,
+                &Work {
+                    share: Share::WHOLE,
+                    threads: 2,
+                    control
+                }
+            )
+            .is_err()
+    );
+    assert!(store.missing() > 0 && store.missing() < store.chunks());
+    computed(&subject, &options, &path, 2);
+    assert_same(&whole, &path);
+}
+
+/// States that were given stand for the census, and are checked like any start.
+#[test]
+fn attractors_can_be_given() {
+    let folder = Folder::new();
+    let first = computed(&bistable(), &slice(8, 8), &folder.join("a"), 2);
+    let states: Vec<Vec<f64>> = shares(&first)
+        .unwrap()
+        .attractors
+        .into_iter()
+        .map(|a| a.state)
+        .collect();
+    let options = BasinOptions {
+        attractors: Some(states),
+        ..slice(8, 8)
+    };
+    let second = computed(&bistable(), &options, &folder.join("b"), 2);
+    let fractions = |store| -> Vec<(Option<usize>, f64)> {
+        let mut all: Vec<_> = shares(store)
+            .unwrap()
+            .attractors
+            .iter()
+            .map(|a| (a.period, a.fraction))
+            .collect();
+        all.sort_by_key(|(period, _)| *period);
+        all
+    };
+    assert_eq!(fractions(&first), fractions(&second));
+}
+
+#[test]
+fn bad_slices_are_refused() {
+    for given in [
+        "",
+        "a1",
+        "a1=",
+        "a1=0:1",
+        "a1=0:1:2:3",
+        "a1=x:1:5",
+        "a1=0:inf:5",
+        "a1=0:1:1",
+        "a1=0:1:-4",
+        "a1=0:1:2.5",
+        "a1=1:0:5",
+        "a1=1:1:5",
+        "a1=0:1:99999999",
+    ] {
+        let error = SliceRange::parse(given).unwrap_err();
+        assert!(error.to_string().contains(&format!("`{given}`")), "{error}");
+    }
+    let range = |text| SliceRange::parse(text).unwrap();
+    let refused = |x, y, change: &dyn Fn(&mut BasinOptions)| {
+        let mut options = BasinOptions::new(range(x), range(y));
+        change(&mut options);
+        Basin::new(&bistable(), &options, &Control::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let keep = |_: &mut BasinOptions| {};
+    for (message, word) in [
+        (
+            refused("a4=0:1:5", "v1=0:1:5", &keep),
+            "a1, a2, a3, v1, v2, v3",
+        ),
+        (refused("a1=0:1:5", "a1=0:1:5", &keep), "both axes"),
+        (
+            refused("a1=0:1:5", "v1=0:1:5", &|o| o.starts = 0),
+            "0 starts",
+        ),
+        (
+            refused("a1=0:1:5", "v1=0:1:5", &|o| o.periods = 0),
+            "0 periods",
+        ),
+        (
+            refused("a1=0:1:5", "v1=0:1:5", &|o| o.state = Some(vec![0.0; 3])),
+            "3 numbers where 6",
+        ),
+        (
+            refused("a1=0:1:5", "v1=0:1:5", &|o| {
+                o.attractors = Some(vec![vec![0.0]]);
+            }),
+            "1 numbers where 6",
+        ),
+    ] {
+        assert!(message.contains(word), "{word}: {message}");
+    }
+    let cancel = AtomicBool::new(true);
+    let control = Control {
+        cancel: Some(&cancel),
+        progress: None,
+    };
+    let stopped = Basin::new(&bistable(), &slice(5, 5), &control);
+    assert!(matches!(stopped, Err(BasinError::Cancelled)));
+}

@@ -1,0 +1,6 @@
+//! Sweeps, basins and their datasets.
+
+mod basins;
+mod datasets;
+mod folder;
+mod physics;

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use nanotap::attractors::AttractorsError;
+use nanotap::branch::BranchError;
 use nanotap::case::CaseError;
 use nanotap::case_file::{CaseFileError, Place, Problem, Source};
 use nanotap::fixed_step_run::FixedStepError;
@@ -131,6 +132,30 @@ impl From<AttractorsError> for Failure {
             }
             AttractorsError::Motion(error) => error.into(),
             AttractorsError::Orbit(error) => error.into(),
+        }
+    }
+}
+
+impl From<BranchError> for Failure {
+    fn from(error: BranchError) -> Self {
+        match error {
+            BranchError::Range { .. } => Self::request(error.to_string(), "change --from or --to"),
+            BranchError::Step { .. } => Self::request(error.to_string(), "give --max-step 0.01"),
+            BranchError::SameParameter { .. } => {
+                Self::request(error.to_string(), "change --second or --parameter")
+            }
+            BranchError::Model { .. } => Self::request(
+                error.to_string(),
+                "keep --from, --to and --second where the model makes sense",
+            ),
+            BranchError::Start {
+                error: OrbitError::Start(_) | OrbitError::NoPeriod,
+                ..
+            } => Self::request(error.to_string(), "change --state or --period"),
+            BranchError::Start { .. } | BranchError::NoSeeds { .. } => Self::Failed(format!(
+                "{error}; start elsewhere with --from, or say --state near an orbit"
+            )),
+            other => Self::Failed(other.to_string()),
         }
     }
 }

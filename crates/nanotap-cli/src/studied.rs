@@ -4,14 +4,29 @@
 use nanotap::case_file::CaseFile;
 use nanotap::model::Model;
 use nanotap::parameter::Parameter;
-use nanotap::physical::{Resolved, Severity};
+use nanotap::physical::{Kind, Resolved, Severity};
 use nanotap::subject::{Key, Subject};
 use nanotap::units::Units;
+use serde::Serialize;
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::{command, number};
+
+/// What a dimensionless parameter is in SI.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct ParameterUnit {
+    /// The quantity: "drive frequency f".
+    pub(crate) quantity: &'static str,
+    /// Its SI unit.
+    pub(crate) unit: &'static str,
+    /// The SI value of 1.
+    pub(crate) si: f64,
+    /// What it measures.
+    #[serde(skip)]
+    pub(crate) kind: Kind,
+}
 
 /// What a command studies.
 pub(crate) struct Studied {
@@ -86,7 +101,6 @@ impl Studied {
     }
 
     /// The parameter that is called `name`.
-    #[allow(dead_code)]
     pub(crate) fn key(&self, name: &str) -> Result<Key, Failure> {
         let given = name.strip_prefix("model.").unwrap_or(name);
         self.subject.key(given).map_err(|error| {
@@ -95,6 +109,48 @@ impl Studied {
                 "name a parameter of the dimensionless model",
             )
         })
+    }
+
+    /// What a parameter is in SI, if the case is physical.
+    pub(crate) fn parameter_unit(&self, key: Key) -> Option<ParameterUnit> {
+        let Key::Cantilever(parameter) = key else {
+            return None;
+        };
+        let resolved = self.resolved.as_ref()?;
+        let row = resolved
+            .mapping()
+            .into_iter()
+            .find(|row| row.parameter == parameter)?;
+        Some(ParameterUnit {
+            quantity: row.quantity,
+            unit: row.kind.si_unit(),
+            si: resolved.scales.of(parameter),
+            kind: row.kind,
+        })
+    }
+
+    /// A value of a parameter, given after `option`: a number of the dimensionless model,
+    /// or of a physical case a quantity with its unit.
+    pub(crate) fn value(&self, key: Key, option: &str, text: &str) -> Result<f64, Failure> {
+        if let Ok(value) = text.trim().parse::<f64>() {
+            return Ok(value);
+        }
+        match self.parameter_unit(key) {
+            Some(unit) => unit
+                .kind
+                .parse(text)
+                .map(|si| si / unit.si)
+                .map_err(|error| {
+                    Failure::request(
+                        format!("{option} {text}: {error}"),
+                        "give a number or a quantity",
+                    )
+                }),
+            None => Err(Failure::request(
+                format!("{option} {text}: not a number"),
+                format!("give a value of {} as a number", key.name()),
+            )),
+        }
     }
 
     /// Drive frequency, the model's unit of Ω.

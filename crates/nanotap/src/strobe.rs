@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use nanotap_dynamics::{StroboscopicMap, Tangency};
 use nanotap_flow::extrema::sign_changes;
 use nanotap_flow::flow::{Observer, SegmentView};
+use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::signal::Signal;
 use nanotap_flow::{Flow, FlowError, Output, System};
 
@@ -17,12 +18,42 @@ use crate::model::Model;
 pub struct Strobe {
     flow: Flow,
     gap: Arc<Output>,
+    /// Derivatives of the system with respect to the parameters of a family.
+    tangents: Arc<[SystemTangent]>,
 }
 
 impl Strobe {
     /// The map of `model`.
     pub fn new(model: &Model) -> Self {
-        Self { flow: Flow::new(Arc::clone(&model.system)), gap: Arc::new(model.gap.clone()) }
+        Self::with_tangents(model, Vec::new())
+    }
+
+    /// The map of `model`, which also knows the derivatives of its system with respect to
+    /// some parameters.
+    pub fn with_tangents(model: &Model, tangents: Vec<SystemTangent>) -> Self {
+        Self {
+            flow: Flow::new(Arc::clone(&model.system)),
+            gap: Arc::new(model.gap.clone()),
+            tangents: tangents.into(),
+        }
+    }
+
+    /// Replaces `state` by `P(state)`, `jacobian` by `∂P/∂state` and `derivatives`
+    /// (`n × p`) by the derivative of `P` with respect to each of the map's parameters.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub fn advance_with_derivatives(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: &mut DMatrix<f64>,
+    ) -> Result<(), FlowError> {
+        self.flow.start(state, 0.0)?;
+        self.flow
+            .run_period_with_sensitivities(&self.tangents, jacobian, derivatives)?;
+        self.flow.state(state);
+        Ok(())
     }
 
     /// The flow it runs.
@@ -49,7 +80,11 @@ impl StroboscopicMap for Strobe {
         Ok(())
     }
 
-    fn advance_with_jacobian(&mut self, state: &mut [f64], jacobian: &mut DMatrix<f64>) -> Result<(), FlowError> {
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), FlowError> {
         self.flow.start(state, 0.0)?;
         self.flow.run_period_with_jacobian(jacobian)?;
         self.flow.state(state);
@@ -62,7 +97,10 @@ impl StroboscopicMap for Strobe {
         tangencies: &mut Vec<Tangency>,
     ) -> Result<(), FlowError> {
         self.flow.start(state, 0.0)?;
-        let mut collector = GapExtrema { gap: &self.gap, tangencies };
+        let mut collector = GapExtrema {
+            gap: &self.gap,
+            tangencies,
+        };
         self.flow.run_period(&mut collector)?;
         self.flow.state(state);
         Ok(())
@@ -80,11 +118,21 @@ impl Observer for GapExtrema<'_> {
         let system: &System = segment.system;
         let regime = segment.regime();
         let gap = regime.project(self.gap);
-        let signal = Signal::of(regime, system.drive(), &gap, segment.modal, segment.phase, segment.length);
+        let signal = Signal::of(
+            regime,
+            system.drive(),
+            &gap,
+            segment.modal,
+            segment.phase,
+            segment.length,
+        );
         let rate = signal.differentiated(segment.length);
         for s in sign_changes(&rate, segment.length) {
             let phase = (segment.phase + s) / system.drive().period();
-            self.tangencies.push(Tangency { phase, value: signal.at(s) });
+            self.tangencies.push(Tangency {
+                phase,
+                value: signal.at(s),
+            });
         }
     }
 }

@@ -3,9 +3,9 @@
 
 use serde::Serialize;
 
-use nanotap_dynamics::{MapFamily, StroboscopicMap};
+use nanotap_dynamics::{MapFamily, StroboscopicMap, TwoParameterFamily};
+use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
-use nanotap_flow::{Flow, FlowError};
 
 use crate::case::Case;
 use crate::model::{Model, ModelError, cantilever_tangent};
@@ -108,14 +108,20 @@ impl Subject {
             .min()
             .filter(|(distance, _)| *distance <= 3);
         let hint = nearest.map_or_else(String::new, |(_, k)| format!(" (did you mean `{k}`?)"));
-        Err(UnknownKey { given: name.to_owned(), known: known.join(", "), hint })
+        Err(UnknownKey {
+            given: name.to_owned(),
+            known: known.join(", "),
+            hint,
+        })
     }
 
     /// The value of a parameter; NaN where the subject does not have it.
     pub fn get(&self, key: Key) -> f64 {
         match (self, key) {
             (Self::Cantilever(case), Key::Cantilever(p)) => case.get(p),
-            (Self::Oscillator(oscillator), Key::Oscillator(p)) => oscillator.get(p).unwrap_or(f64::NAN),
+            (Self::Oscillator(oscillator), Key::Oscillator(p)) => {
+                oscillator.get(p).unwrap_or(f64::NAN)
+            }
             _ => f64::NAN,
         }
     }
@@ -124,8 +130,12 @@ impl Subject {
     #[must_use]
     pub fn with(&self, key: Key, value: f64) -> Self {
         match (self, key) {
-            (Self::Cantilever(case), Key::Cantilever(p)) => Self::Cantilever(case.clone().with(p, value)),
-            (Self::Oscillator(oscillator), Key::Oscillator(p)) => Self::Oscillator(oscillator.with(p, value)),
+            (Self::Cantilever(case), Key::Cantilever(p)) => {
+                Self::Cantilever(case.clone().with(p, value))
+            }
+            (Self::Oscillator(oscillator), Key::Oscillator(p)) => {
+                Self::Oscillator(oscillator.with(p, value))
+            }
             _ => self.clone(),
         }
     }
@@ -155,7 +165,13 @@ impl Subject {
 
     /// Whether its stop is rigid: contact is an instant there.
     pub fn has_rigid_stop(&self) -> bool {
-        matches!(self, Self::Oscillator(Oscillator { stop: Stop::Rigid { .. }, .. }))
+        matches!(
+            self,
+            Self::Oscillator(Oscillator {
+                stop: Stop::Rigid { .. },
+                ..
+            })
+        )
     }
 }
 
@@ -173,28 +189,70 @@ impl MapFamily for Family {
     type Error = ModelError;
 
     fn at(&self, parameter: f64) -> Result<Strobe, ModelError> {
-        Ok(Strobe::new(&self.subject.with(self.key, parameter).model()?))
+        strobe_at(&self.subject, &[(self.key, parameter)])
     }
 
     fn advance_with_derivatives(
         &self,
-        parameter: f64,
+        _parameter: f64,
         map: &mut Strobe,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
         derivative: &mut [f64],
     ) -> Result<(), <Strobe as StroboscopicMap>::Error> {
-        let subject = self.subject.with(self.key, parameter);
-        let tangent = subject
-            .model()
-            .and_then(|model| subject.tangent(&model, self.key))
-            .map_err(|_| FlowError::NotFinite { what: "the derivative of the system" })?;
-        let mut flow = Flow::new(std::sync::Arc::clone(map.flow().system()));
-        flow.start(state, 0.0)?;
         let mut derivatives = DMatrix::zeros(state.len(), 1);
-        flow.run_period_with_sensitivities(&[tangent], jacobian, &mut derivatives)?;
-        flow.state(state);
+        map.advance_with_derivatives(state, jacobian, &mut derivatives)?;
         derivative.copy_from_slice(derivatives.as_slice());
         Ok(())
     }
+}
+
+/// A subject with two free parameters.
+#[derive(Clone, Debug)]
+pub struct PlaneFamily {
+    /// The subject; the values of its free parameters do not matter.
+    pub subject: Subject,
+    /// The free parameters.
+    pub keys: [Key; 2],
+}
+
+impl TwoParameterFamily for PlaneFamily {
+    type Map = Strobe;
+    type Error = ModelError;
+
+    fn at(&self, first: f64, second: f64) -> Result<Strobe, ModelError> {
+        strobe_at(
+            &self.subject,
+            &[(self.keys[0], first), (self.keys[1], second)],
+        )
+    }
+
+    fn advance_with_derivatives(
+        &self,
+        _parameters: [f64; 2],
+        map: &mut Strobe,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: [&mut [f64]; 2],
+    ) -> Result<(), FlowError> {
+        let mut columns = DMatrix::zeros(state.len(), 2);
+        map.advance_with_derivatives(state, jacobian, &mut columns)?;
+        for (derivative, column) in derivatives.into_iter().zip(columns.column_iter()) {
+            derivative.copy_from_slice(column.as_slice());
+        }
+        Ok(())
+    }
+}
+
+/// The map at these values of the free parameters, with its derivatives to them.
+fn strobe_at(subject: &Subject, values: &[(Key, f64)]) -> Result<Strobe, ModelError> {
+    let subject = values
+        .iter()
+        .fold(subject.clone(), |s, &(key, value)| s.with(key, value));
+    let model = subject.model()?;
+    let tangents = values
+        .iter()
+        .map(|&(key, _)| subject.tangent(&model, key))
+        .collect::<Result<_, _>>()?;
+    Ok(Strobe::with_tangents(&model, tangents))
 }

@@ -1,5 +1,6 @@
 //! The program from outside: exit codes, words, JSON and files.
 
+mod branches;
 mod case;
 mod existing_motions;
 mod modes;

@@ -44,7 +44,10 @@ impl Spectrum {
     pub fn of(model: &Model, trajectory: &Trajectory, period: usize, orders: usize) -> Self {
         let tip = trajectory.signal(&model.tip);
         let force = trajectory.signal_by_regime(&model.force);
-        let slope = model.beam.as_ref().map(|beam| trajectory.signal(&beam.slope));
+        let slope = model
+            .beam
+            .as_ref()
+            .map(|beam| trajectory.signal(&beam.slope));
         let base = std::f64::consts::TAU / (model.period() * period as f64);
         let harmonics: Vec<Harmonic> = (1..=orders * period)
             .map(|j| {
@@ -63,13 +66,26 @@ impl Spectrum {
         let first = tip.fourier(base * period as f64);
         let mean = tip.mean();
         let variance = tip.product_integral(&tip) / tip.duration() - mean * mean;
-        let thd = if variance > 0.0 { (1.0 - 0.5 * first.norm_sqr() / variance).clamp(0.0, 1.0) } else { 0.0 };
-        Self { harmonics, thd, phase: lag(first), first_harmonic: first.norm() }
+        let thd = if variance > 0.0 {
+            (1.0 - 0.5 * first.norm_sqr() / variance).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        Self {
+            harmonics,
+            thd,
+            phase: lag(first),
+            first_harmonic: first.norm(),
+        }
     }
 }
 
 /// The lag φ of `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
-fn lag(c: Complex) -> f64 {
+pub(crate) fn lag(c: Complex) -> f64 {
     let degrees = -(c * Complex::new(0.0, 1.0)).arg().to_degrees();
-    if degrees <= -180.0 { degrees + 360.0 } else { degrees }
+    if degrees <= -180.0 {
+        degrees + 360.0
+    } else {
+        degrees
+    }
 }

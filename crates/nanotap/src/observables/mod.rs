@@ -8,6 +8,7 @@ mod harmonics;
 
 pub use clearance::Clearance;
 pub use energy::EnergyBalance;
+pub(crate) use harmonics::lag;
 pub use harmonics::{Harmonic, Spectrum};
 
 use nanotap_flow::Trajectory;
@@ -70,9 +71,14 @@ impl Observables {
         let (_, peak) = force.range()?;
         let mean = tip.mean();
         let mean_square = tip.product_integral(&tip) / duration;
-        let begins = trajectory.events().iter().filter(|e| begins_contact(model, e.from, e.to));
-        let contact: f64 =
-            (0..model.contact.len()).filter(|&r| model.contact[r]).map(|r| trajectory.time_in(r)).sum();
+        let begins = trajectory
+            .events()
+            .iter()
+            .filter(|e| begins_contact(model, e.from, e.to));
+        let contact: f64 = (0..model.contact.len())
+            .filter(|&r| model.contact[r])
+            .map(|r| trajectory.time_in(r))
+            .sum();
         let slope_range = model.beam.as_ref().and_then(|beam| {
             let (low, high) = trajectory.signal(&beam.slope).range()?;
             Some([low.value, high.value])
@@ -109,7 +115,10 @@ impl Observables {
         let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         let clearance = match (self.beam_clearance, next.beam_clearance) {
             (Some(a), Some(b)) => Some(if b.height < a.height {
-                Clearance { period: b.period + self.periods, ..b }
+                Clearance {
+                    period: b.period + self.periods,
+                    ..b
+                }
             } else {
                 a
             }),
@@ -121,14 +130,19 @@ impl Observables {
             tip_min,
             amplitude: 0.5 * (tip_max - tip_min),
             mean_deflection,
-            rms_deflection: (mean(square(self), square(next)) - mean_deflection.powi(2)).max(0.0).sqrt(),
+            rms_deflection: (mean(square(self), square(next)) - mean_deflection.powi(2))
+                .max(0.0)
+                .sqrt(),
             gap_range: hull(self.gap_range, next.gap_range),
             contact_fraction: mean(self.contact_fraction, next.contact_fraction),
             contacts_per_period: mean(self.contacts_per_period, next.contacts_per_period),
             peak_force: self.peak_force.max(next.peak_force),
             mean_force: mean(self.mean_force, next.mean_force),
             impact_speed: self.impact_speed.max(next.impact_speed),
-            slope_range: self.slope_range.zip(next.slope_range).map(|(a, b)| hull(a, b)),
+            slope_range: self
+                .slope_range
+                .zip(next.slope_range)
+                .map(|(a, b)| hull(a, b)),
             energy_balance: self.energy_balance.joined(&next.energy_balance),
             beam_clearance: clearance,
             grazing_contacts: self.grazing_contacts + next.grazing_contacts,

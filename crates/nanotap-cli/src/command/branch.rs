@@ -1,0 +1,435 @@
+//! `nanotap branch`: periodic orbits followed in a parameter, stable and unstable.
+
+use std::fmt::Write as _;
+
+use clap::{Args, ValueEnum};
+use nanotap::branch::{BranchOptions, BranchReport, PointReport, SeedOptions, branch};
+use nanotap::branch_figure::{ParameterAxis, Shown, branch_figure};
+use nanotap::subject::Key;
+use nanotap::time_series;
+use serde::Serialize;
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::studied::{ParameterUnit, Studied};
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{file, motion, number, progress, style};
+
+/// Periodic orbits followed in a parameter, stable and unstable, with their bifurcations.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// The parameter, as the case file calls it (omega, alpha4, gap …)
+    #[arg(long, value_name = "KEY")]
+    parameter: String,
+
+    /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    from: String,
+
+    /// The other end of its range
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    to: String,
+
+    /// Period of the orbit at the start; without it, that of the motion where a run settles
+    #[arg(long, value_name = "N")]
+    period: Option<usize>,
+
+    /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
+    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
+    state: Option<Vec<f64>>,
+
+    /// Also follow the doubled branches at flips, so many doublings deep (1 if no number is given)
+    #[arg(long, value_name = "DEPTH", num_args = 0..=1, default_missing_value = "1")]
+    switch: Option<usize>,
+
+    /// Assemble the whole picture: every stable orbit of a census at several values,
+    /// followed both ways and through two doublings (or as --switch says)
+    #[arg(long)]
+    diagram: bool,
+
+    /// Of --diagram: values of the parameter at which a census is taken
+    #[arg(long, value_name = "K", default_value_t = 5)]
+    values: usize,
+
+    /// Of --diagram: starts at each
+    #[arg(long, value_name = "S", default_value_t = 48)]
+    starts: usize,
+
+    /// Of --diagram: seed of the starts
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    seed: u64,
+
+    /// A second parameter and its range, as in alpha4=5:40: the loci of the bifurcations
+    /// are traced in both
+    #[arg(long, value_name = "KEY=LOW:HIGH", allow_hyphen_values = true)]
+    second: Option<String>,
+
+    /// Longest step, as a part of the range
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.01,
+        allow_negative_numbers = true
+    )]
+    max_step: f64,
+
+    /// What --plot shows against the parameter
+    #[arg(long, value_enum)]
+    show: Option<Show>,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+/// What a picture shows against the parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum Show {
+    TipMax,
+    TipMin,
+    Amplitude,
+    FirstHarmonic,
+    Phase,
+    ContactFraction,
+    PeakForce,
+    ImpactSpeed,
+    /// Largest modulus of a multiplier
+    SpectralRadius,
+}
+
+impl From<Show> for Shown {
+    fn from(show: Show) -> Self {
+        match show {
+            Show::TipMax => Self::TipMax,
+            Show::TipMin => Self::TipMin,
+            Show::Amplitude => Self::Amplitude,
+            Show::FirstHarmonic => Self::FirstHarmonic,
+            Show::Phase => Self::Phase,
+            Show::ContactFraction => Self::ContactFraction,
+            Show::PeakForce => Self::PeakForce,
+            Show::ImpactSpeed => Self::ImpactSpeed,
+            Show::SpectralRadius => Self::SpectralRadius,
+        }
+    }
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    report: &'a BranchReport,
+    /// Of a physical case: what a value of the parameter is to be multiplied with for SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameter_unit: Option<ParameterUnit>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if let Some(path) = &arguments.out.out {
+        file::ending(path, &["csv"])?;
+    }
+    let studied = Studied::of(&arguments.case, output)?;
+    let options = options(arguments, &studied)?;
+    let report = progress::watched(output, "points", |control| {
+        arguments
+            .threads
+            .install(|| branch(&studied.subject, &options, control))
+    })???;
+    if report.cancelled {
+        output.warning("stopped before it was done");
+    }
+    let model = studied.model()?;
+    if let Some(path) = &arguments.out.out {
+        let names = time_series::state_names(&model);
+        file::write(path, csv(&report, &names).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        let rigid = studied.subject.has_rigid_stop();
+        // The greatest displacement of an oscillator with a wall is where the wall stands.
+        let default = if rigid {
+            Shown::ImpactSpeed
+        } else {
+            Shown::TipMax
+        };
+        let shown = arguments.show.map_or(default, Shown::from);
+        let second = report.loci.as_ref().map_or(report.key, |loci| loci.key);
+        let axes = [axis(&studied, report.key), axis(&studied, second)];
+        branch_figure(
+            &report,
+            shown,
+            model.beam.is_some(),
+            &axes,
+            &studied.units(),
+        )
+        .write(path)?;
+    }
+    let document = Document {
+        report: &report,
+        parameter_unit: studied.parameter_unit(report.key),
+    };
+    output.result(&document, |_| text(&studied, &report))
+}
+
+fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Failure> {
+    let key = studied.key(&arguments.parameter)?;
+    let from = studied.value(key, "--from", &arguments.from)?;
+    let to = studied.value(key, "--to", &arguments.to)?;
+    let census = arguments.diagram.then(|| SeedOptions {
+        values: arguments.values,
+        starts: arguments.starts,
+        seed: arguments.seed,
+        ..SeedOptions::default()
+    });
+    if census.is_some() && (arguments.values < 2 || arguments.starts == 0) {
+        return Err(Failure::request(
+            format!(
+                "--diagram with --values {} and --starts {}",
+                arguments.values, arguments.starts
+            ),
+            "give at least 2 values and 1 start",
+        ));
+    }
+    let second = arguments
+        .second
+        .as_deref()
+        .map(|text| second(studied, text))
+        .transpose()?;
+    Ok(BranchOptions {
+        period: arguments.period,
+        state: arguments.state.clone(),
+        doublings: arguments
+            .switch
+            .unwrap_or(if arguments.diagram { 2 } else { 0 }),
+        census,
+        second,
+        max_step: arguments.max_step,
+        ..BranchOptions::over(key, from, to)
+    })
+}
+
+fn second(studied: &Studied, text: &str) -> Result<(Key, f64, f64), Failure> {
+    let wrong = || {
+        Failure::request(
+            format!("--second {text}: not a parameter with its range"),
+            "write it as --second alpha4=5:40",
+        )
+    };
+    let (name, range) = text.split_once('=').ok_or_else(wrong)?;
+    let (low, high) = range.split_once(':').ok_or_else(wrong)?;
+    let key = studied.key(name.trim())?;
+    Ok((
+        key,
+        studied.value(key, "--second", low)?,
+        studied.value(key, "--second", high)?,
+    ))
+}
+
+/// The axis of a parameter, in SI where the case has it.
+fn axis(studied: &Studied, key: Key) -> ParameterAxis {
+    let plain = ParameterAxis::of(key);
+    studied
+        .parameter_unit(key)
+        .map_or(plain, |unit| ParameterAxis {
+            label: format!("{} ({})", unit.quantity, unit.unit),
+            factor: unit.si,
+        })
+}
+
+/// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
+/// points of their branch.
+fn csv(report: &BranchReport, names: &[String]) -> String {
+    let mut csv = format!(
+        "branch,kind,period,{},stable,spectral_radius,tip_max,tip_min,amplitude,contact_fraction,\
+         contacts_per_period,peak_force,impact_speed,first_harmonic,phase,{}\n",
+        report.parameter,
+        names.join(",")
+    );
+    let mut row = |branch: usize, kind: &str, p: &PointReport| {
+        let s = &p.sight;
+        let _ = write!(
+            csv,
+            "{branch},{kind},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            p.period,
+            p.parameter,
+            p.stable,
+            spectral_radius(&p.multipliers),
+            s.tip_max,
+            s.tip_min,
+            s.amplitude,
+            s.contact_fraction,
+            s.contacts_per_period,
+            s.peak_force,
+            s.impact_speed,
+            s.first_harmonic,
+            s.phase
+        );
+        for value in &p.state {
+            let _ = write!(csv, ",{value}");
+        }
+        csv.push('\n');
+    };
+    for branch in 0..report.branches.len() {
+        for p in report.points.iter().filter(|p| p.branch == branch) {
+            row(branch, "", p);
+        }
+        for b in report.bifurcations.iter().filter(|b| b.branch == branch) {
+            let point = PointReport {
+                branch,
+                period: b.period,
+                parameter: b.parameter,
+                state: b.state.clone(),
+                multipliers: b.multipliers.clone(),
+                stable: false,
+                sight: b.sight,
+            };
+            row(branch, b.kind, &point);
+        }
+    }
+    csv
+}
+
+fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
+    multipliers
+        .iter()
+        .map(|[re, im]| re.hypot(*im))
+        .fold(0.0, f64::max)
+}
+
+fn text(studied: &Studied, report: &BranchReport) -> String {
+    let unit = studied.parameter_unit(report.key);
+    let shown = |value: f64| {
+        let plain = number::significant(value, 10);
+        unit.as_ref().map_or(plain.clone(), |unit| {
+            format!("{plain} ({})", unit.kind.format(unit.si * value))
+        })
+    };
+    let heading = format!(
+        "{}: {} from {} to {}",
+        studied.title,
+        report.parameter,
+        number::significant(report.from, 6),
+        number::significant(report.to, 6)
+    );
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    let mut table = Table::new([
+        ("branch", Align::Right),
+        ("period", Align::Right),
+        ("from", Align::Right),
+        ("points", Align::Right),
+        ("stable", Align::Right),
+        ("reaches", Align::Left),
+        ("ends at", Align::Left),
+    ]);
+    for (k, branch) in report.branches.iter().enumerate() {
+        let stable = report
+            .points
+            .iter()
+            .filter(|p| p.branch == k && p.stable)
+            .count();
+        table.row([
+            (k + 1).to_string(),
+            branch.period.to_string(),
+            branch
+                .parent
+                .map_or_else(String::new, |p| format!("branch {}", p + 1)),
+            branch.points.to_string(),
+            stable.to_string(),
+            format!(
+                "{} … {}",
+                number::significant(branch.range[0], 6),
+                number::significant(branch.range[1], 6)
+            ),
+            branch.end.clone(),
+        ]);
+    }
+    text.push_str(&table.render());
+    text.push('\n');
+    if report.bifurcations.is_empty() {
+        text.push_str("  no bifurcation on the way\n");
+    } else {
+        let _ = writeln!(text, "  {}", style::bold("bifurcations"));
+        let mut table = Table::new([
+            ("branch", Align::Right),
+            ("", Align::Left),
+            (report.parameter, Align::Left),
+            ("period", Align::Right),
+            ("tip", Align::Left),
+            ("contact (%)", Align::Point),
+            ("", Align::Left),
+        ]);
+        for b in &report.bifurcations {
+            let extra = b
+                .angle
+                .map_or_else(String::new, |a| format!("pair at {a:.2}°"));
+            table.row([
+                (b.branch + 1).to_string(),
+                b.kind.to_owned(),
+                shown(b.parameter),
+                b.period.to_string(),
+                format!(
+                    "{} … {}",
+                    number::significant(b.sight.tip_min, 5),
+                    number::significant(b.sight.tip_max, 5)
+                ),
+                number::significant(100.0 * b.sight.contact_fraction, 4),
+                extra,
+            ]);
+        }
+        text.push_str(&table.render());
+    }
+    if let Some(loci) = &report.loci {
+        let _ = writeln!(
+            text,
+            "\n  {}",
+            style::bold(&format!("loci in {} and {}", report.parameter, loci.second))
+        );
+        let mut table = Table::new([
+            ("", Align::Left),
+            ("period", Align::Right),
+            ("points", Align::Right),
+            (report.parameter, Align::Left),
+            (loci.second, Align::Left),
+            ("ends at", Align::Left),
+        ]);
+        let range = |values: &[f64]| {
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            format!(
+                "{} … {}",
+                number::significant(low, 6),
+                number::significant(high, 6)
+            )
+        };
+        for curve in &loci.curves {
+            table.row([
+                curve.kind.to_owned(),
+                curve.period.to_string(),
+                curve.first.len().to_string(),
+                range(&curve.first),
+                range(&curve.second),
+                curve.ends.join("; "),
+            ]);
+        }
+        text.push_str(&table.render());
+    }
+    if !report.failures.is_empty() {
+        let _ = writeln!(text, "\n  {}", style::bold("not followed"));
+        for failure in &report.failures {
+            text.push_str(&motion::paragraph(&format!(
+                "{} = {}: {}",
+                report.parameter,
+                number::significant(failure.parameter, 8),
+                failure.reason
+            )));
+        }
+    }
+    text
+}

@@ -10,6 +10,9 @@
 //! and unique, and a safeguarded Newton–Halley iteration finishes, its own last
 //! error bounded by `B`.
 //!
+//! Far from zero longer steps come from lower bounds of the signal that follow only its
+//! slowest terms and replace each faster one by minus its amplitude.
+//!
 //! Two places need more than double precision's plain sums. Near a tangency the
 //! sign of the extremum can drown in rounding: it is then found in twice double
 //! precision, so a dip of 1e-17 is seen for what it is. Right after a switch the
@@ -22,7 +25,9 @@
 //! precision at the points it visits and reports the crossing as grazing.
 
 use crate::double_double;
-use crate::signal::{Jet, Signal};
+use crate::pack::{LARGEST_ANGLE, Library, Math, Plain};
+use crate::signal::{Enclosure, Jet, Signal};
+use std::marker::PhantomData;
 
 /// Where the search starts from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +53,8 @@ pub struct Crossing {
     pub rate: f64,
     /// Whether value and rate vanish together within rounding.
     pub grazing: bool,
+    /// Whether the rate is known better than the signal's own sum tells it.
+    pub refined: bool,
 }
 
 /// What a search cost.
@@ -63,8 +70,34 @@ pub struct Statistics {
 
 /// The first `s` in `(0, length]` where the signal falls to zero, or `None` when it
 /// stays positive for certain.
-pub fn first_crossing(signal: &Signal, length: f64, start: Start, statistics: &mut Statistics) -> Option<Crossing> {
-    let mut search = Search { signal, length, noise: signal.noise(), statistics };
+pub fn first_crossing(
+    signal: &Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Crossing> {
+    if signal.fastest() * length < LARGEST_ANGLE {
+        first_crossing_with::<Plain>(signal, length, start, statistics)
+    } else {
+        first_crossing_with::<Library>(signal, length, start, statistics)
+    }
+}
+
+/// The same in the arithmetic `M`.
+#[inline(always)]
+pub(crate) fn first_crossing_with<M: Math>(
+    signal: &Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Crossing> {
+    let mut search = Search {
+        signal,
+        length,
+        noise: signal.noise(),
+        statistics,
+        arithmetic: PhantomData::<M>,
+    };
     let (s, jet) = match start {
         Start::Inside => {
             search.statistics.evaluations += 1;
@@ -87,36 +120,50 @@ enum Departure {
     Inside(f64, Jet),
 }
 
-struct Search<'a> {
+struct Search<'a, M> {
     signal: &'a Signal,
     length: f64,
     noise: f64,
     statistics: &'a mut Statistics,
+    arithmetic: PhantomData<M>,
 }
+
+/// Dips shallower than this many rounding errors are measured in twice double precision.
+const SHALLOW: f64 = 1e5;
 
 /// Orders of the Taylor series used right after a switch.
 const TAYLOR_ORDER: usize = 10;
 /// Its reach, as an angle of the fastest term.
 const TAYLOR_REACH: f64 = 0.25;
 
-impl Search<'_> {
+impl<M: Math> Search<'_, M> {
+    #[inline(always)]
     fn jet(&mut self, s: f64) -> Jet {
         self.statistics.evaluations += 1;
-        self.signal.jet(s)
+        self.signal.jet_with::<M>(s)
     }
 
+    #[inline(always)]
+    fn enclosure(&mut self, s: f64) -> Enclosure {
+        self.statistics.evaluations += 1;
+        self.signal.enclosure::<M>(s)
+    }
+
+    #[inline(always)]
     fn run(&mut self, mut s: f64, mut jet: Jet) -> Option<Crossing> {
+        let mut relaxed = [Jet::default(); 2];
         loop {
             let left = self.length - s;
             if left < 0.0 {
                 return None;
             }
-            if jet.value <= 0.0 {
-                if let Some(crossing) = self.at_or_below_zero(s, &mut jet) {
-                    return Some(crossing);
-                }
+            if jet.value <= 0.0
+                && let Some(crossing) = self.at_or_below_zero(s, &mut jet)
+            {
+                return Some(crossing);
             }
-            if let Some(reach) = certain_crossing(&jet, self.noise) {
+            let zero = parabola_zero(jet.value, jet.rate, jet.curvature);
+            if let Some(reach) = certain_crossing(&jet, zero, self.noise) {
                 return self.polish(s, jet, s + reach);
             }
             if let Some(distance) = self.unresolved_tangency(&jet) {
@@ -127,10 +174,17 @@ impl Search<'_> {
                     Departure::Inside(at, after) => {
                         s = at;
                         jet = after;
+                        relaxed = [Jet::default(); 2];
                     }
                 }
             }
-            let step = certified_step(&jet);
+            let mut step = certified_step(&jet, zero);
+            for lower in &relaxed {
+                if lower.value > 0.0 {
+                    let zero = parabola_zero(lower.value, lower.rate, lower.curvature);
+                    step = step.max(certified_step(lower, zero));
+                }
+            }
             self.statistics.steps += 1;
             if step >= self.length - s {
                 return None;
@@ -138,12 +192,13 @@ impl Search<'_> {
             // A step below rounding would never end; the value there is decided
             // in twice double precision.
             s += step.max(4.0 * f64::EPSILON * self.length);
-            jet = self.jet(s);
+            Enclosure { jet, relaxed } = self.enclosure(s);
         }
     }
 
     /// The value came out as zero or less although no crossing was certain:
     /// rounding, or a crossing within it.
+    #[cold]
     fn at_or_below_zero(&mut self, s: f64, jet: &mut Jet) -> Option<Crossing> {
         let value = double_double::signal_value(self.signal, s);
         self.statistics.tangencies += 1;
@@ -152,10 +207,15 @@ impl Search<'_> {
             return None;
         }
         // A dip that began and was not seen as a tangency, or the start itself.
-        Some(Crossing { at: s, rate: jet.rate.min(0.0), grazing: jet.rate.abs() < self.noise.sqrt() })
+        Some(Crossing {
+            at: s,
+            rate: jet.rate.min(0.0),
+            grazing: jet.rate.abs() < self.noise.sqrt(),
+            refined: false,
+        })
     }
 
-    /// The distance to a minimum whose sign cannot be told from rounding.
+    /// The distance to a minimum whose depth plain sums cannot tell well from rounding.
     fn unresolved_tangency(&self, jet: &Jet) -> Option<f64> {
         if jet.rate >= 0.0 || jet.curvature <= 0.0 {
             return None;
@@ -163,17 +223,18 @@ impl Search<'_> {
         let distance = -jet.rate / jet.curvature;
         let minimum = jet.value + 0.5 * jet.rate * distance;
         let quadratic = jet.third * distance < 0.2 * jet.curvature;
-        let exact = jet.third * distance.powi(3) < 6.0 * self.noise;
-        (quadratic && exact && minimum.abs() <= 4.0 * self.noise).then_some(distance)
+        let known = jet.third * distance.powi(3) < self.noise.max(0.125 * minimum.abs());
+        (quadratic && known && minimum.abs() <= SHALLOW * self.noise).then_some(distance)
     }
 
     /// Decides a tangency near `s`: a miss continues from the minimum with its
     /// true value, a touch crosses where the parabola through the minimum does.
+    #[cold]
     fn tangency(&mut self, mut s: f64) -> Departure {
         let mut jet = self.jet(s);
         for _ in 0..8 {
             let step = -jet.rate / jet.curvature;
-            if !(step.abs() > f64::EPSILON * self.length) {
+            if step.is_nan() || step.abs() <= f64::EPSILON * self.length {
                 break;
             }
             s += step;
@@ -185,11 +246,23 @@ impl Search<'_> {
         if jet.value >= 0.0 {
             return Departure::Inside(s, jet);
         }
-        let half_width = (-2.0 * jet.value / jet.curvature).sqrt();
-        Departure::Crossing(Crossing { at: s - half_width, rate: -jet.curvature * half_width, grazing: true })
+        // Zero of the parabola through the minimum, then the cubic's correction to it.
+        let curvature = jet.curvature;
+        let half_width = (-2.0 * jet.value / curvature).sqrt();
+        let third = self.signal.shifted(s, 1.0, 0.0).derivative_at_start(3);
+        let h = -half_width * (1.0 + third * half_width / (6.0 * curvature));
+        let rate = (h * (curvature + 0.5 * third * h)).min(0.0);
+        let grazing = jet.value.abs() <= 4.0 * self.noise;
+        Departure::Crossing(Crossing {
+            at: s + h,
+            rate,
+            grazing,
+            refined: true,
+        })
     }
 
     /// The unique zero in `(s, high]`, by Newton–Halley steps kept inside the bracket.
+    #[inline(always)]
     fn polish(&mut self, s: f64, jet: Jet, high: f64) -> Option<Crossing> {
         let tolerance = 0.25 * f64::EPSILON * self.length;
         let (mut low, mut high) = (s, high);
@@ -202,10 +275,16 @@ impl Search<'_> {
             let rate = jet.rate + jet.curvature * step;
             // |g(at + step)| ≤ ⅙ B |step|³ when the step solves the parabola.
             let error = jet.third * step.abs().powi(3) / 6.0;
-            let solved = (jet.value + step * (jet.rate + 0.5 * jet.curvature * step)).abs() <= self.noise;
+            let solved =
+                (jet.value + step * (jet.rate + 0.5 * jet.curvature * step)).abs() <= self.noise;
             if solved && error <= tolerance * rate.abs() || high - low <= tolerance {
                 let at = at + step;
-                return (at <= self.length).then_some(Crossing { at, rate: rate.min(0.0), grazing: false });
+                return (at <= self.length).then_some(Crossing {
+                    at,
+                    rate: rate.min(0.0),
+                    grazing: false,
+                    refined: false,
+                });
             }
             at += step;
             if low > self.length {
@@ -214,11 +293,17 @@ impl Search<'_> {
             jet = self.jet(at);
             if jet.value > 0.0 { low = at } else { high = at }
         }
-        (at <= self.length).then_some(Crossing { at, rate: jet.rate.min(0.0), grazing: false })
+        (at <= self.length).then_some(Crossing {
+            at,
+            rate: jet.rate.min(0.0),
+            grazing: false,
+            refined: false,
+        })
     }
 
     /// Leaves the surface on which the signal's first `vanishing` derivatives
     /// (counting the value) are zero by definition.
+    #[inline(always)]
     fn leave_surface(&mut self, vanishing: usize, rate: Option<f64>) -> Departure {
         self.statistics.evaluations += 1;
         let mut first = self.signal.first_jet();
@@ -237,6 +322,7 @@ impl Search<'_> {
         self.taylor_departure(vanishing, rate)
     }
 
+    #[cold]
     fn taylor_departure(&mut self, vanishing: usize, rate: Option<f64>) -> Departure {
         let reach = (TAYLOR_REACH / self.signal.fastest()).min(self.length);
         let mut derivatives = [0.0; TAYLOR_ORDER + 1];
@@ -253,7 +339,12 @@ impl Search<'_> {
         if derivatives[vanishing] < 0.0 {
             // It does not leave at all: it falls back at once.
             let rate = if vanishing == 1 { derivatives[1] } else { 0.0 };
-            return Departure::Crossing(Crossing { at: 0.0, rate, grazing: vanishing > 1 });
+            return Departure::Crossing(Crossing {
+                at: 0.0,
+                rate,
+                grazing: vanishing > 1,
+                refined: false,
+            });
         }
         // p(h) = g(h) / h^v · …, positive at 0; its coefficients.
         let mut coefficients = [0.0; TAYLOR_ORDER + 1];
@@ -269,107 +360,79 @@ impl Search<'_> {
         let remainder = self.signal.derivative_bound(remainder_order, self.length)
             / (factorial * f64::from(remainder_order))
             * reach.powi(remainder_order as i32 - vanishing as i32);
-        match first_polynomial_zero(p, reach, remainder) {
-            Some(h) => {
-                // g = h^v p(h), so ġ = h^v p'(h) at the zero of p.
-                let (_, slope, _) = polynomial_jet(p, h);
-                let rate = (h.powi(vanishing as i32) * slope).min(0.0);
-                Departure::Crossing(Crossing { at: h, rate, grazing: false })
-            }
-            None => {
-                let mut jet = self.jet(reach);
-                // The Taylor value keeps its relative accuracy where plain sums drown.
-                let value = polynomial_jet(p, reach).0 * reach.powi(vanishing as i32);
-                if value > 0.0 {
-                    jet.value = value;
-                }
-                Departure::Inside(reach, jet)
-            }
+        if let Some(h) = first_polynomial_zero(p, reach, remainder) {
+            // g = h^v p(h), so ġ = h^v p'(h) at the zero of p.
+            let (_, slope, _) = polynomial_jet(p, h);
+            let rate = (h.powi(vanishing as i32) * slope).min(0.0);
+            return Departure::Crossing(Crossing {
+                at: h,
+                rate,
+                grazing: false,
+                refined: false,
+            });
         }
+        let mut jet = self.jet(reach);
+        // The Taylor value keeps its relative accuracy where plain sums drown.
+        let value = polynomial_jet(p, reach).0 * reach.powi(vanishing as i32);
+        if value > 0.0 {
+            jet.value = value;
+        }
+        Departure::Inside(reach, jet)
     }
 }
 
-/// Length up to which the lower cubic stays positive, for certain.
-fn certified_step(jet: &Jet) -> f64 {
+/// Length up to which the lower cubic `g + vh + ½ch² − ⅙bh³` stays positive, for certain.
+///
+/// Up to any reach `H` the cubic lies above the parabola with curvature `c − bH/3`, so
+/// a step is certified when it is within `H` and before that parabola's first zero.
+/// A few good choices of `H` cost a square root each and need no iteration.
+/// `free` is the zero of the parabola `g + vh + ½ch²`.
+#[inline]
+fn certified_step(jet: &Jet, free: f64) -> f64 {
     let (g, v, c, b) = (jet.value, jet.rate, jet.curvature, jet.third);
     if b <= 0.0 {
-        return certified_parabola(g, v, c);
+        return free * SAFE;
     }
-    let lower = |h: f64| g + h * (v + h * (0.5 * c - b * h / 6.0));
-    let slope = |h: f64| v + h * (c - 0.5 * b * h);
-    // Beyond the later critical point the cubic only falls; before the earlier one
-    // (if positive) it falls too.
-    let discriminant = c * c + 2.0 * b * v;
-    let mut floor = 0.0;
-    if discriminant > 0.0 {
-        let root = discriminant.sqrt();
-        let later = (c + root) / b;
-        if v >= 0.0 {
-            floor = later;
-        } else if c > 0.0 {
-            let earlier = -2.0 * v / (c + root);
-            if lower(earlier) > 0.0 {
-                floor = later;
-            }
-        }
+    let within = |reach: f64| reach.min(parabola_zero(g, v, c - b * reach / 3.0));
+    let mut step = 0.0_f64;
+    if free.is_finite() {
+        step = within(free);
     }
-    let mut h;
-    if floor > 0.0 {
-        // Past the maximum the cubic is concave and falls at least as fast as its
-        // parabola and as its cube: start right of its zero, Newton from there.
-        let top = lower(floor);
-        h = floor + (6.0 * top / b).cbrt().min((2.0 * top / discriminant.sqrt()).sqrt());
-        for _ in 0..6 {
-            let next = h - lower(h) / slope(h);
-            if !(next < h) {
-                break;
-            }
-            h = next.max(floor);
-        }
-    } else {
-        // Falling from the start: a step that is too short is still certified.
-        h = g / -v.min(-f64::MIN_POSITIVE);
-        let cubic_reach = (6.0 * g / b).cbrt();
-        h = h.min(cubic_reach);
-        for _ in 0..4 {
-            let s = slope(h);
-            if s >= 0.0 {
-                h *= 0.5;
-                continue;
-            }
-            h -= lower(h) / s;
-            h = h.max(0.0);
-        }
+    if v >= 0.0 {
+        // With g > 0 left out: v + ½ch − ⅙bh² ≥ 0.
+        let root = (0.25 * c * c + 2.0 / 3.0 * b * v).sqrt();
+        let rising = if c > 0.0 {
+            3.0 * (0.5 * c + root) / b
+        } else {
+            2.0 * v / (root - 0.5 * c)
+        };
+        step = step.max(rising).max(within(1.4 * rising));
+    } else if c > 0.0 {
+        // The parabola with the curvature v²/2g just touches zero.
+        let touching = 3.0 * (c - v * v / (2.0 * g)) / b;
+        step = step
+            .max(touching)
+            .max(within(1.3 * touching))
+            .max(within(-v / c));
     }
-    // Make it safe whatever the iterations did.
-    h *= 1.0 - 1e-6;
-    for _ in 0..60 {
-        if h >= floor && lower(h) > 0.0 && (floor > 0.0 || slope_negative_up_to(v, c, b, h)) {
-            return h;
-        }
-        h = floor + 0.9 * (h - floor);
-        if h <= floor * (1.0 + 1e-12) {
-            return floor;
-        }
-    }
-    floor
+    step * SAFE
 }
 
-/// Whether `v + ch − ½bh²` stays negative on `[0, h]`.
-fn slope_negative_up_to(v: f64, c: f64, b: f64, h: f64) -> bool {
-    let peak = (c / b).clamp(0.0, h);
-    v + peak * (c - 0.5 * b * peak) <= 0.0
-}
+/// What rounding could take from a certified step.
+const SAFE: f64 = 1.0 - 1e-9;
 
-/// The same for a signal without third derivative: a parabola.
-fn certified_parabola(g: f64, v: f64, c: f64) -> f64 {
+/// The first positive zero of `g + vh + ½ch²` with `g > 0`; infinite if there is none.
+fn parabola_zero(g: f64, v: f64, c: f64) -> f64 {
     let discriminant = v * v - 2.0 * g * c;
     if discriminant < 0.0 || (v >= 0.0 && c >= 0.0) {
         return f64::INFINITY;
     }
     let root = discriminant.sqrt();
-    let h = if v < 0.0 { 2.0 * g / (-v + root) } else { (v + root) / -c };
-    h * (1.0 - 1e-9)
+    if v < 0.0 {
+        2.0 * g / (root - v)
+    } else {
+        (v + root) / -c
+    }
 }
 
 /// The first zero of the lower cubic divided by `h`, from the surface with rate `v > 0`.
@@ -377,19 +440,24 @@ fn step_from_surface(jet: &Jet) -> f64 {
     let (v, c, b) = (jet.rate, jet.curvature, jet.third);
     let root = (0.25 * c * c + 2.0 / 3.0 * b * v).sqrt();
     // v + ½ c h − ⅙ b h² = 0, in the form without cancellation.
-    let h = if c < 0.0 { 2.0 * v / (root - 0.5 * c) } else { 3.0 * (0.5 * c + root) / b.max(f64::MIN_POSITIVE) };
+    let h = if c < 0.0 {
+        2.0 * v / (root - 0.5 * c)
+    } else {
+        3.0 * (0.5 * c + root) / b.max(f64::MIN_POSITIVE)
+    };
     h * (1.0 - 1e-9)
 }
 
 /// A reach within which the signal falls through zero exactly once, for certain and
-/// by more than rounding.
-fn certain_crossing(jet: &Jet, noise: f64) -> Option<f64> {
+/// by more than rounding; `root` is the zero of the parabola `g + vh + ½ch²`.
+#[inline]
+fn certain_crossing(jet: &Jet, root: f64, noise: f64) -> Option<f64> {
     let (g, v, c, b) = (jet.value, jet.rate, jet.curvature, jet.third);
-    if v >= 0.0 {
+    if v >= 0.0 || !root.is_finite() {
         return None;
     }
-    let root = quadratic_root(jet);
-    if !(root.is_finite() && root > 0.0) {
+    // A shallow dip is left to the tangency's finer measure.
+    if c > 0.0 && v * v - 2.0 * g * c < 2.0 * c * SHALLOW * noise {
         return None;
     }
     // A little beyond the parabola's zero, so that the upper cubic is below zero.
@@ -408,7 +476,11 @@ fn certain_crossing(jet: &Jet, noise: f64) -> Option<f64> {
 fn quadratic_root(jet: &Jet) -> f64 {
     let (g, v, c) = (jet.value, jet.rate, jet.curvature);
     let discriminant = v * v - 2.0 * g * c;
-    if discriminant >= 0.0 { 2.0 * g / (-v + discriminant.sqrt()) } else { -g / v }
+    if discriminant >= 0.0 {
+        2.0 * g / (-v + discriminant.sqrt())
+    } else {
+        -g / v
+    }
 }
 
 /// Value, slope and curvature of `Σ p_j h^j`.
@@ -441,7 +513,11 @@ fn first_polynomial_zero(p: &[f64], reach: f64, remainder: f64) -> Option<f64> {
             return Some(h);
         }
         let root = (slope * slope + 2.0 * curvature_bound * value).sqrt();
-        let step = if slope < 0.0 { 2.0 * value / (root - slope) } else { (slope + root) / curvature_bound };
+        let step = if slope < 0.0 {
+            2.0 * value / (root - slope)
+        } else {
+            (slope + root) / curvature_bound
+        };
         if step < resolution.min(1e-15 * h) {
             return Some(h);
         }

@@ -64,7 +64,9 @@ impl ComplexDd {
 
     fn multiply(self, other: Self) -> Self {
         Self(
-            self.0.multiply(other.0).add(self.1.multiply(other.1).negated()),
+            self.0
+                .multiply(other.0)
+                .add(self.1.multiply(other.1).negated()),
             self.0.multiply(other.1).add(self.1.multiply(other.0)),
         )
     }
@@ -72,7 +74,11 @@ impl ComplexDd {
     /// `e^z` by halving the argument, a Taylor sum, and squaring back.
     fn exp(self) -> Self {
         let size = self.0.0.abs() + self.1.0.abs();
-        let halvings = if size > 0.02 { (size / 0.02).log2().ceil() as i32 } else { 0 };
+        let halvings = if size > 0.02 {
+            (size / 0.02).log2().ceil() as i32
+        } else {
+            0
+        };
         let scale = 0.5_f64.powi(halvings);
         let z = Self(self.0.scaled(scale), self.1.scaled(scale));
         // Sum e^z − 1, which keeps the small part's digits through the squarings.
@@ -96,12 +102,11 @@ impl ComplexDd {
 
 /// The value of a signal at `s` with an error of the order of 1e-28 of its terms.
 pub(crate) fn signal_value(signal: &Signal, s: f64) -> f64 {
-    let exponential = |rate: Complex| {
-        ComplexDd(Dd::two_product(rate.re, s), Dd::two_product(rate.im, s)).exp()
-    };
+    let exponential =
+        |rate: Complex| ComplexDd(Dd::two_product(rate.re, s), Dd::two_product(rate.im, s)).exp();
     let mut sum = Dd::new(signal.constant);
-    for (rate, a) in signal.rates.iter().zip(&signal.amplitudes) {
-        sum = sum.add(ComplexDd::new(*a).multiply(exponential(*rate)).0);
+    for (rate, a) in signal.terms() {
+        sum = sum.add(ComplexDd::new(a).multiply(exponential(rate)).0);
     }
     for term in &signal.powers {
         let mut power = Dd::new(1.0);
@@ -128,7 +133,9 @@ mod tests {
         assert!((e.0.0 - cos).abs() < 1e-15 && (e.1.0 - sin).abs() < 1e-15);
         // e^a e^{-a} = 1 with a not a double.
         let a = Dd::two_product(0.3, 1.7);
-        let product = ComplexDd(a, Dd::ZERO).exp().multiply(ComplexDd(a.negated(), Dd::ZERO).exp());
+        let product = ComplexDd(a, Dd::ZERO)
+            .exp()
+            .multiply(ComplexDd(a.negated(), Dd::ZERO).exp());
         let rest = product.0.add(Dd::new(-1.0));
         assert!((rest.0 + rest.1).abs() < 1e-29);
     }

@@ -22,13 +22,24 @@ impl Drive {
     /// When the period is not positive and finite, or a harmonic is zero.
     pub fn new(period: f64, harmonics: &[u32]) -> Result<Self, FlowError> {
         if !(period.is_finite() && period > 0.0) {
-            return Err(FlowError::Drive { what: format!("a period of {period}") });
+            return Err(FlowError::Drive {
+                what: format!("a period of {period}"),
+            });
         }
         if harmonics.contains(&0) {
-            return Err(FlowError::Drive { what: "a harmonic of 0".into() });
+            return Err(FlowError::Drive {
+                what: "a harmonic of 0".into(),
+            });
         }
-        let frequencies = harmonics.iter().map(|&h| f64::from(h) * TAU / period).collect();
-        Ok(Self { period, harmonics: harmonics.to_vec(), frequencies })
+        let frequencies = harmonics
+            .iter()
+            .map(|&h| f64::from(h) * TAU / period)
+            .collect();
+        Ok(Self {
+            period,
+            harmonics: harmonics.to_vec(),
+            frequencies,
+        })
     }
 
     /// A single tone of angular frequency `omega`.
@@ -37,7 +48,9 @@ impl Drive {
     /// When `omega` is not positive and finite.
     pub fn single(omega: f64) -> Result<Self, FlowError> {
         if !(omega.is_finite() && omega > 0.0) {
-            return Err(FlowError::Drive { what: format!("an angular frequency of {omega}") });
+            return Err(FlowError::Drive {
+                what: format!("an angular frequency of {omega}"),
+            });
         }
         let mut drive = Self::new(TAU / omega, &[1])?;
         drive.frequencies[0] = omega;

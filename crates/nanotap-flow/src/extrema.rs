@@ -21,12 +21,22 @@ pub fn sign_changes(signal: &Signal, length: f64) -> Vec<f64> {
     let mut offset = 0.0;
     let value = signal.at(0.0);
     let on_surface = value.abs() <= signal.noise();
-    let mut sign = if on_surface { first_sign(signal) } else { value.signum() };
-    let mut start = if on_surface { Start::Surface { rate: None } } else { Start::Inside };
+    let mut sign = if on_surface {
+        first_sign(signal)
+    } else {
+        value.signum()
+    };
+    let mut start = if on_surface {
+        Start::Surface { rate: None }
+    } else {
+        Start::Inside
+    };
     while sign != 0.0 && offset < length {
         let left = length - offset;
         let part = signal.shifted(offset, sign, left);
-        let Some(crossing) = first_crossing(&part, left, start, &mut statistics) else { break };
+        let Some(crossing) = first_crossing(&part, left, start, &mut statistics) else {
+            break;
+        };
         offset += crossing.at;
         if offset >= length {
             break;
@@ -35,7 +45,9 @@ pub fn sign_changes(signal: &Signal, length: f64) -> Vec<f64> {
             zeros.push(offset);
         }
         sign = -sign;
-        start = Start::Surface { rate: (crossing.rate < 0.0).then_some(-crossing.rate) };
+        start = Start::Surface {
+            rate: (crossing.rate < 0.0).then_some(-crossing.rate),
+        };
     }
     zeros
 }
@@ -56,7 +68,10 @@ impl PiecewiseSignal {
         for piece in &self.pieces {
             let rate = piece.signal.differentiated(piece.length);
             for s in sign_changes(&rate, piece.length) {
-                out.push(Extremum { time: piece.start + s, value: piece.signal.at(s) });
+                out.push(Extremum {
+                    time: piece.start + s,
+                    value: piece.signal.at(s),
+                });
             }
         }
         out
@@ -65,12 +80,21 @@ impl PiecewiseSignal {
     /// The least and the greatest value, ends and switches included; `None` if empty.
     pub fn range(&self) -> Option<(Extremum, Extremum)> {
         let ends = self.pieces.iter().flat_map(|p| {
-            [0.0, p.length].map(|s| Extremum { time: p.start + s, value: p.signal.at(s) })
+            [0.0, p.length].map(|s| Extremum {
+                time: p.start + s,
+                value: p.signal.at(s),
+            })
         });
         let mut all: Vec<Extremum> = ends.collect();
         all.extend(self.local_extrema());
-        let least = all.iter().copied().min_by(|a, b| a.value.total_cmp(&b.value))?;
-        let greatest = all.iter().copied().max_by(|a, b| a.value.total_cmp(&b.value))?;
+        let least = all
+            .iter()
+            .copied()
+            .min_by(|a, b| a.value.total_cmp(&b.value))?;
+        let greatest = all
+            .iter()
+            .copied()
+            .max_by(|a, b| a.value.total_cmp(&b.value))?;
         Some((least, greatest))
     }
 }
@@ -84,13 +108,23 @@ mod tests {
     /// sin s has its zeros at multiples of π, sin² s − ½ at odd multiples of π/4.
     #[test]
     fn zeros_of_known_functions() {
-        let sine = Signal::from_terms(0.0, vec![Complex::new(0.0, 1.0)], vec![Complex::new(0.0, -1.0)], 10.0);
+        let sine = Signal::from_terms(
+            0.0,
+            &[(Complex::new(0.0, 1.0), Complex::new(0.0, -1.0))],
+            Vec::new(),
+            10.0,
+        );
         let zeros = sign_changes(&sine, 10.0);
         assert_eq!(zeros.len(), 3);
         for (k, z) in zeros.iter().enumerate() {
             assert!((z - PI * (k + 1) as f64).abs() < 1e-14);
         }
-        let cosine = Signal::from_terms(0.0, vec![Complex::new(0.0, 2.0)], vec![Complex::new(-0.5, 0.0)], 10.0);
+        let cosine = Signal::from_terms(
+            0.0,
+            &[(Complex::new(0.0, 2.0), Complex::new(-0.5, 0.0))],
+            Vec::new(),
+            10.0,
+        );
         let zeros = sign_changes(&cosine, 10.0);
         assert_eq!(zeros.len(), 6);
         for (k, z) in zeros.iter().enumerate() {

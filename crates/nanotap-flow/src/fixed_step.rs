@@ -34,23 +34,46 @@ impl<'a> FixedStep<'a> {
     ///
     /// # Errors
     /// When sizes do not fit, a step count is zero, or no regime holds the state.
-    pub fn new(system: &'a System, x: &[f64], steps: &[u32], switching: Switching) -> Result<Self, FlowError> {
+    pub fn new(
+        system: &'a System,
+        x: &[f64],
+        steps: &[u32],
+        switching: Switching,
+    ) -> Result<Self, FlowError> {
         if steps.len() != system.regimes().len() {
             let expected = system.regimes().len();
-            return Err(FlowError::Shape { what: "the list of step counts", found: steps.len(), expected });
+            return Err(FlowError::Shape {
+                what: "the list of step counts",
+                found: steps.len(),
+                expected,
+            });
         }
         if steps.contains(&0) {
-            return Err(FlowError::Shape { what: "a step count", found: 0, expected: 1 });
+            return Err(FlowError::Shape {
+                what: "a step count",
+                found: 0,
+                expected: 1,
+            });
         }
         if x.len() != system.dimension() {
             let expected = system.dimension();
-            return Err(FlowError::Shape { what: "the state", found: x.len(), expected });
+            return Err(FlowError::Shape {
+                what: "the state",
+                found: x.len(),
+                expected,
+            });
         }
         if x.iter().any(|v| !v.is_finite()) {
             return Err(FlowError::NotFinite { what: "the state" });
         }
         let (regime, _) = system.regime_at(x, 0.0)?;
-        Ok(Self { system, steps: steps.to_vec(), switching, regime, state: DVector::from_column_slice(x) })
+        Ok(Self {
+            system,
+            steps: steps.to_vec(),
+            switching,
+            regime,
+            state: DVector::from_column_slice(x),
+        })
     }
 
     /// The state.

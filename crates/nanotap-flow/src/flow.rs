@@ -1,7 +1,10 @@
 //! Running a system: from switch to switch in modal coordinates, one drive period
 //! at a time.
 
-use crate::crossing::{Crossing, Start, Statistics, first_crossing};
+use crate::crossing::{Crossing, Start, Statistics, first_crossing_with};
+#[cfg(target_arch = "x86_64")]
+use crate::pack::Fused;
+use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
 use crate::regime::Regime;
 use crate::signal::Signal;
 use crate::system::{Switch, System};
@@ -55,6 +58,8 @@ pub struct SwitchView<'a> {
 
 /// Something that watches a flow: a recorder, a Jacobian, a sensitivity.
 pub trait Observer {
+    /// Whether it watches nothing, so that nothing need be prepared for it.
+    const IDLE: bool = false;
     /// A stretch within one regime was completed.
     fn segment(&mut self, segment: &SegmentView<'_>) {
         let _ = segment;
@@ -67,7 +72,9 @@ pub trait Observer {
     fn period_end(&mut self) {}
 }
 
-impl Observer for () {}
+impl Observer for () {
+    const IDLE: bool = true;
+}
 
 impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
     fn segment(&mut self, segment: &SegmentView<'_>) {
@@ -90,16 +97,20 @@ pub struct Flow {
     system: Arc<System>,
     regime: usize,
     phase: f64,
-    modal: Vec<Complex>,
+    /// Modal coordinates, then the tones' phasors, packed: `[re, im]`.
+    packed: Vec<[Pack; 2]>,
+    /// The work space of a switch.
+    next: Vec<[Pack; 2]>,
     /// The exit whose guard starts at zero, and how.
     surface: Option<(usize, Start)>,
     signal: Signal,
-    phasors: Vec<Complex>,
+    /// For observers: modal coordinates and `e^{λ_k s}` as plain numbers.
+    modal: Vec<Complex>,
     factors: Vec<Complex>,
-    stacked: Vec<f64>,
     state: Vec<f64>,
     statistics: Statistics,
     switches: u64,
+    fused: bool,
 }
 
 /// Switches without time passing before chatter without a sticking regime is refused.
@@ -111,21 +122,25 @@ const CHATTER_RESOLUTION: f64 = 1e-8;
 impl Flow {
     /// A flow of `system`; call [`Flow::start`] before running it.
     pub fn new(system: Arc<System>) -> Self {
-        let largest = system.regimes().iter().map(|r| r.basis().len()).max().unwrap_or(0);
-        let tones = system.drive().frequencies().len();
-        let zero = Complex::new(0.0, 0.0);
+        let largest = system
+            .regimes()
+            .iter()
+            .map(|r| r.basis().len())
+            .max()
+            .unwrap_or(0);
         Self {
             regime: 0,
             phase: 0.0,
-            modal: Vec::with_capacity(largest),
+            packed: Vec::new(),
+            next: Vec::new(),
             surface: None,
             signal: Signal::default(),
-            phasors: vec![zero; tones],
-            factors: vec![zero; largest],
-            stacked: vec![0.0; 2 * largest],
+            modal: Vec::with_capacity(largest),
+            factors: Vec::with_capacity(largest),
             state: vec![0.0; system.dimension()],
             statistics: Statistics::default(),
             switches: 0,
+            fused: fused_available(),
             system,
         }
     }
@@ -162,7 +177,11 @@ impl Flow {
     pub fn start(&mut self, x: &[f64], phase: f64) -> Result<(), FlowError> {
         let n = self.system.dimension();
         if x.len() != n {
-            return Err(FlowError::Shape { what: "the state", found: x.len(), expected: n });
+            return Err(FlowError::Shape {
+                what: "the state",
+                found: x.len(),
+                expected: n,
+            });
         }
         if !x.iter().all(|v| v.is_finite()) || !phase.is_finite() {
             return Err(FlowError::NotFinite { what: "the state" });
@@ -171,15 +190,56 @@ impl Flow {
         self.regime = regime;
         self.phase = phase;
         self.surface = surface.map(|exit| (exit, Start::Surface { rate: None }));
-        let basis = self.system.regimes()[regime].basis();
-        self.modal.resize(basis.len(), Complex::new(0.0, 0.0));
-        self.system.regimes()[regime].to_modal(self.system.drive(), x, phase, &mut self.modal);
+        let system = Arc::clone(&self.system);
+        let regime = &system.regimes()[regime];
+        self.modal
+            .resize(regime.basis().len(), Complex::new(0.0, 0.0));
+        regime.to_modal(system.drive(), x, phase, &mut self.modal);
+        self.pack_modal(&system);
+        self.set_phasors(&system);
         Ok(())
     }
 
     /// Writes the state (length `n`) to `x`.
     pub fn state(&self, x: &mut [f64]) {
-        self.system.regimes()[self.regime].to_state(self.system.drive(), &self.modal, self.phase, x);
+        let regime = &self.system.regimes()[self.regime];
+        let modal = (0..regime.basis().len()).map(|k| self.coordinate(k));
+        regime.to_state(self.system.drive(), modal, self.phase, x);
+    }
+
+    fn coordinate(&self, k: usize) -> Complex {
+        let [re, im] = &self.packed[k / WIDTH];
+        Complex::new(re[k % WIDTH], im[k % WIDTH])
+    }
+
+    fn set_coordinate(&mut self, k: usize, q: Complex) {
+        let [re, im] = &mut self.packed[k / WIDTH];
+        re[k % WIDTH] = q.re;
+        im[k % WIDTH] = q.im;
+    }
+
+    /// Packs `self.modal`; phasors are zero afterwards.
+    fn pack_modal(&mut self, system: &System) {
+        let count = self.modal.len() + system.drive().frequencies().len();
+        self.packed.clear();
+        self.packed.resize(count.div_ceil(WIDTH), [[0.0; WIDTH]; 2]);
+        for k in 0..self.modal.len() {
+            self.set_coordinate(k, self.modal[k]);
+        }
+    }
+
+    fn unpack_modal(&mut self, count: usize) {
+        self.modal.clear();
+        for k in 0..count {
+            self.modal.push(self.coordinate(k));
+        }
+    }
+
+    fn set_phasors(&mut self, system: &System) {
+        let modes = system.regimes()[self.regime].basis().len();
+        for k in 0..system.drive().frequencies().len() {
+            self.set_coordinate(modes + k, system.drive().phasor(k, self.phase));
+        }
     }
 
     /// Runs to the end of the drive period; the phase is then zero.
@@ -190,6 +250,11 @@ impl Flow {
         let period = self.system.drive().period();
         self.run_until(period, observer)?;
         self.phase = 0.0;
+        // Phasors are carried from switch to switch; a new period sets them right.
+        let modes = self.system.regimes()[self.regime].basis().len();
+        for k in 0..self.system.drive().frequencies().len() {
+            self.set_coordinate(modes + k, Complex::new(1.0, 0.0));
+        }
         observer.period_end();
         Ok(())
     }
@@ -199,36 +264,76 @@ impl Flow {
     /// # Errors
     /// As [`Flow::run_period`].
     pub fn run_until<O: Observer>(&mut self, end: f64, observer: &mut O) -> Result<(), FlowError> {
+        if self.system.largest_angle() > pack::LARGEST_ANGLE {
+            return self.run::<Library, O>(end, observer);
+        }
+        #[cfg(target_arch = "x86_64")]
+        if self.fused {
+            // SAFETY: `fused` is set only where the machine has these instructions.
+            return unsafe { self.run_fused(end, observer) };
+        }
+        self.run::<Plain, O>(end, observer)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn run_fused<O: Observer>(&mut self, end: f64, observer: &mut O) -> Result<(), FlowError> {
+        self.run::<Fused, O>(end, observer)
+    }
+
+    #[inline(always)]
+    fn run<M: Math, O: Observer>(&mut self, end: f64, observer: &mut O) -> Result<(), FlowError> {
         let system = Arc::clone(&self.system);
         let mut stalled = 0;
         while self.phase < end {
             let left = end - self.phase;
-            for (k, phasor) in self.phasors.iter_mut().enumerate() {
-                *phasor = system.drive().phasor(k, self.phase);
-            }
-            let found = self.next_crossing(&system, left)?;
+            let found = self.next_crossing::<M>(&system, left)?;
             let length = found.map_or(left, |(_, crossing)| crossing.at);
-            self.pass(&system, length, observer);
+            self.pass::<M, O>(&system, length, observer);
             let Some((exit, crossing)) = found else {
                 self.phase = end;
                 break;
             };
-            stalled = if length <= f64::EPSILON * end { stalled + 1 } else { 0 };
+            stalled = if length <= f64::EPSILON * end {
+                stalled + 1
+            } else {
+                0
+            };
             if stalled > STALLED_SWITCHES {
                 return Err(FlowError::Accumulation { time: self.phase });
             }
-            self.switch(&system, exit, crossing, observer);
+            self.switch::<M, O>(&system, exit, crossing, observer);
         }
         Ok(())
     }
 
     /// The earliest exit within `left`.
-    fn next_crossing(&mut self, system: &System, left: f64) -> Result<Option<(usize, Crossing)>, FlowError> {
+    #[inline(always)]
+    fn next_crossing<M: Math>(
+        &mut self,
+        system: &System,
+        left: f64,
+    ) -> Result<Option<(usize, Crossing)>, FlowError> {
         let regime = &system.regimes()[self.regime];
+        let clustered = !regime.basis().clusters.is_empty();
+        if clustered {
+            self.unpack_modal(regime.basis().len());
+        }
         let mut earliest: Option<(usize, Crossing)> = None;
         for (e, exit) in system.prepared(self.regime).iter().enumerate() {
             let horizon = earliest.map_or(left, |(_, c)| c.at);
-            self.signal.refill(regime, system.drive(), &exit.guard, &self.modal, &self.phasors, horizon);
+            if clustered {
+                self.signal = Signal::of(
+                    regime,
+                    system.drive(),
+                    &exit.guard,
+                    &self.modal,
+                    self.phase,
+                    horizon,
+                );
+            } else {
+                self.signal.refill::<M>(&exit.kernel, &self.packed, horizon);
+            }
             if !self.signal.is_finite() {
                 return Err(FlowError::Diverged { time: self.phase });
             }
@@ -236,7 +341,9 @@ impl Flow {
                 Some((surface, start)) if surface == e => start,
                 _ => Start::Inside,
             };
-            if let Some(crossing) = first_crossing(&self.signal, horizon, start, &mut self.statistics) {
+            if let Some(crossing) =
+                first_crossing_with::<M>(&self.signal, horizon, start, &mut self.statistics)
+            {
                 earliest = Some((e, crossing));
             }
         }
@@ -244,29 +351,66 @@ impl Flow {
     }
 
     /// Moves on by `length` within the regime.
-    fn pass<O: Observer>(&mut self, system: &System, length: f64, observer: &mut O) {
+    #[inline(always)]
+    fn pass<M: Math, O: Observer>(&mut self, system: &System, length: f64, observer: &mut O) {
         let basis = system.regimes()[self.regime].basis();
-        let factors = &mut self.factors[..basis.len()];
-        for (factor, lambda) in factors.iter_mut().zip(&basis.eigenvalues) {
-            *factor = (lambda * length).exp();
+        if O::IDLE && basis.clusters.is_empty() {
+            let rates = &system.packed_rates()[self.regime];
+            for ([re, im], [decay, frequency]) in self.packed.iter_mut().zip(rates) {
+                let factor =
+                    pack::exp_complex::<M>(M::load(decay), M::load(frequency), M::splat(length));
+                let q = pack::complex_mul::<M>([M::load(re), M::load(im)], factor);
+                *re = M::store(q[0]);
+                *im = M::store(q[1]);
+            }
+        } else {
+            self.pass_watched(system, length, observer);
         }
-        observer.segment(&SegmentView {
-            system,
-            regime: self.regime,
-            phase: self.phase,
-            length,
-            modal: &self.modal,
-            factors,
-        });
-        basis.apply(&mut self.modal, length, factors);
         self.phase += length;
         if length > 0.0 {
             self.surface = None;
         }
     }
 
+    /// The same where someone watches or eigenvalues coincide.
+    fn pass_watched<O: Observer>(&mut self, system: &System, length: f64, observer: &mut O) {
+        let basis = system.regimes()[self.regime].basis();
+        self.unpack_modal(basis.len());
+        self.factors.clear();
+        self.factors.extend(
+            basis
+                .eigenvalues
+                .iter()
+                .map(|lambda| (lambda * length).exp()),
+        );
+        observer.segment(&SegmentView {
+            system,
+            regime: self.regime,
+            phase: self.phase,
+            length,
+            modal: &self.modal,
+            factors: &self.factors,
+        });
+        basis.apply(&mut self.modal, length, &self.factors);
+        for k in 0..self.modal.len() {
+            self.set_coordinate(k, self.modal[k]);
+        }
+        for (k, &omega) in system.drive().frequencies().iter().enumerate() {
+            let (sin, cos) = (omega * length).sin_cos();
+            let phasor = self.coordinate(basis.len() + k) * Complex::new(cos, sin);
+            self.set_coordinate(basis.len() + k, phasor);
+        }
+    }
+
     /// Takes exit `exit`.
-    fn switch<O: Observer>(&mut self, system: &System, exit: usize, crossing: Crossing, observer: &mut O) {
+    #[inline(always)]
+    fn switch<M: Math, O: Observer>(
+        &mut self,
+        system: &System,
+        exit: usize,
+        crossing: Crossing,
+        observer: &mut O,
+    ) {
         self.switches += 1;
         let description = &system.exits()[self.regime][exit];
         let prepared = &system.prepared(self.regime)[exit];
@@ -275,23 +419,28 @@ impl Flow {
             (Some(sticking), true) => (sticking, prepared.sticking_twin),
             _ => (&prepared.switch, prepared.twin),
         };
-        observer.switch(&SwitchView {
-            system,
-            switch,
-            exit,
-            stuck,
-            phase: self.phase,
-            rate: crossing.rate,
-            grazing: crossing.grazing,
-            modal: &self.modal,
-        });
-        self.change_basis(system, switch);
+        if !O::IDLE {
+            self.unpack_modal(system.regimes()[self.regime].basis().len());
+            observer.switch(&SwitchView {
+                system,
+                switch,
+                exit,
+                stuck,
+                phase: self.phase,
+                rate: crossing.rate,
+                grazing: crossing.grazing,
+                modal: &self.modal,
+            });
+        }
+        self.change_basis::<M>(switch);
         self.surface = twin.map(|twin| {
             let start = if description.release {
                 Start::Release
-            } else if description.reset.is_none() && crossing.grazing {
+            } else if description.reset.is_none() && crossing.refined {
                 // The rate is continuous and here known better than from the sums.
-                Start::Surface { rate: Some(-crossing.rate) }
+                Start::Surface {
+                    rate: Some(-crossing.rate),
+                }
             } else {
                 Start::Surface { rate: None }
             };
@@ -304,35 +453,55 @@ impl Flow {
     /// sequence is below rounding.
     fn chatter_ends(&mut self, system: &System, exit: usize, crossing: Crossing) -> bool {
         let prepared = &system.prepared(self.regime)[exit];
-        let Some(acceleration) = &prepared.acceleration else { return false };
+        let Some(acceleration) = &prepared.acceleration else {
+            return false;
+        };
         let mut state = std::mem::take(&mut self.state);
         self.state(&mut state);
         let pressed = -acceleration.at(system.drive(), &state, self.phase);
         self.state = state;
-        let fastest = self.signal.fastest().max(std::f64::consts::TAU / system.drive().period());
+        let fastest = self
+            .signal
+            .fastest()
+            .max(std::f64::consts::TAU / system.drive().period());
         // Flights last about 2|ġ|/a; a must keep its sign for far longer than that.
         pressed > 0.0 && -crossing.rate * fastest <= CHATTER_RESOLUTION * pressed
     }
 
-    fn change_basis(&mut self, system: &System, switch: &Switch) {
-        let (to, from) = (switch.matrix.nrows() / 2, switch.matrix.ncols() / 2);
-        let stacked = &mut self.stacked[..2 * to];
-        stacked.copy_from_slice(switch.constant.as_slice());
-        for (k, [real, imaginary]) in switch.tones.iter().enumerate() {
-            let phasor = system.drive().phasor(k, self.phase);
-            for (s, (r, i)) in stacked.iter_mut().zip(real.iter().zip(imaginary.iter())) {
-                *s += r * phasor.re - i * phasor.im;
+    #[inline(always)]
+    fn change_basis<M: Math>(&mut self, switch: &Switch) {
+        let packed = &switch.packed;
+        let packs = packed.packs;
+        let count = packed.columns.len() / packs;
+        let inputs = (count - 1) / 2;
+        self.next.resize(packs, [[0.0; WIDTH]; 2]);
+        for (i, out) in self.next.iter_mut().enumerate() {
+            let constant = &packed.columns[(count - 1) * packs + i];
+            let mut sum = [M::load(&constant[0]), M::load(&constant[1])];
+            for part in 0..2 {
+                for k in 0..inputs {
+                    let x = M::splat(self.packed[k / WIDTH][part][k % WIDTH]);
+                    let [re, im] = &packed.columns[(part * inputs + k) * packs + i];
+                    sum = [
+                        M::fma(M::load(re), x, sum[0]),
+                        M::fma(M::load(im), x, sum[1]),
+                    ];
+                }
             }
+            *out = sum.map(M::store);
         }
-        for (k, q) in self.modal.iter().enumerate() {
-            let (re, im) = (switch.matrix.column(k), switch.matrix.column(from + k));
-            for (s, (a, b)) in stacked.iter_mut().zip(re.iter().zip(im.iter())) {
-                *s += a * q.re + b * q.im;
-            }
-        }
-        self.modal.resize(to, Complex::new(0.0, 0.0));
-        for (k, q) in self.modal.iter_mut().enumerate() {
-            *q = Complex::new(stacked[k], stacked[to + k]);
-        }
+        std::mem::swap(&mut self.packed, &mut self.next);
+    }
+}
+
+/// Whether this machine has fused multiply-add in vectors of four.
+pub(crate) fn fused_available() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        false
     }
 }

@@ -17,7 +17,10 @@ pub struct HarmonicVector {
 impl HarmonicVector {
     /// Zero, for a state of dimension `n` and `tones` tones.
     pub fn zeros(n: usize, tones: usize) -> Self {
-        Self { constant: DVector::zeros(n), tones: vec![DVector::zeros(n); tones] }
+        Self {
+            constant: DVector::zeros(n),
+            tones: vec![DVector::zeros(n); tones],
+        }
     }
 
     /// Adds `sine · sin ω_k t + cosine · cos ω_k t`.
@@ -55,7 +58,10 @@ impl HarmonicVector {
             .zip(drive.frequencies())
             .map(|(z, &w)| z * Complex::new(0.0, w))
             .collect();
-        Self { constant: DVector::zeros(self.constant.len()), tones }
+        Self {
+            constant: DVector::zeros(self.constant.len()),
+            tones,
+        }
     }
 
     /// `matrix · self`.
@@ -82,8 +88,17 @@ impl HarmonicVector {
         }
     }
 
-    pub(crate) fn check(&self, what: &'static str, n: usize, tones: usize) -> Result<(), FlowError> {
-        let shape = |found, expected| FlowError::Shape { what, found, expected };
+    pub(crate) fn check(
+        &self,
+        what: &'static str,
+        n: usize,
+        tones: usize,
+    ) -> Result<(), FlowError> {
+        let shape = |found, expected| FlowError::Shape {
+            what,
+            found,
+            expected,
+        };
         if self.constant.len() != n {
             return Err(shape(self.constant.len(), n));
         }
@@ -96,8 +111,16 @@ impl HarmonicVector {
             }
         }
         let finite = self.constant.iter().all(|v| v.is_finite())
-            && self.tones.iter().flat_map(|z| z.iter()).all(|z| z.re.is_finite() && z.im.is_finite());
-        if finite { Ok(()) } else { Err(FlowError::NotFinite { what }) }
+            && self
+                .tones
+                .iter()
+                .flat_map(|z| z.iter())
+                .all(|z| z.re.is_finite() && z.im.is_finite());
+        if finite {
+            Ok(())
+        } else {
+            Err(FlowError::NotFinite { what })
+        }
     }
 }
 
@@ -116,7 +139,11 @@ pub struct Output {
 impl Output {
     /// `row · x` alone, for a drive of `tones` tones.
     pub fn linear(row: RowDVector<f64>, tones: usize) -> Self {
-        Self { row, constant: 0.0, tones: vec![Complex::new(0.0, 0.0); tones] }
+        Self {
+            row,
+            constant: 0.0,
+            tones: vec![Complex::new(0.0, 0.0); tones],
+        }
     }
 
     /// Adds `sine · sin ω_k t + cosine · cos ω_k t`.
@@ -149,15 +176,24 @@ impl Output {
         Self {
             row: &self.row + factor * &other.row,
             constant: self.constant + factor * other.constant,
-            tones: self.tones.iter().zip(&other.tones).map(|(a, b)| a + b * factor).collect(),
+            tones: self
+                .tones
+                .iter()
+                .zip(&other.tones)
+                .map(|(a, b)| a + b * factor)
+                .collect(),
         }
     }
 
     /// The value at state `x` and time `t`.
     pub fn at(&self, drive: &Drive, x: &[f64], t: f64) -> f64 {
         let linear: f64 = self.row.iter().zip(x).map(|(r, x)| r * x).sum();
-        let harmonic: f64 =
-            self.tones.iter().enumerate().map(|(k, z)| (z * drive.phasor(k, t)).re).sum();
+        let harmonic: f64 = self
+            .tones
+            .iter()
+            .enumerate()
+            .map(|(k, z)| (z * drive.phasor(k, t)).re)
+            .sum();
         linear + self.constant + harmonic
     }
 
@@ -174,19 +210,43 @@ impl Output {
             .zip(drive.frequencies())
             .map(|((z, f), &w)| z * Complex::new(0.0, w) + dot(f))
             .collect();
-        Self { row: &self.row * matrix, constant: (&self.row * &forcing.constant)[0], tones }
+        Self {
+            row: &self.row * matrix,
+            constant: (&self.row * &forcing.constant)[0],
+            tones,
+        }
     }
 
-    pub(crate) fn check(&self, what: &'static str, n: usize, tones: usize) -> Result<(), FlowError> {
+    pub(crate) fn check(
+        &self,
+        what: &'static str,
+        n: usize,
+        tones: usize,
+    ) -> Result<(), FlowError> {
         if self.row.len() != n {
-            return Err(FlowError::Shape { what, found: self.row.len(), expected: n });
+            return Err(FlowError::Shape {
+                what,
+                found: self.row.len(),
+                expected: n,
+            });
         }
         if self.tones.len() != tones {
-            return Err(FlowError::Shape { what, found: self.tones.len(), expected: tones });
+            return Err(FlowError::Shape {
+                what,
+                found: self.tones.len(),
+                expected: tones,
+            });
         }
         let finite = self.constant.is_finite()
             && self.row.iter().all(|v| v.is_finite())
-            && self.tones.iter().all(|z| z.re.is_finite() && z.im.is_finite());
-        if finite { Ok(()) } else { Err(FlowError::NotFinite { what }) }
+            && self
+                .tones
+                .iter()
+                .all(|z| z.re.is_finite() && z.im.is_finite());
+        if finite {
+            Ok(())
+        } else {
+            Err(FlowError::NotFinite { what })
+        }
     }
 }

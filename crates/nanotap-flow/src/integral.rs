@@ -19,16 +19,21 @@ fn terms(signal: &Signal) -> Vec<Term> {
         power: 0,
         amplitude: Complex::new(signal.constant, 0.0),
     };
-    let simple = signal
-        .rates
-        .iter()
-        .zip(&signal.amplitudes)
-        .map(|(&rate, &amplitude)| Term { rate, power: 0, amplitude });
-    let powers = signal
-        .powers
-        .iter()
-        .map(|t| Term { rate: t.rate, power: t.power, amplitude: t.amplitude });
-    std::iter::once(constant).chain(simple).chain(powers).filter(|t| t.amplitude.norm() != 0.0).collect()
+    let simple = signal.terms().map(|(rate, amplitude)| Term {
+        rate,
+        power: 0,
+        amplitude,
+    });
+    let powers = signal.powers.iter().map(|t| Term {
+        rate: t.rate,
+        power: t.power,
+        amplitude: t.amplitude,
+    });
+    std::iter::once(constant)
+        .chain(simple)
+        .chain(powers)
+        .filter(|t| t.amplitude.norm() != 0.0)
+        .collect()
 }
 
 /// `(e^z − 1)/z`, accurate for every `z`.
@@ -68,7 +73,10 @@ fn moment(rate: Complex, power: u32, length: f64) -> Complex {
 
 /// `∫₀^length g ds`.
 pub fn integral(signal: &Signal, length: f64) -> f64 {
-    terms(signal).iter().map(|t| (t.amplitude * moment(t.rate, t.power, length)).re).sum()
+    terms(signal)
+        .iter()
+        .map(|t| (t.amplitude * moment(t.rate, t.power, length)).re)
+        .sum()
 }
 
 /// `∫₀^length g(s) e^{−iω(start + s)} ds`.
@@ -93,7 +101,8 @@ pub fn product_integral(g: &Signal, h: &Signal, length: f64) -> f64 {
         for b in &h {
             let power = a.power + b.power;
             let direct = a.amplitude * b.amplitude * moment(a.rate + b.rate, power, length);
-            let crossed = a.amplitude * b.amplitude.conj() * moment(a.rate + b.rate.conj(), power, length);
+            let crossed =
+                a.amplitude * b.amplitude.conj() * moment(a.rate + b.rate.conj(), power, length);
             sum += 0.5 * (direct.re + crossed.re);
         }
     }
@@ -103,22 +112,36 @@ pub fn product_integral(g: &Signal, h: &Signal, length: f64) -> f64 {
 impl PiecewiseSignal {
     /// The integral over the whole time covered.
     pub fn integral(&self) -> f64 {
-        self.pieces.iter().map(|p| integral(&p.signal, p.length)).sum()
+        self.pieces
+            .iter()
+            .map(|p| integral(&p.signal, p.length))
+            .sum()
     }
 
     /// The time mean (0 of an empty signal).
     pub fn mean(&self) -> f64 {
         let duration = self.duration();
-        if duration > 0.0 { self.integral() / duration } else { 0.0 }
+        if duration > 0.0 {
+            self.integral() / duration
+        } else {
+            0.0
+        }
     }
 
     /// The Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the duration `D`, so
     /// that the component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, omega: f64) -> Complex {
-        let sum: Complex =
-            self.pieces.iter().map(|p| fourier_integral(&p.signal, p.start, p.length, omega)).sum();
+        let sum: Complex = self
+            .pieces
+            .iter()
+            .map(|p| fourier_integral(&p.signal, p.start, p.length, omega))
+            .sum();
         let duration = self.duration();
-        if duration > 0.0 { sum * 2.0 / duration } else { Complex::new(0.0, 0.0) }
+        if duration > 0.0 {
+            sum * 2.0 / duration
+        } else {
+            Complex::new(0.0, 0.0)
+        }
     }
 
     /// `∫ g h dt` with another output of the same trajectory (the same pieces).
@@ -138,7 +161,9 @@ mod tests {
     fn simpson(f: impl Fn(f64) -> f64, length: f64) -> f64 {
         let n = 20_000;
         let h = length / f64::from(n);
-        let inner: f64 = (1..n).map(|i| f(f64::from(i) * h) * if i % 2 == 1 { 4.0 } else { 2.0 }).sum();
+        let inner: f64 = (1..n)
+            .map(|i| f(f64::from(i) * h) * if i % 2 == 1 { 4.0 } else { 2.0 })
+            .sum();
         (f(0.0) + f(length) + inner) * h / 3.0
     }
 
@@ -146,23 +171,29 @@ mod tests {
     fn integrals_agree_with_simpsons_rule() {
         let g = Signal::from_terms(
             0.4,
-            vec![Complex::new(-0.3, 5.0), Complex::new(0.0, 2.6), Complex::new(-1e-9, 0.0)],
-            vec![Complex::new(0.7, 0.2), Complex::new(-0.1, 0.3), Complex::new(0.2, 0.0)],
+            &[
+                (Complex::new(-0.3, 5.0), Complex::new(0.7, 0.2)),
+                (Complex::new(0.0, 2.6), Complex::new(-0.1, 0.3)),
+                (Complex::new(-1e-9, 0.0), Complex::new(0.2, 0.0)),
+            ],
+            Vec::new(),
             2.4,
         );
-        let mut h = Signal::from_terms(
-            -0.1,
-            vec![Complex::new(-2.0, 0.0), Complex::new(0.0, 2.6)],
-            vec![Complex::new(0.9, 0.0), Complex::new(0.5, 0.1)],
-            2.4,
-        );
-        for (power, rate) in [(1, 0.0), (2, -0.7), (3, -40.0)] {
-            h.powers.push(crate::signal::PowerTerm {
+        let powers =
+            [(1, 0.0), (2, -0.7), (3, -40.0)].map(|(power, rate)| crate::signal::PowerTerm {
                 rate: Complex::new(rate, 0.0),
                 power,
                 amplitude: Complex::new(0.6, 0.0),
             });
-        }
+        let h = Signal::from_terms(
+            -0.1,
+            &[
+                (Complex::new(-2.0, 0.0), Complex::new(0.9, 0.0)),
+                (Complex::new(0.0, 2.6), Complex::new(0.5, 0.1)),
+            ],
+            powers.to_vec(),
+            2.4,
+        );
         let l = 2.4;
         assert!((integral(&g, l) - simpson(|s| g.at(s), l)).abs() < 1e-12);
         assert!((integral(&h, l) - simpson(|s| h.at(s), l)).abs() < 1e-11);

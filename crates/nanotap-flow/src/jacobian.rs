@@ -20,9 +20,16 @@ impl Jacobian {
         let left = &regime.basis().left;
         let (m, n) = left.shape();
         let mut columns = DMatrix::zeros(2 * m, n);
-        columns.view_mut((0, 0), (m, n)).copy_from(&left.map(|z| z.re));
-        columns.view_mut((m, 0), (m, n)).copy_from(&left.map(|z| z.im));
-        Self { columns, scratch: Vec::new() }
+        columns
+            .view_mut((0, 0), (m, n))
+            .copy_from(&left.map(|z| z.re));
+        columns
+            .view_mut((m, 0), (m, n))
+            .copy_from(&left.map(|z| z.im));
+        Self {
+            columns,
+            scratch: Vec::new(),
+        }
     }
 
     /// `∂x/∂x₀` (`n × n`) of a flow that is in `regime` now.
@@ -58,7 +65,8 @@ impl Observer for Jacobian {
         }
         for mut column in self.columns.column_iter_mut() {
             self.scratch.clear();
-            self.scratch.extend((0..m).map(|k| Complex::new(column[k], column[m + k])));
+            self.scratch
+                .extend((0..m).map(|k| Complex::new(column[k], column[m + k])));
             basis.apply(&mut self.scratch, segment.length, segment.factors);
             for (k, q) in self.scratch.iter().enumerate() {
                 column[k] = q.re;
@@ -68,18 +76,31 @@ impl Observer for Jacobian {
     }
 
     fn switch(&mut self, view: &SwitchView<'_>) {
-        self.columns = match &view.switch.tangent {
-            Some(tangent) => tangent * &self.columns,
-            None => {
-                let regime = &view.system.regimes()[view.switch.from];
-                let mut x = DVector::zeros(view.system.dimension());
-                regime.to_state(view.system.drive(), view.modal, view.phase, x.as_mut_slice());
-                let saltation =
-                    view.system.saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
-                &view.switch.to_modal * (saltation * (&view.switch.from_modal * &self.columns))
-            }
-        };
+        if let Some(tangent) = &view.switch.tangent {
+            self.columns = product(tangent, &self.columns);
+            return;
+        }
+        let regime = &view.system.regimes()[view.switch.from];
+        let mut x = DVector::zeros(view.system.dimension());
+        let modal = view.modal.iter().copied();
+        regime.to_state(view.system.drive(), modal, view.phase, x.as_mut_slice());
+        let saltation =
+            view.system
+                .saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
+        self.columns =
+            &view.switch.to_modal * (saltation * (&view.switch.from_modal * &self.columns));
     }
+}
+
+/// `a b`; small matrices, for which a general product would be mostly set-up.
+fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
+    for (mut out, b) in out.column_iter_mut().zip(b.column_iter()) {
+        for (a, &factor) in a.column_iter().zip(b.iter()) {
+            out.axpy(factor, &a, 1.0);
+        }
+    }
+    out
 }
 
 impl Flow {
@@ -88,7 +109,10 @@ impl Flow {
     ///
     /// # Errors
     /// As [`Flow::run_period`].
-    pub fn run_period_with_jacobian(&mut self, jacobian: &mut DMatrix<f64>) -> Result<(), FlowError> {
+    pub fn run_period_with_jacobian(
+        &mut self,
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), FlowError> {
         let mut carried = Jacobian::identity(&self.system().regimes()[self.regime()]);
         self.run_period(&mut carried)?;
         carried.to_state(&self.system().regimes()[self.regime()], jacobian);

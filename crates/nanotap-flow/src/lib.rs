@@ -19,6 +19,10 @@
 //!
 //! Nothing here knows of periods, attractors or microscopes.
 
+// The inner loop is compiled once for any machine and once inside a function for machines
+// with vector registers; only what is inlined there gets their instructions.
+#![allow(clippy::inline_always)]
+
 pub mod crossing;
 mod double_double;
 pub mod drive;
@@ -29,6 +33,7 @@ pub mod flow;
 pub mod harmonic;
 pub mod integral;
 pub mod jacobian;
+mod pack;
 pub mod regime;
 pub mod sensitivity;
 pub mod signal;

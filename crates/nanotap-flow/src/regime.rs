@@ -1,5 +1,7 @@
 //! One linear regime, `ẋ = A x + f(t)` with harmonic `f`, solved in closed form.
 
+use crate::pack::{Pack, WIDTH};
+use crate::signal::relaxation_masks;
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
 use nalgebra::{DMatrix, DVector};
 
@@ -44,7 +46,12 @@ impl Regime {
     ) -> Result<Self, FlowError> {
         check(&matrix, &forcing, drive)?;
         let response = forced_response(index, &forcing, drive, &basis)?;
-        Ok(Self { matrix, forcing, basis, response })
+        Ok(Self {
+            matrix,
+            forcing,
+            basis,
+            response,
+        })
     }
 
     /// `A`.
@@ -88,9 +95,15 @@ impl Regime {
     }
 
     /// The state of modal coordinates `q` at time `t`, written to `x`.
-    pub(crate) fn to_state(&self, drive: &Drive, q: &[Complex], t: f64, x: &mut [f64]) {
+    pub(crate) fn to_state(
+        &self,
+        drive: &Drive,
+        q: impl IntoIterator<Item = Complex>,
+        t: f64,
+        x: &mut [f64],
+    ) {
         x.copy_from_slice(self.response.at(drive, t).as_slice());
-        for (k, q) in q.iter().enumerate() {
+        for (k, q) in q.into_iter().enumerate() {
             for (x, r) in x.iter_mut().zip(self.basis.right.column(k).iter()) {
                 *x += r.re * q.re - r.im * q.im;
             }
@@ -103,7 +116,9 @@ impl Regime {
             output.row.iter().zip(column).map(|(r, z)| z * *r).sum()
         };
         ModalOutput {
-            modal: (0..self.basis.len()).map(|k| dot(self.basis.right.column(k).as_slice())).collect(),
+            modal: (0..self.basis.len())
+                .map(|k| dot(self.basis.right.column(k).as_slice()))
+                .collect(),
             tones: output
                 .tones
                 .iter()
@@ -126,16 +141,94 @@ pub struct ModalOutput {
     pub constant: f64,
 }
 
+/// A [`ModalOutput`] of a regime without clusters, packed for the inner loop: modal
+/// coordinates first, then the tones' phasors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Kernel {
+    pub(crate) packs: Vec<KernelPack>,
+    pub(crate) count: usize,
+    pub(crate) constant: f64,
+    /// The largest `|λ|`.
+    pub(crate) fastest: f64,
+    /// Whether some `Re λ` is positive.
+    pub(crate) grows: bool,
+}
+
+/// Four terms of a kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct KernelPack {
+    pub(crate) decay: Pack,
+    pub(crate) frequency: Pack,
+    pub(crate) weight: [Pack; 2],
+    /// `|λ|³`.
+    pub(crate) cube: Pack,
+    /// Which terms each lower bound follows.
+    pub(crate) masks: [Pack; 2],
+}
+
+impl Kernel {
+    /// Packs `output` of `regime`.
+    pub(crate) fn new(regime: &Regime, drive: &Drive, output: &ModalOutput) -> Self {
+        let modal = regime
+            .basis
+            .eigenvalues
+            .iter()
+            .copied()
+            .zip(output.modal.iter().copied());
+        let tones = drive
+            .frequencies()
+            .iter()
+            .map(|&w| Complex::new(0.0, w))
+            .zip(output.tones.iter().copied());
+        let terms: Vec<(Complex, Complex)> = modal.chain(tones).collect();
+        let mut kernel = Self {
+            packs: vec![KernelPack::default(); terms.len().div_ceil(WIDTH)],
+            count: terms.len(),
+            constant: output.constant,
+            ..Self::default()
+        };
+        let rates: Vec<Complex> = terms.iter().map(|t| t.0).collect();
+        let masks = relaxation_masks(&rates);
+        for (k, (rate, weight)) in terms.into_iter().enumerate() {
+            let (pack, i) = (&mut kernel.packs[k / WIDTH], k % WIDTH);
+            for (lanes, mask) in pack.masks.iter_mut().zip(masks[k]) {
+                lanes[i] = mask;
+            }
+            let norm = rate.norm();
+            pack.decay[i] = rate.re;
+            pack.frequency[i] = rate.im;
+            pack.weight[0][i] = weight.re;
+            pack.weight[1][i] = weight.im;
+            pack.cube[i] = norm.powi(3);
+            if weight.norm() > 0.0 {
+                kernel.fastest = kernel.fastest.max(norm);
+                kernel.grows |= rate.re > 0.0;
+            }
+        }
+        kernel
+    }
+}
+
 fn check(matrix: &DMatrix<f64>, forcing: &HarmonicVector, drive: &Drive) -> Result<(), FlowError> {
     let n = matrix.nrows();
     if n == 0 {
-        return Err(FlowError::Shape { what: "a regime's matrix", found: 0, expected: 1 });
+        return Err(FlowError::Shape {
+            what: "a regime's matrix",
+            found: 0,
+            expected: 1,
+        });
     }
     if matrix.ncols() != n {
-        return Err(FlowError::Shape { what: "a regime's matrix", found: matrix.ncols(), expected: n });
+        return Err(FlowError::Shape {
+            what: "a regime's matrix",
+            found: matrix.ncols(),
+            expected: n,
+        });
     }
     if matrix.iter().any(|v| !v.is_finite()) {
-        return Err(FlowError::NotFinite { what: "a regime's matrix" });
+        return Err(FlowError::NotFinite {
+            what: "a regime's matrix",
+        });
     }
     forcing.check("a regime's forcing", n, drive.frequencies().len())
 }
@@ -149,7 +242,11 @@ fn forced_response(
 ) -> Result<HarmonicVector, FlowError> {
     let n = forcing.constant.len();
     let resonance = |frequency: f64| {
-        move |mode: Complex| FlowError::Resonance { regime: index, frequency, mode: mode.im.abs() }
+        move |mode: Complex| FlowError::Resonance {
+            regime: index,
+            frequency,
+            mode: mode.im.abs(),
+        }
     };
     let mut tones = Vec::with_capacity(forcing.tones.len());
     for (tone, &omega) in forcing.tones.iter().zip(drive.frequencies()) {
@@ -170,7 +267,9 @@ fn forced_response(
         tones.push(real + imaginary * Complex::new(0.0, 1.0));
     }
     let b = &basis.left * forcing.constant.map(|v| Complex::new(v, 0.0));
-    let y = basis.resolvent(Complex::new(0.0, 0.0), &b).map_err(resonance(0.0))?;
+    let y = basis
+        .resolvent(Complex::new(0.0, 0.0), &b)
+        .map_err(resonance(0.0))?;
     let constant = (&basis.right * y).map(|z| z.re);
     debug_assert_eq!(constant.len(), n);
     Ok(HarmonicVector { constant, tones })

@@ -41,10 +41,17 @@ impl SystemTangent {
     /// The derivative of nothing: every entry zero, to be filled in.
     pub fn zeros(system: &System) -> Self {
         let (n, tones) = (system.dimension(), system.drive().frequencies().len());
-        let regime = RegimeTangent { matrix: DMatrix::zeros(n, n), forcing: HarmonicVector::zeros(n, tones) };
+        let regime = RegimeTangent {
+            matrix: DMatrix::zeros(n, n),
+            forcing: HarmonicVector::zeros(n, tones),
+        };
         Self {
             regimes: vec![regime; system.regimes().len()],
-            guards: system.exits().iter().map(|e| e.iter().map(|e| e.guard.scaled(0.0)).collect()).collect(),
+            guards: system
+                .exits()
+                .iter()
+                .map(|e| e.iter().map(|e| e.guard.scaled(0.0)).collect())
+                .collect(),
             resets: system.exits().iter().map(|e| vec![None; e.len()]).collect(),
             log_period: 0.0,
         }
@@ -103,7 +110,11 @@ impl Source {
 
 /// `∫₀^L e^{λ(L−τ)} e^{μτ} dτ`, without overflow or cancellation.
 fn response(lambda: Complex, mu: Complex, length: f64) -> Complex {
-    let (slow, fast) = if lambda.re >= mu.re { (lambda, mu) } else { (mu, lambda) };
+    let (slow, fast) = if lambda.re >= mu.re {
+        (lambda, mu)
+    } else {
+        (mu, lambda)
+    };
     (slow * length).exp() * phi1((fast - slow) * length) * length
 }
 
@@ -115,18 +126,27 @@ impl<'a> Sensitivity<'a> {
             .iter()
             .map(|t| {
                 let pairs = system.regimes().iter().zip(&t.regimes);
-                pairs.map(|(r, tangent)| Source::new(r, tangent, t.log_period)).collect()
+                pairs
+                    .map(|(r, tangent)| Source::new(r, tangent, t.log_period))
+                    .collect()
             })
             .collect();
         let m = system.regimes()[regime].basis().len();
-        Self { tangents, sources, modal: vec![vec![Complex::new(0.0, 0.0); m]; tangents.len()] }
+        Self {
+            tangents,
+            sources,
+            modal: vec![vec![Complex::new(0.0, 0.0); m]; tangents.len()],
+        }
     }
 
     /// `∂x/∂θ_p` (length `n`) of a flow that is in `regime` now.
     pub fn to_state(&self, regime: &Regime, p: usize, derivative: &mut [f64]) {
         derivative.fill(0.0);
         for (k, q) in self.modal[p].iter().enumerate() {
-            for (d, r) in derivative.iter_mut().zip(regime.basis().right.column(k).iter()) {
+            for (d, r) in derivative
+                .iter_mut()
+                .zip(regime.basis().right.column(k).iter())
+            {
                 *d += r.re * q.re - r.im * q.im;
             }
         }
@@ -150,17 +170,30 @@ impl Observer for Sensitivity<'_> {
         let system = view.system;
         let from = &system.regimes()[view.switch.from];
         let mut x = DVector::zeros(system.dimension());
-        from.to_state(system.drive(), view.modal, view.phase, x.as_mut_slice());
+        from.to_state(
+            system.drive(),
+            view.modal.iter().copied(),
+            view.phase,
+            x.as_mut_slice(),
+        );
         let saltation = system.saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
         let exit = &system.exits()[view.switch.from][view.exit];
-        let reset = if view.stuck { exit.sticking.as_ref().map(|s| &s.reset) } else { exit.reset.as_ref() };
+        let reset = if view.stuck {
+            exit.sticking.as_ref().map(|s| &s.reset)
+        } else {
+            exit.reset.as_ref()
+        };
         let n = system.dimension();
         let jump = reset.map_or_else(|| DMatrix::identity(n, n), |r| r.matrix.clone());
         let mut before = DVector::zeros(n);
         for p in 0..self.tangents.len() {
             self.to_state(from, p, before.as_mut_slice());
             let tangent = &self.tangents[p];
-            let guard = tangent.guards[view.switch.from][view.exit].at(system.drive(), x.as_slice(), view.phase);
+            let guard = tangent.guards[view.switch.from][view.exit].at(
+                system.drive(),
+                x.as_slice(),
+                view.phase,
+            );
             let mut after = &saltation * &before;
             // The part of the saltation beyond the jump is u hᵀ with h s + ∂g in place
             // of h s: the switch moves with the guard as well.
@@ -170,12 +203,16 @@ impl Observer for Sensitivity<'_> {
                 let u = (&saltation - &jump) * along.transpose() / size;
                 after += u * guard;
             }
-            if let (Some(change), false) = (&tangent.resets[view.switch.from][view.exit], view.stuck) {
+            if let (Some(change), false) =
+                (&tangent.resets[view.switch.from][view.exit], view.stuck)
+            {
                 after += &change.matrix * &x + change.offset.at(system.drive(), view.phase);
             }
             let stacked = &view.switch.to_modal * after;
             let m = stacked.len() / 2;
-            self.modal[p] = (0..m).map(|k| Complex::new(stacked[k], stacked[m + k])).collect();
+            self.modal[p] = (0..m)
+                .map(|k| Complex::new(stacked[k], stacked[m + k]))
+                .collect();
         }
     }
 }
@@ -189,7 +226,9 @@ fn simple_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<
         let mut sum = *sigma * segment.factors[k];
         for (j, q) in segment.modal.iter().enumerate() {
             sum += source.direct[(k, j)] * q * response(lambda, lambdas[j], segment.length);
-            sum += source.mirrored[(k, j)] * q.conj() * response(lambda, lambdas[j].conj(), segment.length);
+            sum += source.mirrored[(k, j)]
+                * q.conj()
+                * response(lambda, lambdas[j].conj(), segment.length);
         }
         for (t, [direct, mirrored]) in source.tones.iter().enumerate() {
             let phasor = drive.phasor(t, segment.phase);
@@ -208,9 +247,20 @@ fn augmented_segment(modal: &mut [Complex], source: &Source, segment: &SegmentVi
     let regime = segment.regime();
     let drive = segment.system.drive();
     let n = segment.system.dimension();
-    let (extended, start) = augmented(regime.matrix(), regime.forcing(), source, drive, segment.phase);
+    let (extended, start) = augmented(
+        regime.matrix(),
+        regime.forcing(),
+        source,
+        drive,
+        segment.phase,
+    );
     let mut z = start;
-    regime.to_state(drive, segment.modal, segment.phase, &mut z.as_mut_slice()[n..2 * n]);
+    regime.to_state(
+        drive,
+        segment.modal.iter().copied(),
+        segment.phase,
+        &mut z.as_mut_slice()[n..2 * n],
+    );
     for (k, q) in modal.iter().enumerate() {
         for (i, r) in regime.basis().right.column(k).iter().enumerate() {
             z[i] += r.re * q.re - r.im * q.im;
@@ -218,7 +268,14 @@ fn augmented_segment(modal: &mut [Complex], source: &Source, segment: &SegmentVi
     }
     let end = (extended * segment.length).exp() * z;
     for (k, sigma) in modal.iter_mut().enumerate() {
-        *sigma = regime.basis().left.row(k).iter().zip(end.iter()).map(|(l, s)| l * *s).sum();
+        *sigma = regime
+            .basis()
+            .left
+            .row(k)
+            .iter()
+            .zip(end.iter())
+            .map(|(l, s)| l * *s)
+            .sum();
     }
 }
 

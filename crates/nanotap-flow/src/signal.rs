@@ -1,7 +1,8 @@
 //! What any linear output is inside a regime: a constant plus a finite sum of
 //! decaying complex exponentials, with bounds on its derivatives.
 
-use crate::regime::ModalOutput;
+use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
+use crate::regime::{Kernel, ModalOutput};
 use crate::{Complex, Drive, Regime};
 
 /// `g(s) = c + Re Σ_k a_k e^{λ_k s} + Re Σ_j b_j s^{p_j} e^{λ_j s}`, `s ≥ 0`.
@@ -12,13 +13,20 @@ use crate::{Complex, Drive, Regime};
 pub struct Signal {
     /// `c`.
     pub constant: f64,
-    /// `λ_k`.
-    pub rates: Vec<Complex>,
-    /// `a_k`.
-    pub amplitudes: Vec<Complex>,
     /// The terms with a power of `s`.
     pub powers: Vec<PowerTerm>,
-    lanes: Lanes,
+    /// How many terms there are without one.
+    count: usize,
+    packs: Vec<TermPack>,
+    /// Bound on the third derivative of growing terms and power terms, over the whole
+    /// segment.
+    third_constant: f64,
+    /// `|c| + Σ|a_k| + …`, the size against which rounding is measured.
+    size: f64,
+    /// The largest `|λ_k|`.
+    fastest: f64,
+    /// Whether terms only decay, so that their amplitudes bound what is to come.
+    relaxes: bool,
 }
 
 /// `Re(amplitude · s^power · e^{rate s})` with `power ≥ 1`.
@@ -34,68 +42,136 @@ pub struct PowerTerm {
 
 /// Value and first two derivatives at a point, with a bound on the third from
 /// there on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Jet {
-    /// `g`.
+    /// The value.
     pub value: f64,
-    /// `g'`.
+    /// The first derivative.
     pub rate: f64,
-    /// `g''`.
+    /// The second derivative.
     pub curvature: f64,
-    /// An upper bound of `|g'''|` from here to the end of the segment.
+    /// An upper bound of the third derivative's size from here to the end of the segment.
     pub third: f64,
 }
 
-/// The amplitudes of `g`, `g'`, `g''` and the bound on `g'''`, term by term, in
-/// separate arrays so that the compiler can run them side by side.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Lanes {
-    decay: Vec<f64>,
-    frequency: Vec<f64>,
-    value: [Vec<f64>; 2],
-    rate: [Vec<f64>; 2],
-    curvature: [Vec<f64>; 2],
-    third: Vec<f64>,
-    /// Bound on `g'''` from growing terms and power terms, over the whole segment.
-    third_constant: f64,
-    /// `|c| + Σ|a_k| + …`, the size against which rounding is measured.
-    size: f64,
+/// A [`Jet`] and jets of lower bounds of the signal, in which only the slowest terms are
+/// followed and every faster one is replaced by minus its amplitude. A fast term of
+/// small amplitude bounds the third derivative badly and the value hardly at all: far
+/// from zero these certify longer steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Enclosure {
+    pub(crate) jet: Jet,
+    pub(crate) relaxed: [Jet; RELAXATIONS],
+}
+
+/// How many lower bounds are looked at.
+const RELAXATIONS: usize = 2;
+
+/// How many of `count` terms the lower bounds follow.
+fn followed(count: usize) -> [usize; RELAXATIONS] {
+    [2, if count <= 5 { 3 } else { 4 }]
+}
+
+/// For each of the terms' rates, 1 in the lower bounds that follow it and 0 elsewhere.
+pub(crate) fn relaxation_masks(rates: &[Complex]) -> Vec<[f64; RELAXATIONS]> {
+    let mut order: Vec<usize> = (0..rates.len()).collect();
+    order.sort_by(|&a, &b| rates[a].norm().total_cmp(&rates[b].norm()));
+    let mut masks = vec![[0.0; RELAXATIONS]; rates.len()];
+    for (rank, &k) in order.iter().enumerate() {
+        masks[k] = followed(rates.len()).map(|n| if rank < n { 1.0 } else { 0.0 });
+    }
+    masks
+}
+
+/// Four terms side by side: rates, the complex amplitudes of value, rate and curvature,
+/// and the size of the third derivative. Lanes that are not used are zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct TermPack {
+    decay: Pack,
+    frequency: Pack,
+    value: [Pack; 2],
+    rate: [Pack; 2],
+    curvature: [Pack; 2],
+    third: Pack,
+    amplitude: Pack,
+    /// Which terms each lower bound follows.
+    masks: [Pack; RELAXATIONS],
 }
 
 impl Signal {
-    /// A signal from its terms; `length` is how far it will be looked at.
-    pub fn from_terms(constant: f64, rates: Vec<Complex>, amplitudes: Vec<Complex>, length: f64) -> Self {
-        let mut signal = Self { constant, rates, amplitudes, ..Self::default() };
-        signal.prepare(length);
+    /// A signal from its terms (rate and amplitude); `length` is how far it will be
+    /// looked at.
+    pub fn from_terms(
+        constant: f64,
+        terms: &[(Complex, Complex)],
+        powers: Vec<PowerTerm>,
+        length: f64,
+    ) -> Self {
+        let mut signal = Self {
+            constant,
+            powers,
+            count: terms.len(),
+            ..Self::default()
+        };
+        signal
+            .packs
+            .resize(terms.len().div_ceil(WIDTH), TermPack::default());
+        signal.size = constant.abs();
+        let rates: Vec<Complex> = terms.iter().map(|t| t.0).collect();
+        let masks = relaxation_masks(&rates);
+        signal.relaxes = signal.powers.is_empty() && rates.iter().all(|r| r.re <= 0.0);
+        for (k, &(rate, a)) in terms.iter().enumerate() {
+            let (pack, i) = (&mut signal.packs[k / WIDTH], k % WIDTH);
+            let (b, norm) = (a * rate, rate.norm());
+            let c = b * rate;
+            pack.decay[i] = rate.re;
+            pack.frequency[i] = rate.im;
+            pack.amplitude[i] = a.norm();
+            for (lanes, mask) in pack.masks.iter_mut().zip(masks[k]) {
+                lanes[i] = mask;
+            }
+            for (lanes, z) in [
+                (&mut pack.value, a),
+                (&mut pack.rate, b),
+                (&mut pack.curvature, c),
+            ] {
+                lanes[0][i] = z.re;
+                lanes[1][i] = z.im;
+            }
+            if rate.re > 0.0 {
+                signal.third_constant += c.norm() * norm * (rate.re * length).exp();
+            } else {
+                pack.third[i] = c.norm() * norm;
+            }
+            signal.size += a.norm();
+            signal.fastest = signal.fastest.max(norm);
+        }
+        for term in &signal.powers {
+            signal.third_constant += term.bound(3, length);
+            signal.size += term.bound(0, length);
+            signal.fastest = signal.fastest.max(term.rate.norm());
+        }
         signal
     }
 
     /// The signal of `output` over a segment of `regime` that starts at time `t`
     /// with modal coordinates `q`.
-    pub fn of(regime: &Regime, drive: &Drive, output: &ModalOutput, q: &[Complex], t: f64, length: f64) -> Self {
-        let mut signal = Self::default();
-        let phasors: Vec<Complex> = (0..drive.frequencies().len()).map(|k| drive.phasor(k, t)).collect();
-        signal.refill(regime, drive, output, q, &phasors, length);
-        signal
-    }
-
-    /// The same, reusing this signal's memory. `phasors` are the tones' `e^{iω_k t}`.
-    pub(crate) fn refill(
-        &mut self,
+    pub fn of(
         regime: &Regime,
         drive: &Drive,
         output: &ModalOutput,
         q: &[Complex],
-        phasors: &[Complex],
+        t: f64,
         length: f64,
-    ) {
-        self.constant = output.constant;
-        self.rates.clear();
-        self.amplitudes.clear();
-        self.powers.clear();
+    ) -> Self {
         let basis = regime.basis();
-        self.rates.extend_from_slice(&basis.eigenvalues);
-        self.amplitudes.extend(output.modal.iter().zip(q).map(|(w, q)| w * q));
+        let mut terms: Vec<(Complex, Complex)> = basis
+            .eigenvalues
+            .iter()
+            .zip(output.modal.iter().zip(q))
+            .map(|(r, (w, q))| (*r, w * q))
+            .collect();
+        let mut powers = Vec::new();
         for cluster in &basis.clusters {
             let range = cluster.start..cluster.start + cluster.size();
             for (p, matrix) in cluster.powers().iter().enumerate() {
@@ -106,89 +182,158 @@ impl Signal {
                     }
                 }
                 let rate = basis.eigenvalues[cluster.start];
-                self.powers.push(PowerTerm { rate, power: p as u32 + 1, amplitude });
+                powers.push(PowerTerm {
+                    rate,
+                    power: p as u32 + 1,
+                    amplitude,
+                });
             }
         }
-        for ((z, &omega), phasor) in output.tones.iter().zip(drive.frequencies()).zip(phasors) {
+        for (k, (z, &omega)) in output.tones.iter().zip(drive.frequencies()).enumerate() {
             if z.re != 0.0 || z.im != 0.0 {
-                self.rates.push(Complex::new(0.0, omega));
-                self.amplitudes.push(z * phasor);
+                terms.push((Complex::new(0.0, omega), z * drive.phasor(k, t)));
             }
         }
-        self.prepare(length);
+        Self::from_terms(output.constant, &terms, powers, length)
     }
 
-    fn prepare(&mut self, length: f64) {
-        let lanes = &mut self.lanes;
-        let n = self.rates.len();
-        for lane in [&mut lanes.decay, &mut lanes.frequency, &mut lanes.third]
-            .into_iter()
-            .chain(&mut lanes.value)
-            .chain(&mut lanes.rate)
-            .chain(&mut lanes.curvature)
-        {
-            lane.clear();
-            lane.reserve(n);
+    /// The signal of a regime without clusters, from packed modal coordinates and
+    /// phasors, reusing this signal's memory.
+    #[inline(always)]
+    pub(crate) fn refill<M: Math>(&mut self, kernel: &Kernel, q: &[[Pack; 2]], length: f64) {
+        self.constant = kernel.constant;
+        self.count = kernel.count;
+        self.fastest = kernel.fastest;
+        self.powers.clear();
+        self.packs.resize(kernel.packs.len(), TermPack::default());
+        let mut size = M::splat(0.0);
+        for (pack, (kernel, [qr, qi])) in self.packs.iter_mut().zip(kernel.packs.iter().zip(q)) {
+            let both = |z: &[Pack; 2]| [M::load(&z[0]), M::load(&z[1])];
+            let q = [M::load(qr), M::load(qi)];
+            let rate = [M::load(&kernel.decay), M::load(&kernel.frequency)];
+            let a = pack::complex_mul::<M>(both(&kernel.weight), q);
+            let b = pack::complex_mul::<M>(a, rate);
+            let c = pack::complex_mul::<M>(b, rate);
+            let norm = M::sqrt(M::fma(a[0], a[0], M::mul(a[1], a[1])));
+            size = M::add(size, norm);
+            pack.decay = kernel.decay;
+            pack.frequency = kernel.frequency;
+            pack.value = a.map(M::store);
+            pack.rate = b.map(M::store);
+            pack.curvature = c.map(M::store);
+            pack.third = M::store(M::mul(norm, M::load(&kernel.cube)));
+            pack.amplitude = M::store(norm);
+            pack.masks = kernel.masks;
         }
-        lanes.third_constant = 0.0;
-        lanes.size = self.constant.abs();
-        for (rate, a) in self.rates.iter().zip(&self.amplitudes) {
-            let (b, norm) = (a * rate, rate.norm());
-            let c = b * rate;
-            lanes.decay.push(rate.re);
-            lanes.frequency.push(rate.im);
-            lanes.value[0].push(a.re);
-            lanes.value[1].push(a.im);
-            lanes.rate[0].push(b.re);
-            lanes.rate[1].push(b.im);
-            lanes.curvature[0].push(c.re);
-            lanes.curvature[1].push(c.im);
-            let third = c.norm() * norm;
-            if rate.re > 0.0 {
-                lanes.third.push(0.0);
-                lanes.third_constant += third * (rate.re * length).exp();
-            } else {
-                lanes.third.push(third);
+        self.size = pack::sum::<M>(size) + self.constant.abs();
+        self.third_constant = 0.0;
+        self.relaxes = !kernel.grows;
+        if kernel.grows {
+            for pack in &mut self.packs {
+                for i in 0..WIDTH {
+                    if pack.decay[i] > 0.0 {
+                        self.third_constant += pack.third[i] * (pack.decay[i] * length).exp();
+                        pack.third[i] = 0.0;
+                    }
+                }
             }
-            lanes.size += a.norm();
         }
-        for term in &self.powers {
-            lanes.third_constant += term.bound(3, length);
-            lanes.size += term.bound(0, length);
-        }
+    }
+
+    /// Rate and amplitude of each term without a power.
+    pub fn terms(&self) -> impl Iterator<Item = (Complex, Complex)> + '_ {
+        (0..self.count).map(|k| {
+            let (pack, i) = (&self.packs[k / WIDTH], k % WIDTH);
+            let amplitude = Complex::new(pack.value[0][i], pack.value[1][i]);
+            (Complex::new(pack.decay[i], pack.frequency[i]), amplitude)
+        })
     }
 
     /// Value, rate, curvature and third-derivative bound at `s`.
     pub fn jet(&self, s: f64) -> Jet {
-        let lanes = &self.lanes;
-        let mut jet =
-            Jet { value: self.constant, rate: 0.0, curvature: 0.0, third: lanes.third_constant };
-        for k in 0..self.rates.len() {
-            let grown = (lanes.decay[k] * s).exp();
-            let (sin, cos) = (lanes.frequency[k] * s).sin_cos();
-            let (re, im) = (grown * cos, grown * sin);
-            jet.value += lanes.value[0][k] * re - lanes.value[1][k] * im;
-            jet.rate += lanes.rate[0][k] * re - lanes.rate[1][k] * im;
-            jet.curvature += lanes.curvature[0][k] * re - lanes.curvature[1][k] * im;
-            jet.third += lanes.third[k] * grown;
+        if self.fastest * s.abs() < pack::LARGEST_ANGLE {
+            self.jet_with::<Plain>(s)
+        } else {
+            self.jet_with::<Library>(s)
         }
+    }
+
+    #[inline(always)]
+    pub(crate) fn jet_with<M: Math>(&self, s: f64) -> Jet {
+        self.enclosure::<M>(s).jet
+    }
+
+    /// The jet at `s` with the jets of the lower bounds.
+    #[inline(always)]
+    pub(crate) fn enclosure<M: Math>(&self, s: f64) -> Enclosure {
+        let zero = M::splat(0.0);
+        let mut all = [zero; 4];
+        let mut slow = [[zero; 4]; RELAXATIONS];
+        let mut left_out = [zero; RELAXATIONS];
+        let at = M::splat(s);
+        for p in &self.packs {
+            let grown = pack::exp::<M>(M::mul(M::load(&p.decay), at));
+            let (sin, cos) = pack::sin_cos::<M>(M::mul(M::load(&p.frequency), at));
+            let (re, im) = (M::mul(grown, cos), M::mul(grown, sin));
+            let real = |z: &[Pack; 2]| M::fnma(M::load(&z[1]), im, M::mul(M::load(&z[0]), re));
+            let terms = [
+                real(&p.value),
+                real(&p.rate),
+                real(&p.curvature),
+                M::mul(M::load(&p.third), grown),
+            ];
+            let amplitude = M::mul(M::load(&p.amplitude), grown);
+            for i in 0..4 {
+                all[i] = M::add(all[i], terms[i]);
+            }
+            for r in 0..RELAXATIONS {
+                let mask = M::load(&p.masks[r]);
+                for i in 0..4 {
+                    slow[r][i] = M::fma(terms[i], mask, slow[r][i]);
+                }
+                left_out[r] = M::add(left_out[r], M::fnma(amplitude, mask, amplitude));
+            }
+        }
+        let jet = |sums: [f64; 4], constant: f64| Jet {
+            value: constant + sums[0],
+            rate: sums[1],
+            curvature: sums[2],
+            third: self.third_constant + sums[3],
+        };
+        let mut enclosure = Enclosure {
+            jet: jet(pack::sums::<M>(all), self.constant),
+            relaxed: [Jet::default(); RELAXATIONS],
+        };
+        if self.relaxes {
+            let left_out = pack::sums::<M>([left_out[0], left_out[1], zero, zero]);
+            for r in 0..RELAXATIONS {
+                enclosure.relaxed[r] = jet(pack::sums::<M>(slow[r]), self.constant - left_out[r]);
+            }
+        }
+        let jet = &mut enclosure.jet;
         for term in &self.powers {
             jet.value += term.derivative(0, s);
             jet.rate += term.derivative(1, s);
             jet.curvature += term.derivative(2, s);
         }
-        jet
+        enclosure
     }
 
     /// The jet at `s = 0`, which needs no exponential.
+    #[inline(always)]
     pub fn first_jet(&self) -> Jet {
-        let lanes = &self.lanes;
         let mut jet = Jet {
-            value: self.constant + lanes.value[0].iter().sum::<f64>(),
-            rate: lanes.rate[0].iter().sum(),
-            curvature: lanes.curvature[0].iter().sum(),
-            third: lanes.third_constant + lanes.third.iter().sum::<f64>(),
+            value: self.constant,
+            rate: 0.0,
+            curvature: 0.0,
+            third: self.third_constant,
         };
+        for p in &self.packs {
+            jet.value += pack::sum::<Plain>(p.value[0]);
+            jet.rate += pack::sum::<Plain>(p.rate[0]);
+            jet.curvature += pack::sum::<Plain>(p.curvature[0]);
+            jet.third += pack::sum::<Plain>(p.third);
+        }
         for term in &self.powers {
             jet.value += term.derivative(0, 0.0);
             jet.rate += term.derivative(1, 0.0);
@@ -199,11 +344,7 @@ impl Signal {
 
     /// The value at `s`.
     pub fn at(&self, s: f64) -> f64 {
-        let mut value = self.constant;
-        for (rate, a) in self.rates.iter().zip(&self.amplitudes) {
-            value += (a * (rate * s).exp()).re;
-        }
-        value + self.powers.iter().map(|term| term.derivative(0, s)).sum::<f64>()
+        self.jet(s).value
     }
 
     /// The value at `s` with an error far below double precision's (about 1e-28 of
@@ -214,71 +355,84 @@ impl Signal {
 
     /// The `order`-th derivative at `s = 0`.
     pub fn derivative_at_start(&self, order: u32) -> f64 {
-        let mut value = if order == 0 { self.constant } else { 0.0 };
-        for (rate, a) in self.rates.iter().zip(&self.amplitudes) {
-            value += (a * rate.powu(order)).re;
-        }
-        value + self.powers.iter().map(|term| term.derivative(order, 0.0)).sum::<f64>()
+        let constant = if order == 0 { self.constant } else { 0.0 };
+        let simple: f64 = self
+            .terms()
+            .map(|(rate, a)| (a * rate.powu(order)).re)
+            .sum();
+        constant
+            + simple
+            + self
+                .powers
+                .iter()
+                .map(|term| term.derivative(order, 0.0))
+                .sum::<f64>()
     }
 
     /// An upper bound of the `order`-th derivative's size over `[0, length]`.
     pub fn derivative_bound(&self, order: u32, length: f64) -> f64 {
-        let mut bound = if order == 0 { self.constant.abs() } else { 0.0 };
-        for (rate, a) in self.rates.iter().zip(&self.amplitudes) {
-            bound += a.norm() * rate.norm().powi(order as i32) * (rate.re.max(0.0) * length).exp();
-        }
-        bound + self.powers.iter().map(|term| term.bound(order, length)).sum::<f64>()
+        let constant = if order == 0 { self.constant.abs() } else { 0.0 };
+        let simple: f64 = self
+            .terms()
+            .map(|(rate, a)| {
+                a.norm() * rate.norm().powi(order as i32) * (rate.re.max(0.0) * length).exp()
+            })
+            .sum();
+        constant
+            + simple
+            + self
+                .powers
+                .iter()
+                .map(|term| term.bound(order, length))
+                .sum::<f64>()
     }
 
     /// The largest `|λ_k|`: how fast the signal can turn.
     pub fn fastest(&self) -> f64 {
-        let simple = self.rates.iter().map(|r| r.norm());
-        let powers = self.powers.iter().map(|t| t.rate.norm());
-        simple.chain(powers).fold(0.0, f64::max)
+        self.fastest
     }
 
     /// The size of rounding errors in its value.
     pub fn noise(&self) -> f64 {
-        4.0 * f64::EPSILON * self.lanes.size
+        4.0 * f64::EPSILON * self.size
     }
 
     /// Whether every term is finite.
     pub fn is_finite(&self) -> bool {
-        self.lanes.size.is_finite()
+        self.size.is_finite()
     }
 
-    /// `g'` as a signal.
+    /// The derivative as a signal.
     #[must_use]
     pub fn differentiated(&self, length: f64) -> Self {
-        let mut amplitudes: Vec<Complex> =
-            self.rates.iter().zip(&self.amplitudes).map(|(r, a)| r * a).collect();
-        let mut rates = self.rates.clone();
+        let mut terms: Vec<(Complex, Complex)> = self.terms().map(|(r, a)| (r, r * a)).collect();
         let mut powers = Vec::new();
         for term in &self.powers {
-            powers.push(PowerTerm { amplitude: term.amplitude * term.rate, ..*term });
+            powers.push(PowerTerm {
+                amplitude: term.amplitude * term.rate,
+                ..*term
+            });
             let amplitude = term.amplitude * f64::from(term.power);
             if term.power > 1 {
-                powers.push(PowerTerm { amplitude, power: term.power - 1, rate: term.rate });
+                powers.push(PowerTerm {
+                    amplitude,
+                    power: term.power - 1,
+                    rate: term.rate,
+                });
             } else {
-                rates.push(term.rate);
-                amplitudes.push(amplitude);
+                terms.push((term.rate, amplitude));
             }
         }
-        let mut signal = Self { rates, amplitudes, powers, ..Self::default() };
-        signal.prepare(length);
-        signal
+        Self::from_terms(0.0, &terms, powers, length)
     }
 
     /// `factor · g(start + s)` as a signal in `s`, to be looked at over `length`.
     #[must_use]
     pub fn shifted(&self, start: f64, factor: f64, length: f64) -> Self {
-        let mut amplitudes: Vec<Complex> = self
-            .rates
-            .iter()
-            .zip(&self.amplitudes)
-            .map(|(r, a)| a * (r * start).exp() * factor)
+        let mut terms: Vec<(Complex, Complex)> = self
+            .terms()
+            .map(|(r, a)| (r, a * (r * start).exp() * factor))
             .collect();
-        let mut rates = self.rates.clone();
         let mut powers = Vec::new();
         for term in &self.powers {
             // (s + start)^p = Σ_i C(p, i) s^i start^{p−i}
@@ -287,17 +441,18 @@ impl Signal {
             for i in (0..=term.power).rev() {
                 let amplitude = grown * binomial * start.powi((term.power - i) as i32);
                 if i == 0 {
-                    rates.push(term.rate);
-                    amplitudes.push(amplitude);
+                    terms.push((term.rate, amplitude));
                 } else {
-                    powers.push(PowerTerm { amplitude, power: i, rate: term.rate });
+                    powers.push(PowerTerm {
+                        amplitude,
+                        power: i,
+                        rate: term.rate,
+                    });
                 }
                 binomial *= f64::from(i) / f64::from(term.power - i + 1);
             }
         }
-        let mut signal = Self { constant: self.constant * factor, rates, amplitudes, powers, ..Self::default() };
-        signal.prepare(length);
-        signal
+        Self::from_terms(self.constant * factor, &terms, powers, length)
     }
 }
 
@@ -314,7 +469,8 @@ impl PowerTerm {
     fn derivative(self, order: u32, s: f64) -> f64 {
         let mut sum = Complex::new(0.0, 0.0);
         for i in 0..=order.min(self.power) {
-            sum += self.rate.powu(order - i) * self.weight(order, i) * s.powi((self.power - i) as i32);
+            sum +=
+                self.rate.powu(order - i) * self.weight(order, i) * s.powi((self.power - i) as i32);
         }
         (self.amplitude * sum * (self.rate * s).exp()).re
     }
@@ -337,19 +493,17 @@ mod tests {
     use super::*;
 
     fn example() -> Signal {
-        let mut signal = Signal::from_terms(
-            0.3,
-            vec![Complex::new(-0.2, 3.0), Complex::new(-0.5, 0.0), Complex::new(0.0, 2.6)],
-            vec![Complex::new(0.4, -0.7), Complex::new(-1.1, 0.0), Complex::new(0.1, 0.2)],
-            4.0,
-        );
-        signal.powers.push(PowerTerm {
+        let power = PowerTerm {
             rate: Complex::new(-1.0, 0.0),
             power: 2,
             amplitude: Complex::new(0.8, 0.0),
-        });
-        signal.prepare(4.0);
-        signal
+        };
+        let terms = [
+            (Complex::new(-0.2, 3.0), Complex::new(0.4, -0.7)),
+            (Complex::new(-0.5, 0.0), Complex::new(-1.1, 0.0)),
+            (Complex::new(0.0, 2.6), Complex::new(0.1, 0.2)),
+        ];
+        Signal::from_terms(0.3, &terms, vec![power], 4.0)
     }
 
     #[test]
@@ -363,10 +517,17 @@ mod tests {
             let curvature = (signal.jet(s + h).rate - signal.jet(s - h).rate) / (2.0 * h);
             assert!((jet.curvature - curvature).abs() < 1e-8);
             assert!((signal.differentiated(4.0).at(s) - jet.rate).abs() < 1e-13);
-            assert!((signal.shifted(0.4, -2.0, 4.0).at(s - 0.4 * s.min(0.0)) + 2.0 * signal.at(s + 0.4)).abs() < 1e-13);
+            assert!(
+                (signal.shifted(0.4, -2.0, 4.0).at(s - 0.4 * s.min(0.0))
+                    + 2.0 * signal.at(s + 0.4))
+                .abs()
+                    < 1e-13
+            );
         }
         let (first, zero) = (signal.first_jet(), signal.jet(0.0));
-        assert!((first.value - zero.value).abs() < 1e-15 && (first.third - zero.third).abs() < 1e-13);
+        assert!(
+            (first.value - zero.value).abs() < 1e-15 && (first.third - zero.third).abs() < 1e-13
+        );
         for order in 0..6 {
             let direct = signal.derivative_at_start(order);
             assert!(direct.abs() <= signal.derivative_bound(order, 4.0));
@@ -382,7 +543,8 @@ mod tests {
             let bound = signal.jet(s).third;
             for j in i..40 {
                 let t = 0.1 * f64::from(j);
-                let third = (signal.jet(t + 1e-4).curvature - signal.jet(t - 1e-4).curvature) / 2e-4;
+                let third =
+                    (signal.jet(t + 1e-4).curvature - signal.jet(t - 1e-4).curvature) / 2e-4;
                 assert!(third.abs() <= bound + 1e-6);
             }
         }

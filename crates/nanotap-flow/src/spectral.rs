@@ -76,7 +76,9 @@ impl SpectralBasis {
         let mut grouping = FIRST_GROUPING;
         let mut best: Option<(f64, Self)> = None;
         while grouping <= LAST_GROUPING {
-            if let Some(mut basis) = grouped_basis(&balanced, eigenvalues.as_slice(), grouping / horizon) {
+            if let Some(mut basis) =
+                grouped_basis(&balanced, eigenvalues.as_slice(), grouping / horizon)
+            {
                 let residual = basis.residual(&balanced);
                 if best.as_ref().is_none_or(|(r, _)| residual < *r) {
                     basis.finish(horizon);
@@ -113,12 +115,24 @@ impl SpectralBasis {
         left: DMatrix<Complex>,
     ) -> Result<Self, FlowError> {
         let m = eigenvalues.len();
-        for (what, found) in [("the right eigenvectors", right.ncols()), ("the left eigenvectors", left.nrows())] {
+        for (what, found) in [
+            ("the right eigenvectors", right.ncols()),
+            ("the left eigenvectors", left.nrows()),
+        ] {
             if found != m {
-                return Err(FlowError::Shape { what, found, expected: m });
+                return Err(FlowError::Shape {
+                    what,
+                    found,
+                    expected: m,
+                });
             }
         }
-        Ok(Self { eigenvalues, right, left, clusters: Vec::new() })
+        Ok(Self {
+            eigenvalues,
+            right,
+            left,
+            clusters: Vec::new(),
+        })
     }
 
     /// Number of complex coordinates.
@@ -160,7 +174,11 @@ impl SpectralBasis {
 
     /// The forced response's modal part: solves `(z − Λ) y = b` in modal
     /// coordinates, `Err` with the offending eigenvalue where `z` is one.
-    pub(crate) fn resolvent(&self, z: Complex, b: &DVector<Complex>) -> Result<DVector<Complex>, Complex> {
+    pub(crate) fn resolvent(
+        &self,
+        z: Complex,
+        b: &DVector<Complex>,
+    ) -> Result<DVector<Complex>, Complex> {
         let size = b.iter().map(|v| v.norm()).fold(0.0, f64::max);
         let mut y = DVector::zeros(b.len());
         for k in 0..self.len() {
@@ -233,14 +251,19 @@ fn groups(eigenvalues: &[Complex], distance: f64) -> Vec<Vec<Complex>> {
         for j in 0..i {
             if (eigenvalues[i] - eigenvalues[j]).norm() < distance && label[i] != label[j] {
                 let (from, to) = (label[i], label[j]);
-                label.iter_mut().filter(|l| **l == from).for_each(|l| *l = to);
+                label
+                    .iter_mut()
+                    .filter(|l| **l == from)
+                    .for_each(|l| *l = to);
             }
         }
     }
     let mut out = Vec::new();
     for k in 0..n {
-        let group: Vec<Complex> =
-            (0..n).filter(|&i| label[i] == k).map(|i| eigenvalues[i]).collect();
+        let group: Vec<Complex> = (0..n)
+            .filter(|&i| label[i] == k)
+            .map(|i| eigenvalues[i])
+            .collect();
         if group.is_empty() {
             continue;
         }
@@ -253,11 +276,16 @@ fn groups(eigenvalues: &[Complex], distance: f64) -> Vec<Vec<Complex>> {
     out
 }
 
-fn grouped_basis(matrix: &DMatrix<f64>, eigenvalues: &[Complex], distance: f64) -> Option<SpectralBasis> {
+fn grouped_basis(
+    matrix: &DMatrix<f64>,
+    eigenvalues: &[Complex],
+    distance: f64,
+) -> Option<SpectralBasis> {
     let n = matrix.nrows();
     let complex = matrix.map(|v| Complex::new(v, 0.0));
     let transposed = complex.transpose();
-    let (mut lambdas, mut rights, mut lefts, mut clusters) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut lambdas, mut rights, mut lefts, mut clusters) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for group in groups(eigenvalues, distance) {
         let real = group.iter().any(|z| z.im <= 0.0) && group.iter().any(|z| z.im >= 0.0);
         let right = invariant_subspace(&complex, eigenvalues, &group, real)?;
@@ -278,7 +306,11 @@ fn grouped_basis(matrix: &DMatrix<f64>, eigenvalues: &[Complex], distance: f64) 
             if real {
                 coupling.apply(|z| z.im = 0.0);
             }
-            clusters.push(Cluster { start: lambdas.len(), coupling, powers: Vec::new() });
+            clusters.push(Cluster {
+                start: lambdas.len(),
+                coupling,
+                powers: Vec::new(),
+            });
         }
         let weight = Complex::new(if real { 1.0 } else { 2.0 }, 0.0);
         for k in 0..size {
@@ -322,23 +354,32 @@ fn invariant_subspace(
         mean.im = 0.0;
     }
     let radius = group.iter().map(|z| (z - mean).norm()).fold(0.0, f64::max);
-    let others = eigenvalues.iter().filter(|z| !group.contains(z) && (real || z.im > 0.0 || group.len() > 1));
-    let gap = others.map(|z| (z - mean).norm()).fold(f64::INFINITY, f64::min);
-    let scale = matrix.iter().map(|z| z.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let others = eigenvalues
+        .iter()
+        .filter(|z| !group.contains(z) && (real || z.im > 0.0 || group.len() > 1));
+    let gap = others
+        .map(|z| (z - mean).norm())
+        .fold(f64::INFINITY, f64::min);
+    let scale = matrix
+        .iter()
+        .map(|z| z.norm())
+        .fold(f64::MIN_POSITIVE, f64::max);
     let (offset, rounds) = if group.len() == 1 {
         (2.0 * f64::EPSILON * scale, 3)
     } else {
         (radius.max(0.02 * gap.min(scale)), 60)
     };
     // A pivot may come out as exactly zero; a shift a little further off does not.
-    let factor = (0..4).map(|k| offset * 8.0_f64.powi(k)).find_map(|offset| {
-        let mut shifted = matrix.clone();
-        for i in 0..n {
-            shifted[(i, i)] -= mean + Complex::new(offset, 0.0);
-        }
-        let factor = shifted.lu();
-        factor.is_invertible().then_some(factor)
-    })?;
+    let factor = (0..4)
+        .map(|k| offset * 8.0_f64.powi(k))
+        .find_map(|offset| {
+            let mut shifted = matrix.clone();
+            for i in 0..n {
+                shifted[(i, i)] -= mean + Complex::new(offset, 0.0);
+            }
+            let factor = shifted.lu();
+            factor.is_invertible().then_some(factor)
+        })?;
     // Any start that is not orthogonal to the subspace will do; these numbers are
     // irregular and fixed, so that equal input gives equal bits.
     let mut basis = DMatrix::from_fn(n, group.len(), |i, j| {
@@ -347,7 +388,10 @@ fn invariant_subspace(
     });
     for _ in 0..rounds {
         basis = factor.solve(&basis)?;
-        if basis.iter().any(|z| !(z.re.is_finite() && z.im.is_finite())) {
+        if basis
+            .iter()
+            .any(|z| !(z.re.is_finite() && z.im.is_finite()))
+        {
             return None;
         }
         if real {
@@ -361,7 +405,10 @@ fn invariant_subspace(
 /// Turns each column of a (numerically) real subspace into a real vector.
 fn make_real(basis: &mut DMatrix<Complex>) {
     for mut column in basis.column_iter_mut() {
-        let largest = column.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let largest = column
+            .iter()
+            .copied()
+            .max_by(|a, b| a.norm().total_cmp(&b.norm()));
         let turn = largest.map_or(Complex::new(1.0, 0.0), |z| z.conj() / z.norm());
         for z in column.iter_mut() {
             *z = Complex::new((*z * turn).re, 0.0);
@@ -375,7 +422,10 @@ mod tests {
 
     fn propagate(matrix: &DMatrix<f64>, x: &DVector<f64>, s: f64) -> DVector<f64> {
         let basis = SpectralBasis::of(matrix, s, 0).unwrap();
-        let mut q: Vec<Complex> = (&basis.left * x.map(|v| Complex::new(v, 0.0))).iter().copied().collect();
+        let mut q: Vec<Complex> = (&basis.left * x.map(|v| Complex::new(v, 0.0)))
+            .iter()
+            .copied()
+            .collect();
         let mut factors = vec![Complex::new(0.0, 0.0); q.len()];
         basis.advance(&mut q, s, &mut factors);
         (&basis.right * DVector::from_vec(q)).map(|z| z.re)
@@ -390,7 +440,10 @@ mod tests {
             let x = DVector::from_vec(vec![0.3, -1.2]);
             let expected = (&a * 2.5).exp() * &x;
             let got = propagate(&a, &x, 2.5);
-            assert!((&got - &expected).amax() < 2e-14, "zeta {zeta}: {got} {expected}");
+            assert!(
+                (&got - &expected).amax() < 2e-14,
+                "zeta {zeta}: {got} {expected}"
+            );
         }
     }
 
@@ -401,7 +454,9 @@ mod tests {
         let a = DMatrix::from_row_slice(
             4,
             4,
-            &[0.0, 1.0, 0.0, 0.0, -1.0, -2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, -2.0],
+            &[
+                0.0, 1.0, 0.0, 0.0, -1.0, -2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, -2.0,
+            ],
         );
         let x = DVector::from_vec(vec![0.3, -1.2, 0.7, 0.4]);
         let expected = (&a * 2.0).exp() * &x;
@@ -415,7 +470,9 @@ mod tests {
         let a = DMatrix::from_row_slice(
             4,
             4,
-            &[0.0, 1.0, 0.0, 0.0, -4.0, -0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -4.0, -0.2],
+            &[
+                0.0, 1.0, 0.0, 0.0, -4.0, -0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -4.0, -0.2,
+            ],
         );
         let x = DVector::from_vec(vec![0.3, -1.2, 0.7, 0.4]);
         let expected = (&a * 3.0).exp() * &x;

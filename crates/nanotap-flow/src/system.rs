@@ -1,7 +1,8 @@
 //! A piecewise-linear system: its regimes and the exits between them.
 
 use crate::harmonic::{HarmonicVector, Output};
-use crate::regime::{ModalOutput, Regime};
+use crate::pack::{Pack, WIDTH};
+use crate::regime::{Kernel, ModalOutput, Regime};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
 
@@ -45,7 +46,13 @@ pub struct Exit {
 impl Exit {
     /// A continuous switch to `target` when `guard` falls to zero.
     pub fn new(guard: Output, target: usize) -> Self {
-        Self { guard, target, reset: None, sticking: None, release: false }
+        Self {
+            guard,
+            target,
+            reset: None,
+            sticking: None,
+            release: false,
+        }
     }
 
     /// With a jump of the state.
@@ -79,6 +86,10 @@ pub struct System {
     regimes: Vec<Regime>,
     exits: Vec<Vec<Exit>>,
     switches: Vec<Vec<PreparedExit>>,
+    /// `[Re λ, Im λ]` of each regime's modal coordinates and tones, packed.
+    rates: Vec<Vec<[Pack; 2]>>,
+    /// The largest `|λ|` of any regime or tone.
+    fastest: f64,
 }
 
 /// What an exit needs at run time.
@@ -86,6 +97,8 @@ pub struct System {
 pub(crate) struct PreparedExit {
     /// The guard in modal coordinates of the regime it leaves.
     pub(crate) guard: ModalOutput,
+    /// The same, packed.
+    pub(crate) kernel: Kernel,
     /// The change of basis of the plain switch.
     pub(crate) switch: Switch,
     /// The change of basis into the sticking regime.
@@ -109,9 +122,8 @@ pub struct Switch {
     pub to: usize,
     /// `2m⁺ × 2m⁻`, acting on `[Re q; Im q]`.
     pub(crate) matrix: DMatrix<f64>,
-    pub(crate) constant: DVector<f64>,
-    /// Multiplies `[cos ω_k t, −sin ω_k t]`, a pair of columns a tone.
-    pub(crate) tones: Vec<[DVector<f64>; 2]>,
+    /// The same with what the tones' phasors and the constant add, packed.
+    pub(crate) packed: PackedSwitch,
     /// The constant saltation `1 + u hᵀ` where the vector field's jump is
     /// proportional to the guard's rate; then the map is smooth through grazing.
     pub(crate) saltation: Option<DVector<f64>>,
@@ -123,48 +135,150 @@ pub struct Switch {
     pub(crate) to_modal: DMatrix<f64>,
 }
 
+/// A switch for packed coordinates: modal coordinates first, then phasors. The columns
+/// multiply, in this order, the real parts, the imaginary parts, and one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct PackedSwitch {
+    /// `[re, im]` packs of each column, column after column.
+    pub(crate) columns: Vec<[Pack; 2]>,
+    /// Packs a column.
+    pub(crate) packs: usize,
+}
+
+impl PackedSwitch {
+    fn new(matrix: &DMatrix<f64>, to_modal: &DMatrix<f64>, shift: &HarmonicVector) -> Self {
+        let (to, from) = (matrix.nrows() / 2, matrix.ncols() / 2);
+        let tones = shift.tones.len();
+        let packs = (to + tones).div_ceil(WIDTH);
+        let mut switch = Self {
+            columns: Vec::new(),
+            packs,
+        };
+        let mut push = |column: &[f64], phasor: Option<(usize, usize)>| {
+            let start = switch.columns.len();
+            switch.columns.resize(start + packs, [[0.0; WIDTH]; 2]);
+            for k in 0..to {
+                for part in 0..2 {
+                    switch.columns[start + k / WIDTH][part][k % WIDTH] = column[part * to + k];
+                }
+            }
+            // A phasor goes on as it is.
+            if let Some((tone, part)) = phasor {
+                let k = to + tone;
+                switch.columns[start + k / WIDTH][part][k % WIDTH] = 1.0;
+            }
+        };
+        for part in 0..2 {
+            for k in 0..from {
+                push(matrix.column(part * from + k).as_slice(), None);
+            }
+            for (tone, z) in shift.tones.iter().enumerate() {
+                // Re(z e^{iωt}) = Re z cos − Im z sin.
+                let column = if part == 0 {
+                    to_modal * z.map(|z| z.re)
+                } else {
+                    to_modal * z.map(|z| -z.im)
+                };
+                push(column.as_slice(), Some((tone, part)));
+            }
+        }
+        push((to_modal * &shift.constant).as_slice(), None);
+        switch
+    }
+}
+
 impl System {
     /// Joins regimes and exits (`exits[r]` lead out of regime `r`).
     ///
     /// # Errors
     /// When sizes do not fit or an exit leads nowhere.
-    pub fn new(drive: Drive, regimes: Vec<Regime>, exits: Vec<Vec<Exit>>) -> Result<Self, FlowError> {
+    pub fn new(
+        drive: Drive,
+        regimes: Vec<Regime>,
+        exits: Vec<Vec<Exit>>,
+    ) -> Result<Self, FlowError> {
         let dimension = regimes.first().map_or(0, |r| r.matrix().nrows());
         if dimension == 0 {
-            return Err(FlowError::Shape { what: "the list of regimes", found: 0, expected: 1 });
+            return Err(FlowError::Shape {
+                what: "the list of regimes",
+                found: 0,
+                expected: 1,
+            });
         }
         if exits.len() != regimes.len() {
-            return Err(FlowError::Shape { what: "the list of exits", found: exits.len(), expected: regimes.len() });
+            return Err(FlowError::Shape {
+                what: "the list of exits",
+                found: exits.len(),
+                expected: regimes.len(),
+            });
         }
         let tones = drive.frequencies().len();
         for regime in &regimes {
             let found = regime.matrix().nrows();
             if found != dimension {
-                return Err(FlowError::Shape { what: "a regime's matrix", found, expected: dimension });
+                return Err(FlowError::Shape {
+                    what: "a regime's matrix",
+                    found,
+                    expected: dimension,
+                });
             }
         }
         for exit in exits.iter().flatten() {
             exit.guard.check("a guard", dimension, tones)?;
-            let targets = std::iter::once(exit.target).chain(exit.sticking.as_ref().map(|s| s.regime));
+            let targets =
+                std::iter::once(exit.target).chain(exit.sticking.as_ref().map(|s| s.regime));
             for target in targets {
                 if target >= regimes.len() {
-                    return Err(FlowError::Target { target, regimes: regimes.len() });
+                    return Err(FlowError::Target {
+                        target,
+                        regimes: regimes.len(),
+                    });
                 }
             }
-            for reset in exit.reset.iter().chain(exit.sticking.as_ref().map(|s| &s.reset)) {
+            for reset in exit
+                .reset
+                .iter()
+                .chain(exit.sticking.as_ref().map(|s| &s.reset))
+            {
                 let (rows, columns) = reset.matrix.shape();
                 for found in [rows, columns] {
                     if found != dimension {
-                        return Err(FlowError::Shape { what: "a reset's matrix", found, expected: dimension });
+                        return Err(FlowError::Shape {
+                            what: "a reset's matrix",
+                            found,
+                            expected: dimension,
+                        });
                     }
                 }
                 reset.offset.check("a reset's offset", dimension, tones)?;
             }
         }
-        let mut system = Self { dimension, drive, regimes, exits, switches: Vec::new() };
+        let mut system = Self {
+            dimension,
+            drive,
+            regimes,
+            exits,
+            switches: Vec::new(),
+            rates: Vec::new(),
+            fastest: 0.0,
+        };
         system.switches = (0..system.regimes.len())
-            .map(|r| system.exits[r].iter().map(|exit| system.prepare(r, exit)).collect())
+            .map(|r| {
+                system.exits[r]
+                    .iter()
+                    .map(|exit| system.prepare(r, exit))
+                    .collect()
+            })
             .collect();
+        system.rates = system
+            .regimes
+            .iter()
+            .map(|r| packed_rates(r, &system.drive))
+            .collect();
+        let rates = system.rates.iter().flatten();
+        system.fastest = rates
+            .flat_map(|[re, im]| re.iter().zip(im).map(|(re, im)| re.hypot(*im)))
+            .fold(0.0, f64::max);
         Ok(system)
     }
 
@@ -186,6 +300,15 @@ impl System {
     /// The exits of each regime.
     pub fn exits(&self) -> &[Vec<Exit>] {
         &self.exits
+    }
+
+    /// The largest angle that any term turns through in a drive period.
+    pub(crate) fn largest_angle(&self) -> f64 {
+        self.fastest * self.drive.period()
+    }
+
+    pub(crate) fn packed_rates(&self) -> &[Vec<[Pack; 2]>] {
+        &self.rates
     }
 
     pub(crate) fn prepared(&self, regime: usize) -> &[PreparedExit] {
@@ -227,9 +350,13 @@ impl System {
             let leads_here = move |e: &&Exit| e.sticking.as_ref().is_some_and(|s| s.regime == r);
             exits.iter().filter(leads_here).map(move |e| (from, e))
         });
-        let Some((from, impact)) = impacts.next() else { return true };
+        let Some((from, impact)) = impacts.next() else {
+            return true;
+        };
         let regime = &self.regimes[from];
-        let rate = impact.guard.rate(regime.matrix(), regime.forcing(), &self.drive);
+        let rate = impact
+            .guard
+            .rate(regime.matrix(), regime.forcing(), &self.drive);
         [&impact.guard, &rate]
             .iter()
             .all(|output| output.at(&self.drive, x, t).abs() <= 64.0 * rounding(output, x))
@@ -255,17 +382,27 @@ impl System {
                 .rate(target.matrix(), target.forcing(), &self.drive)
                 .rate(target.matrix(), target.forcing(), &self.drive)
         });
+        let guard = self.regimes[from].project(&exit.guard);
         PreparedExit {
-            guard: self.regimes[from].project(&exit.guard),
+            kernel: Kernel::new(&self.regimes[from], &self.drive, &guard),
+            guard,
             switch: self.switch(from, exit.target, exit.reset.as_ref(), &exit.guard),
-            sticking: exit.sticking.as_ref().map(|s| self.switch(from, s.regime, Some(&s.reset), &exit.guard)),
+            sticking: exit
+                .sticking
+                .as_ref()
+                .map(|s| self.switch(from, s.regime, Some(&s.reset), &exit.guard)),
             twin: if exit.release {
                 // After release the guard that starts at zero is the impact's.
-                self.exits[exit.target].iter().position(|e| e.sticking.as_ref().is_some_and(|s| s.regime == from))
+                self.exits[exit.target]
+                    .iter()
+                    .position(|e| e.sticking.as_ref().is_some_and(|s| s.regime == from))
             } else {
                 self.twin(&exit.guard, exit.target)
             },
-            sticking_twin: exit.sticking.as_ref().and_then(|s| self.twin(&exit.guard, s.regime)),
+            sticking_twin: exit
+                .sticking
+                .as_ref()
+                .and_then(|s| self.twin(&exit.guard, s.regime)),
             acceleration,
         }
     }
@@ -273,7 +410,9 @@ impl System {
     /// The exit of `target` whose guard is `guard` or its negative.
     fn twin(&self, guard: &Output, target: usize) -> Option<usize> {
         let reversed = guard.scaled(-1.0);
-        self.exits[target].iter().position(|e| e.guard == reversed || e.guard == *guard)
+        self.exits[target]
+            .iter()
+            .position(|e| e.guard == reversed || e.guard == *guard)
     }
 
     fn switch(&self, from: usize, to: usize, reset: Option<&Reset>, guard: &Output) -> Switch {
@@ -284,29 +423,35 @@ impl System {
         let jump = reset.map_or(&identity, |r| &r.matrix);
         // x⁻ = Re(R q) = [Re R, −Im R] [Re q; Im q]
         let mut from_modal = DMatrix::zeros(n, 2 * ma);
-        from_modal.view_mut((0, 0), (n, ma)).copy_from(&a.basis().right.map(|z| z.re));
-        from_modal.view_mut((0, ma), (n, ma)).copy_from(&a.basis().right.map(|z| -z.im));
+        from_modal
+            .view_mut((0, 0), (n, ma))
+            .copy_from(&a.basis().right.map(|z| z.re));
+        from_modal
+            .view_mut((0, ma), (n, ma))
+            .copy_from(&a.basis().right.map(|z| -z.im));
         let mut to_modal = DMatrix::zeros(2 * mb, n);
-        to_modal.view_mut((0, 0), (mb, n)).copy_from(&b.basis().left.map(|z| z.re));
-        to_modal.view_mut((mb, 0), (mb, n)).copy_from(&b.basis().left.map(|z| z.im));
+        to_modal
+            .view_mut((0, 0), (mb, n))
+            .copy_from(&b.basis().left.map(|z| z.re));
+        to_modal
+            .view_mut((mb, 0), (mb, n))
+            .copy_from(&b.basis().left.map(|z| z.im));
         let mut shift = a.response().mapped(jump);
         if let Some(reset) = reset {
             shift = shift.plus(1.0, &reset.offset);
         }
         let shift = shift.plus(-1.0, b.response());
-        let tones = shift
-            .tones
-            .iter()
-            .map(|z| [&to_modal * z.map(|z| z.re), &to_modal * z.map(|z| z.im)])
-            .collect();
+        let matrix = &to_modal * jump * &from_modal;
+        let packed = PackedSwitch::new(&matrix, &to_modal, &shift);
         let saltation = self.constant_saltation(from, to, reset, guard);
-        let tangent = saltation.as_ref().map(|u| &to_modal * (jump + u * &guard.row) * &from_modal);
+        let tangent = saltation
+            .as_ref()
+            .map(|u| &to_modal * (jump + u * &guard.row) * &from_modal);
         Switch {
             from,
             to,
-            matrix: &to_modal * jump * &from_modal,
-            constant: &to_modal * &shift.constant,
-            tones,
+            matrix,
+            packed,
             saltation,
             tangent,
             from_modal,
@@ -351,7 +496,12 @@ impl System {
     }
 
     /// `f⁺(Rx + ρ, t) − R f⁻(x, t) − ρ̇` as an affine function of the state.
-    fn field_jump(&self, from: usize, to: usize, reset: Option<&Reset>) -> (DMatrix<f64>, HarmonicVector) {
+    fn field_jump(
+        &self,
+        from: usize,
+        to: usize,
+        reset: Option<&Reset>,
+    ) -> (DMatrix<f64>, HarmonicVector) {
         let (a, b) = (&self.regimes[from], &self.regimes[to]);
         match reset {
             None => (b.matrix() - a.matrix(), b.forcing().plus(-1.0, a.forcing())),
@@ -370,7 +520,14 @@ impl System {
     ///
     /// Constant wherever the field's jump is proportional to the guard's rate;
     /// otherwise `R + (f⁺ − R f⁻ − ρ̇) hᵀ/ġ`, singular at grazing.
-    pub fn saltation(&self, from: usize, exit: usize, stuck: bool, x: &DVector<f64>, t: f64) -> DMatrix<f64> {
+    pub fn saltation(
+        &self,
+        from: usize,
+        exit: usize,
+        stuck: bool,
+        x: &DVector<f64>,
+        t: f64,
+    ) -> DMatrix<f64> {
         let description = &self.exits[from][exit];
         let prepared = &self.switches[from][exit];
         let (switch, reset) = match (&description.sticking, &prepared.sticking) {
@@ -386,9 +543,28 @@ impl System {
         let (matrix, forcing) = self.field_jump(from, switch.to, reset);
         let change = matrix * x + forcing.at(&self.drive, t);
         let regime = &self.regimes[from];
-        let rate = description.guard.rate(regime.matrix(), regime.forcing(), &self.drive);
+        let rate = description
+            .guard
+            .rate(regime.matrix(), regime.forcing(), &self.drive);
         jump + change * h / rate.at(&self.drive, x.as_slice(), t)
     }
+}
+
+fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<[Pack; 2]> {
+    let tones = drive.frequencies().iter().map(|&w| Complex::new(0.0, w));
+    let rates: Vec<Complex> = regime
+        .basis()
+        .eigenvalues
+        .iter()
+        .copied()
+        .chain(tones)
+        .collect();
+    let mut packs = vec![[[0.0; WIDTH]; 2]; rates.len().div_ceil(WIDTH)];
+    for (k, rate) in rates.into_iter().enumerate() {
+        packs[k / WIDTH][0][k % WIDTH] = rate.re;
+        packs[k / WIDTH][1][k % WIDTH] = rate.im;
+    }
+    packs
 }
 
 /// The size of rounding errors in an output's value.
@@ -403,6 +579,9 @@ fn flat(row: &DVector<f64>, constant: f64, tones: &[Complex]) -> DVector<f64> {
     let harmonic = tones.iter().flat_map(|z| [z.re, z.im]);
     DVector::from_iterator(
         row.len() + 1 + 2 * tones.len(),
-        row.iter().copied().chain(std::iter::once(constant)).chain(harmonic),
+        row.iter()
+            .copied()
+            .chain(std::iter::once(constant))
+            .chain(harmonic),
     )
 }

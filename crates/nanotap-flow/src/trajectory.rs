@@ -61,7 +61,12 @@ impl Recorder {
     /// The recording, of a flow of `system`.
     pub fn finish(self, system: Arc<System>) -> Trajectory {
         let end = self.segments.last().map_or(0.0, |s| s.start + s.length);
-        Trajectory { system, segments: self.segments, events: self.events, end }
+        Trajectory {
+            system,
+            segments: self.segments,
+            events: self.events,
+            end,
+        }
     }
 }
 
@@ -161,13 +166,22 @@ impl Trajectory {
         let mut factors = modal.clone();
         regime.basis().advance(&mut modal, s, &mut factors);
         let mut x = vec![0.0; self.system.dimension()];
-        regime.to_state(self.system.drive(), &modal, segment.phase + s, &mut x);
+        regime.to_state(
+            self.system.drive(),
+            modal.iter().copied(),
+            segment.phase + s,
+            &mut x,
+        );
         Some(x)
     }
 
     /// How long the motion stays in `regime`.
     pub fn time_in(&self, regime: usize) -> f64 {
-        self.segments.iter().filter(|s| s.regime == regime).map(|s| s.length).sum()
+        self.segments
+            .iter()
+            .filter(|s| s.regime == regime)
+            .map(|s| s.length)
+            .sum()
     }
 
     /// An output over the whole trajectory, the same in every regime.
@@ -183,14 +197,25 @@ impl Trajectory {
     pub fn signal_by_regime(&self, outputs: &[Output]) -> PiecewiseSignal {
         let drive = self.system.drive();
         let regimes = self.system.regimes();
-        let modal: Vec<_> = regimes.iter().zip(outputs).map(|(r, o)| r.project(o)).collect();
+        let modal: Vec<_> = regimes
+            .iter()
+            .zip(outputs)
+            .map(|(r, o)| r.project(o))
+            .collect();
         let pieces = self
             .segments
             .iter()
             .map(|s| Piece {
                 start: s.start,
                 length: s.length,
-                signal: Signal::of(&regimes[s.regime], drive, &modal[s.regime], &s.modal, s.phase, s.length),
+                signal: Signal::of(
+                    &regimes[s.regime],
+                    drive,
+                    &modal[s.regime],
+                    &s.modal,
+                    s.phase,
+                    s.length,
+                ),
             })
             .collect();
         PiecewiseSignal { pieces }

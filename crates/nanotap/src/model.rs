@@ -8,8 +8,8 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::sensitivity::{RegimeTangent, SystemTangent};
 pub use nanotap_flow::FlowError;
+use nanotap_flow::sensitivity::{RegimeTangent, SystemTangent};
 use nanotap_flow::{Drive, Exit, HarmonicVector, Output, SpectralBasis, System};
 
 use crate::beam::Modes;
@@ -114,17 +114,27 @@ impl Model {
         let drive = Drive::single(case.omega)?;
         let mass = galerkin.mass.clone().cholesky();
         let Some(mass) = mass else {
-            return Err(FlowError::NotFinite { what: "the mass matrix" }.into());
+            return Err(FlowError::NotFinite {
+                what: "the mass matrix",
+            }
+            .into());
         };
         let n = case.modes;
         let mut regimes = Vec::new();
         for regime in Regime::ALL {
             let r = regime.index();
-            let matrix = companion(&mass.solve(&galerkin.stiffness[r]), &mass.solve(&galerkin.damping[r]));
+            let matrix = companion(
+                &mass.solve(&galerkin.stiffness[r]),
+                &mass.solve(&galerkin.damping[r]),
+            );
             let forcing = accelerations(&galerkin.forcing[r], |f| mass.solve(f));
             regimes.push(match Spectrum::new(&galerkin, regime) {
                 Ok(s) => {
-                    let basis = SpectralBasis::from_simple_eigenpairs(s.eigenvalues, s.right_state, s.left_state)?;
+                    let basis = SpectralBasis::from_simple_eigenpairs(
+                        s.eigenvalues,
+                        s.right_state,
+                        s.left_state,
+                    )?;
                     nanotap_flow::Regime::with_basis(r, matrix, forcing, &drive, basis)?
                 }
                 // (Nearly) critical damping has no basis of eigenvectors; the general
@@ -133,7 +143,10 @@ impl Model {
             });
         }
         let gap = gap_output(&galerkin.gap, n);
-        let exits = vec![vec![Exit::new(gap.clone(), 1)], vec![Exit::new(gap.scaled(-1.0), 0)]];
+        let exits = vec![
+            vec![Exit::new(gap.clone(), 1)],
+            vec![Exit::new(gap.scaled(-1.0), 0)],
+        ];
         let system = Arc::new(System::new(drive, regimes, exits)?);
         Ok(Self::with_outputs(case, &galerkin, system, gap))
     }
@@ -141,7 +154,8 @@ impl Model {
     fn with_outputs(case: &Case, galerkin: &Galerkin, system: Arc<System>, gap: Output) -> Self {
         let modes = &galerkin.modes;
         let displacement = |v: &DVector<f64>| state_row(v, 0);
-        let base = Output::linear(RowDVector::zeros(2 * case.modes), 1).with_tone(0, case.alpha2, 0.0);
+        let base =
+            Output::linear(RowDVector::zeros(2 * case.modes), 1).with_tone(0, case.alpha2, 0.0);
         let contact_force = {
             // f = −(α4 V_T + α6 V̇_T)
             let regime = &system.regimes()[1];
@@ -158,7 +172,11 @@ impl Model {
             force,
             power,
             impact_loss: 0.0,
-            beam: Some(BeamOutputs { modes: modes.clone(), slope: displacement(&modes.tip_slope), base }),
+            beam: Some(BeamOutputs {
+                modes: modes.clone(),
+                slope: displacement(&modes.tip_slope),
+                base,
+            }),
             gap,
             system,
         }
@@ -173,7 +191,8 @@ impl Model {
     pub fn tip_rate(&self) -> Output {
         // The state holds the velocities, so that every regime says the same.
         let free = &self.system.regimes()[0];
-        self.tip.rate(free.matrix(), free.forcing(), self.system.drive())
+        self.tip
+            .rate(free.matrix(), free.forcing(), self.system.drive())
     }
 
     /// Displacement of the tip at which it touches: −(α2 sin Ωτ + α5) for the cantilever,
@@ -193,19 +212,31 @@ impl Model {
 ///
 /// # Errors
 /// As [`Model::cantilever`].
-pub fn cantilever_tangent(case: &Case, model: &Model, parameter: Parameter) -> Result<SystemTangent, ModelError> {
+pub fn cantilever_tangent(
+    case: &Case,
+    model: &Model,
+    parameter: Parameter,
+) -> Result<SystemTangent, ModelError> {
     let galerkin = Galerkin::new(case)?;
     let derivative = galerkin.derivative(parameter);
     let Some(mass) = galerkin.mass.clone().cholesky() else {
-        return Err(FlowError::NotFinite { what: "the mass matrix" }.into());
+        return Err(FlowError::NotFinite {
+            what: "the mass matrix",
+        }
+        .into());
     };
     let mut tangent = SystemTangent::zeros(&model.system);
     for r in 0..2 {
         // ∂(M⁻¹K) = M⁻¹(∂K − ∂M M⁻¹K), and so on.
-        let (k, c) = (mass.solve(&galerkin.stiffness[r]), mass.solve(&galerkin.damping[r]));
+        let (k, c) = (
+            mass.solve(&galerkin.stiffness[r]),
+            mass.solve(&galerkin.damping[r]),
+        );
         let dk = mass.solve(&(&derivative.stiffness[r] - &derivative.mass * &k));
         let dc = mass.solve(&(&derivative.damping[r] - &derivative.mass * &c));
-        let change = |df: &DVector<f64>, f: &DVector<f64>| mass.solve(&(df - &derivative.mass * mass.solve(f)));
+        let change = |df: &DVector<f64>, f: &DVector<f64>| {
+            mass.solve(&(df - &derivative.mass * mass.solve(f)))
+        };
         let (f, df) = (&galerkin.forcing[r], &derivative.forcing[r]);
         let forcing = Forcing {
             sine: change(&df.sine, &f.sine),
@@ -215,7 +246,10 @@ pub fn cantilever_tangent(case: &Case, model: &Model, parameter: Parameter) -> R
         let n = case.modes;
         let mut matrix = companion(&dk, &dc);
         matrix.view_mut((0, n), (n, n)).fill(0.0);
-        tangent.regimes[r] = RegimeTangent { matrix, forcing: accelerations(&forcing, Clone::clone) };
+        tangent.regimes[r] = RegimeTangent {
+            matrix,
+            forcing: accelerations(&forcing, Clone::clone),
+        };
     }
     let gap = gap_output(&derivative.gap, case.modes);
     tangent.guards = vec![vec![gap.clone()], vec![gap.scaled(-1.0)]];
@@ -258,7 +292,9 @@ fn state_row(v: &DVector<f64>, block: usize) -> Output {
 
 fn gap_output(gap: &Gap, n: usize) -> Output {
     debug_assert_eq!(gap.tip.len(), n);
-    state_row(&gap.tip, 0).with_tone(0, gap.sine, 0.0).with_constant(gap.constant)
+    state_row(&gap.tip, 0)
+        .with_tone(0, gap.sine, 0.0)
+        .with_constant(gap.constant)
 }
 
 /// Energy flows in one regime, in the frame of the resting sample. With y = α2 sin Ωτ,
@@ -283,8 +319,14 @@ fn powers(
     let tip_speed = state_row(&modes.tip, 1).plus(1.0, &base_rate);
     let mean_speed = integral.plus(1.0, &base_rate);
     let momentum = mean_speed.plus(case.alpha1, &tip_speed);
-    let clamp = rate(&momentum).plus(case.alpha3, &mean_speed).plus(-1.0, force);
-    let product = |weight, a: &Output, b: &Output| Product { weight, a: a.clone(), b: b.clone() };
+    let clamp = rate(&momentum)
+        .plus(case.alpha3, &mean_speed)
+        .plus(-1.0, force);
+    let product = |weight, a: &Output, b: &Output| Product {
+        weight,
+        a: a.clone(),
+        b: b.clone(),
+    };
     let mut drive = vec![product(1.0, &clamp, &base_rate)];
     if case.cosine_term == CosineTerm::Printed {
         // Printed minus corrected: −α2 α3 (1 − Ω) I cos Ωτ, acting on ȧ.
@@ -301,19 +343,34 @@ fn powers(
         state_row(&unit, block)
     };
     // ∫(Ẇ + ẏ)² = |ȧ|² + ẏ (2 I·ȧ + ẏ)
-    let mut squared_speed: Vec<Product> =
-        (0..case.modes).map(|j| product(1.0, &unit(j, 1), &unit(j, 1))).collect();
-    squared_speed.push(product(1.0, &base_rate, &integral.scaled(2.0).plus(1.0, &base_rate)));
+    let mut squared_speed: Vec<Product> = (0..case.modes)
+        .map(|j| product(1.0, &unit(j, 1), &unit(j, 1)))
+        .collect();
+    squared_speed.push(product(
+        1.0,
+        &base_rate,
+        &integral.scaled(2.0).plus(1.0, &base_rate),
+    ));
     let weighted = |factor: f64| {
-        squared_speed.iter().map(move |p| Product { weight: p.weight * factor, ..p.clone() })
+        squared_speed.iter().map(move |p| Product {
+            weight: p.weight * factor,
+            ..p.clone()
+        })
     };
     let mut stored: Vec<Product> = weighted(0.5).collect();
     stored.push(product(0.5 * case.alpha1, &tip_speed, &tip_speed));
-    stored.extend((0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))));
+    stored.extend(
+        (0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))),
+    );
     let mut sample = Vec::new();
     if regime == Regime::Contact {
         sample.push(product(case.alpha6, &rate(gap), &rate(gap)));
         stored.push(product(0.5 * case.alpha4, gap, gap));
     }
-    Powers { drive, beam: weighted(case.alpha3).collect(), sample, stored }
+    Powers {
+        drive,
+        beam: weighted(case.alpha3).collect(),
+        sample,
+        stored,
+    }
 }

@@ -160,17 +160,26 @@ impl Oscillator {
     pub fn validate(&self) -> Result<(), OscillatorError> {
         use OscillatorParameter as P;
         for parameter in P::ALL {
-            let Some(value) = self.get(parameter) else { continue };
+            let Some(value) = self.get(parameter) else {
+                continue;
+            };
             let (right, expected) = match parameter {
                 P::Mass | P::Omega => (value > 0.0, "a positive, finite number is needed"),
                 P::Stiffness | P::Damping | P::ContactStiffness | P::ContactDamping => {
                     (value >= 0.0, "a finite number of at least 0 is needed")
                 }
-                P::Restitution => ((0.0..=1.0).contains(&value), "a number from 0 to 1 is needed"),
+                P::Restitution => (
+                    (0.0..=1.0).contains(&value),
+                    "a number from 0 to 1 is needed",
+                ),
                 P::Forcing | P::Gap => (true, "a finite number is needed"),
             };
             if !(right && value.is_finite() && value.abs() <= 1e12) {
-                return Err(OscillatorError { key: parameter.name(), value, expected });
+                return Err(OscillatorError {
+                    key: parameter.name(),
+                    value,
+                    expected,
+                });
             }
         }
         Ok(())
@@ -188,7 +197,10 @@ impl Oscillator {
         let (regimes, exits) = match self.stop {
             Stop::Soft { stiffness, damping } => {
                 let contact = self.regime(1, stiffness, damping, &drive)?;
-                let exits = vec![vec![Exit::new(gap.clone(), 1)], vec![Exit::new(gap.scaled(-1.0), 0)]];
+                let exits = vec![
+                    vec![Exit::new(gap.clone(), 1)],
+                    vec![Exit::new(gap.scaled(-1.0), 0)],
+                ];
                 (vec![free, contact], exits)
             }
             Stop::Rigid { restitution } => self.rigid(restitution, free, &gap, &drive)?,
@@ -227,13 +239,19 @@ impl Oscillator {
             offset: HarmonicVector::zeros(2, 1),
         };
         // The gap's acceleration in flight is minus the pressing force over the mass.
-        let acceleration = gap
-            .rate(free.matrix(), free.forcing(), drive)
-            .rate(free.matrix(), free.forcing(), drive);
-        let still = nanotap_flow::Regime::new(1, DMatrix::zeros(2, 2), HarmonicVector::zeros(2, 1), drive)?;
+        let acceleration = gap.rate(free.matrix(), free.forcing(), drive).rate(
+            free.matrix(),
+            free.forcing(),
+            drive,
+        );
+        let still =
+            nanotap_flow::Regime::new(1, DMatrix::zeros(2, 2), HarmonicVector::zeros(2, 1), drive)?;
         let impact = Exit::new(gap.clone(), 0)
             .with_reset(bounce(restitution))
-            .with_sticking(Sticking { regime: 1, reset: bounce(0.0) });
+            .with_sticking(Sticking {
+                regime: 1,
+                reset: bounce(0.0),
+            });
         let release = Exit::new(acceleration.scaled(-1.0), 0).as_release();
         Ok((vec![free, still], vec![vec![impact], vec![release]]))
     }
@@ -253,7 +271,11 @@ impl Oscillator {
             Stop::Soft { stiffness, damping } => gap.scaled(-stiffness).plus(damping, &speed),
             Stop::Rigid { .. } => drive.plus(-self.stiffness, &tip),
         };
-        let product = |weight, a: &Output, b: &Output| Product { weight, a: a.clone(), b: b.clone() };
+        let product = |weight, a: &Output, b: &Output| Product {
+            weight,
+            a: a.clone(),
+            b: b.clone(),
+        };
         let power = |contact_stiffness: f64, contact_damping: f64| Powers {
             drive: vec![product(1.0, &drive, &speed)],
             beam: vec![product(self.damping, &speed, &speed)],
@@ -285,7 +307,11 @@ impl Oscillator {
     ///
     /// # Errors
     /// As [`Oscillator::model`].
-    pub fn tangent(&self, model: &Model, parameter: OscillatorParameter) -> Result<SystemTangent, ModelError> {
+    pub fn tangent(
+        &self,
+        model: &Model,
+        parameter: OscillatorParameter,
+    ) -> Result<SystemTangent, ModelError> {
         use OscillatorParameter as P;
         let mut tangent = SystemTangent::zeros(&model.system);
         // (k, c, constant force, drive) of each moving regime, and their derivatives.
@@ -293,10 +319,17 @@ impl Oscillator {
             Stop::Soft { stiffness, damping } => (stiffness, damping),
             Stop::Rigid { .. } => (0.0, 0.0),
         };
-        let moving = if matches!(self.stop, Stop::Soft { .. }) { 2 } else { 1 };
+        let moving = if matches!(self.stop, Stop::Soft { .. }) {
+            2
+        } else {
+            1
+        };
         for r in 0..moving {
             let inside = if r == 1 { 1.0 } else { 0.0 };
-            let (k, c) = (self.stiffness + inside * soft_k, self.damping + inside * soft_c);
+            let (k, c) = (
+                self.stiffness + inside * soft_k,
+                self.damping + inside * soft_c,
+            );
             let held = inside * soft_k * self.gap;
             let m = self.mass;
             let [dk, dc, dheld, df] = match parameter {
@@ -348,7 +381,7 @@ impl Oscillator {
             P::Forcing => [0.0, 0.0, 1.0],
             _ => return,
         };
-        tangent.guards[1][0] =
-            Output::linear(RowDVector::from_row_slice(&[-dk / m, -dc / m]), 1).with_tone(0, 0.0, df / m);
+        tangent.guards[1][0] = Output::linear(RowDVector::from_row_slice(&[-dk / m, -dc / m]), 1)
+            .with_tone(0, 0.0, df / m);
     }
 }

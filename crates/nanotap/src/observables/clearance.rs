@@ -31,7 +31,9 @@ impl Clearance {
         let beam = model.beam.as_ref()?;
         let at = |xi: f64| least_height(model, beam, trajectory, xi);
         let count = POSITIONS_PER_MODE * beam.modes.count();
-        let grid: Vec<Self> = (0..=count).filter_map(|i| at(i as f64 / count as f64)).collect();
+        let grid: Vec<Self> = (0..=count)
+            .filter_map(|i| at(i as f64 / count as f64))
+            .collect();
         let best = (0..grid.len()).min_by(|&a, &b| grid[a].height.total_cmp(&grid[b].height))?;
         let mut low = grid[best.saturating_sub(1)].xi;
         let mut high = grid[(best + 1).min(grid.len() - 1)].xi;
@@ -39,12 +41,19 @@ impl Clearance {
         // Golden section between the neighbours.
         let golden = 0.381_966_011_250_105;
         for _ in 0..30 {
-            let (a, b) = (at(low + golden * (high - low))?, at(high - golden * (high - low))?);
+            let (a, b) = (
+                at(low + golden * (high - low))?,
+                at(high - golden * (high - low))?,
+            );
             let lower = if a.height < b.height { a } else { b };
             if lower.height < least.height {
                 least = lower;
             }
-            if a.height < b.height { high = b.xi } else { low = a.xi }
+            if a.height < b.height {
+                high = b.xi
+            } else {
+                low = a.xi
+            }
             if high - low < 1e-7 {
                 break;
             }
@@ -58,7 +67,16 @@ impl Clearance {
     }
 }
 
-fn least_height(model: &Model, beam: &BeamOutputs, trajectory: &Trajectory, xi: f64) -> Option<Clearance> {
+fn least_height(
+    model: &Model,
+    beam: &BeamOutputs,
+    trajectory: &Trajectory,
+    xi: f64,
+) -> Option<Clearance> {
     let (least, _) = trajectory.signal(&beam.height(xi)).range()?;
-    Some(Clearance { height: least.value, xi, period: least.time / model.period() })
+    Some(Clearance {
+        height: least.value,
+        xi,
+        period: least.time / model.period(),
+    })
 }

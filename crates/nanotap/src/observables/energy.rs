@@ -29,14 +29,29 @@ impl EnergyBalance {
     /// The balance of `trajectory`, a recording of `model`.
     pub fn of(model: &Model, trajectory: &Trajectory) -> Self {
         let work = |select: fn(&crate::model::Powers) -> &[Product]| -> f64 {
-            let count = model.power.iter().map(|p| select(p).len()).max().unwrap_or(0);
-            (0..count).map(|i| product_work(model, trajectory, select, i)).sum()
+            let count = model
+                .power
+                .iter()
+                .map(|p| select(p).len())
+                .max()
+                .unwrap_or(0);
+            (0..count)
+                .map(|i| product_work(model, trajectory, select, i))
+                .sum()
         };
         let drive_work = work(|p| &p.drive);
         let beam_damping = work(|p| &p.beam);
-        let impacts: f64 = trajectory.events().iter().filter(|e| e.from == 0).map(|e| e.rate * e.rate).sum();
+        let impacts: f64 = trajectory
+            .events()
+            .iter()
+            .filter(|e| e.from == 0)
+            .map(|e| e.rate * e.rate)
+            .sum();
         let sample_damping = work(|p| &p.sample) + model.impact_loss * impacts;
-        let ends = trajectory.segments().first().zip(trajectory.segments().last());
+        let ends = trajectory
+            .segments()
+            .first()
+            .zip(trajectory.segments().last());
         let (start, end) = ends.map_or((0.0, 0.0), |(first, last)| {
             (
                 stored(model, trajectory, first, first.start),
@@ -48,10 +63,23 @@ impl EnergyBalance {
         Self::closed(drive_work, beam_damping, sample_damping, end - start, moved)
     }
 
-    fn closed(drive_work: f64, beam_damping: f64, sample_damping: f64, stored: f64, moved: f64) -> Self {
+    fn closed(
+        drive_work: f64,
+        beam_damping: f64,
+        sample_damping: f64,
+        stored: f64,
+        moved: f64,
+    ) -> Self {
         let rest = drive_work - beam_damping - sample_damping - stored;
         let residual = if moved > 0.0 { rest / moved } else { 0.0 };
-        Self { drive_work, beam_damping, sample_damping, stored, residual, moved }
+        Self {
+            drive_work,
+            beam_damping,
+            sample_damping,
+            stored,
+            residual,
+            moved,
+        }
     }
 
     /// The balance of this stretch and the next together.
@@ -79,17 +107,32 @@ fn product_work(
     let weighted: Vec<_> = model
         .power
         .iter()
-        .map(|p| select(p).get(i).map_or_else(|| zero.clone(), |p| p.a.scaled(p.weight)))
+        .map(|p| {
+            select(p)
+                .get(i)
+                .map_or_else(|| zero.clone(), |p| p.a.scaled(p.weight))
+        })
         .collect();
-    let other: Vec<_> =
-        model.power.iter().map(|p| select(p).get(i).map_or_else(|| zero.clone(), |p| p.b.clone())).collect();
-    trajectory.signal_by_regime(&weighted).product_integral(&trajectory.signal_by_regime(&other))
+    let other: Vec<_> = model
+        .power
+        .iter()
+        .map(|p| {
+            select(p)
+                .get(i)
+                .map_or_else(|| zero.clone(), |p| p.b.clone())
+        })
+        .collect();
+    trajectory
+        .signal_by_regime(&weighted)
+        .product_integral(&trajectory.signal_by_regime(&other))
 }
 
 fn stored(model: &Model, trajectory: &Trajectory, segment: &Segment, time: f64) -> f64 {
     let drive = model.system.drive();
     let phase = segment.phase + (time - segment.start);
-    let Some(state) = trajectory.state_at(time) else { return 0.0 };
+    let Some(state) = trajectory.state_at(time) else {
+        return 0.0;
+    };
     model.power[segment.regime]
         .stored
         .iter()

@@ -12,7 +12,9 @@ use nanotap_flow::Flow;
 
 fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
     let mut x = state.to_vec();
-    Strobe::new(&subject.model().unwrap()).advance(&mut x).unwrap();
+    Strobe::new(&subject.model().unwrap())
+        .advance(&mut x)
+        .unwrap();
     x
 }
 
@@ -21,15 +23,21 @@ fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
 fn worst(subject: &Subject, state: &[f64]) -> f64 {
     let model = subject.model().unwrap();
     let keys: Vec<Key> = subject.keys();
-    let tangents: Vec<_> = keys.iter().map(|k| subject.tangent(&model, *k).unwrap()).collect();
+    let tangents: Vec<_> = keys
+        .iter()
+        .map(|k| subject.tangent(&model, *k).unwrap())
+        .collect();
     let n = state.len();
     let (mut jacobian, mut derivatives) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
     let mut flow = Flow::new(model.system.clone());
     flow.start(state, 0.0).unwrap();
-    flow.run_period_with_sensitivities(&tangents, &mut jacobian, &mut derivatives).unwrap();
+    flow.run_period_with_sensitivities(&tangents, &mut jacobian, &mut derivatives)
+        .unwrap();
     let difference = |f: &dyn Fn(f64) -> Vec<f64>, h: f64| -> Vec<f64> {
         let (a, b, c, d) = (f(-2.0 * h), f(-h), f(h), f(2.0 * h));
-        (0..n).map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h)).collect()
+        (0..n)
+            .map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h))
+            .collect()
     };
     let mut worst: f64 = 0.0;
     let mut compare = |exact: &[f64], estimate: &[f64]| {
@@ -50,14 +58,20 @@ fn worst(subject: &Subject, state: &[f64]) -> f64 {
         let value = subject.get(*key);
         // One-sided parameters are tested away from their bound.
         let moved = |h: f64| advance(&subject.with(*key, value + h), state);
-        compare(derivatives.column(p).as_slice(), &difference(&moved, 1e-5 * value.abs().max(0.1)));
+        compare(
+            derivatives.column(p).as_slice(),
+            &difference(&moved, 1e-5 * value.abs().max(0.1)),
+        );
     }
     worst
 }
 
 #[test]
 fn cantilever_with_contacts() {
-    let case = Case { alpha5: 0.02, ..Case::paper() };
+    let case = Case {
+        alpha5: 0.02,
+        ..Case::paper()
+    };
     for modes in [1, 3, 5] {
         let subject = Subject::Cantilever(case.clone().with_modes(modes));
         let mut state = vec![0.0; 2 * modes];
@@ -71,7 +85,10 @@ fn cantilever_with_contacts() {
 
 #[test]
 fn oscillators_with_soft_and_rigid_stops() {
-    let soft = Stop::Soft { stiffness: 30.0, damping: 0.4 };
+    let soft = Stop::Soft {
+        stiffness: 30.0,
+        damping: 0.4,
+    };
     let rigid = Stop::Rigid { restitution: 0.8 };
     for stop in [soft, rigid] {
         let subject = Subject::Oscillator(Oscillator {
@@ -100,9 +117,17 @@ fn critically_damped_contact() {
         forcing: 1.0,
         omega: 1.7,
         gap: 0.1,
-        stop: Stop::Soft { stiffness: 15.0, damping: 7.8 },
+        stop: Stop::Soft {
+            stiffness: 15.0,
+            damping: 7.8,
+        },
     });
-    assert!(!subject.model().unwrap().system.regimes()[1].basis().clusters.is_empty());
+    assert!(
+        !subject.model().unwrap().system.regimes()[1]
+            .basis()
+            .clusters
+            .is_empty()
+    );
     let error = worst(&subject, &[-0.2, 0.5]);
     assert!(error < 1e-6, "{error:e}");
 }
@@ -113,21 +138,38 @@ fn critically_damped_contact() {
 fn grazing_is_of_the_three_halves_type() {
     // A lever that just misses: the gap's least value over the run is the knob, set by
     // α5; state and drive stay.
-    let free = Case { alpha5: 1.0, ..Case { omega: 3.1, ..Case::paper() } };
+    let free = Case {
+        alpha5: 1.0,
+        ..Case {
+            omega: 3.1,
+            ..Case::paper()
+        }
+    };
     let start = [0.03, 0.0, 0.0, 0.1, 0.0, 0.0];
     let model = Model::cantilever(&free).unwrap();
     let run = nanotap_flow::Trajectory::record(&model.system, &start, 1).unwrap();
     let (lowest, _) = run.signal(&model.gap).range().unwrap();
     let unhindered = run.state_at(run.end()).unwrap();
     let deviation = |depth: f64| -> f64 {
-        let case = Case { alpha5: 1.0 - lowest.value - depth, ..free.clone() };
+        let case = Case {
+            alpha5: 1.0 - lowest.value - depth,
+            ..free.clone()
+        };
         let state = advance(&Subject::Cantilever(case), &start);
-        state.iter().zip(&unhindered).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+        state
+            .iter()
+            .zip(&unhindered)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f64>()
+            .sqrt()
     };
     for decade in 3..8 {
         let depth = 10.0_f64.powi(-decade);
         let slope = (deviation(depth) / deviation(0.25 * depth)).ln() / 4.0_f64.ln();
-        assert!((slope - 1.5).abs() < 0.05, "penetration {depth:e}: slope {slope}");
+        assert!(
+            (slope - 1.5).abs() < 0.05,
+            "penetration {depth:e}: slope {slope}"
+        );
     }
     assert_eq!(deviation(-1e-9), deviation(-1e-3));
 }

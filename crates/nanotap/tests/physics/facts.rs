@@ -8,7 +8,10 @@ use nanotap_flow::Trajectory;
 use proptest::prelude::*;
 
 fn at(omega: f64) -> Case {
-    Case { omega, ..Case::paper() }
+    Case {
+        omega,
+        ..Case::paper()
+    }
 }
 
 fn settled(case: &Case) -> OrbitReport {
@@ -24,7 +27,14 @@ fn modulus([re, im]: [f64; 2]) -> f64 {
 fn period_one_at_omega_3() {
     let report = settled(&at(3.0));
     assert_eq!((report.period, report.stable), (1, true));
-    let expected = [0.04867449626, -4.170932009e-4, 3.895611e-5, -0.02693553697, 3.208938387e-3, 3.311213241e-3];
+    let expected = [
+        0.04867449626,
+        -4.170932009e-4,
+        3.895611e-5,
+        -0.02693553697,
+        3.208938387e-3,
+        3.311213241e-3,
+    ];
     for (got, expected) in report.state.iter().zip(expected) {
         assert!((got - expected).abs() < 6e-12, "{got} {expected}");
     }
@@ -39,7 +49,11 @@ fn period_one_at_omega_3() {
         assert!((got - expected).abs() < 1e-10, "{got} {expected}");
     }
     assert!(report.observables.energy_balance.residual.abs() < 1e-11);
-    assert!(report.determinant_defect < 1e-10, "{}", report.determinant_defect);
+    assert!(
+        report.determinant_defect < 1e-10,
+        "{}",
+        report.determinant_defect
+    );
 }
 
 /// N = 3, Eq. (26), α1 = 0.1, Ω = 4.1: range of the gap, largest multiplier.
@@ -47,7 +61,10 @@ fn period_one_at_omega_3() {
 fn period_one_at_omega_4_1() {
     let report = settled(&at(4.1));
     let [low, high] = report.observables.gap_range;
-    assert!((low + 0.40724).abs() < 1e-5 && (high - 1.18168).abs() < 1e-5, "{low} {high}");
+    assert!(
+        (low + 0.40724).abs() < 1e-5 && (high - 1.18168).abs() < 1e-5,
+        "{low} {high}"
+    );
     assert!((modulus(report.multipliers[0]) - 0.895782).abs() < 1e-6);
 }
 
@@ -58,14 +75,21 @@ fn period_one_at_omega_20() {
     let report = settled(&at(20.0));
     assert_eq!(report.period, 1);
     assert!((report.observables.tip_min + 0.41706).abs() < 1e-5);
-    assert!((report.observables.tip_max - 1.75832).abs() < 3e-5, "{}", report.observables.tip_max);
+    assert!(
+        (report.observables.tip_max - 1.75832).abs() < 3e-5,
+        "{}",
+        report.observables.tip_max
+    );
     // Extrema come from roots of the rate: no dense sample exceeds them, and the densest
     // comes as near as its spacing allows.
     let model = Model::cantilever(&at(20.0)).unwrap();
     let tip = report.trajectory.signal(&model.tip);
     let samples = 20_000;
     let highest = (0..samples)
-        .map(|i| tip.at(model.period() * f64::from(i) / f64::from(samples)).unwrap())
+        .map(|i| {
+            tip.at(model.period() * f64::from(i) / f64::from(samples))
+                .unwrap()
+        })
         .fold(f64::NEG_INFINITY, f64::max);
     assert!((0.0..1e-7).contains(&(report.observables.tip_max - highest + 1e-15)));
 }
@@ -81,7 +105,14 @@ fn single_mode_at_omega_20() {
 #[test]
 fn unstable_period_one_at_omega_2_6() {
     let model = Model::cantilever(&at(2.6)).unwrap();
-    let report = orbit(&model, &OrbitOptions { period: Some(1), ..OrbitOptions::default() }).unwrap();
+    let report = orbit(
+        &model,
+        &OrbitOptions {
+            period: Some(1),
+            ..OrbitOptions::default()
+        },
+    )
+    .unwrap();
     assert!(!report.stable);
     assert!((report.multipliers[0][0] + 1.392).abs() < 1e-3 && report.multipliers[0][1] == 0.0);
 }
@@ -90,10 +121,20 @@ fn unstable_period_one_at_omega_2_6() {
 /// α1 = 0.1, α4 = 20. A drive of amplitude 1e-9 leaves a free oscillation of it.
 #[test]
 fn bilinear_frequency_of_one_mode() {
-    let case = Case { modes: 1, alpha2: 1e-9, omega: 0.05, ..Case::paper_eq24() };
+    let case = Case {
+        modes: 1,
+        alpha2: 1e-9,
+        omega: 0.05,
+        ..Case::paper_eq24()
+    };
     let model = Model::cantilever(&case).unwrap();
     let trajectory = Trajectory::record(&model.system, &[0.0, 1.0], 1).unwrap();
-    let starts: Vec<f64> = trajectory.events().iter().filter(|e| e.to == 1).map(|e| e.time).collect();
+    let starts: Vec<f64> = trajectory
+        .events()
+        .iter()
+        .filter(|e| e.to == 1)
+        .map(|e| e.time)
+        .collect();
     let cycles = (starts.len() - 1) as f64;
     let frequency = std::f64::consts::TAU * cycles / (starts[starts.len() - 1] - starts[0]);
     assert!((frequency - 4.351246).abs() < 1e-6, "{frequency}");
@@ -103,9 +144,22 @@ fn bilinear_frequency_of_one_mode() {
 /// base amplitude 2.878087 at Ω = 2.6 without tip mass, up to the modes left out.
 #[test]
 fn free_lever_moves_as_the_exact_beam() {
-    let case = Case { modes: 20, alpha1: 0.0, alpha3: 1e-9, alpha5: 5.0, ..Case::paper() };
+    let case = Case {
+        modes: 20,
+        alpha1: 0.0,
+        alpha3: 1e-9,
+        alpha5: 5.0,
+        ..Case::paper()
+    };
     let model = Model::cantilever(&case).unwrap();
-    let report = orbit(&model, &OrbitOptions { period: Some(1), state: Some(vec![0.0; 40]), ..OrbitOptions::default() });
+    let report = orbit(
+        &model,
+        &OrbitOptions {
+            period: Some(1),
+            state: Some(vec![0.0; 40]),
+            ..OrbitOptions::default()
+        },
+    );
     let report = report.unwrap();
     assert_eq!(report.events.len(), 0);
     // W is relative to the base: the tip's absolute amplitude is one base amplitude more.
@@ -116,7 +170,10 @@ fn free_lever_moves_as_the_exact_beam() {
 /// The printed Eq. (14) is another drive: the motion differs, its balance closes.
 #[test]
 fn printed_cosine_term_balances_its_energy_too() {
-    let case = Case { cosine_term: CosineTerm::Printed, ..at(3.0) };
+    let case = Case {
+        cosine_term: CosineTerm::Printed,
+        ..at(3.0)
+    };
     let (printed, corrected) = (settled(&case), settled(&at(3.0)));
     assert!((printed.state[0] - corrected.state[0]).abs() > 1e-5);
     assert!(printed.observables.energy_balance.residual.abs() < 1e-11);

@@ -23,9 +23,20 @@ fn rigid(omega: f64, restitution: f64) -> Oscillator {
 #[test]
 fn one_impact_orbit_hits_at_the_known_speed() {
     let model = rigid(2.5, 0.8).model().unwrap();
-    let report = orbit(&model, &OrbitOptions { period: Some(1), ..OrbitOptions::default() }).unwrap();
+    let report = orbit(
+        &model,
+        &OrbitOptions {
+            period: Some(1),
+            ..OrbitOptions::default()
+        },
+    )
+    .unwrap();
     assert_eq!(report.observables.contacts_per_period, 1.0);
-    assert!((report.observables.impact_speed - 0.6453521784).abs() < 1e-9, "{}", report.observables.impact_speed);
+    assert!(
+        (report.observables.impact_speed - 0.6453521784).abs() < 1e-9,
+        "{}",
+        report.observables.impact_speed
+    );
     assert!(report.observables.energy_balance.residual.abs() < 1e-11);
 }
 
@@ -35,12 +46,26 @@ fn one_impact_orbit_hits_at_the_known_speed() {
 #[test]
 fn linear_response_grazes_where_coco_says() {
     for (omega, amplitude, tolerance) in [(1.0, 0.1, 1e-12), (0.8, 0.368782, 1e-6)] {
-        let mut oscillator = Oscillator { damping: 0.1, gap: 1.0, omega, ..rigid(omega, 0.8) };
+        let mut oscillator = Oscillator {
+            damping: 0.1,
+            gap: 1.0,
+            omega,
+            ..rigid(omega, 0.8)
+        };
         let touches = |forcing: f64, oscillator: &mut Oscillator| {
             oscillator.forcing = forcing;
             // The free response's own amplitude, as the flow sees it.
-            let model = Oscillator { gap: 1e3, ..*oscillator }.model().unwrap();
-            let start = OrbitOptions { period: Some(1), state: Some(vec![0.0, 0.0]), ..OrbitOptions::default() };
+            let model = Oscillator {
+                gap: 1e3,
+                ..*oscillator
+            }
+            .model()
+            .unwrap();
+            let start = OrbitOptions {
+                period: Some(1),
+                state: Some(vec![0.0, 0.0]),
+                ..OrbitOptions::default()
+            };
             orbit(&model, &start).unwrap().observables.tip_max
         };
         // The response is linear in the forcing.
@@ -50,8 +75,17 @@ fn linear_response_grazes_where_coco_says() {
         for (factor, contacts) in [(1.0 - 1e-9, false), (1.0 + 1e-9, true)] {
             oscillator.forcing = grazing * factor;
             let model = oscillator.model().unwrap();
-            let far = Oscillator { gap: 1e3, ..oscillator }.model().unwrap();
-            let start = OrbitOptions { period: Some(1), state: Some(vec![0.0, 0.0]), ..OrbitOptions::default() };
+            let far = Oscillator {
+                gap: 1e3,
+                ..oscillator
+            }
+            .model()
+            .unwrap();
+            let start = OrbitOptions {
+                period: Some(1),
+                state: Some(vec![0.0, 0.0]),
+                ..OrbitOptions::default()
+            };
             let free = orbit(&far, &start).unwrap();
             let run = Trajectory::record(&model.system, &free.state, 1).unwrap();
             assert_eq!(!run.events().is_empty(), contacts, "{factor}");
@@ -66,7 +100,13 @@ fn linear_response_grazes_where_coco_says() {
 fn chatter_ends_in_closed_form() {
     let (g, v0, r) = (0.7, 0.4, 0.8);
     let stiffness = 1e-6;
-    let ball = Oscillator { stiffness, forcing: 0.0, omega: 0.3, gap: -g / stiffness, ..rigid(1.0, r) };
+    let ball = Oscillator {
+        stiffness,
+        forcing: 0.0,
+        omega: 0.3,
+        gap: -g / stiffness,
+        ..rigid(1.0, r)
+    };
     let model = ball.model().unwrap();
     let mut flow = nanotap_flow::Flow::new(model.system.clone());
     flow.start(&[ball.gap, -v0], 0.0).unwrap();
@@ -79,7 +119,11 @@ fn chatter_ends_in_closed_form() {
     assert!((x[0] - ball.gap).abs() < 1e-8 && x[1] == 0.0, "{x:?}");
     let run = recorder.finish(model.system.clone());
     let stuck = run.events().iter().find(|e| e.to == 1).unwrap();
-    assert!((stuck.time - end).abs() < 1e-6 * end, "{} {end}", stuck.time);
+    assert!(
+        (stuck.time - end).abs() < 1e-6 * end,
+        "{} {end}",
+        stuck.time
+    );
     let impacts = run.events().len();
     // ln(1e-8)/ln(0.8) is about 83 flights.
     assert!((40..140).contains(&impacts), "{impacts}");
@@ -91,13 +135,25 @@ fn chatter_ends_in_closed_form() {
 fn sticking_ends_when_the_force_changes_sign() {
     let model = rigid(0.3, 0.2).model().unwrap();
     let run = Trajectory::record(&model.system, &[0.0, 0.0], 3).unwrap();
-    let releases: Vec<f64> = run.events().iter().filter(|e| e.from == 1).map(|e| e.time).collect();
+    let releases: Vec<f64> = run
+        .events()
+        .iter()
+        .filter(|e| e.from == 1)
+        .map(|e| e.time)
+        .collect();
     assert!(!releases.is_empty());
     let quarter = std::f64::consts::FRAC_PI_2 / 0.3;
-    assert!((releases[0] - quarter).abs() < 1e-10, "{releases:?} {quarter}");
+    assert!(
+        (releases[0] - quarter).abs() < 1e-10,
+        "{releases:?} {quarter}"
+    );
     let seen = Observables::of(&model, &run).unwrap();
     assert!(seen.tip_max <= 1e-12);
-    assert!(seen.energy_balance.residual.abs() < 1e-9, "{:?}", seen.energy_balance);
+    assert!(
+        seen.energy_balance.residual.abs() < 1e-9,
+        "{:?}",
+        seen.energy_balance
+    );
 }
 
 /// The soft stop with κ → ∞ and the damper that gives the same restitution tends to the
@@ -110,14 +166,30 @@ fn stiff_soft_stop_tends_to_the_rigid_one() {
         l / (1.0 + l * l).sqrt()
     };
     let speed = |stop: Stop| {
-        let model = Oscillator { stop, ..rigid(2.5, r) }.model().unwrap();
-        let report = orbit(&model, &OrbitOptions { period: Some(1), ..OrbitOptions::default() }).unwrap();
+        let model = Oscillator {
+            stop,
+            ..rigid(2.5, r)
+        }
+        .model()
+        .unwrap();
+        let report = orbit(
+            &model,
+            &OrbitOptions {
+                period: Some(1),
+                ..OrbitOptions::default()
+            },
+        )
+        .unwrap();
         report.observables.impact_speed
     };
     let exact = speed(Stop::Rigid { restitution: r });
     let mut previous = f64::INFINITY;
     for stiffness in [1e4_f64, 1e6, 1e8] {
-        let error = (speed(Stop::Soft { stiffness, damping: 2.0 * zeta * stiffness.sqrt() }) - exact).abs();
+        let error = (speed(Stop::Soft {
+            stiffness,
+            damping: 2.0 * zeta * stiffness.sqrt(),
+        }) - exact)
+            .abs();
         assert!(error < 0.2 * previous, "{stiffness}: {error}");
         previous = error;
     }

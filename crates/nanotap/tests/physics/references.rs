@@ -55,11 +55,19 @@ fn errors(name: &str) -> (f64, f64) {
         }
     }
     let events = reference["events"].as_array().unwrap();
-    assert_eq!(trajectory.events().len(), events.len(), "{name}: number of switches");
+    assert_eq!(
+        trajectory.events().len(),
+        events.len(),
+        "{name}: number of switches"
+    );
     let mut worst_time: f64 = 0.0;
     for (got, expected) in trajectory.events().iter().zip(events) {
         worst_time = worst_time.max((got.time - number(&expected["tau"])).abs());
-        let kind = if got.to == 1 { "contact_start" } else { "contact_end" };
+        let kind = if got.to == 1 {
+            "contact_start"
+        } else {
+            "contact_end"
+        };
         assert_eq!(expected["kind"], kind);
     }
     (worst_state, worst_time)
@@ -87,15 +95,24 @@ fn undamped_runs_of_eq_24() {
 #[test]
 fn regular_run_of_200_periods() {
     let reference = reference("regular_Om3.5_long200");
-    let case = Case { omega: 3.5, ..Case::paper() };
+    let case = Case {
+        omega: 3.5,
+        ..Case::paper()
+    };
     let model = Model::cantilever(&case).unwrap();
     let trajectory = Trajectory::record(&model.system, &[0.0; 6], 200).unwrap();
     let mut map = Strobe::new(&model);
     let mut state = vec![0.0; 6];
     for k in 1..=200 {
         map.advance(&mut state).unwrap();
-        for (got, expected) in state.iter().zip(numbers(&reference["states"][k.to_string()])) {
-            assert!((got - expected).abs() < 1e-12, "period {k}: {got} {expected}");
+        for (got, expected) in state
+            .iter()
+            .zip(numbers(&reference["states"][k.to_string()]))
+        {
+            assert!(
+                (got - expected).abs() < 1e-12,
+                "period {k}: {got} {expected}"
+            );
         }
     }
     let events = numbers(&reference["events"]);

@@ -9,7 +9,7 @@ use nanotap_flow::{Flow, Trajectory};
 /// otherwise free period dips below the sample by the depth whose contact lasts a given
 /// part of a period, down to 1e-8. In free flight the motion does not depend on α5, so
 /// the depth that double precision really gives is known from the same closed form
-/// evaluated in twice double precision: where it is a dip the contact must be found,
+/// evaluated in twice double precision: where it is a dip by more than one rounding error the contact must be found,
 /// with the duration that depth and curvature say, and where it is a near miss there
 /// must be none.
 #[test]
@@ -19,7 +19,12 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
     for i in 0..1500_u32 {
         let u = |k: usize| (f64::from(i) * [0.754_877_67, 0.569_840_29, 0.430_159_71][k]).fract();
         let modes = 1 + (i % 5) as usize;
-        let far = Case { omega: 1.0 + 20.0 * u(0), modes, alpha5: 3.0, ..Case::paper() };
+        let far = Case {
+            omega: 1.0 + 20.0 * u(0),
+            modes,
+            alpha5: 3.0,
+            ..Case::paper()
+        };
         let mut start = vec![0.0; 2 * modes];
         start[0] = 0.4 * u(1) - 0.2;
         start[modes] = 2.0 * u(2) - 1.0;
@@ -35,13 +40,19 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
             continue;
         }
         let curvature = gap.pieces[0].signal.jet(lowest.time).curvature;
+        let rounding = 0.25 * gap.pieces[0].signal.noise();
         for exponent in 0..13 {
             let part = 10.0_f64.powf(-2.0 - 0.5 * f64::from(exponent));
             let depth = curvature * (part * period).powi(2) / 8.0;
-            let case = Case { alpha5: far.alpha5 - lowest.value - depth, ..far.clone() };
+            let case = Case {
+                alpha5: far.alpha5 - lowest.value - depth,
+                ..far.clone()
+            };
             let mut shifted = model.gap.clone();
             shifted.constant = case.alpha5;
-            let dip = -free.signal(&shifted).pieces[0].signal.accurate_at(lowest.time);
+            let dip = -free.signal(&shifted).pieces[0]
+                .signal
+                .accurate_at(lowest.time);
 
             let near = Model::cantilever(&case).unwrap();
             let mut flow = Flow::new(near.system.clone());
@@ -51,9 +62,17 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
             evaluations += flow.statistics().evaluations;
             let run = recorder.finish(near.system.clone());
             let found = run.events().windows(2).find(|e| e[0].to == 1);
+            if dip.abs() <= rounding {
+                // Its amplitudes rounded another way, the same motion touches or misses.
+                continue;
+            }
             if dip <= 0.0 {
                 misses += 1;
-                assert!(found.is_none(), "invented: case {i}, missed by {:e}, {case:?}", -dip);
+                assert!(
+                    found.is_none(),
+                    "invented: case {i}, missed by {:e}, {case:?}",
+                    -dip
+                );
                 continue;
             }
             let found = found.unwrap_or_else(|| panic!("missed: case {i}, dip {dip:e}, {case:?}"));
@@ -62,8 +81,13 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
             shortest = shortest.min(duration / period);
             let expected = (8.0 * dip / curvature).sqrt();
             // Times are doubles: near 1e-8 of a period the difference of two keeps eight digits.
-            // The contact's own pull and the next order are of relative size part.
-            worst = worst.max((duration / expected - 1.0).abs() / (10.0 * part).max(1e-6));
+            // The contact's own pull and the next order are of the size of the angle that the
+            // fastest mode turns through; the depth itself is known to rounding; and times
+            // are doubles, so near 1e-8 of a period their difference keeps seven digits.
+            let angle = gap.pieces[0].signal.fastest() * part * period;
+            let allowed = (2.0 * angle).max(rounding / dip).max(1e-6);
+            let error = (duration / expected - 1.0).abs() / allowed;
+            worst = worst.max(error);
         }
     }
     println!(
@@ -83,10 +107,19 @@ fn the_shortest_contacts_that_doubles_can_tell_are_found() {
     let mut shortest: f64 = 1.0;
     for i in 0..40_u32 {
         let omega = 2.0 + 0.37 * f64::from(i);
-        let model = Model::cantilever(&Case { omega, alpha5: 0.6, ..Case::paper() }).unwrap();
+        let model = Model::cantilever(&Case {
+            omega,
+            alpha5: 0.6,
+            ..Case::paper()
+        })
+        .unwrap();
         let contacts = |v: f64| -> Vec<f64> {
             let run = Trajectory::record(&model.system, &[0.0, 0.0, 0.0, v, 0.0, 0.0], 1).unwrap();
-            run.events().windows(2).filter(|e| e[0].to == 1).map(|e| e[1].time - e[0].time).collect()
+            run.events()
+                .windows(2)
+                .filter(|e| e[0].to == 1)
+                .map(|e| e[1].time - e[0].time)
+                .collect()
         };
         let (mut miss, mut touch) = (0.0, -40.0);
         if !contacts(miss).is_empty() || contacts(touch).is_empty() {
@@ -94,10 +127,17 @@ fn the_shortest_contacts_that_doubles_can_tell_are_found() {
         }
         while (0.5 * (miss + touch) != miss) && (0.5 * (miss + touch) != touch) {
             let middle = 0.5 * (miss + touch);
-            if contacts(middle).is_empty() { miss = middle } else { touch = middle }
+            if contacts(middle).is_empty() {
+                miss = middle
+            } else {
+                touch = middle
+            }
         }
         let durations = contacts(touch);
-        shortest = durations.iter().map(|d| d / model.period()).fold(shortest, f64::min);
+        shortest = durations
+            .iter()
+            .map(|d| d / model.period())
+            .fold(shortest, f64::min);
     }
     println!("shortest contact found: {shortest:.1e} of a period");
     assert!(shortest < 1e-7, "{shortest:e}");

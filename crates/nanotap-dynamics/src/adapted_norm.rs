@@ -12,6 +12,9 @@
 use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 
+/// A few units in the last place.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// The norm ‖δ‖_H = |Lᵀδ|, H = L Lᵀ.
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptedNorm {
@@ -83,6 +86,23 @@ impl AdaptedNorm {
             sum += v * v;
         }
         sum.sqrt()
+    }
+
+    /// Distance below which rounding hides any contraction: that by which the orbit
+    /// fails to close and that of a few units in the last place of its state.
+    pub(crate) fn floor(&self, center: &[f64], image: &[f64]) -> f64 {
+        let off: Vec<f64> = center
+            .iter()
+            .enumerate()
+            .map(|(i, x)| {
+                x * if i % 2 == 0 {
+                    1.0 + ROUNDING
+                } else {
+                    1.0 - ROUNDING
+                }
+            })
+            .collect();
+        10.0 * (self.distance(center, image) + self.distance(center, &off))
     }
 
     /// Half width, coordinate by coordinate, of the box around the unit ball.

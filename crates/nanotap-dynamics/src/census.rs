@@ -230,29 +230,28 @@ pub fn census<M: StroboscopicMap>(
             &mut transient_spectrum,
         ));
     }
+    let sides = sides(starts);
     let relaxation = balls
         .iter()
-        .map(|n| n.relaxation(widest(starts)))
+        .map(|n| n.relaxation(&sides))
         .fold(0.0, f64::max);
     assemble(&outcomes, orbits, relaxation, transient_spectrum, control)
 }
 
-/// Largest side of the box around the starts.
-fn widest(starts: &[Vec<f64>]) -> f64 {
+/// Sides of the box around the starts.
+fn sides(starts: &[Vec<f64>]) -> Vec<f64> {
     let Some(first) = starts.first() else {
-        return 0.0;
+        return Vec::new();
     };
-    (0..first.len())
-        .map(|i| {
-            let side = starts
-                .iter()
-                .filter_map(|s| s.get(i))
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
-                    (l.min(v), h.max(v))
-                });
-            side.1 - side.0
-        })
-        .fold(0.0, f64::max)
+    let mut low = first.clone();
+    let mut high = first.clone();
+    for start in starts {
+        for (v, (l, h)) in start.iter().zip(low.iter_mut().zip(&mut high)) {
+            *l = l.min(*v);
+            *h = h.max(*v);
+        }
+    }
+    low.iter().zip(&high).map(|(l, h)| h - l).collect()
 }
 
 /// The contracting neighbourhoods that could be found, with the orbit of each.

@@ -21,7 +21,7 @@ use crate::adapted_norm::AdaptedNorm;
 use crate::failure::{MapFailure, advance, advance_with_jacobian};
 use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
-use crate::vector::{distance, unit};
+use crate::vector::unit;
 
 /// Factor between the radii tried, and between the radius that passes and the one used.
 const SHRINK: f64 = 0.75;
@@ -65,20 +65,23 @@ impl Neighbourhood {
         let rate = 0.5 * (1.0 + norm.rate());
         let unit_extents = norm.extents();
         let widest = unit_extents.iter().copied().fold(0.0, f64::max);
+        let floor = 10.0 * norm.floor(&center, &work.state);
         let scale = orbit.scale().max(1e3 * orbit.error);
-        let floor_distance = 100.0 * orbit.error;
-        let least = unit_extents
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min)
-            .max(1e-12 * widest);
-        let floor = floor_distance / least;
         let mut radius = scale / widest;
         for _ in 0..TRIALS {
             if radius < 8.0 * floor {
                 break;
             }
-            if contracts(map, &center, orbit.period, &norm, radius, rate, &mut work) {
+            if contracts(
+                map,
+                &center,
+                orbit.period,
+                &norm,
+                radius,
+                rate,
+                floor,
+                &mut work,
+            ) {
                 let radius = SHRINK * radius;
                 return Ok(Some(Self {
                     extents: unit_extents.iter().map(|e| e * radius).collect(),
@@ -144,17 +147,15 @@ impl Neighbourhood {
         Ok(after <= self.rate * before || after <= self.floor)
     }
 
-    /// Periods that the slowest linear decay needs from the largest extent of
-    /// `widths` to the ball: the natural length of a transient that is no chaos.
-    pub fn relaxation(&self, widths: f64) -> f64 {
-        let extent = self
-            .extents
+    /// Periods that the slowest linear decay needs from a box with these sides to the
+    /// ball: the natural length of a transient that is no chaos.
+    pub fn relaxation(&self, sides: &[f64]) -> f64 {
+        let ratio = sides
             .iter()
-            .copied()
-            .fold(0.0, f64::max)
-            .max(f64::MIN_POSITIVE);
-        let folds = (widths / extent).max(1.0).ln();
-        folds * self.period as f64 / -self.rate.ln()
+            .zip(&self.extents)
+            .map(|(s, e)| s / e.max(f64::MIN_POSITIVE))
+            .fold(1.0, f64::max);
+        ratio.ln() * self.period as f64 / -self.rate.ln()
     }
 }
 
@@ -202,6 +203,7 @@ fn contracts<M: StroboscopicMap>(
     norm: &AdaptedNorm,
     radius: f64,
     rate: f64,
+    floor: f64,
     work: &mut Return,
 ) -> bool {
     let d = center.len();
@@ -222,8 +224,7 @@ fn contracts<M: StroboscopicMap>(
                 return false;
             }
             let before = norm.distance(&point, center);
-            let rounding = 1e-12 * distance(&point, &vec![0.0; d]);
-            if norm.distance(&work.state, center) > rate * before + rounding {
+            if norm.distance(&work.state, center) > rate * before + floor {
                 return false;
             }
         }

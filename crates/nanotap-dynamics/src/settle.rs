@@ -594,12 +594,7 @@ pub(crate) fn approaches<M: StroboscopicMap>(
     for _ in 0..(n - nearest) % n {
         advance(map, &mut x)?;
     }
-    let least = adapted
-        .extents()
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
-        .max(f64::MIN_POSITIVE);
-    let floor = 10.0 * orbit.error / least;
+    let floor = adapted.floor(center, &point);
     let first = adapted.distance(&x, center);
     if first <= floor {
         return Ok(true);

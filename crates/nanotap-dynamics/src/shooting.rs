@@ -298,20 +298,19 @@ impl Segments {
     /// How far the points may be from the true orbit: the Newton corrections that
     /// answer the residual and a rounding error in every entry of every period.
     pub(crate) fn error_estimate(&self) -> Option<f64> {
-        let growth = self.jacobians.iter().fold(1.0f64, |m, a| m.max(a.amax()));
-        let noise = 4.0 * f64::EPSILON * self.scale * growth.min(1e4);
+        let noise = self.rounding();
         let mut system = BlockCyclic::new(self.d, self.n);
         let mut step = vec![0.0; self.points.len()];
-        let mut error = noise;
+        let mut error = f64::EPSILON * self.scale;
         for sample in 0..3u64 {
             let right: Vec<f64> = (0..self.points.len())
                 .map(|i| {
                     if sample == 0 {
                         self.residuals[i]
                     } else if mix(sample << 32 | i as u64) & 1 == 0 {
-                        noise
+                        noise[i]
                     } else {
-                        -noise
+                        -noise[i]
                     }
                 })
                 .collect();
@@ -323,6 +322,24 @@ impl Segments {
             error = error.max(norm(&step));
         }
         Some(error)
+    }
+
+    /// Rounding of each entry of each P(x_k): some tens of operations on every
+    /// entry of x_k, carried through DP, and of the result.
+    fn rounding(&self) -> Vec<f64> {
+        let (d, n) = (self.d, self.n);
+        let mut noise = vec![0.0; n * d];
+        for k in 0..n {
+            let state = &self.points[k * d..(k + 1) * d];
+            let next = (k + 1) % n;
+            for i in 0..d {
+                let row = self.jacobians[k].row(i);
+                let carried: f64 = row.iter().zip(state).map(|(a, x)| (a * x).abs()).sum();
+                noise[k * d + i] =
+                    32.0 * f64::EPSILON * (carried + self.points[next * d + i].abs());
+            }
+        }
+        noise
     }
 
     /// The orbit with its minimal period, multipliers and error estimate.

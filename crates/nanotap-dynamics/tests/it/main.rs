@@ -7,6 +7,7 @@ mod branching;
 mod closing;
 mod counting;
 mod exponents;
+mod properties;
 mod settling;
 mod slicing;
 mod tracing;

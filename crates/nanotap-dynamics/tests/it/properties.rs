@@ -1,0 +1,148 @@
+//! What must hold for every system, tried on random ones.
+
+use std::convert::Infallible;
+
+use nanotap_dynamics::{
+    CensusOptions, Control, DMatrix, Fate, LyapunovOptions, Neighbourhood, SettleOptions,
+    ShootingOptions, StartBox, StroboscopicMap, Verdict, census, close_orbit, settle,
+};
+use proptest::prelude::*;
+
+use crate::systems::{Henon, Logistic, System, thrown};
+
+/// x → A x + b.
+#[derive(Clone, Debug)]
+struct Affine {
+    matrix: DMatrix<f64>,
+    offset: Vec<f64>,
+}
+
+impl StroboscopicMap for Affine {
+    type Error = Infallible;
+
+    fn dimension(&self) -> usize {
+        self.offset.len()
+    }
+
+    fn period(&self) -> f64 {
+        1.0
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+        let image: Vec<f64> = self
+            .matrix
+            .row_iter()
+            .zip(&self.offset)
+            .map(|(row, b)| {
+                b + row
+                    .iter()
+                    .zip(state.iter())
+                    .map(|(a, x)| a * x)
+                    .sum::<f64>()
+            })
+            .collect();
+        state.copy_from_slice(&image);
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Infallible> {
+        jacobian.copy_from(&self.matrix);
+        self.advance(state)
+    }
+}
+
+prop_compose! {
+    /// A contracting affine map of dimension 4 (row sums below 0.97).
+    fn contraction()(
+        entries in prop::collection::vec(-1.0f64..1.0, 16),
+        offset in prop::collection::vec(-3.0f64..3.0, 4),
+        size in 0.1f64..0.97,
+    ) -> Affine {
+        let matrix = DMatrix::from_row_slice(4, 4, &entries);
+        let widest = matrix.row_iter().map(|r| r.abs().sum()).fold(0.0, f64::max);
+        Affine { matrix: matrix * (size / widest.max(1e-3)), offset }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Every start of a contraction settles on its one fixed point (1 − A)⁻¹ b.
+    #[test]
+    fn contractions_settle_on_their_fixed_point(
+        map in contraction(),
+        start in prop::collection::vec(-50.0f64..50.0, 4),
+    ) {
+        let settled = settle(&mut map.clone(), &start, &SettleOptions::default());
+        let Verdict::Periodic(orbit) = settled.verdict else {
+            return Err(TestCaseError::fail(format!("{:?}", settled.verdict)));
+        };
+        let offset = DMatrix::from_column_slice(4, 1, &map.offset);
+        let exact = (DMatrix::identity(4, 4) - &map.matrix).lu().solve(&offset).unwrap();
+        prop_assert_eq!(orbit.period, 1);
+        for (x, e) in orbit.states[0].iter().zip(exact.iter()) {
+            prop_assert!((x - e).abs() <= 1e-11 * exact.amax().max(50.0));
+        }
+        // The multipliers' sum and product are the trace and determinant of A.
+        let sum: f64 = orbit.multipliers.iter().map(|m| m.re).sum();
+        prop_assert!((sum - map.matrix.trace()).abs() < 1e-12);
+        let determinant = map.matrix.determinant().abs().ln();
+        prop_assert!((orbit.log_determinant - determinant).abs() < 1e-9);
+    }
+
+    /// Whatever starts in a contracting ball is nearer after one return, stays in it,
+    /// and ends on the orbit.
+    #[test]
+    fn balls_hold_what_they_promise(a in 0.05f64..0.36, u in -1.0f64..1.0, v in -1.0f64..1.0) {
+        let mut map = System(Henon { a, b: 0.3 });
+        let fixed = map.0.fixed_point();
+        let orbit = close_orbit(&mut map, &fixed, 1, &ShootingOptions::default()).unwrap();
+        let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let extents = ball.extents();
+        let start = [fixed[0] + u * extents[0], fixed[1] + v * extents[1]];
+        prop_assume!(ball.contains(&start));
+        prop_assert!(ball.holds(&mut map, &start, &mut [0.0; 2]).unwrap());
+        let next = thrown(&mut map, &start, 1);
+        prop_assert!(ball.contains(&next));
+        let end = thrown(&mut map, &start, 20_000);
+        prop_assert!((end[0] - fixed[0]).abs() < 1e-9);
+    }
+
+    /// Every start of a census has exactly one fate, and fractions add up to one.
+    #[test]
+    fn every_start_is_counted_once(r in 1.1f64..4.0, seed: u64) {
+        let starts = StartBox::new(vec![-0.2], vec![1.2]).unwrap().starts(seed, 24);
+        let options = CensusOptions {
+            pilots: 8,
+            settle: SettleOptions {
+                lyapunov: LyapunovOptions { min_periods: 500, max_periods: 1000, ..LyapunovOptions::default() },
+                birkhoff_periods: 256,
+                ..SettleOptions::default()
+            },
+        };
+        let result = census(&System(Logistic(r)), &starts, &options, &Control::default());
+        let attracted: usize = result.attractors.iter().map(|a| a.fraction.count).sum();
+        let wandering = result.transient_chaos.as_ref().map_or(0, |t| t.wandering.count);
+        prop_assert_eq!(
+            attracted + wandering + result.unbounded.count + result.undecided.len(),
+            starts.len()
+        );
+        for (index, attractor) in result.attractors.iter().enumerate() {
+            let fates = result.fates.iter().filter(
+                |f| matches!(f, Fate::Attractor { index: i, .. } if *i == index),
+            );
+            prop_assert_eq!(fates.count(), attractor.fraction.count);
+        }
+        // Outside [0, 1] all runs off, inside nothing does.
+        for (start, fate) in starts.iter().zip(&result.fates) {
+            let inside = (0.0..=1.0).contains(&start[0]);
+            prop_assert_eq!(*fate != Fate::Unbounded, inside);
+        }
+        // The logistic map has one attractor at most (negative Schwarzian derivative).
+        prop_assert!(result.attractors.len() <= 1, "{:?}", result.attractors);
+    }
+}

@@ -243,21 +243,17 @@ pub(crate) fn collapse<F: MapFamily>(
     let zero = narrow(solver, from, (0.0, step), (1.0, last), |_, node, _| {
         Some(dot(&reference, &gap(node)) / square)
     });
-    match zero {
+    if let Some(z) = zero {
         // A difference that only turns by a right angle is no meeting.
-        Some(z) => {
-            let left = gap(&z.node);
-            (dot(&left, &left) <= 0.01 * square).then_some((z.at, z.node.parameter))
-        }
-        // Both branches meet there, so the corrector may fail: interpolate.
-        None => {
-            let t = 1.0 / (1.0 - last);
-            Some((
-                t * step,
-                from.parameter + t * (to.parameter - from.parameter),
-            ))
-        }
+        let left = gap(&z.node);
+        return (dot(&left, &left) <= 0.01 * square).then_some((z.at, z.node.parameter));
     }
+    // Both branches meet there, so the corrector may fail: interpolate.
+    let t = 1.0 / (1.0 - last);
+    Some((
+        t * step,
+        from.parameter + t * (to.parameter - from.parameter),
+    ))
 }
 
 /// All bifurcations between two neighbouring nodes, in order along the arc.

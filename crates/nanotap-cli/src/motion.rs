@@ -318,8 +318,12 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
         .iter()
         .enumerate()
         .map(|(k, value)| match errors.and_then(|e| e.get(k)) {
-            Some(error) => format!("{value:.4} ± {error:.4}"),
-            None => format!("{value:.4}"),
+            Some(error) => format!(
+                "{} ± {}",
+                number::significant(*value, 3),
+                number::significant(*error, 1)
+            ),
+            None => number::significant(*value, 4),
         })
         .collect();
     list.join(", ")

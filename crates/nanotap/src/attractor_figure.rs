@@ -22,7 +22,7 @@ const MOST: usize = 8;
 /// Phase portraits and strobe points of every attractor, each in its own colour, and the
 /// unstable orbits found as open markers.
 pub fn attractors_figure(model: &Model, found: &Attractors, units: &Units) -> Figure {
-    let tips = found.attractors.iter().flat_map(|a| {
+    let tips = found.attractors.iter().filter_map(|a| {
         let o = a
             .orbit
             .as_ref()

@@ -2,15 +2,15 @@
 //! can be read off it.
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, Control, Fraction, LyapunovSpectrum, OrbitSearch,
-    PeriodicOrbit, SettleOptions, StartBox, StartBoxError, census, find_orbits,
+    AttractorKind, Census, CensusOptions, Control, Fraction, OrbitSearch, PeriodicOrbit,
+    SettleOptions, StartBox, StartBoxError, census, find_orbits,
 };
 use serde::Serialize;
 
 use crate::model::Model;
 use crate::observables::Observables;
 use crate::orbit::{OrbitError, OrbitReport, report};
-use crate::simulate::{Classification, SimulateError, observe};
+use crate::simulate::{Classification, SimulateError, largest_exponent, observe};
 use crate::start_box::default_box;
 use crate::strobe::Strobe;
 use crate::time_series::state_names;
@@ -332,13 +332,6 @@ fn one(
             observables,
         }))
     };
-    let largest = |s: &LyapunovSpectrum| {
-        let (value, error) = s.largest();
-        format!(
-            "largest exponent {value:.4} ± {error:.4} per period over {} periods",
-            s.periods
-        )
-    };
     let (classification, spectrum, evidence, orbit, wandering) = match kind {
         AttractorKind::Periodic(orbit) => {
             let evidence = format!(
@@ -352,7 +345,7 @@ fn one(
         AttractorKind::QuasiPeriodic(torus) => {
             let evidence = format!(
                 "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
-                largest(&torus.spectrum),
+                largest_exponent(&torus.spectrum),
                 torus.birkhoff_digits,
                 torus.nearest_return
             );
@@ -367,7 +360,7 @@ fn one(
         AttractorKind::Chaotic { spectrum, lifetime } => {
             let evidence = format!(
                 "{}; none of {} starts escaped in {:.0} periods together (mean lifetime above {:.0} at 95 %)",
-                largest(spectrum),
+                largest_exponent(spectrum),
                 fraction.count,
                 lifetime.exposure,
                 lifetime.low

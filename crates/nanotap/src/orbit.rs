@@ -135,10 +135,10 @@ fn settled(
     options: &OrbitOptions,
 ) -> Result<PeriodicOrbit, OrbitError> {
     let end = settle(map, start, &options.settle);
-    if let Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } = &end.verdict {
-        if period.is_none_or(|p| p % orbit.period == 0) {
-            return Ok(orbit.clone());
-        }
+    if let Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } = &end.verdict
+        && period.is_none_or(|p| p % orbit.period == 0)
+    {
+        return Ok(orbit.clone());
     }
     match period {
         None => Err(OrbitError::NotPeriodic {

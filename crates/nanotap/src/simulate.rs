@@ -402,6 +402,21 @@ pub fn contact_events(model: &Model, trajectory: &Trajectory, offset: f64) -> Ve
         .collect()
 }
 
+/// The largest exponent in words.
+pub(crate) fn largest_exponent(spectrum: &LyapunovSpectrum) -> String {
+    let (value, error) = spectrum.largest();
+    // Near zero the digits after the point would say nothing.
+    let shown = if value.abs() < 1e-3 {
+        format!("{value:.1e} ± {error:.0e}")
+    } else {
+        format!("{value:.4} ± {error:.4}")
+    };
+    format!(
+        "largest exponent {shown} per period over {} periods",
+        spectrum.periods
+    )
+}
+
 /// A verdict in the words of the output.
 #[derive(Clone, Debug)]
 pub struct Named {
@@ -418,13 +433,7 @@ pub struct Named {
 impl Named {
     /// Names a verdict.
     pub fn of(verdict: &Verdict) -> Self {
-        let exponent = |s: &LyapunovSpectrum| {
-            let (value, error) = s.largest();
-            format!(
-                "largest exponent {value:.4} ± {error:.4} per period over {} periods",
-                s.periods
-            )
-        };
+        let exponent = largest_exponent;
         let periodic = |orbit: &PeriodicOrbit| {
             format!(
                 "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",

@@ -92,10 +92,10 @@ impl Subject {
     /// # Errors
     /// [`UnknownKey`] with what there is and the nearest name.
     pub fn key(&self, name: &str) -> Result<Key, UnknownKey> {
-        if let Self::Cantilever(_) = self {
-            if let Ok(parameter) = name.parse::<Parameter>() {
-                return Ok(Key::Cantilever(parameter));
-            }
+        if let Self::Cantilever(_) = self
+            && let Ok(parameter) = name.parse::<Parameter>()
+        {
+            return Ok(Key::Cantilever(parameter));
         }
         let keys = self.keys();
         if let Some(key) = keys.iter().find(|k| k.name() == name) {

@@ -133,7 +133,7 @@ fn text(studied: &Studied, report: &LyapunovReport) -> String {
     for (k, (exponent, error)) in report.exponents.iter().zip(&report.errors).enumerate() {
         table.row([
             (k + 1).to_string(),
-            format!("{exponent:.5}"),
+            number::significant(*exponent, 5),
             number::significant(*error, 2),
         ]);
     }

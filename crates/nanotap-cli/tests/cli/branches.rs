@@ -49,7 +49,7 @@ fn the_period_1_orbit_doubles_where_it_should() {
             .concat(),
         )
         .json();
-    // Issue: Ω = 2.9137224181 and 2.5050406984, to 1e-9.
+    // Reference: Ω = 2.9137224181 and 2.5050406984, to 1e-9.
     let flips = of_kind(&json, "flip");
     assert_eq!(flips.len(), 2, "{flips:?}");
     assert!((flips[0] - 2.913_722_418_1).abs() < 1e-9, "{flips:?}");
@@ -131,7 +131,7 @@ fn the_doubled_branch_joins_both_flips() {
 fn the_restitution_model_flips_where_it_should() {
     let folder = Folder::new();
     folder.write("impact.toml", IMPACT);
-    // Issue: gap 0, r = 0.8 flips at ω = 1.2606766 and 2.6533477.
+    // Reference: gap 0, r = 0.8 flips at ω = 1.2606766 and 2.6533477.
     for (to, expected) in [("1.1", 1.260_676_6), ("3", 2.653_347_7)] {
         let json = folder
             .run(&[

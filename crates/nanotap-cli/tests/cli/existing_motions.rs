@@ -24,7 +24,7 @@ fn coexisting_motions_are_all_found() {
     let json = folder.run(&[&arguments[..], &["--json"]].concat()).json();
     let list = json["attractors"].as_array().unwrap();
     let periods: Vec<u64> = list.iter().map(|a| a["period"].as_u64().unwrap()).collect();
-    // Issue: at Ω = 20, α1 = 0 a period-1 (W up to 0.7357) and a period-4 (W up to 3.0047).
+    // Reference: at Ω = 20, α1 = 0 a period-1 (W up to 0.7357) and a period-4 (W up to 3.0047).
     assert_eq!(periods, [1, 4]);
     assert!((number(&list[0], "tip_max") - 0.7357).abs() < 5e-5);
     assert!((number(&list[1], "tip_max") - 3.0047).abs() < 5e-5);
@@ -96,7 +96,7 @@ fn chaos_is_an_attractor_with_its_evidence_and_unstable_orbits() {
             .unwrap()
             .contains("none of 16 starts escaped")
     );
-    // Issue: about 0.253 ± 0.01 per period at Ω = 2.6.
+    // Reference: about 0.253 ± 0.01 per period at Ω = 2.6.
     let largest = list[0]["lyapunov"][0].as_f64().unwrap();
     let error = list[0]["lyapunov_errors"][0].as_f64().unwrap();
     assert!(
@@ -182,7 +182,7 @@ fn an_oscillator_with_a_rigid_stop_is_counted_too() {
 }
 
 #[test]
-fn the_spectrum_is_the_issues_and_sums_to_the_trace() {
+fn the_spectrum_is_right_and_sums_to_the_trace() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&[
         "lyapunov",

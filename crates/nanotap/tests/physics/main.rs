@@ -4,5 +4,6 @@
 mod derivatives;
 mod facts;
 mod impact_oscillator;
+mod motions;
 mod references;
 mod short_contacts;

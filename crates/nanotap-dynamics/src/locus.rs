@@ -25,7 +25,7 @@ use crate::bifurcation::{Bifurcation, BifurcationKind};
 use crate::branch_solver::OrbitTangency;
 use crate::continuation::{BranchEnd, ContinuationError};
 use crate::control::Control;
-use crate::failure::{MapFailure, advance_with_tangencies, finite};
+use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
 use crate::map::StroboscopicMap;
 use crate::multipliers::Multipliers;
 use crate::orbit::PeriodicOrbit;
@@ -195,6 +195,14 @@ struct LocusNode {
     iterations: usize,
 }
 
+/// A_{n−1} … A_0.
+fn product(factors: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let d = factors.first().map_or(0, DMatrix::nrows);
+    factors
+        .iter()
+        .fold(DMatrix::identity(d, d), |product, a| a * product)
+}
+
 /// The run of n periods from x.
 struct Trajectory {
     segments: Segments,
@@ -285,20 +293,20 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
         })
     }
 
-    fn evaluate(&self, u: &[f64]) -> Result<Evaluation, MapFailure> {
+    /// Everything at u; the borders are brought up to date on the way.
+    fn evaluate(&mut self, u: &[f64]) -> Result<Evaluation, MapFailure> {
         let Trajectory {
             segments,
             end,
             by_parameter,
         } = self.orbit_from(u)?;
-        let mut monodromy = DMatrix::identity(self.d, self.d);
-        for a in &segments.jacobians {
-            monodromy = a * monodromy;
-        }
-        let scalar = self.scalar(u, &segments, &monodromy)?;
-        if !scalar.is_finite() {
-            return Err(MapFailure::NotFinite);
-        }
+        let monodromy = product(&segments.jacobians);
+        self.refresh_borders(&monodromy);
+        let scalar = if let BifurcationKind::Grazing { .. } = self.kind {
+            self.scalar_alone(&mut self.map_at(u)?, &u[..self.d])?
+        } else {
+            self.scalar_of(&segments.jacobians, &monodromy)?
+        };
         Ok(Evaluation {
             gap: end.iter().zip(u).map(|(a, b)| a - b).collect(),
             monodromy,
@@ -307,37 +315,50 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
         })
     }
 
-    /// The function that vanishes on the locus.
-    fn scalar(
+    fn map_at(&self, u: &[f64]) -> Result<F::Map, MapFailure> {
+        self.family
+            .at(u[self.d], u[self.d + 1])
+            .map_err(MapFailure::refused)
+    }
+
+    /// The function that vanishes on the locus, from the Jacobians of an orbit.
+    fn scalar_of(
         &self,
-        u: &[f64],
-        segments: &Segments,
+        jacobians: &[DMatrix<f64>],
         monodromy: &DMatrix<f64>,
     ) -> Result<f64, MapFailure> {
-        match self.kind {
-            BifurcationKind::Fold | BifurcationKind::Crossing => Ok(self
-                .bordered(monodromy, -1.0, false)
-                .map_or(f64::NAN, |(_, g)| g)),
-            BifurcationKind::Flip => Ok(self
-                .bordered(monodromy, 1.0, false)
-                .map_or(f64::NAN, |(_, g)| g)),
+        let value = match self.kind {
+            BifurcationKind::Fold | BifurcationKind::Crossing => {
+                self.bordered(monodromy, -1.0, false).map(|(_, g)| g)
+            }
+            BifurcationKind::Flip => self.bordered(monodromy, 1.0, false).map(|(_, g)| g),
             BifurcationKind::NeimarkSacker { .. } => {
-                let Ok(multipliers) = Multipliers::of_product(&segments.jacobians) else {
-                    return Err(MapFailure::NotFinite);
-                };
-                Ok(multipliers
-                    .values
-                    .iter()
-                    .filter(|m| m.im > 0.0)
-                    .map(|m| m.norm_sqr() - 1.0)
-                    .min_by(|a, b| a.abs().total_cmp(&b.abs()))
-                    .unwrap_or(f64::NAN))
+                Multipliers::of_product(jacobians).ok().and_then(|m| {
+                    m.values
+                        .iter()
+                        .filter(|m| m.im > 0.0)
+                        .map(|m| m.norm_sqr() - 1.0)
+                        .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+                })
             }
-            BifurcationKind::Grazing { .. } => {
-                let tangency = self.tangency(u)?;
-                Ok(tangency.map_or(f64::NAN, |t| t.value))
-            }
+            BifurcationKind::Grazing { .. } => None,
+        };
+        value.filter(|v| v.is_finite()).ok_or(MapFailure::NotFinite)
+    }
+
+    /// That function for the run from `x`, without derivatives by parameters.
+    fn scalar_alone(&self, map: &mut F::Map, x: &[f64]) -> Result<f64, MapFailure> {
+        if let BifurcationKind::Grazing { .. } = self.kind {
+            let value = self.tangency(map, x)?.map(|t| t.value);
+            return value.filter(|v| v.is_finite()).ok_or(MapFailure::NotFinite);
         }
+        let d = self.d;
+        let mut jacobians = vec![DMatrix::zeros(d, d); self.n];
+        let mut state = x.to_vec();
+        for jacobian in &mut jacobians {
+            advance_with_jacobian(map, &mut state, jacobian)?;
+        }
+        self.scalar_of(&jacobians, &product(&jacobians))
     }
 
     /// Solution of [[M + shift, b], [cᵀ, 0]] (v, g) = (0, 1), transposed if asked.
@@ -382,19 +403,14 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
     }
 
     /// The extremum nearest in time to the one followed.
-    fn tangency(&self, u: &[f64]) -> Result<Option<OrbitTangency>, MapFailure> {
-        let d = self.d;
-        let mut map = self
-            .family
-            .at(u[d], u[d + 1])
-            .map_err(MapFailure::refused)?;
-        let mut state = u[..d].to_vec();
+    fn tangency(&self, map: &mut F::Map, x: &[f64]) -> Result<Option<OrbitTangency>, MapFailure> {
+        let mut state = x.to_vec();
         let mut one = Vec::new();
         let mut nearest: Option<(f64, OrbitTangency)> = None;
         let period = self.n as f64;
         for k in 0..self.n {
             one.clear();
-            advance_with_tangencies(&mut map, &mut state, &mut one)?;
+            advance_with_tangencies(map, &mut state, &mut one)?;
             for t in &one {
                 let time = k as f64 + t.phase;
                 let apart = (time - self.time).rem_euclid(period);
@@ -409,15 +425,20 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
     }
 
     fn gradient(&self, u: &[f64]) -> Result<Vec<f64>, MapFailure> {
+        let d = self.d;
+        let mut here = self.map_at(u)?;
         let mut shifted = u.to_vec();
         let mut gradient = Vec::with_capacity(u.len());
         for i in 0..u.len() {
             let h = 1e-6 * self.scales[i];
+            let (high, low) = (u[i] + h, u[i] - h);
             let mut at = |value: f64| -> Result<f64, MapFailure> {
                 shifted[i] = value;
-                Ok(self.evaluate(&shifted)?.scalar)
+                if i < d {
+                    return self.scalar_alone(&mut here, &shifted[..d]);
+                }
+                self.scalar_alone(&mut self.map_at(&shifted)?, &shifted[..d])
             };
-            let (high, low) = (u[i] + h, u[i] - h);
             let difference = at(high)? - at(low)?;
             shifted[i] = u[i];
             gradient.push(difference / (high - low));
@@ -453,9 +474,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
         let mut u = guess.to_vec();
         let mut last = f64::INFINITY;
         let mut iterations = 0;
-        loop {
-            let e = self.evaluate(&u).map_err(|e| e.to_string())?;
-            self.refresh_borders(&e.monodromy);
+        let matrix = loop {
             let e = self.evaluate(&u).map_err(|e| e.to_string())?;
             let gradient = self.gradient(&u).map_err(|e| e.to_string())?;
             let mut right = DVector::zeros(d + 2);
@@ -463,8 +482,11 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
                 right[i] = -e.gap[i];
             }
             right[d] = -e.scalar;
-            let lu = self.matrix(&e, &gradient, row).lu();
-            let step = lu.solve(&right).ok_or("the bordered system is singular")?;
+            let step = self
+                .matrix(&e, &gradient, row)
+                .lu()
+                .solve(&right)
+                .ok_or("the bordered system is singular")?;
             let size = (0..d + 2).fold(0.0f64, |m, i| m.max((step[i] / self.scales[i]).abs()));
             if !size.is_finite() {
                 return Err("the bordered system is singular".into());
@@ -473,21 +495,19 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
                 *v += s;
             }
             iterations += 1;
+            // The next step would be smaller by the error of the gradient, 1e-8 or so.
             let stalled = size > 0.5 * last;
-            if size <= 1e-14 || (stalled && size <= 1e-9) {
-                break;
+            if size <= 1e-11 || (stalled && size <= 1e-9) {
+                break self.matrix(&e, &gradient, orientation);
             }
             if iterations >= 15 || size > 2.0 * last {
                 return Err("the corrector did not converge".into());
             }
             last = size;
-        }
-        let e = self.evaluate(&u).map_err(|e| e.to_string())?;
-        let gradient = self.gradient(&u).map_err(|e| e.to_string())?;
+        };
         let mut right = DVector::zeros(d + 2);
         right[d + 1] = 1.0;
-        let tangent = self
-            .matrix(&e, &gradient, orientation)
+        let tangent = matrix
             .lu()
             .solve(&right)
             .ok_or("the curve has no direction")?;
@@ -496,7 +516,8 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
             return Err("the curve has no direction".into());
         }
         if let BifurcationKind::Grazing { .. } = self.kind
-            && let Ok(Some(t)) = self.tangency(&u)
+            && let Ok(mut map) = self.map_at(&u)
+            && let Ok(Some(t)) = self.tangency(&mut map, &u[..d])
         {
             self.time = t.time;
         }

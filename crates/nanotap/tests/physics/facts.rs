@@ -223,3 +223,35 @@ proptest! {
         }
     }
 }
+
+/// The clearance of a long run looks closely at the lowest few of its segments only; it
+/// must be the least of the clearances of its single periods, where every segment is
+/// looked at closely.
+#[test]
+fn clearance_of_a_long_run_is_the_least_of_its_periods() {
+    for (omega, modes) in [(2.6, 3), (20.0, 5)] {
+        let case = Case {
+            omega,
+            ..Case::paper()
+        }
+        .with_modes(modes);
+        let model = Model::cantilever(&case).unwrap();
+        let seen = |state: &[f64], periods: usize| {
+            let run = Trajectory::record(&model.system, state, periods).unwrap();
+            let clearance = nanotap::observables::Observables::of(&model, &run).unwrap();
+            (
+                clearance.beam_clearance.unwrap().height,
+                run.state_at(run.end()).unwrap(),
+            )
+        };
+        let mut state = vec![0.0; 2 * modes];
+        let (whole, _) = seen(&state, 40);
+        let mut least = f64::INFINITY;
+        for _ in 0..40 {
+            let (height, next) = seen(&state, 1);
+            least = least.min(height);
+            state = next;
+        }
+        assert!((whole - least).abs() < 1e-9, "{whole} {least}");
+    }
+}

@@ -149,12 +149,16 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
             0 => String::new(),
             n => format!(", {n} of them grazing"),
         };
+        // A rigid stop is touched for an instant.
+        let (name, share) = if o.contact_fraction > 0.0 {
+            let percent = number::significant(100.0 * o.contact_fraction, 4);
+            ("contact", format!("{percent} % of the time"))
+        } else {
+            ("impacts", String::new())
+        };
         table.row([
-            "contact",
-            &format!(
-                "{} % of the time",
-                number::significant(100.0 * o.contact_fraction, 4)
-            ),
+            name,
+            &share,
             "",
             &format!(
                 "{} a period{grazing}",
@@ -167,12 +171,14 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
             &si(Kind::Velocity, o.impact_speed),
             "greatest at which a contact begins",
         ]);
-        table.row([
-            "force on the tip",
-            &format!("up to {}", number::significant(o.peak_force, 6)),
-            &si(Kind::Force, o.peak_force),
-            &format!("mean {}", number::significant(o.mean_force, 4)),
-        ]);
+        if o.contact_fraction > 0.0 {
+            table.row([
+                "force on the tip",
+                &format!("up to {}", number::significant(o.peak_force, 6)),
+                &si(Kind::Force, o.peak_force),
+                &format!("mean {}", number::significant(o.mean_force, 4)),
+            ]);
+        }
     } else {
         table.row(["contact", "none", "", ""]);
     }
@@ -205,7 +211,8 @@ pub(crate) fn energy(o: &Observables, units: &Units) -> String {
     let balance = &o.energy_balance;
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
     let mut row = |name: &str, value: f64, note: String| {
-        let value = value / o.periods;
+        // Zero has no sign.
+        let value = value / o.periods + 0.0;
         let si = units
             .si(Kind::Energy)
             .map_or_else(String::new, |u| Kind::Energy.format(u * value));

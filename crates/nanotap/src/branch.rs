@@ -555,9 +555,15 @@ fn described(
         cancelled: false,
         key,
     };
-    // A seed at an end of the range has nothing on one side.
-    let kept: Vec<usize> = (0..diagram.branches.len())
-        .filter(|&k| diagram.branches[k].branch.points.len() > 1)
+    // A seed at an end of the range has nothing on one side, and a branch that was followed
+    // from both of its ends is one.
+    let branches = &diagram.branches;
+    let kept: Vec<usize> = (0..branches.len())
+        .filter(|&k| branches[k].branch.points.len() > 1)
+        .filter(|&k| {
+            let span = (options.to - options.from).abs();
+            !(0..k).any(|earlier| are_one(&branches[earlier].branch, &branches[k].branch, span))
+        })
         .collect();
     for (index, &k) in kept.iter().enumerate() {
         let DiagramBranch {
@@ -577,6 +583,19 @@ fn described(
         }
     }
     Ok(report)
+}
+
+/// Whether two branches pass through just the same bifurcations, of which there are some.
+fn are_one(a: &Branch, b: &Branch, span: f64) -> bool {
+    let same = |x: &Bifurcation, y: &Bifurcation| {
+        kind_name(x.kind) == kind_name(y.kind) && (x.parameter - y.parameter).abs() <= 1e-7 * span
+    };
+    let among = |x: &Branch, y: &Branch| {
+        x.bifurcations
+            .iter()
+            .all(|p| y.bifurcations.iter().any(|q| same(p, q)))
+    };
+    a.period == b.period && !a.bifurcations.is_empty() && among(a, b) && among(b, a)
 }
 
 fn summary(branch: &Branch, parent: Option<usize>, depth: usize) -> BranchSummary {

@@ -44,7 +44,7 @@ impl Shown {
             Self::TipMax => ("greatest displacement $x_{max}$", Kind::Length),
             Self::TipMin => ("least displacement $x_{min}$", Kind::Length),
             Self::Amplitude => ("amplitude (half of peak to peak)", Kind::Length),
-            Self::FirstHarmonic => ("amplitude at the drive's frequency", Kind::Length),
+            Self::FirstHarmonic => ("amplitude at the drive frequency", Kind::Length),
             Self::Phase => ("phase (°)", Kind::Number),
             Self::ContactFraction => ("part of the time in contact", Kind::Number),
             Self::PeakForce => ("greatest force", Kind::Force),

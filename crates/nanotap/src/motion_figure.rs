@@ -5,7 +5,7 @@ use nanotap_figures::{
     Axis, Band, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Note, Panel, Place,
     Points, Rule, Shape, Stems,
 };
-use nanotap_flow::trajectory::PiecewiseSignal;
+use nanotap_flow::trajectory::{Piece, PiecewiseSignal};
 use nanotap_flow::{Output, Trajectory};
 
 use crate::convergence::Convergence;
@@ -68,11 +68,24 @@ impl<'a> View<'a> {
             .collect()
     }
 
+    /// Piece by piece up to its very end: an impact turns the velocity round at one instant.
     fn portrait(&self, periods: f64) -> Vec<(f64, f64)> {
-        self.instants(periods)
-            .into_iter()
-            .filter_map(|t| self.state(t))
-            .collect()
+        let end = periods * self.model.period();
+        let mut points = Vec::new();
+        for (tip, rate) in self.tip.pieces.iter().zip(&self.rate.pieces) {
+            if tip.start >= end {
+                break;
+            }
+            let count = points_on(tip, self.model.period());
+            points.extend((0..=count).map(|k| {
+                let s = tip.length * k as f64 / count as f64;
+                (
+                    self.length.0 * tip.signal.at(s),
+                    self.velocity.0 * rate.signal.at(s),
+                )
+            }));
+        }
+        points
     }
 
     fn state(&self, t: f64) -> Option<(f64, f64)> {
@@ -125,7 +138,11 @@ impl<'a> View<'a> {
             .with(
                 Line::new(self.over_time(&self.model.tip, periods))
                     .colour(Colour::BLUE)
-                    .label("tip"),
+                    .label(if self.model.beam.is_some() {
+                        "tip"
+                    } else {
+                        "mass"
+                    }),
             )
     }
 
@@ -169,15 +186,20 @@ fn time_axis() -> Axis {
     Axis::linear("time $τ / T$ (drive periods)").tight()
 }
 
+/// Points that show every turn of every mode on a piece.
+fn points_on(piece: &Piece, period: f64) -> usize {
+    let turns = piece.length * piece.signal.fastest() / std::f64::consts::TAU;
+    let share = piece.length / period;
+    let wanted = (POINTS_PER_TURN * turns).max(FEWEST_POINTS * share);
+    wanted.min(POINTS_PER_PERIOD * share).max(6.0).ceil() as usize
+}
+
 fn instants(signal: &PiecewiseSignal, period: f64, periods: f64) -> Vec<f64> {
     let end = periods * period;
     let mut times = Vec::new();
     for piece in signal.pieces.iter().take_while(|p| p.start < end) {
-        let turns = piece.length * piece.signal.fastest() / std::f64::consts::TAU;
-        let share = piece.length / period;
-        let wanted = (POINTS_PER_TURN * turns).max(FEWEST_POINTS * share);
-        let count = wanted.min(POINTS_PER_PERIOD * share).max(6.0).ceil();
-        times.extend((0..count as usize).map(|k| piece.start + piece.length * k as f64 / count));
+        let count = points_on(piece, period);
+        times.extend((0..count).map(|k| piece.start + piece.length * k as f64 / count as f64));
     }
     let last = signal.pieces.last().map_or(0.0, |p| p.start + p.length);
     times.retain(|t| *t < end);

@@ -55,21 +55,32 @@ impl Units {
         let Some(si) = self.si(kind) else {
             return (1.0, String::new());
         };
-        let shown = (size * si).abs();
-        let power = if shown > 0.0 && shown.is_finite() {
-            (3 * (shown.log10() / 3.0).floor() as i32).clamp(-18, 12)
-        } else {
-            0
-        };
-        let prefix = PREFIXES
-            .iter()
-            .find(|(p, _)| *p == power)
-            .map_or("", |(_, name)| name);
-        (
-            si / 10f64.powi(power),
-            format!(" ({prefix}{})", kind.si_unit()),
-        )
+        let (factor, unit) = prefixed(kind, si, size);
+        (factor, format!(" ({unit})"))
     }
+}
+
+/// For numbers up to `size` of which 1 is `si` in SI: what they are to be multiplied with,
+/// and the unit with the prefix that fits.
+pub fn prefixed(kind: Kind, si: f64, size: f64) -> (f64, String) {
+    // A kilogram has a prefix already.
+    let (unit, si) = if kind == Kind::Mass {
+        ("g", 1e3 * si)
+    } else {
+        (kind.si_unit(), si)
+    };
+    let shown = (size * si).abs();
+    let takes_prefix = kind != Kind::AngularFrequency;
+    let power = if takes_prefix && shown > 0.0 && shown.is_finite() {
+        (3 * (shown.log10() / 3.0).floor() as i32).clamp(-18, 12)
+    } else {
+        0
+    };
+    let prefix = PREFIXES
+        .iter()
+        .find(|(p, _)| *p == power)
+        .map_or("", |(_, name)| name);
+    (si / 10f64.powi(power), format!("{prefix}{unit}"))
 }
 
 #[cfg(test)]
@@ -105,6 +116,10 @@ mod tests {
         assert_eq!(unit, " (nN)");
         assert!((factor * 0.005 - 5.0).abs() < 1e-9);
         assert_eq!(units.axis(Kind::Length, 0.0).1, " (m)");
+        // 3 of 1 ng.
+        let (factor, unit) = prefixed(Kind::Mass, 1e-12, 3.0);
+        assert_eq!(unit, "ng");
+        assert!((factor * 3.0 - 3.0).abs() < 1e-12);
     }
 
     #[test]

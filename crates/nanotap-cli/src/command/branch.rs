@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use nanotap::branch::{BranchOptions, BranchReport, PointReport, SeedOptions, branch};
 use nanotap::branch_figure::{ParameterAxis, Shown, branch_figure};
 use nanotap::subject::Key;
-use nanotap::time_series;
+use nanotap::{time_series, units};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -160,8 +160,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             Shown::TipMax
         };
         let shown = arguments.show.map_or(default, Shown::from);
-        let second = report.loci.as_ref().map_or(report.key, |loci| loci.key);
-        let axes = [axis(&studied, report.key), axis(&studied, second)];
+        let size = report.from.abs().max(report.to.abs());
+        let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
+            (loci.key, loci.range[0].abs().max(loci.range[1].abs()))
+        });
+        let axes = [
+            axis(&studied, report.key, size),
+            axis(&studied, second, reach),
+        ];
         branch_figure(
             &report,
             shown,
@@ -232,15 +238,18 @@ fn second(studied: &Studied, text: &str) -> Result<(Key, f64, f64), Failure> {
     ))
 }
 
-/// The axis of a parameter, in SI where the case has it.
-fn axis(studied: &Studied, key: Key) -> ParameterAxis {
-    let plain = ParameterAxis::of(key);
-    studied
-        .parameter_unit(key)
-        .map_or(plain, |unit| ParameterAxis {
-            label: format!("{} ({})", unit.quantity, unit.unit),
-            factor: unit.si,
-        })
+/// The axis of a parameter that goes up to `size`, in SI where the case has it.
+fn axis(studied: &Studied, key: Key, size: f64) -> ParameterAxis {
+    studied.parameter_unit(key).map_or_else(
+        || ParameterAxis::of(key),
+        |unit| {
+            let (factor, name) = units::prefixed(unit.kind, unit.si, size);
+            ParameterAxis {
+                label: format!("{} ({name})", unit.quantity),
+                factor,
+            }
+        },
+    )
 }
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the

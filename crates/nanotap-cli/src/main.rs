@@ -4,6 +4,7 @@
 
 mod arguments;
 mod command;
+mod dataset;
 mod failure;
 mod file;
 mod motion;

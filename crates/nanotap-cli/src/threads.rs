@@ -13,6 +13,14 @@ pub(crate) struct ThreadsArgument {
 }
 
 impl ThreadsArgument {
+    /// How many; 0 if nobody said.
+    pub(crate) fn number(&self) -> Result<usize, Failure> {
+        if self.threads == Some(0) {
+            return Err(nobody());
+        }
+        Ok(self.threads.unwrap_or(0))
+    }
+
     /// Does `work` on so many threads.
     pub(crate) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R, Failure> {
         let Some(threads) = self.threads else {
@@ -30,4 +38,8 @@ impl ThreadsArgument {
             .map(|pool| pool.install(work))
             .map_err(|error| Failure::Failed(format!("cannot start {threads} threads: {error}")))
     }
+}
+
+fn nobody() -> Failure {
+    Failure::request("--threads 0: nobody would work", "give 1 or more")
 }

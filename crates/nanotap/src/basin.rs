@@ -598,26 +598,41 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     let known = known(store)?;
     let axes = &store.schema().grid.axes;
     let (rows, columns) = (axes[0].length, axes[1].length);
-    // In front of the attractors' own categories stand those of points without one.
-    let extra = [UNSETTLED, UNBOUNDED, FAILED];
-    let mut cells = vec![None; rows * columns];
+    // After the attractors' own categories come those of points without one.
+    let others = [
+        (UNSETTLED, "unsettled", 190),
+        (UNBOUNDED, "unbounded", 60),
+        (FAILED, "not followed", 120),
+    ];
+    let mut present = std::collections::BTreeSet::new();
+    let mut cells: Vec<Option<i32>> = vec![None; rows * columns];
     for chunk in 0..store.chunks() {
         let block = store.schema().grid.block(chunk);
         let labels = labels(store, &block)?;
         for (entry, label) in block.entries().zip(labels) {
-            let category = usize::try_from(label).unwrap_or_else(|_| {
-                known.len() + extra.iter().position(|e| *e == label).unwrap_or(0)
-            });
-            cells[entry[0] * columns + entry[1]] = Some(category);
+            present.insert(label);
+            cells[entry[0] * columns + entry[1]] = Some(label);
         }
     }
     let (y, x) = (values(store, &axes[0].name), values(store, &axes[1].name));
+    let shown: Vec<_> = others
+        .iter()
+        .filter(|(label, ..)| present.contains(label))
+        .collect();
+    let cells = cells.into_iter().map(|label| {
+        let label = label?;
+        let other = || Some(known.len() + shown.iter().position(|(l, ..)| *l == label)?);
+        usize::try_from(label)
+            .ok()
+            .filter(|k| *k < known.len())
+            .or_else(other)
+    });
     let mut layer = CategoryMap::new(columns, rows, cells, edges(&x), edges(&y));
     for (index, attractor) in known.iter().enumerate() {
         layer = layer.category_in(attractor.name(), category(index));
     }
-    for (name, grey) in [("unsettled", 190), ("unbounded", 60), ("not followed", 120)] {
-        layer = layer.category_in(name, Colour::rgb(grey, grey, grey));
+    for (_, name, grey) in shown {
+        layer = layer.category_in(*name, Colour::rgb(*grey, *grey, *grey));
     }
     let mut panel = Panel::new(
         FigureAxis::linear(symbol(&axes[1].name)),
@@ -632,7 +647,7 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
             let within = |v: f64, (low, high): (f64, f64)| low <= v && v <= high;
             within(p.0, edges(&x)) && within(p.1, edges(&y))
         };
-        for attractor in &known {
+        for (index, attractor) in known.iter().enumerate() {
             let points: Vec<(f64, f64)> = attractor
                 .states
                 .iter()
@@ -641,7 +656,7 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
                 .collect();
             panel = if attractor.period.is_some() {
                 let marks = Markers::new(points).shape(Shape::Circle).size(1.6);
-                panel.with(marks.colour(Colour::BLACK).white_edge())
+                panel.with(marks.colour(category(index)).white_edge())
             } else {
                 panel.with(Points::new(points).diameter(0.3).colour(Colour::BLACK))
             };

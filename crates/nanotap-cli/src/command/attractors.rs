@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-fn parse_side(text: &str) -> Result<(String, f64, f64), String> {
+pub(super) fn parse_side(text: &str) -> Result<(String, f64, f64), String> {
     let wrong = || format!("`{text}` is no side of a box; write it as a1=-1:1");
     let (name, interval) = text.split_once('=').ok_or_else(wrong)?;
     let (low, high) = interval.split_once(':').ok_or_else(wrong)?;

@@ -1,13 +1,16 @@
 //! The commands, one a file.
 
 mod attractors;
+mod basin;
 mod branch;
 mod case;
 mod convergence;
 mod lyapunov;
+mod merge;
 mod modes;
 mod orbit;
 mod simulate;
+mod sweep;
 
 use clap::Subcommand;
 use nanotap::case::Case;
@@ -33,6 +36,12 @@ pub(crate) enum Command {
     Attractors(attractors::Arguments),
     /// Periodic orbits followed in a parameter, stable and unstable
     Branch(branch::Arguments),
+    /// How the motion changes with one or two parameters, from any number of starts
+    Sweep(sweep::Arguments),
+    /// Basins of attraction on a slice of initial states
+    Basin(basin::Arguments),
+    /// Put together what several machines computed of one sweep or basin
+    Merge(merge::Arguments),
     /// Lyapunov spectrum with error bars, and a Poincaré section
     Lyapunov(lyapunov::Arguments),
     /// The same motion with N = 1 … K modes: how many are enough
@@ -48,6 +57,9 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Orbit(arguments) => orbit::run(arguments, output),
         Command::Attractors(arguments) => attractors::run(arguments, output),
         Command::Branch(arguments) => branch::run(arguments, output),
+        Command::Sweep(arguments) => sweep::run(arguments, output),
+        Command::Basin(arguments) => basin::run(arguments, output),
+        Command::Merge(arguments) => merge::run(arguments, output),
         Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
         Command::Convergence(arguments) => convergence::run(arguments, output),
     }

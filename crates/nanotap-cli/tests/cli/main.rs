@@ -6,5 +6,6 @@ mod existing_motions;
 mod modes;
 mod motions;
 mod physical;
+mod sweeps;
 mod terminal;
 mod util;

@@ -81,7 +81,11 @@ fn diagram(store: &Store) -> Result<Figure, StoreError> {
             else {
                 continue;
             };
-            let diameter = if points.len() > 20_000 { 0.13 } else { 0.22 };
+            let diameter = match points.len() {
+                0..2_000 => 0.5,
+                2_000..20_000 => 0.3,
+                _ => 0.13,
+            };
             panel = panel.with(
                 Points::new(points)
                     .diameter(diameter)

@@ -13,7 +13,7 @@ pub struct Summary {
     /// All of them.
     pub runs: usize,
     /// By classification; every one is there, also with 0.
-    pub classifications: BTreeMap<&'static str, usize>,
+    pub counts: BTreeMap<&'static str, usize>,
     /// Periodic ones by period.
     pub periods: BTreeMap<i32, usize>,
 }
@@ -24,14 +24,14 @@ impl Summary {
         store.require_all()?;
         let mut summary = Self::default();
         summary
-            .classifications
+            .counts
             .extend(CLASSES.iter().map(|c| (c.name(), 0)));
         for chunk in 0..store.chunks() {
             let Motions { codes, periods } = Motions::read(store, chunk)?;
             summary.runs += codes.len();
             for (code, period) in codes.into_iter().zip(periods) {
                 if let Some(class) = class_of(code) {
-                    *summary.classifications.entry(class.name()).or_default() += 1;
+                    *summary.counts.entry(class.name()).or_default() += 1;
                 }
                 if period > 0 {
                     *summary.periods.entry(period).or_default() += 1;

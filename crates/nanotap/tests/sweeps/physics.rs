@@ -166,7 +166,7 @@ fn seeded_starts_find_what_coexists() {
     let subject = paper(20.0, 0.0);
     let swept = Swept::of(&subject, &["alpha1=0:0.1:2"], |o| o.starts = seeded(12));
     let summary = swept.summary();
-    assert_eq!(summary.classifications["periodic"], 24, "{summary:?}");
+    assert_eq!(summary.counts["periodic"], 24, "{summary:?}");
     let (periods, tops, bottoms) = (
         swept.all("period"),
         swept.all("tip_max"),
@@ -194,7 +194,7 @@ fn chaos_is_called_so_with_its_exponent() {
     let swept = Swept::of(&paper(2.6, 0.1), &["omega=2.6:2.6:1"], |o| {
         o.starts = seeded(4);
     });
-    assert_eq!(swept.summary().classifications["chaotic"], 4);
+    assert_eq!(swept.summary().counts["chaotic"], 4);
     let (values, errors) = (swept.column("lyapunov"), swept.column("lyapunov_error"));
     for (value, error) in values.iter().zip(&errors) {
         assert!(

@@ -1,0 +1,47 @@
+//! `nanotap merge`: what several machines computed of one dataset, put together.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nanotap::dataset::merge;
+
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::{file, number, style};
+
+/// Put together what several machines computed of one dataset with --chunk.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// The datasets, made by the same command with different --chunk
+    #[arg(value_name = "DATASET", required = true)]
+    sources: Vec<PathBuf>,
+
+    /// The merged dataset: byte for byte what one machine would have made
+    #[arg(long, value_name = "PATH")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    file::ending(&arguments.out, &["zarr"])?;
+    let merged = merge(&arguments.sources, &arguments.out)?;
+    output.result(&merged, |merged| {
+        format!(
+            "{}\n",
+            style::bold(&format!(
+                "{}: {} of {} chunks, {} copied now",
+                merged.path.display(),
+                merged.chunks - merged.missing.len(),
+                merged.chunks,
+                merged.copied
+            ))
+        )
+    })?;
+    if merged.missing.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Failed(format!(
+        "{} missing; merge the other shares too, or give the sweep's or basin's command with --out {}",
+        number::counted(merged.missing.len(), "chunk is", "chunks are"),
+        arguments.out.display()
+    )))
+}

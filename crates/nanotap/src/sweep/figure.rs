@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nanotap_figures::{
-    Axis, CategoryMap, Colour, DOUBLE_COLUMN, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel, Points,
+    Axis, CategoryMap, Colour, DOUBLE_COLUMN, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel,
+    Points, category,
 };
 
 use super::summary::{Motions, class_of};
@@ -12,6 +13,8 @@ use crate::simulate::Classification;
 
 /// Categories of a map that get a colour of their own.
 const MOST_CATEGORIES: usize = 12;
+/// Colours of [`category`] before it begins again with tints.
+const PALETTE: usize = 7;
 
 /// The picture of a finished dataset.
 pub(super) fn of(store: &Store) -> Result<Figure, StoreError> {
@@ -138,6 +141,11 @@ fn map(store: &Store) -> Result<Figure, StoreError> {
         .map(|motions| Some(index.get(motions).copied().unwrap_or(named.len())))
         .collect();
     let mut layer = CategoryMap::new(columns, y.values.len(), cells, x.edges(), y.edges());
+    // Not those that stand for a class of motions, nor tints of them.
+    let taken = [Colour::GREEN, Colour::VERMILLION].map(family);
+    let mut free = (0..)
+        .filter(|k| !taken.contains(&Some(k % PALETTE)))
+        .map(category);
     for motions in &named {
         let name = words(motions);
         let single = if motions.len() == 1 {
@@ -146,7 +154,9 @@ fn map(store: &Store) -> Result<Figure, StoreError> {
             None
         };
         layer = match single {
-            Some(Classification::Periodic) | None => layer.category(name),
+            Some(Classification::Periodic) | None => {
+                layer.category_in(name, free.next().unwrap_or(Colour::GREY))
+            }
             Some(class) => layer.category_in(name, colour(class)),
         };
     }
@@ -157,6 +167,11 @@ fn map(store: &Store) -> Result<Figure, StoreError> {
         .with(layer)
         .legend(Legend::Right);
     Ok(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
+}
+
+/// The place of a colour among those of [`category`].
+fn family(colour: Colour) -> Option<usize> {
+    (0..PALETTE).find(|k| category(*k) == colour)
 }
 
 /// `period 1 + chaotic`.

@@ -323,29 +323,62 @@ impl System {
     /// # Errors
     /// [`FlowError::NoRegime`] when there is none.
     pub fn regime_at(&self, x: &[f64], t: f64) -> Result<(usize, Option<usize>), FlowError> {
-        for (r, exits) in self.exits.iter().enumerate() {
-            if !self.may_stick(r, x, t) {
-                continue;
+        let exact = |_: usize, output: &Output| ON_SURFACE * rounding(output, x);
+        if let Some(found) = self.regime_within(x, t, &exact) {
+            return Ok(found);
+        }
+        // On a rigid stop, a state that was computed a moment after an impact lies off the
+        // surface by the rounding of the whole motion, not of this state alone.
+        let computed =
+            |r: usize, output: &Output| ON_SURFACE * self.motion_rounding(r, output, x, t);
+        if let Some(found) = self.regime_within(x, t, &computed) {
+            return Ok(found);
+        }
+        // Moving into the stop: in flight, and the impact is now.
+        (0..self.regimes.len())
+            .find(|&r| {
+                self.may_stick(r, x, t, &computed)
+                    && self.exits[r]
+                        .iter()
+                        .all(|exit| exit.guard.at(&self.drive, x, t) >= -computed(r, &exit.guard))
+            })
+            .map(|r| (r, None))
+            .ok_or(FlowError::NoRegime)
+    }
+
+    /// The first regime that holds the state, outputs within `tolerance` being zero.
+    fn regime_within(
+        &self,
+        x: &[f64],
+        t: f64,
+        tolerance: &impl Fn(usize, &Output) -> f64,
+    ) -> Option<(usize, Option<usize>)> {
+        self.exits.iter().enumerate().find_map(|(r, exits)| {
+            if !self.may_stick(r, x, t, tolerance) {
+                return None;
             }
             let mut surface = None;
             let inside = exits.iter().enumerate().all(|(e, exit)| {
                 let value = exit.guard.at(&self.drive, x, t);
-                if value.abs() <= rounding(&exit.guard, x) {
+                if value.abs() <= tolerance(r, &exit.guard) {
                     surface = Some(e);
-                    return self.rises(r, &exit.guard, x, t);
+                    return self.rises(r, &exit.guard, x, t, tolerance);
                 }
                 value > 0.0
             });
-            if inside {
-                return Ok((r, surface));
-            }
-        }
-        Err(FlowError::NoRegime)
+            inside.then_some((r, surface))
+        })
     }
 
     /// Whether regime `r` is no sticking regime, or one in which this state sticks:
     /// guard and rate of the impact are zero.
-    fn may_stick(&self, r: usize, x: &[f64], t: f64) -> bool {
+    fn may_stick(
+        &self,
+        r: usize,
+        x: &[f64],
+        t: f64,
+        tolerance: &impl Fn(usize, &Output) -> f64,
+    ) -> bool {
         let mut impacts = self.exits.iter().enumerate().flat_map(|(from, exits)| {
             let leads_here = move |e: &&Exit| e.sticking.as_ref().is_some_and(|s| s.regime == r);
             exits.iter().filter(leads_here).map(move |e| (from, e))
@@ -359,20 +392,44 @@ impl System {
             .rate(regime.matrix(), regime.forcing(), &self.drive);
         [&impact.guard, &rate]
             .iter()
-            .all(|output| output.at(&self.drive, x, t).abs() <= 64.0 * rounding(output, x))
+            .all(|output| output.at(&self.drive, x, t).abs() <= 2.0 * tolerance(from, output))
     }
 
-    fn rises(&self, regime: usize, guard: &Output, x: &[f64], t: f64) -> bool {
-        let regime = &self.regimes[regime];
+    fn rises(
+        &self,
+        r: usize,
+        guard: &Output,
+        x: &[f64],
+        t: f64,
+        tolerance: &impl Fn(usize, &Output) -> f64,
+    ) -> bool {
+        let regime = &self.regimes[r];
         let mut output = guard.clone();
         for _ in 0..4 {
             output = output.rate(regime.matrix(), regime.forcing(), &self.drive);
             let value = output.at(&self.drive, x, t);
-            if value.abs() > rounding(&output, x) {
+            if value.abs() > tolerance(r, &output) {
                 return value > 0.0;
             }
         }
         true
+    }
+
+    /// The size of rounding errors that an output has along the motion through this state:
+    /// that of all its modal terms, which cancel in the output itself.
+    fn motion_rounding(&self, r: usize, output: &Output, x: &[f64], t: f64) -> f64 {
+        let regime = &self.regimes[r];
+        let modal = regime.project(output);
+        let mut q = vec![Complex::new(0.0, 0.0); regime.basis().len()];
+        regime.to_modal(&self.drive, x, t, &mut q);
+        let own: f64 = modal
+            .modal
+            .iter()
+            .zip(&q)
+            .map(|(w, q)| (w * q).norm())
+            .sum();
+        let forced: f64 = modal.tones.iter().map(|z| z.norm()).sum();
+        f64::EPSILON * (own + forced + modal.constant.abs()) + rounding(output, x)
     }
 
     fn prepare(&self, from: usize, exit: &Exit) -> PreparedExit {
@@ -566,6 +623,10 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<[Pack; 2]> {
     }
     packs
 }
+
+/// A state is on a surface when its guard is within this many rounding errors of zero: a
+/// state computed a moment after a switch is no nearer.
+const ON_SURFACE: f64 = 32.0;
 
 /// The size of rounding errors in an output's value.
 fn rounding(output: &Output, x: &[f64]) -> f64 {

@@ -195,3 +195,30 @@ fn stiff_soft_stop_tends_to_the_rigid_one() {
     }
     assert!(previous < 1e-3);
 }
+
+/// However the drive period falls on the impacts, a run can be cut at any of its periods
+/// and go on: an impact a rounding error before or after the cut leaves a state on the
+/// wall, or behind it by rounding, and that is where it is. At ω = 1.26, where the
+/// doubled motion of gap 0 and r = 0.8 comes to impact at the drive's own phase 0.
+#[test]
+fn runs_that_impact_at_phase_zero_go_on() {
+    use nanotap::strobe::Strobe;
+    use nanotap_dynamics::StroboscopicMap;
+    let model = rigid(1.26, 0.8).model().unwrap();
+    let mut map = Strobe::new(&model);
+    for state in [
+        [0.0, -0.5],
+        [0.0, 0.5],
+        [2e-17, -0.5],
+        [2e-17, 0.5],
+        [-2e-17, 0.7],
+        [1e-17, 0.0],
+    ] {
+        let mut x = state;
+        map.advance(&mut x)
+            .unwrap_or_else(|error| panic!("{state:?}: {error}"));
+        assert!(x[0] <= 1e-15 && x[1].is_finite());
+    }
+    // Behind the wall by more than rounding is no state at all.
+    assert!(map.advance(&mut [1e-9, 0.5]).is_err());
+}

@@ -21,6 +21,7 @@ pub mod motion_figure;
 pub mod observables;
 pub mod orbit;
 pub mod oscillator;
+pub mod paper;
 pub mod parameter;
 pub mod physical;
 pub mod simulate;

@@ -9,6 +9,7 @@ mod lyapunov;
 mod merge;
 mod modes;
 mod orbit;
+mod paper;
 mod simulate;
 mod sweep;
 
@@ -46,6 +47,8 @@ pub(crate) enum Command {
     Lyapunov(lyapunov::Arguments),
     /// The same motion with N = 1 … K modes: how many are enough
     Convergence(convergence::Arguments),
+    /// Every figure and number of the paper, with verdicts and evidence
+    Paper(paper::Arguments),
 }
 
 /// Runs `command`.
@@ -62,6 +65,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Merge(arguments) => merge::run(arguments, output),
         Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
         Command::Convergence(arguments) => convergence::run(arguments, output),
+        Command::Paper(arguments) => paper::run(arguments, output),
     }
 }
 

@@ -1,0 +1,105 @@
+//! `nanotap paper`: every figure and number of the paper computed again, with verdicts.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use nanotap::paper::{Check, Options, PaperError, Report, Verdict, Written, report, section_names};
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::threads::ThreadsArgument;
+use crate::{progress, style};
+
+/// Every figure and number of the paper, with verdicts and evidence
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// Folder for the report and its pictures; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "nanotap-paper")]
+    out: PathBuf,
+
+    /// Only these sections, such as fig4 eq25 time-step
+    #[arg(long, value_name = "ID", num_args = 1.., value_delimiter = ',')]
+    only: Vec<String>,
+
+    /// Fewer starts and parameter values: seconds instead of minutes, wider bounds
+    #[arg(long)]
+    quick: bool,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    out: &'a PathBuf,
+    html: &'a PathBuf,
+    markdown: &'a PathBuf,
+    pictures: &'a [PathBuf],
+    quick: bool,
+    reproduced: usize,
+    differs: usize,
+    ambiguous: usize,
+    checks: Vec<&'a Check>,
+    seconds: f64,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let begun = Instant::now();
+    let options = Options { only: arguments.only.clone(), quick: arguments.quick };
+    let report = progress::watched(output, "percent", |control| {
+        arguments.threads.install(|| report(&options, control))
+    })??
+    .map_err(failure)?;
+    let written = report.write(&arguments.out).map_err(failure)?;
+    let document = Document {
+        out: &arguments.out,
+        html: &written.html,
+        markdown: &written.markdown,
+        pictures: &written.pictures,
+        quick: report.quick,
+        reproduced: report.count(Verdict::Reproduced),
+        differs: report.count(Verdict::Differs),
+        ambiguous: report.count(Verdict::Ambiguous),
+        checks: report.checks().collect(),
+        seconds: begun.elapsed().as_secs_f64(),
+    };
+    output.result(&document, |document| text(document, &report, &written))
+}
+
+fn failure(error: PaperError) -> Failure {
+    match error {
+        PaperError::UnknownSection { .. } => Failure::request(
+            error.to_string(),
+            format!("name sections as in --only {}", section_names().next().unwrap_or_default()),
+        ),
+        other => Failure::Failed(other.to_string()),
+    }
+}
+
+fn text(document: &Document<'_>, report: &Report, written: &Written) -> String {
+    let mut text = style::bold("the paper computed again");
+    text.push('\n');
+    for section in &report.sections {
+        let _ = writeln!(text, "\n  {}", style::bold(section.title));
+        for check in &section.checks {
+            let verdict = format!("{:<10}", check.verdict.name());
+            let _ = writeln!(text, "  {}  {}", style::bold(&verdict), check.paper);
+            let _ = writeln!(text, "              {}", style::faint(&check.here));
+        }
+    }
+    let _ = write!(
+        text,
+        "\n  {} reproduced, {} differ, {} ambiguous; {} pictures; {:.0} s\n  {}\n",
+        document.reproduced,
+        document.differs,
+        document.ambiguous,
+        written.pictures.len() / 2,
+        document.seconds,
+        written.html.display()
+    );
+    text
+}

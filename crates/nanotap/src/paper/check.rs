@@ -1,0 +1,138 @@
+//! One statement of the paper beside what was computed here.
+
+use serde::Serialize;
+
+/// What became of a statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// It holds here.
+    Reproduced,
+    /// It does not.
+    Differs,
+    /// The paper says too little, or contradicts itself.
+    Ambiguous,
+}
+
+impl Verdict {
+    /// Every verdict.
+    pub const ALL: [Self; 3] = [Self::Reproduced, Self::Differs, Self::Ambiguous];
+
+    /// Reproduced where the statement `holds`, else differs.
+    pub const fn of(holds: bool) -> Self {
+        if holds {
+            Self::Reproduced
+        } else {
+            Self::Differs
+        }
+    }
+
+    /// The word for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Reproduced => "reproduced",
+            Self::Differs => "differs",
+            Self::Ambiguous => "ambiguous",
+        }
+    }
+}
+
+/// A statement of the paper, what holds here, and how anyone can see for themselves.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// Its name, such as `eq25` or `fig8-amplitude`.
+    pub id: String,
+    /// What the paper says, and where.
+    pub paper: String,
+    /// What holds here.
+    pub here: String,
+    /// Whether the two agree.
+    pub verdict: Verdict,
+    /// Why the verdict can be believed.
+    pub evidence: String,
+    /// A command line that computes it again.
+    pub rerun: String,
+}
+
+impl Check {
+    /// A statement with the verdict on it; evidence and command are added.
+    pub fn new(
+        id: impl Into<String>,
+        paper: impl Into<String>,
+        here: impl Into<String>,
+        verdict: Verdict,
+    ) -> Self {
+        Self {
+            id: id.into(),
+            paper: paper.into(),
+            here: here.into(),
+            verdict,
+            evidence: String::new(),
+            rerun: String::new(),
+        }
+    }
+
+    /// Adds the evidence.
+    #[must_use]
+    pub fn evidence(mut self, evidence: impl Into<String>) -> Self {
+        self.evidence = evidence.into();
+        self
+    }
+
+    /// Adds the command line.
+    #[must_use]
+    pub fn rerun(mut self, rerun: impl Into<String>) -> Self {
+        self.rerun = rerun.into();
+        self
+    }
+}
+
+/// Whether `value`, rounded to `decimals` decimals, is the number that was `printed`.
+pub(super) fn rounds_to(value: f64, printed: f64, decimals: i32) -> bool {
+    // A thousandth of a unit forgives the binary form of the printed number.
+    (value - printed).abs() <= 0.501 * 10f64.powi(-decimals)
+}
+
+/// `value` with `digits` significant digits, without an exponent where it is short.
+pub(super) fn digits(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = value.abs().log10().floor();
+    let text = if (-4.0..7.0).contains(&exponent) {
+        let decimals = (digits as f64 - 1.0 - exponent).max(0.0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.*e}", digits.saturating_sub(1))
+    };
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn printed_numbers_are_compared_at_their_last_digit() {
+        // Eq. (23) of the paper: 4.694² = 22.0336 is printed as 22.03.
+        assert!(rounds_to(22.0336, 22.03, 2));
+        assert!(!rounds_to(22.0361, 22.03, 2));
+        assert!(rounds_to(61.6972, 61.7, 1));
+        assert!(!rounds_to(f64::NAN, 61.7, 1));
+    }
+
+    #[test]
+    fn digits_are_significant_ones() {
+        assert_eq!(digits(7.790_952, 4), "7.791");
+        assert_eq!(digits(0.004_700_1, 2), "0.0047");
+        assert_eq!(digits(-55.718, 3), "−55.7");
+        assert_eq!(digits(3.1e-9, 2), "3.1e−9");
+        assert_eq!(digits(0.0, 3), "0");
+    }
+
+    #[test]
+    fn verdicts_follow_from_whether_the_statement_holds() {
+        assert_eq!(Verdict::of(true), Verdict::Reproduced);
+        assert_eq!(Verdict::of(false), Verdict::Differs);
+    }
+}

@@ -1,0 +1,154 @@
+//! What one figure or equation of the paper comes to: text, tables, pictures, checks.
+
+use nanotap_figures::{DOUBLE_COLUMN, Figure};
+
+use super::check::Check;
+
+/// A part of the report.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// Its name, such as `fig4`.
+    pub id: &'static str,
+    /// Its heading.
+    pub title: &'static str,
+    /// Paragraphs.
+    pub text: Vec<String>,
+    /// Tables.
+    pub tables: Vec<Table>,
+    /// Pictures.
+    pub pictures: Vec<Picture>,
+    /// Statements of the paper.
+    pub checks: Vec<Check>,
+}
+
+impl Section {
+    /// A section without anything in it yet.
+    pub fn new(id: &'static str, title: &'static str) -> Self {
+        Self {
+            id,
+            title,
+            text: Vec::new(),
+            tables: Vec::new(),
+            pictures: Vec::new(),
+            checks: Vec::new(),
+        }
+    }
+
+    /// Adds a paragraph.
+    #[must_use]
+    pub fn text(mut self, text: impl Into<String>) -> Self {
+        self.text.push(text.into());
+        self
+    }
+
+    /// Adds a table.
+    #[must_use]
+    pub fn table(mut self, table: Table) -> Self {
+        self.tables.push(table);
+        self
+    }
+
+    /// Adds a picture.
+    #[must_use]
+    pub fn picture(mut self, picture: Picture) -> Self {
+        self.pictures.push(picture);
+        self
+    }
+
+    /// Adds a check.
+    #[must_use]
+    pub fn check(mut self, check: Check) -> Self {
+        self.checks.push(check);
+        self
+    }
+}
+
+/// A table of text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// What it shows.
+    pub caption: String,
+    /// Heads of the columns.
+    pub columns: Vec<String>,
+    /// Rows, an entry a column.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table without rows yet.
+    pub fn new<'a>(
+        caption: impl Into<String>,
+        columns: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        Self {
+            caption: caption.into(),
+            columns: columns.into_iter().map(str::to_owned).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        let mut row: Vec<String> = cells.into_iter().collect();
+        row.resize(self.columns.len(), String::new());
+        self.rows.push(row);
+    }
+}
+
+/// A picture with its words.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// The name of its files, without ending.
+    pub name: String,
+    /// What it is about.
+    pub title: String,
+    /// What it shows.
+    pub caption: String,
+    /// The panels, without title and caption.
+    figure: Figure,
+    width: f64,
+    height: f64,
+}
+
+/// Letters of a caption to the millimetre of its width.
+const LETTERS_PER_MM: f64 = 0.92;
+/// Height of a line of the caption, mm.
+const LINE: f64 = 3.3;
+/// Height of the title, mm.
+const TITLE: f64 = 5.0;
+
+impl Picture {
+    /// A picture of two columns' width whose panels take `height` mm.
+    pub fn new(
+        name: impl Into<String>,
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        figure: Figure,
+        height: f64,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            title: title.into(),
+            caption: caption.into(),
+            figure: figure.width(DOUBLE_COLUMN),
+            width: DOUBLE_COLUMN,
+            height,
+        }
+    }
+
+    /// The panels alone, for a page that sets title and caption itself.
+    pub fn bare(&self) -> Figure {
+        self.figure.clone().height(self.height)
+    }
+
+    /// The picture as it stands alone, with title and caption.
+    pub fn whole(&self) -> Figure {
+        let letters = self.caption.chars().count() as f64;
+        let lines = (letters / (LETTERS_PER_MM * self.width)).ceil();
+        self.figure
+            .clone()
+            .title(self.title.clone())
+            .caption(self.caption.clone())
+            .height(self.height + TITLE + LINE * lines)
+    }
+}

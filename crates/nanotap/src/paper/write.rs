@@ -1,0 +1,66 @@
+//! The report's files: `report.html`, `report.md`, `checks.json`, and each picture as
+//! SVG and PNG.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::section::Picture;
+use super::{Check, PaperError, Report, html, markdown};
+
+/// What was written.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// The page with everything in it.
+    pub html: PathBuf,
+    /// The Markdown table.
+    pub markdown: PathBuf,
+    /// The checks as JSON.
+    pub checks: PathBuf,
+    /// Pictures, SVG and PNG in turn.
+    pub pictures: Vec<PathBuf>,
+}
+
+impl Report {
+    /// Writes the report into `folder`, which is made if it is not there. Files of other
+    /// names in it stay as they are.
+    ///
+    /// # Errors
+    /// When a picture cannot be drawn or a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<Written, PaperError> {
+        fs::create_dir_all(folder).map_err(|source| PaperError::Write { path: folder.to_path_buf(), source })?;
+        let pictures: Vec<&Picture> = self.sections.iter().flat_map(|s| &s.pictures).collect();
+        let pictures: Vec<PathBuf> = pictures
+            .par_iter()
+            .flat_map(|picture| ["svg", "png"].map(|ending| draw(picture, folder, ending)))
+            .collect::<Result<_, PaperError>>()?;
+        let checks: Vec<&Check> = self.checks().collect();
+        let json = serde_json::to_string_pretty(&checks)
+            .map_err(|error| PaperError::Failed { what: "checks.json".into(), why: error.to_string() })?;
+        Ok(Written {
+            html: put(folder.join("report.html"), &html::page(self)?)?,
+            markdown: put(folder.join("report.md"), &markdown::document(self))?,
+            checks: put(folder.join("checks.json"), &(json + "\n"))?,
+            pictures,
+        })
+    }
+}
+
+fn draw(picture: &Picture, folder: &Path, ending: &str) -> Result<PathBuf, PaperError> {
+    let path = folder.join(format!("{}.{ending}", picture.name));
+    picture
+        .whole()
+        .write(&path)
+        .map_err(|source| PaperError::Figure { name: picture.name.clone(), source })?;
+    Ok(path)
+}
+
+/// Writes a file under a temporary name and renames it: a reader never meets half of it.
+fn put(path: PathBuf, text: &str) -> Result<PathBuf, PaperError> {
+    let temporary = path.with_extension(format!("{}.tmp", std::process::id()));
+    fs::write(&temporary, text)
+        .and_then(|()| fs::rename(&temporary, &path))
+        .map_err(|source| PaperError::Write { path: path.clone(), source })?;
+    Ok(path)
+}

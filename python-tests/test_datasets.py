@@ -1,7 +1,7 @@
 """Datasets made at the terminal, opened where the data are looked at.
 
-Run as `pytest python-tests`; the environment variable NANOTAP names the program
-(otherwise the release build of this checkout).
+Run by `cargo xtask test-python`, which installs what they need. The environment
+variable NANOTAP names the program (otherwise the release build of this checkout).
 """
 
 import json

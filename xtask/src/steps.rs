@@ -44,6 +44,11 @@ pub(crate) static STEPS: &[Step] = &[
         run: test_rust,
     },
     Step {
+        name: "test-python",
+        about: "the Python tests, on the release build's datasets",
+        run: test_python,
+    },
+    Step {
         name: "test-doc",
         about: "the examples in the documentation",
         run: test_doc,
@@ -92,6 +97,23 @@ fn lint(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["clippy", "--workspace", "--all-targets", "--release"]);
     command.args(["--", "-D", "warnings"]);
     Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+fn test_python(workspace: &Workspace) -> Result<Tally, String> {
+    let mut build = workspace.cargo(&["build", "--release"]);
+    if !succeeds(&workspace.root, &mut build)? {
+        return Err("the program could not be built".into());
+    }
+    let mut command = workspace.python_tool("pytest")?;
+    command.args(["--quiet", "python-tests"]);
+    if let Ok(target) = std::env::var("CARGO_TARGET_DIR") {
+        let program = std::path::Path::new(&target)
+            .join("release")
+            .join("nanotap");
+        command.env("NANOTAP", program);
+    }
+    let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
+    Ok(Tally::of_tests(&lines, succeeded))
 }
 
 fn test_rust(workspace: &Workspace) -> Result<Tally, String> {

@@ -83,7 +83,10 @@ pub(crate) fn title(arguments: &CaseArguments) -> String {
 }
 
 /// A physical case resolved with the built-in catalogue and those that the arguments add.
-pub(crate) fn resolve(tables: &PhysicalTables, arguments: &CaseArguments) -> Result<Resolved, Failure> {
+pub(crate) fn resolve(
+    tables: &PhysicalTables,
+    arguments: &CaseArguments,
+) -> Result<Resolved, Failure> {
     let mut catalogue = Catalogue::builtin()?;
     for path in &arguments.catalogue {
         catalogue.extend_from_file(path)?;

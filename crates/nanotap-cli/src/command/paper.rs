@@ -49,7 +49,10 @@ struct Document<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
-    let options = Options { only: arguments.only.clone(), quick: arguments.quick };
+    let options = Options {
+        only: arguments.only.clone(),
+        quick: arguments.quick,
+    };
     let report = progress::watched(output, "percent", |control| {
         arguments.threads.install(|| report(&options, control))
     })??
@@ -74,7 +77,10 @@ fn failure(error: PaperError) -> Failure {
     match error {
         PaperError::UnknownSection { .. } => Failure::request(
             error.to_string(),
-            format!("name sections as in --only {}", section_names().next().unwrap_or_default()),
+            format!(
+                "name sections as in --only {}",
+                section_names().next().unwrap_or_default()
+            ),
         ),
         other => Failure::Failed(other.to_string()),
     }

@@ -62,16 +62,31 @@ const CLAIMS: [Coexistence; 4] = [
 impl Coexistence {
     /// Whether a census found all that.
     fn holds(&self, counted: &Counted) -> bool {
-        self.periodic.iter().all(|(period, count)| counted.stable(*period).len() >= *count)
+        self.periodic
+            .iter()
+            .all(|(period, count)| counted.stable(*period).len() >= *count)
             && (!self.nonperiodic || !counted.chaos().is_empty())
     }
 }
 
 /// Every attractor of the cases of Figs. 6–17.
-pub(super) fn section(laboratory: &Laboratory<'_>, mut section: Section) -> Result<Section, PaperError> {
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    mut section: Section,
+) -> Result<Section, PaperError> {
     let mut table = Table::new(
         "Every attractor found, from seeded starts in a box that fits the case",
-        ["Ω", "α₁", "N", "motion", "starts", "W min", "W max", "amplitude", "largest |μ|, or λ₁ a period"],
+        [
+            "Ω",
+            "α₁",
+            "N",
+            "motion",
+            "starts",
+            "W min",
+            "W max",
+            "amplitude",
+            "largest |μ|, or λ₁ a period",
+        ],
     );
     for claim in &CLAIMS {
         let mut kinds = Vec::new();
@@ -99,7 +114,14 @@ pub(super) fn section(laboratory: &Laboratory<'_>, mut section: Section) -> Resu
             here = format!("so it is with N = {}; {here}", agreeing.join(", "));
         }
         section = section.check(
-            Check::new(claim.id, claim.paper, here, Verdict::of(!agreeing.is_empty())).evidence(evidence).rerun(again),
+            Check::new(
+                claim.id,
+                claim.paper,
+                here,
+                Verdict::of(!agreeing.is_empty()),
+            )
+            .evidence(evidence)
+            .rerun(again),
         );
     }
     Ok(section
@@ -113,7 +135,14 @@ pub(super) fn section(laboratory: &Laboratory<'_>, mut section: Section) -> Resu
 
 fn rows(table: &mut Table, counted: &Counted) -> Result<(), PaperError> {
     let case = &counted.case;
-    let head = || [case.omega.to_string(), case.alpha1.to_string(), case.modes.to_string()].into_iter();
+    let head = || {
+        [
+            case.omega.to_string(),
+            case.alpha1.to_string(),
+            case.modes.to_string(),
+        ]
+        .into_iter()
+    };
     for (orbit, fraction) in counted.all_stable() {
         let o = counted.look(orbit)?.observables;
         table.row(head().chain([

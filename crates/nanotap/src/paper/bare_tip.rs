@@ -30,14 +30,19 @@ struct Reading {
 
 impl Reading {
     fn new(laboratory: &Laboratory<'_>, omega: f64) -> Result<Self, PaperError> {
-        let case = Case::paper().with(Parameter::Alpha1, 0.0).with(Parameter::Omega, omega);
+        let case = Case::paper()
+            .with(Parameter::Alpha1, 0.0)
+            .with(Parameter::Omega, omega);
         let counted = laboratory.count(&case)?;
         let orbits = laboratory.orbits(&counted, LONGEST, 256)?;
         Ok(Self { counted, orbits })
     }
 
     fn unstable(&self, period: usize) -> Vec<&PeriodicOrbit> {
-        self.orbits.iter().filter(|o| o.period == period && !o.is_stable()).collect()
+        self.orbits
+            .iter()
+            .filter(|o| o.period == period && !o.is_stable())
+            .collect()
     }
 
     /// What there is of a period: "one attracts (W from … to …), one repels".
@@ -45,11 +50,19 @@ impl Reading {
         let mut parts = Vec::new();
         for (orbit, _) in self.counted.stable(period) {
             let o = self.counted.look(orbit)?.observables;
-            parts.push(format!("one that attracts (W from {} to {})", digits(o.tip_min, 4), digits(o.tip_max, 5)));
+            parts.push(format!(
+                "one that attracts (W from {} to {})",
+                digits(o.tip_min, 4),
+                digits(o.tip_max, 5)
+            ));
         }
         for orbit in self.unstable(period) {
             let o = self.counted.look(orbit)?.observables;
-            parts.push(format!("one that repels (W from {} to {})", digits(o.tip_min, 4), digits(o.tip_max, 5)));
+            parts.push(format!(
+                "one that repels (W from {} to {})",
+                digits(o.tip_min, 4),
+                digits(o.tip_max, 5)
+            ));
         }
         let omega = self.counted.case.omega;
         Ok(if parts.is_empty() {
@@ -67,26 +80,47 @@ impl Reading {
 
     /// Time series and phase portrait of an orbit.
     fn panels(&self, orbit: &PeriodicOrbit, periods: usize) -> Result<[Panel; 2], PaperError> {
-        let stability = if orbit.is_stable() { "stable" } else { "unstable" };
+        let stability = if orbit.is_stable() {
+            "stable"
+        } else {
+            "unstable"
+        };
         let omega = self.counted.case.omega;
         let view = View::new(&self.counted.model, &orbit.states[0], periods)?;
         let whole = View::new(&self.counted.model, &orbit.states[0], orbit.period)?;
         Ok([
             view.time_panel(format!("Ω = {omega}: period {}, {stability}", orbit.period)),
-            whole.portrait_panel(format!("largest |μ| = {}", digits(orbit.spectral_radius(), 4)), 0.8),
+            whole.portrait_panel(
+                format!("largest |μ| = {}", digits(orbit.spectral_radius(), 4)),
+                0.8,
+            ),
         ])
     }
 }
 
 impl Bare {
     fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
-        Ok(Self { fast: Reading::new(laboratory, 20.0)?, slow: Reading::new(laboratory, 2.6)? })
+        Ok(Self {
+            fast: Reading::new(laboratory, 20.0)?,
+            slow: Reading::new(laboratory, 2.6)?,
+        })
     }
 
-    fn check(&self, id: &str, paper: &str, period: usize, claimed: usize) -> Result<Check, PaperError> {
+    fn check(
+        &self,
+        id: &str,
+        paper: &str,
+        period: usize,
+        claimed: usize,
+    ) -> Result<Check, PaperError> {
         let stable = [&self.fast, &self.slow].map(|r| r.counted.stable(period).len());
-        let all = [&self.fast, &self.slow].map(|r| r.counted.stable(period).len() + r.unstable(period).len());
-        let here = format!("{}; {}", self.fast.describe(period)?, self.slow.describe(period)?);
+        let all = [&self.fast, &self.slow]
+            .map(|r| r.counted.stable(period).len() + r.unstable(period).len());
+        let here = format!(
+            "{}; {}",
+            self.fast.describe(period)?,
+            self.slow.describe(period)?
+        );
         Ok(Check::new(id, paper, here, verdict(claimed, stable, all))
             .evidence(format!(
                 "Ω = 20, {}; Ω = 2.6, {}; {}",
@@ -123,11 +157,20 @@ fn picture(
     for row in rows {
         let [time, portrait] = match row {
             Some((reading, orbit, periods)) => reading.panels(orbit, *periods)?,
-            None => [empty_portrait("no such motion"), empty_portrait("no such motion")],
+            None => [
+                empty_portrait("no such motion"),
+                empty_portrait("no such motion"),
+            ],
         };
         figure = figure.with(time).with(portrait);
     }
-    Ok(Picture::new(name, title, format!("Eq. (26) with α₁ = 0, N = 3. {caption} {KEY}"), figure, 64.0 * rows.len() as f64))
+    Ok(Picture::new(
+        name,
+        title,
+        format!("Eq. (26) with α₁ = 0, N = 3. {caption} {KEY}"),
+        figure,
+        64.0 * rows.len() as f64,
+    ))
 }
 
 /// Fig. 15.
@@ -135,10 +178,19 @@ pub(super) fn fig15(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
     let bare = Bare::new(laboratory)?;
     let kinds = |r: &Reading| r.counted.kinds().join(", ");
     // The captions' reading is the better one if only there a subharmonic attracts.
-    let subharmonic = |r: &Reading| r.counted.all_stable().iter().any(|(orbit, _)| orbit.period > 1);
+    let subharmonic = |r: &Reading| {
+        r.counted
+            .all_stable()
+            .iter()
+            .any(|(orbit, _)| orbit.period > 1)
+    };
     let reading = match (subharmonic(&bare.fast), subharmonic(&bare.slow)) {
-        (true, false) => "only at Ω = 20 does a subharmonic exist, as Figs. 16 and 17 need: the captions look right",
-        (false, true) => "only at Ω = 2.6 does a subharmonic exist, as Figs. 16 and 17 need: the text looks right",
+        (true, false) => {
+            "only at Ω = 20 does a subharmonic exist, as Figs. 16 and 17 need: the captions look right"
+        }
+        (false, true) => {
+            "only at Ω = 2.6 does a subharmonic exist, as Figs. 16 and 17 need: the text looks right"
+        }
         _ => "the motions that exist do not tell which is meant",
     };
     Ok(section
@@ -187,7 +239,10 @@ pub(super) fn fig16(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
         (None, None) => {
             let orbit = bare.fast.best(4).or_else(|| bare.fast.best(1));
             let Some(orbit) = orbit else {
-                return Err(PaperError::Failed { what: "Fig. 16".into(), why: "no orbit at Ω = 20".into() });
+                return Err(PaperError::Failed {
+                    what: "Fig. 16".into(),
+                    why: "no orbit at Ω = 20".into(),
+                });
             };
             let words = "No period-2 orbit was found, stable or not; the subharmonic that exists at Ω = 20 stands in its place.";
             (&bare.fast, orbit, orbit.period, words)
@@ -201,15 +256,28 @@ pub(super) fn fig16(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
             shown.3,
             &[Some((shown.0, shown.1, shown.2))],
         )?)
-        .check(bare.check("fig16", "Fig. 16: a period-2 motion exists with α₁ = 0", 2, 1)?)
+        .check(bare.check(
+            "fig16",
+            "Fig. 16: a period-2 motion exists with α₁ = 0",
+            2,
+            1,
+        )?)
         .check(
             Check::new(
                 "fig16-no-period-3",
                 "section 4: no period-3 motion was found for α₁ = 0 at Ω = 2.6",
-                if no_three { "none attracts here either" } else { "one attracts" },
+                if no_three {
+                    "none attracts here either"
+                } else {
+                    "one attracts"
+                },
                 Verdict::of(no_three),
             )
-            .evidence(format!("{}; {}", bare.slow.counted.summary(), bare.slow.counted.missed()))
+            .evidence(format!(
+                "{}; {}",
+                bare.slow.counted.summary(),
+                bare.slow.counted.missed()
+            ))
             .rerun(bare.slow.counted.rerun()),
         ))
 }
@@ -217,10 +285,20 @@ pub(super) fn fig16(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
 /// Fig. 17.
 pub(super) fn fig17(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
     let bare = Bare::new(laboratory)?;
-    let stable: Vec<&PeriodicOrbit> = bare.fast.counted.stable(4).into_iter().map(|(orbit, _)| orbit).collect();
+    let stable: Vec<&PeriodicOrbit> = bare
+        .fast
+        .counted
+        .stable(4)
+        .into_iter()
+        .map(|(orbit, _)| orbit)
+        .collect();
     let unstable = bare.fast.unstable(4);
-    let mut rows: Vec<Option<(&Reading, &PeriodicOrbit, usize)>> =
-        stable.iter().chain(&unstable).take(2).map(|orbit| Some((&bare.fast, *orbit, 4))).collect();
+    let mut rows: Vec<Option<(&Reading, &PeriodicOrbit, usize)>> = stable
+        .iter()
+        .chain(&unstable)
+        .take(2)
+        .map(|orbit| Some((&bare.fast, *orbit, 4)))
+        .collect();
     if rows.is_empty() {
         rows.push(None);
     }
@@ -237,11 +315,20 @@ pub(super) fn fig17(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
                     1 => "(a, b) The one that attracts.".to_owned(),
                     n => format!("{n} attract."),
                 },
-                if unstable.is_empty() { "" } else { "(c, d) The saddle beside it, which no run stays on." }
+                if unstable.is_empty() {
+                    ""
+                } else {
+                    "(c, d) The saddle beside it, which no run stays on."
+                }
             ),
             &rows,
         )?)
-        .check(bare.check("fig17", "Fig. 17: two period-4 motions coexist with α₁ = 0", 4, 2)?)
+        .check(bare.check(
+            "fig17",
+            "Fig. 17: two period-4 motions coexist with α₁ = 0",
+            4,
+            2,
+        )?)
         .check(
             Check::new(
                 "fig17-no-tip-mass",

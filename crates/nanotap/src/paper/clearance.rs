@@ -25,31 +25,72 @@ struct Row {
 }
 
 /// Fig. 2f.
-pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let mut rows = Vec::new();
     let undamped = Case::paper_eq24();
     let (model, orbit) = response(&undamped)?;
-    rows.extend(row("Fig. 4", "periodic response".into(), &undamped, &model, &orbit.state, 1)?);
-    for (figure, omega, alpha1) in
-        [("Figs. 6, 7", 2.6, 0.1), ("Figs. 8–14", 20.0, 0.1), ("Figs. 15–17", 20.0, 0.0), ("Figs. 15–17, text", 2.6, 0.0)]
-    {
-        let case = Case::paper().with(Parameter::Omega, omega).with(Parameter::Alpha1, alpha1);
+    rows.extend(row(
+        "Fig. 4",
+        "periodic response".into(),
+        &undamped,
+        &model,
+        &orbit.state,
+        1,
+    )?);
+    for (figure, omega, alpha1) in [
+        ("Figs. 6, 7", 2.6, 0.1),
+        ("Figs. 8–14", 20.0, 0.1),
+        ("Figs. 15–17", 20.0, 0.0),
+        ("Figs. 15–17, text", 2.6, 0.0),
+    ] {
+        let case = Case::paper()
+            .with(Parameter::Omega, omega)
+            .with(Parameter::Alpha1, alpha1);
         let counted = laboratory.count(&case)?;
         for (orbit, _) in counted.all_stable() {
             let motion = format!("period {}", orbit.period);
-            rows.extend(row(figure, motion, &case, &counted.model, &orbit.states[0], orbit.period)?);
+            rows.extend(row(
+                figure,
+                motion,
+                &case,
+                &counted.model,
+                &orbit.states[0],
+                orbit.period,
+            )?);
         }
         for chaos in counted.chaos() {
             let watched = laboratory.either(WATCHED, 50);
-            rows.extend(row(figure, "chaos".into(), &case, &counted.model, chaos.state, watched)?);
+            rows.extend(row(
+                figure,
+                "chaos".into(),
+                &case,
+                &counted.model,
+                chaos.state,
+                watched,
+            )?);
         }
     }
     let mut table = Table::new(
         "Least height V(ξ, τ) of the beam above the sample, in units of g₀, over each motion (N = 3)",
-        ["figure", "Ω", "α₁", "motion", "least height", "at ξ", "verdict"],
+        [
+            "figure",
+            "Ω",
+            "α₁",
+            "motion",
+            "least height",
+            "at ξ",
+            "verdict",
+        ],
     );
     for r in &rows {
-        let verdict = if r.clearance.touches() { "the beam would touch" } else { "only the tip touches" };
+        let verdict = if r.clearance.touches() {
+            "the beam would touch"
+        } else {
+            "only the tip touches"
+        };
         table.row([
             r.figure.into(),
             r.case.omega.to_string(),
@@ -66,14 +107,33 @@ pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<S
     } else {
         let list: Vec<String> = touching
             .iter()
-            .map(|r| format!("{} at Ω = {}, α₁ = {} ({} at ξ = {})", r.motion, r.case.omega, r.case.alpha1, digits(r.clearance.height, 3), digits(r.clearance.xi, 2)))
+            .map(|r| {
+                format!(
+                    "{} at Ω = {}, α₁ = {} ({} at ξ = {})",
+                    r.motion,
+                    r.case.omega,
+                    r.case.alpha1,
+                    digits(r.clearance.height, 3),
+                    digits(r.clearance.xi, 2)
+                )
+            })
             .collect();
         format!("not in {}", list.join(", "))
     };
     let shown = touching.first().copied().or(rows.first());
     let again = shown.map_or_else(
         || rerun::section("fig2f"),
-        |r| rerun::on_case("simulate", &r.case, &format!("--transient 0 --periods {} {}", r.periods, rerun::state(&r.state))),
+        |r| {
+            rerun::on_case(
+                "simulate",
+                &r.case,
+                &format!(
+                    "--transient 0 --periods {} {}",
+                    r.periods,
+                    rerun::state(&r.state)
+                ),
+            )
+        },
     );
     Ok(section
         .text(
@@ -102,8 +162,18 @@ fn row(
     state: &[f64],
     periods: usize,
 ) -> Result<Option<Row>, PaperError> {
-    let trajectory = Trajectory::record(&model.system, state, periods)
-        .map_err(|error| PaperError::Failed { what: motion.clone(), why: error.to_string() })?;
+    let trajectory =
+        Trajectory::record(&model.system, state, periods).map_err(|error| PaperError::Failed {
+            what: motion.clone(),
+            why: error.to_string(),
+        })?;
     let clearance = Clearance::of(model, &trajectory);
-    Ok(clearance.map(|clearance| Row { figure, motion, case: case.clone(), state: state.to_vec(), periods, clearance }))
+    Ok(clearance.map(|clearance| Row {
+        figure,
+        motion,
+        case: case.clone(),
+        state: state.to_vec(),
+        periods,
+        clearance,
+    }))
 }

@@ -32,20 +32,39 @@ struct Response {
 }
 
 /// Fig. 4.
-pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let most = laboratory.either(MOST, 8);
     let responses: Vec<Response> = (1..=most)
         .into_par_iter()
         .map(|modes| {
             let (model, orbit) = response(&Case::paper_eq24().with_modes(modes))?;
-            Ok(Response { modes, series: tip_series(&model, &orbit), orbit })
+            Ok(Response {
+                modes,
+                series: tip_series(&model, &orbit),
+                orbit,
+            })
         })
         .collect::<Result<_, PaperError>>()?;
     let best = &responses[most - 1];
-    let to = |r: &Response, other: &Response| difference(&r.series, &other.series) / best.orbit.observables.amplitude;
+    let to = |r: &Response, other: &Response| {
+        difference(&r.series, &other.series) / best.orbit.observables.amplitude
+    };
     let mut table = Table::new(
-        format!("The periodic response with N modes; differences of W are the largest over the period, in parts of the amplitude with N = {most}"),
-        ["N", "W max", "W min", "in contact", "to N − 1", format!("to N = {most}").as_str(), "largest ||μ| − 1|"],
+        format!(
+            "The periodic response with N modes; differences of W are the largest over the period, in parts of the amplitude with N = {most}"
+        ),
+        [
+            "N",
+            "W max",
+            "W min",
+            "in contact",
+            "to N − 1",
+            format!("to N = {most}").as_str(),
+            "largest ||μ| − 1|",
+        ],
     );
     for (i, r) in responses.iter().enumerate() {
         let o = &r.orbit.observables;
@@ -54,14 +73,21 @@ pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<S
             format!("{:.5}", o.tip_max),
             format!("{:.5}", o.tip_min),
             format!("{:.1} %", 100.0 * o.contact_fraction),
-            if i == 0 { String::new() } else { format!("{:.2} %", 100.0 * to(r, &responses[i - 1])) },
+            if i == 0 {
+                String::new()
+            } else {
+                format!("{:.2} %", 100.0 * to(r, &responses[i - 1]))
+            },
             format!("{:.2} %", 100.0 * to(r, best)),
             digits(off_circle(&r.orbit), 1),
         ]);
     }
     let single = to(&responses[0], &responses[1]);
     let last = to(&responses[2], &responses[3]);
-    let off = responses.iter().map(|r| off_circle(&r.orbit)).fold(0.0, f64::max);
+    let off = responses
+        .iter()
+        .map(|r| off_circle(&r.orbit))
+        .fold(0.0, f64::max);
     let contact = responses[2].orbit.observables.contact_fraction;
     let rerun_orbit = |r: &Response| {
         rerun::on_case(
@@ -70,7 +96,10 @@ pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<S
             &format!("--period 1 {}", rerun::state(&r.orbit.state)),
         )
     };
-    let enough = responses.iter().position(|r| to(r, best) < 0.01).map_or(most, |i| i + 1);
+    let enough = responses
+        .iter()
+        .position(|r| to(r, best) < 0.01)
+        .map_or(most, |i| i + 1);
     Ok(section
         .text(
             "Eq. (24) has no damping, so nothing settles: a run from rest keeps its free vibration for ever, and \
@@ -137,36 +166,63 @@ pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<S
 
 /// Largest distance of a multiplier from the unit circle.
 fn off_circle(orbit: &OrbitReport) -> f64 {
-    orbit.multipliers.iter().map(|[re, im]| (re.hypot(*im) - 1.0).abs()).fold(0.0, f64::max)
+    orbit
+        .multipliers
+        .iter()
+        .map(|[re, im]| (re.hypot(*im) - 1.0).abs())
+        .fold(0.0, f64::max)
 }
 
 fn tip_series(model: &Model, orbit: &OrbitReport) -> Vec<f64> {
     let tip = orbit.trajectory.signal(&model.tip);
     let end = orbit.trajectory.end();
-    (0..INSTANTS).filter_map(|k| tip.at(end * k as f64 / INSTANTS as f64)).collect()
+    (0..INSTANTS)
+        .filter_map(|k| tip.at(end * k as f64 / INSTANTS as f64))
+        .collect()
 }
 
 fn difference(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
 }
 
 fn overlay(responses: &[Response], laboratory: &Laboratory<'_>) -> Result<Picture, PaperError> {
     let time = || Axis::linear("time $τ / T$ (drive periods)").tight();
     let tip = || Axis::linear("tip deflection $W$");
-    let mut periodic = Panel::new(time(), tip()).title("periodic response, solved for by shooting").legend(Legend::Above);
-    let mut from_rest = Panel::new(time(), tip()).title("run from rest").legend(Legend::Hidden);
+    let mut periodic = Panel::new(time(), tip())
+        .title("periodic response, solved for by shooting")
+        .legend(Legend::Above);
+    let mut from_rest = Panel::new(time(), tip())
+        .title("run from rest")
+        .legend(Legend::Hidden);
     let dashes = [Dash::Dotted, Dash::DashDot, Dash::Dashed, Dash::Solid];
-    let colours = [Colour::VERMILLION, Colour::GREEN, Colour::BLUE, Colour::BLACK];
+    let colours = [
+        Colour::VERMILLION,
+        Colour::GREEN,
+        Colour::BLUE,
+        Colour::BLACK,
+    ];
     let shown = PAPER_MODES.min(responses.len());
     for (i, r) in responses.iter().take(shown).enumerate() {
         let model = Model::cantilever(&Case::paper_eq24().with_modes(r.modes))?;
         let view = View::new(&model, &r.orbit.state, 2)?;
         if i + 1 == shown {
-            periodic = periodic.with(Band::x(view.contacts()).label(format!("contact, N = {}", r.modes)));
+            periodic =
+                periodic.with(Band::x(view.contacts()).label(format!("contact, N = {}", r.modes)));
         }
-        let style = |line: Line| line.dash(dashes[i]).colour(colours[i]).label(format!("N = {}", r.modes));
+        let style = |line: Line| {
+            line.dash(dashes[i])
+                .colour(colours[i])
+                .label(format!("N = {}", r.modes))
+        };
         periodic = periodic.with(style(view.tip_line()));
-        let rest = View::new(&model, &vec![0.0; model.dimension()], laboratory.either(RUN, 8))?;
+        let rest = View::new(
+            &model,
+            &vec![0.0; model.dimension()],
+            laboratory.either(RUN, 8),
+        )?;
         from_rest = from_rest.with(style(rest.tip_line()));
     }
     Ok(Picture::new(
@@ -180,21 +236,48 @@ fn overlay(responses: &[Response], laboratory: &Laboratory<'_>) -> Result<Pictur
     ))
 }
 
-fn convergence(responses: &[Response], to: &dyn Fn(&Response, &Response) -> f64, most: usize) -> Picture {
+fn convergence(
+    responses: &[Response],
+    to: &dyn Fn(&Response, &Response) -> f64,
+    most: usize,
+) -> Picture {
     let best = &responses[most - 1];
-    let all: Vec<(f64, f64)> =
-        responses[..most - 1].iter().map(|r| (r.modes as f64, to(r, best))).filter(|p| p.1 > 0.0).collect();
-    let steps: Vec<(f64, f64)> =
-        responses.windows(2).map(|w| (w[1].modes as f64, to(&w[1], &w[0]))).filter(|p| p.1 > 0.0).collect();
-    let marks = (1..=most).filter(|n| *n == 1 || n % 5 == 0 || *n < 5).map(|n| (n as f64, n.to_string()));
+    let all: Vec<(f64, f64)> = responses[..most - 1]
+        .iter()
+        .map(|r| (r.modes as f64, to(r, best)))
+        .filter(|p| p.1 > 0.0)
+        .collect();
+    let steps: Vec<(f64, f64)> = responses
+        .windows(2)
+        .map(|w| (w[1].modes as f64, to(&w[1], &w[0])))
+        .filter(|p| p.1 > 0.0)
+        .collect();
+    let marks = (1..=most)
+        .filter(|n| *n == 1 || n % 5 == 0 || *n < 5)
+        .map(|n| (n as f64, n.to_string()));
     let panel = Panel::new(
-        Axis::linear("modes $N$").range(0.5, most as f64 + 0.5).marks(marks),
+        Axis::linear("modes $N$")
+            .range(0.5, most as f64 + 0.5)
+            .marks(marks),
         Axis::log("largest difference of $W$ / amplitude"),
     )
     .with(Line::new(all.clone()).colour(Colour::BLUE).width(0.6))
-    .with(Markers::new(all).colour(Colour::BLUE).label(format!("to N = {most}")))
-    .with(Line::new(steps.clone()).colour(Colour::VERMILLION).width(0.6))
-    .with(Markers::new(steps).colour(Colour::VERMILLION).open().label("to N − 1"));
+    .with(
+        Markers::new(all)
+            .colour(Colour::BLUE)
+            .label(format!("to N = {most}")),
+    )
+    .with(
+        Line::new(steps.clone())
+            .colour(Colour::VERMILLION)
+            .width(0.6),
+    )
+    .with(
+        Markers::new(steps)
+            .colour(Colour::VERMILLION)
+            .open()
+            .label("to N − 1"),
+    );
     Picture::new(
         "fig04-convergence",
         "How Fig. 4 goes on: the periodic response with more modes",

@@ -19,18 +19,26 @@ const START: (f64, f64) = (0.1, 0.2);
 /// model.
 pub(super) fn response(undamped: &Case) -> Result<(Model, OrbitReport), PaperError> {
     let failed = |why: String| PaperError::Failed {
-        what: format!("the periodic response at Ω = {}, N = {}", undamped.omega, undamped.modes),
+        what: format!(
+            "the periodic response at Ω = {}, N = {}",
+            undamped.omega, undamped.modes
+        ),
         why,
     };
     let damped = |factor: f64| {
         Model::cantilever(
-            &undamped.clone().with(Parameter::Alpha3, factor * START.0).with(Parameter::Alpha6, factor * START.1),
+            &undamped
+                .clone()
+                .with(Parameter::Alpha3, factor * START.0)
+                .with(Parameter::Alpha6, factor * START.1),
         )
     };
     let model = damped(1.0)?;
     let rest = vec![0.0; model.dimension()];
     let settled = settle(&mut Strobe::new(&model), &rest, &SettleOptions::default());
-    let (Verdict::Periodic(mut orbit) | Verdict::TransientChaos { mut orbit, .. }) = settled.verdict else {
+    let (Verdict::Periodic(mut orbit) | Verdict::TransientChaos { mut orbit, .. }) =
+        settled.verdict
+    else {
         return Err(failed("the damped motion is not periodic".into()));
     };
     let factors = (1..=HALVINGS).map(|k| 0.5f64.powi(k)).chain([0.0]);
@@ -38,8 +46,13 @@ pub(super) fn response(undamped: &Case) -> Result<(Model, OrbitReport), PaperErr
     for factor in factors {
         model = damped(factor)?;
         let start = orbit.states[0].clone();
-        orbit = close_orbit(&mut Strobe::new(&model), &start, orbit.period, &ShootingOptions::default())
-            .map_err(|error| failed(error.to_string()))?;
+        orbit = close_orbit(
+            &mut Strobe::new(&model),
+            &start,
+            orbit.period,
+            &ShootingOptions::default(),
+        )
+        .map_err(|error| failed(error.to_string()))?;
     }
     let report = report(&model, &orbit, 20).map_err(|error| failed(error.to_string()))?;
     Ok((model, report))

@@ -12,7 +12,12 @@ use crate::physical::sample::{Elastic, reduced_modulus};
 
 /// Eq. (7): α3 and α6 as printed are not pure numbers.
 pub(super) fn damping_units(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let lever = DampedLever { length: 100e-6, mass: 1e-7, bending: 1e-11, damping: 1e-3 };
+    let lever = DampedLever {
+        length: 100e-6,
+        mass: 1e-7,
+        bending: 1e-11,
+        damping: 1e-3,
+    };
     let printed = lever.in_grams().alpha3_printed() / lever.alpha3_printed();
     let corrected = lever.in_grams().alpha3_corrected() / lever.alpha3_corrected();
     let pure = |ratio: f64| (ratio - 1.0).abs() < 1e-9;
@@ -51,7 +56,12 @@ impl DampedLever {
     /// The unit of mass a thousand times smaller: m (kg/m), EI (kg m³/s²) and C
     /// (kg/(m s)) are each proportional to it.
     fn in_grams(self) -> Self {
-        Self { mass: 1e3 * self.mass, bending: 1e3 * self.bending, damping: 1e3 * self.damping, ..self }
+        Self {
+            mass: 1e3 * self.mass,
+            bending: 1e3 * self.bending,
+            damping: 1e3 * self.damping,
+            ..self
+        }
     }
 
     fn alpha3_printed(self) -> f64 {
@@ -64,16 +74,24 @@ impl DampedLever {
 }
 
 /// Eq. (14): the printed cosine term lacks the Ω of Eq. (6). Does it matter?
-pub(super) fn cosine_term(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn cosine_term(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let mut table = Table::new(
         "Attractors with the cosine term of Eq. (6) and with that printed in Eq. (14)",
         ["N", "Ω", "α₁", "Eq. (6)", "Eq. (14) as printed"],
     );
     let mut same = true;
     for (omega, alpha1) in [(2.6, 0.1), (20.0, 0.1), (20.0, 0.0)] {
-        let case = Case::paper().with(Parameter::Omega, omega).with(Parameter::Alpha1, alpha1);
+        let case = Case::paper()
+            .with(Parameter::Omega, omega)
+            .with(Parameter::Alpha1, alpha1);
         let corrected = laboratory.count(&case)?;
-        let printed = laboratory.count(&Case { cosine_term: CosineTerm::Printed, ..case.clone() })?;
+        let printed = laboratory.count(&Case {
+            cosine_term: CosineTerm::Printed,
+            ..case.clone()
+        })?;
         same &= corrected.kinds() == printed.kinds();
         table.row([
             case.modes.to_string(),
@@ -90,7 +108,10 @@ pub(super) fn cosine_term(laboratory: &Laboratory<'_>, section: Section) -> Resu
         "−α₂ α₃ Ω ∫φ_i cos Ωτ, as the Galerkin projection of Eq. (6) gives it; with the printed form other kinds \
          of motion attract"
     };
-    let printed_case = Case { cosine_term: CosineTerm::Printed, ..Case::paper() };
+    let printed_case = Case {
+        cosine_term: CosineTerm::Printed,
+        ..Case::paper()
+    };
     Ok(section
         .text(
             "Eq. (6) damps the beam by its own velocity and by that of its base, α₂ Ω cos Ωτ. Eq. (14), its \
@@ -109,11 +130,16 @@ pub(super) fn cosine_term(laboratory: &Laboratory<'_>, section: Section) -> Resu
 }
 
 /// Eq. (23).
-pub(super) fn bare_frequencies(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn bare_frequencies(
+    _: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let exact = exact_beam::frequencies(0.0, 0.0, 3).map_err(crate::model::ModelError::from)?;
     let printed = [(3.52, 2), (22.03, 2), (61.7, 1)];
     let holds = agree(&exact, &printed);
-    let bare = Case::paper().with(Parameter::Alpha1, 0.0).with(Parameter::Alpha4, 0.0);
+    let bare = Case::paper()
+        .with(Parameter::Alpha1, 0.0)
+        .with(Parameter::Alpha4, 0.0);
     Ok(section.check(
         Check::new(
             "eq23",
@@ -132,10 +158,15 @@ const MOST_MODES: usize = 10;
 const EQ25: [(f64, i32); 3] = [(7.79, 2), (20.33, 2), (55.81, 2)];
 
 /// Eq. (25).
-pub(super) fn contact_frequencies(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn contact_frequencies(
+    _: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let table_of = |modes: usize| {
-        ModeTable::new(&Case::paper_eq24().with_modes(modes))
-            .map_err(|error| PaperError::Failed { what: "the frequencies in contact".into(), why: error.to_string() })
+        ModeTable::new(&Case::paper_eq24().with_modes(modes)).map_err(|error| PaperError::Failed {
+            what: "the frequencies in contact".into(),
+            why: error.to_string(),
+        })
     };
     let mut table = Table::new(
         "Frequencies in contact at α₁ = 0.1, α₄ = 20; the paper prints 7.79, 20.33, 55.81",
@@ -152,8 +183,18 @@ pub(super) fn contact_frequencies(_: &Laboratory<'_>, section: Section) -> Resul
         if modes == 3 {
             three.clone_from(&contact);
         }
-        let cell = |i: usize| contact.get(i).map_or_else(String::new, |v| format!("{v:.4}"));
-        table.row([modes.to_string(), cell(0), cell(1), cell(2), if agrees { "yes".into() } else { "no".into() }]);
+        let cell = |i: usize| {
+            contact
+                .get(i)
+                .map_or_else(String::new, |v| format!("{v:.4}"))
+        };
+        table.row([
+            modes.to_string(),
+            cell(0),
+            cell(1),
+            cell(2),
+            if agrees { "yes".into() } else { "no".into() },
+        ]);
     }
     let last = table_of(3)?;
     let exact = &last.exact_contact;
@@ -163,7 +204,11 @@ pub(super) fn contact_frequencies(_: &Laboratory<'_>, section: Section) -> Resul
         format!("{:.4}", exact[0]),
         format!("{:.4}", exact[1]),
         format!("{:.4}", exact[2]),
-        if exact_agrees { "yes".into() } else { "no".into() },
+        if exact_agrees {
+            "yes".into()
+        } else {
+            "no".into()
+        },
     ]);
     let bare = exact_beam::frequencies(0.0, 0.0, 3).map_err(crate::model::ModelError::from)?;
     let with_tip = &last.exact_free;
@@ -230,11 +275,19 @@ pub(super) fn contact_frequencies(_: &Laboratory<'_>, section: Section) -> Resul
 
 /// Whether every number rounds to its printed form.
 fn agree(values: &[f64], printed: &[(f64, i32)]) -> bool {
-    values.len() >= printed.len() && values.iter().zip(printed).all(|(v, (p, decimals))| rounds_to(*v, *p, *decimals))
+    values.len() >= printed.len()
+        && values
+            .iter()
+            .zip(printed)
+            .all(|(v, (p, decimals))| rounds_to(*v, *p, *decimals))
 }
 
 fn list(values: &[f64], significant: usize) -> String {
-    values.iter().map(|v| digits(*v, significant)).collect::<Vec<_>>().join(", ")
+    values
+        .iter()
+        .map(|v| digits(*v, significant))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// A sample of section 4: modulus in Pa, α4 as printed, half a unit of its last digit.
@@ -245,7 +298,10 @@ const SAMPLES: [(&str, f64, f64, f64); 4] = [
     ("stiffest", 50e9, 233.5, 0.05),
 ];
 /// The tip, as section 4 describes it.
-const SILICON: Elastic = Elastic { modulus: 130e9, poisson: 0.27 };
+const SILICON: Elastic = Elastic {
+    modulus: 130e9,
+    poisson: 0.27,
+};
 
 /// Section 4: α4 of ten samples from Hertz's contact.
 pub(super) fn samples(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
@@ -253,17 +309,33 @@ pub(super) fn samples(_: &Laboratory<'_>, section: Section) -> Result<Section, P
     let rigid = low <= high;
     // With the tip's own compliance there must be one Poisson ratio for all.
     let ratios: Vec<f64> = (0..=50).map(|k| 0.01 * f64::from(k)).collect();
-    let compliant = |poisson: f64| slopes(|modulus| reduced_modulus(Elastic { modulus, poisson }, Some(SILICON)));
+    let compliant = |poisson: f64| {
+        slopes(|modulus| reduced_modulus(Elastic { modulus, poisson }, Some(SILICON)))
+    };
     let fits = ratios.iter().any(|&poisson| {
         let (low, high) = compliant(poisson);
         low <= high
     });
     let mut table = Table::new(
         "α₄ as printed, and as Hertz's formula scales it from polystyrene's 18.7 (ν₂ = 0.3)",
-        ["sample", "E₂", "printed", "rigid tip", "tip of E₁ = 130 GPa"],
+        [
+            "sample",
+            "E₂",
+            "printed",
+            "rigid tip",
+            "tip of E₁ = 130 GPa",
+        ],
     );
     let scaled = |tip: Option<Elastic>, modulus: f64| {
-        let of = |modulus: f64| reduced_modulus(Elastic { modulus, poisson: 0.3 }, tip);
+        let of = |modulus: f64| {
+            reduced_modulus(
+                Elastic {
+                    modulus,
+                    poisson: 0.3,
+                },
+                tip,
+            )
+        };
         SAMPLES[1].2 * of(modulus) / of(SAMPLES[1].1)
     };
     for (name, modulus, printed, _) in SAMPLES {
@@ -309,10 +381,16 @@ pub(super) fn samples(_: &Laboratory<'_>, section: Section) -> Result<Section, P
 /// The range of factors between α4 and `modulus_of` that the printed digits of all
 /// samples leave; empty (low > high) if there is none.
 fn slopes(modulus_of: impl Fn(f64) -> f64) -> (f64, f64) {
-    SAMPLES.iter().fold((0.0, f64::INFINITY), |(low, high), &(_, modulus, printed, half)| {
-        let modulus = modulus_of(modulus);
-        (f64::max(low, (printed - half) / modulus), f64::min(high, (printed + half) / modulus))
-    })
+    SAMPLES.iter().fold(
+        (0.0, f64::INFINITY),
+        |(low, high), &(_, modulus, printed, half)| {
+            let modulus = modulus_of(modulus);
+            (
+                f64::max(low, (printed - half) / modulus),
+                f64::min(high, (printed + half) / modulus),
+            )
+        },
+    )
 }
 
 /// Section 3: with α5 = 0 nothing depends on the size of the motion.
@@ -320,9 +398,14 @@ pub(super) fn scaling(_: &Laboratory<'_>, section: Section) -> Result<Section, P
     use nanotap_dynamics::StroboscopicMap as _;
     let map_of = |alpha2: f64| -> Result<_, PaperError> {
         let case = Case::paper().with(Parameter::Alpha2, alpha2);
-        Ok(crate::strobe::Strobe::new(&crate::model::Model::cantilever(&case)?))
+        Ok(crate::strobe::Strobe::new(
+            &crate::model::Model::cantilever(&case)?,
+        ))
     };
-    let failed = |error: nanotap_flow::FlowError| PaperError::Failed { what: "a run".into(), why: error.to_string() };
+    let failed = |error: nanotap_flow::FlowError| PaperError::Failed {
+        what: "a run".into(),
+        why: error.to_string(),
+    };
     let factor = 3.0;
     let (mut small, mut large) = (map_of(0.1)?, map_of(0.1 * factor)?);
     let mut x = vec![0.1, 0.01, 0.001, 0.2, 0.02, 0.002];
@@ -330,7 +413,12 @@ pub(super) fn scaling(_: &Laboratory<'_>, section: Section) -> Result<Section, P
     small.advance(&mut x).map_err(failed)?;
     large.advance(&mut y).map_err(failed)?;
     let size = y.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-    let difference = x.iter().zip(&y).map(|(x, y)| (factor * x - y).abs()).fold(0.0, f64::max) / size;
+    let difference = x
+        .iter()
+        .zip(&y)
+        .map(|(x, y)| (factor * x - y).abs())
+        .fold(0.0, f64::max)
+        / size;
     Ok(section.check(
         Check::new(
             "scaling",
@@ -353,10 +441,20 @@ mod tests {
 
     #[test]
     fn only_the_corrected_damping_is_a_pure_number() {
-        let lever = DampedLever { length: 2.0, mass: 3.0, bending: 5.0, damping: 0.7 };
+        let lever = DampedLever {
+            length: 2.0,
+            mass: 3.0,
+            bending: 5.0,
+            damping: 0.7,
+        };
         // C and EI scale as the unit of mass: the printed factor as its square root.
-        assert!((lever.in_grams().alpha3_printed() / lever.alpha3_printed() - 1e3f64.sqrt()).abs() < 1e-12);
-        assert!((lever.in_grams().alpha3_corrected() / lever.alpha3_corrected() - 1.0).abs() < 1e-12);
+        assert!(
+            (lever.in_grams().alpha3_printed() / lever.alpha3_printed() - 1e3f64.sqrt()).abs()
+                < 1e-12
+        );
+        assert!(
+            (lever.in_grams().alpha3_corrected() / lever.alpha3_corrected() - 1.0).abs() < 1e-12
+        );
     }
 
     #[test]

@@ -30,24 +30,38 @@ struct Fast {
 impl Fast {
     fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
         let counted = laboratory.count(&fast_case(3))?;
-        let attractor = counted.all_stable().first().map(|(orbit, _)| (*orbit).clone());
+        let attractor = counted
+            .all_stable()
+            .first()
+            .map(|(orbit, _)| (*orbit).clone());
         let Some(attractor) = attractor else {
             return Err(PaperError::Failed {
                 what: "the census at Ω = 20".into(),
                 why: "no periodic attractor was found".into(),
             });
         };
-        Ok(Self { counted, attractor, scan: laboratory.spurious()? })
+        Ok(Self {
+            counted,
+            attractor,
+            scan: laboratory.spurious()?,
+        })
     }
 
     /// The exact motion above, a motion of a grid below.
     fn figure(&self, periods: usize, grid: Option<&GridMotion>) -> Result<Figure, PaperError> {
         let view = View::new(&self.counted.model, &self.attractor.states[0], periods)?;
-        let loop_view = View::new(&self.counted.model, &self.attractor.states[0], self.attractor.period)?;
+        let loop_view = View::new(
+            &self.counted.model,
+            &self.attractor.states[0],
+            self.attractor.period,
+        )?;
         let rows = if grid.is_some() { 2 } else { 1 };
         let figure = Figure::new(rows, 2)
             .column_widths([1.7, 1.0])
-            .with(view.time_panel(format!("exact flow, N = 3: period {}", self.attractor.period)))
+            .with(view.time_panel(format!(
+                "exact flow, N = 3: period {}",
+                self.attractor.period
+            )))
             .with(loop_view.portrait_panel("", 0.9));
         Ok(match grid {
             None => figure,
@@ -62,14 +76,22 @@ impl Fast {
 
     /// What the census says against a claim.
     fn evidence(&self) -> String {
-        format!("N = 3, {}; {}", self.counted.summary(), self.counted.missed())
+        format!(
+            "N = 3, {}; {}",
+            self.counted.summary(),
+            self.counted.missed()
+        )
     }
 
     fn rerun_orbit(&self) -> String {
         rerun::on_case(
             "orbit",
             &self.counted.case,
-            &format!("--period {} {}", self.attractor.period, rerun::state(&self.attractor.states[0])),
+            &format!(
+                "--period {} {}",
+                self.attractor.period,
+                rerun::state(&self.attractor.states[0])
+            ),
         )
     }
 }
@@ -77,16 +99,29 @@ impl Fast {
 /// Time series and phase portrait of what a grid shows.
 fn grid_panels(motion: &GridMotion, model: &Model, periods: usize) -> [Panel; 2] {
     let curve = motion.curve(model, periods);
-    let time = Panel::new(Axis::linear("time $τ / T$ (drive periods)").tight(), Axis::linear("tip deflection $W$"))
-        .title(format!("fixed steps, {}: {}", motion.grid.short(), motion.words()))
-        .legend(Legend::Hidden)
-        .with(Line::new(curve.iter().map(|p| (p[0], p[1]))).colour(GRID));
+    let time = Panel::new(
+        Axis::linear("time $τ / T$ (drive periods)").tight(),
+        Axis::linear("tip deflection $W$"),
+    )
+    .title(format!(
+        "fixed steps, {}: {}",
+        motion.grid.short(),
+        motion.words()
+    ))
+    .legend(Legend::Hidden)
+    .with(Line::new(curve.iter().map(|p| (p[0], p[1]))).colour(GRID));
     let strobes = (0..periods).filter_map(|k| {
-        let at = curve.iter().min_by(|a, b| (a[0] - k as f64).abs().total_cmp(&(b[0] - k as f64).abs()))?;
+        let at = curve
+            .iter()
+            .min_by(|a, b| (a[0] - k as f64).abs().total_cmp(&(b[0] - k as f64).abs()))?;
         Some((at[1], at[2]))
     });
     let portrait = empty_portrait("")
-        .with(Line::new(curve.iter().map(|p| (p[1], p[2]))).colour(GRID).width(0.6))
+        .with(
+            Line::new(curve.iter().map(|p| (p[1], p[2])))
+                .colour(GRID)
+                .width(0.6),
+        )
         .with(Markers::new(strobes).colour(Colour::BLACK).size(0.9));
     [time, portrait]
 }
@@ -111,7 +146,10 @@ pub(super) fn fig8(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     let found = fast.counted.stable(1).len();
     let one_mode = fast.scan.exact_amplitude(1).unwrap_or(f64::NAN);
     let matches = rounds_to(one_mode, 0.145, 3);
-    let single_orbit = single.all_stable().first().map(|(orbit, _)| (*orbit).clone());
+    let single_orbit = single
+        .all_stable()
+        .first()
+        .map(|(orbit, _)| (*orbit).clone());
     let (mut figure, mut words) = (fast.figure(2, None)?, String::new());
     if let Some(orbit) = &single_orbit {
         let view = View::new(&single.model, &orbit.states[0], 2)?;
@@ -124,11 +162,20 @@ pub(super) fn fig8(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             .with(three_loop.portrait_panel("", 0.9))
             .with(view.time_panel("N = 1: the only attractor"))
             .with(loop_view.portrait_panel("", 0.9));
-        words = format!(" (c, d) With one mode its amplitude is {}.", digits(one_mode, 4));
+        words = format!(
+            " (c, d) With one mode its amplitude is {}.",
+            digits(one_mode, 4)
+        );
     }
     let again = single_orbit.map_or_else(
         || single.rerun(),
-        |o| rerun::on_case("orbit", &single.case, &format!("--period 1 {}", rerun::state(&o.states[0]))),
+        |o| {
+            rerun::on_case(
+                "orbit",
+                &single.case,
+                &format!("--period 1 {}", rerun::state(&o.states[0])),
+            )
+        },
     );
     Ok(section
         .picture(Picture::new(
@@ -227,7 +274,11 @@ struct LongPeriod {
     amplitude: f64,
 }
 
-fn long_period(laboratory: &Laboratory<'_>, section: Section, figure: &LongPeriod) -> Result<Section, PaperError> {
+fn long_period(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+    figure: &LongPeriod,
+) -> Result<Section, PaperError> {
     let fast = Fast::new(laboratory)?;
     let (period, amplitude) = (figure.period, figure.amplitude);
     let grid = fast.scan.nearest(Some(period), amplitude);
@@ -272,25 +323,53 @@ fn long_period(laboratory: &Laboratory<'_>, section: Section, figure: &LongPerio
 
 /// Fig. 10.
 pub(super) fn fig10(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let figure = LongPeriod { name: "fig10", id: "fig10", number: 10, period: 11, claimed: 1, amplitude: 1.18 };
+    let figure = LongPeriod {
+        name: "fig10",
+        id: "fig10",
+        number: 10,
+        period: 11,
+        claimed: 1,
+        amplitude: 1.18,
+    };
     long_period(laboratory, section, &figure)
 }
 
 /// Fig. 11.
 pub(super) fn fig11(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let figure = LongPeriod { name: "fig11", id: "fig11", number: 11, period: 28, claimed: 1, amplitude: 1.45 };
+    let figure = LongPeriod {
+        name: "fig11",
+        id: "fig11",
+        number: 11,
+        period: 28,
+        claimed: 1,
+        amplitude: 1.45,
+    };
     long_period(laboratory, section, &figure)
 }
 
 /// Fig. 12.
 pub(super) fn fig12(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let figure = LongPeriod { name: "fig12", id: "fig12", number: 12, period: 21, claimed: 1, amplitude: 0.34 };
+    let figure = LongPeriod {
+        name: "fig12",
+        id: "fig12",
+        number: 12,
+        period: 21,
+        claimed: 1,
+        amplitude: 0.34,
+    };
     long_period(laboratory, section, &figure)
 }
 
 /// Fig. 13.
 pub(super) fn fig13(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let figure = LongPeriod { name: "fig13", id: "fig13", number: 13, period: 21, claimed: 2, amplitude: 0.245 };
+    let figure = LongPeriod {
+        name: "fig13",
+        id: "fig13",
+        number: 13,
+        period: 21,
+        claimed: 2,
+        amplitude: 0.245,
+    };
     long_period(laboratory, section, &figure)
 }
 

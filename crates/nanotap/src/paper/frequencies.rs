@@ -22,7 +22,9 @@ pub(super) fn mode_shapes(_: &Laboratory<'_>, section: Section) -> Result<Sectio
     )
     .with(Rule::horizontal(0.0));
     for mode in beam.iter() {
-        let shape = (0..POINTS).map(|k| k as f64 / (POINTS - 1) as f64).map(|xi| (xi, mode.shape(xi)));
+        let shape = (0..POINTS)
+            .map(|k| k as f64 / (POINTS - 1) as f64)
+            .map(|xi| (xi, mode.shape(xi)));
         panel = panel.with(Line::new(shape).label(format!("mode {}", mode.number)));
     }
     // A clamped-free mode j has j − 1 nodes between its ends.
@@ -30,7 +32,9 @@ pub(super) fn mode_shapes(_: &Laboratory<'_>, section: Section) -> Result<Sectio
         .iter()
         .map(|mode| {
             let value = |k: usize| mode.shape(k as f64 / 1000.0);
-            (20..1000).filter(|&k| (value(k) > 0.0) != (value(k + 1) > 0.0)).count()
+            (20..1000)
+                .filter(|&k| (value(k) > 0.0) != (value(k + 1) > 0.0))
+                .count()
         })
         .collect();
     let holds = nodes == [0, 1, 2];
@@ -72,7 +76,11 @@ pub(super) fn maps(_: &Laboratory<'_>, section: Section) -> Result<Section, Pape
             Axis::log("contact stiffness $α_4$").range(STIFFNESSES.0, STIFFNESSES.1),
             Axis::linear(format!("$ω_{j}$ / $ω_{{0{j}}}$")),
         )
-        .title(if j == 1 { "first frequency" } else { "second frequency" })
+        .title(if j == 1 {
+            "first frequency"
+        } else {
+            "second frequency"
+        })
         .with(Rule::horizontal(1.0))
     });
     let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
@@ -88,13 +96,17 @@ pub(super) fn maps(_: &Laboratory<'_>, section: Section) -> Result<Section, Pape
             }
         }
         for (panel, line) in panels.iter_mut().zip(lines) {
-            *panel = panel.clone().with(Line::new(line).label(format!("$α_1$ = {alpha1}")));
+            *panel = panel
+                .clone()
+                .with(Line::new(line).label(format!("$α_1$ = {alpha1}")));
         }
     }
     let spread = ranges.map(|(low, high)| high / low);
     let holds = spread[0] > spread[1];
-    let three = ModeTable::new(&Case::paper())
-        .map_err(|error| PaperError::Failed { what: "the frequencies in contact".into(), why: error.to_string() })?;
+    let three = ModeTable::new(&Case::paper()).map_err(|error| PaperError::Failed {
+        what: "the frequencies in contact".into(),
+        why: error.to_string(),
+    })?;
     let paper = at(0.1, 20.0)?;
     let [first, second] = panels;
     Ok(section

@@ -76,7 +76,9 @@ impl Column {
 
 /// `count` equally spaced values, both ends among them.
 pub(super) fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|k| from + (to - from) * k as f64 / (count.max(2) - 1) as f64).collect()
+    (0..count)
+        .map(|k| from + (to - from) * k as f64 / (count.max(2) - 1) as f64)
+        .collect()
 }
 
 /// The columns at `values` of a parameter, from `starts` starts each.
@@ -126,8 +128,10 @@ fn budgets() -> SettleOptions {
 
 fn column(subject: &Subject, at: f64, starts: usize) -> Result<Column, PaperError> {
     let model = subject.model()?;
-    let area = default_box(&model)
-        .map_err(|error| PaperError::Failed { what: "the box of starts".into(), why: error.to_string() })?;
+    let area = default_box(&model).map_err(|error| PaperError::Failed {
+        what: "the box of starts".into(),
+        why: error.to_string(),
+    })?;
     let mut map = Strobe::new(&model);
     let budgets = budgets();
     let mut motions: Vec<Seen> = Vec::new();
@@ -152,7 +156,11 @@ fn column(subject: &Subject, at: f64, starts: usize) -> Result<Column, PaperErro
                 None => (&settled.state, SHOWN),
             };
             let maxima = maxima(&model, state, periods)?;
-            motions.push(Seen { kind, orbit, maxima });
+            motions.push(Seen {
+                kind,
+                orbit,
+                maxima,
+            });
         }
     }
     Ok(Column { at, motions })
@@ -161,14 +169,27 @@ fn column(subject: &Subject, at: f64, starts: usize) -> Result<Column, PaperErro
 /// Greatest deflection of the tip away from the sample (of an oscillator: distance from its
 /// stop) in each of `periods` drive periods from `state`.
 pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec<f64>, PaperError> {
-    let trajectory = Trajectory::record(&model.system, state, periods)
-        .map_err(|error| PaperError::Failed { what: "a motion's maxima".into(), why: error.to_string() })?;
-    let signal = trajectory.signal(if model.beam.is_some() { &model.tip } else { &model.gap });
+    let trajectory =
+        Trajectory::record(&model.system, state, periods).map_err(|error| PaperError::Failed {
+            what: "a motion's maxima".into(),
+            why: error.to_string(),
+        })?;
+    let signal = trajectory.signal(if model.beam.is_some() {
+        &model.tip
+    } else {
+        &model.gap
+    });
     let period_of = |start: f64| (start / model.period() + 1e-9).floor();
     Ok(signal
         .pieces
         .chunk_by(|a, b| period_of(a.start) == period_of(b.start))
-        .filter_map(|pieces| PiecewiseSignal { pieces: pieces.to_vec() }.range().map(|(_, high)| high.value))
+        .filter_map(|pieces| {
+            PiecewiseSignal {
+                pieces: pieces.to_vec(),
+            }
+            .range()
+            .map(|(_, high)| high.value)
+        })
         .collect())
 }
 
@@ -204,8 +225,17 @@ pub(super) fn draw(mut panel: Panel, columns: &[Column], diameter: f64) -> Panel
             })
             .collect();
         if !points.is_empty() {
-            let diameter = if matches!(k, 5..) { 0.6 * diameter } else { diameter };
-            panel = panel.with(Points::new(points).diameter(diameter).colour(*colour).label(*label));
+            let diameter = if matches!(k, 5..) {
+                0.6 * diameter
+            } else {
+                diameter
+            };
+            panel = panel.with(
+                Points::new(points)
+                    .diameter(diameter)
+                    .colour(*colour)
+                    .label(*label),
+            );
         }
     }
     panel
@@ -227,10 +257,18 @@ pub(super) fn where_seen(columns: &[Column], kind: impl Fn(&Column) -> bool) -> 
         .filter(|part| part.first().is_some_and(&kind))
         .filter_map(|part| {
             let (from, to) = (part.first()?.at, part.last()?.at);
-            Some(if part.len() == 1 { format!("{from:.3}") } else { format!("{from:.3}–{to:.3}") })
+            Some(if part.len() == 1 {
+                format!("{from:.3}")
+            } else {
+                format!("{from:.3}–{to:.3}")
+            })
         })
         .collect();
-    if parts.is_empty() { "nowhere".to_owned() } else { parts.join(", ") }
+    if parts.is_empty() {
+        "nowhere".to_owned()
+    } else {
+        parts.join(", ")
+    }
 }
 
 #[cfg(test)]
@@ -238,16 +276,31 @@ mod tests {
     use super::*;
 
     fn column(at: f64, kinds: &[Kind]) -> Column {
-        let motions = kinds.iter().map(|kind| Seen { kind: *kind, orbit: None, maxima: vec![1.0] }).collect();
+        let motions = kinds
+            .iter()
+            .map(|kind| Seen {
+                kind: *kind,
+                orbit: None,
+                maxima: vec![1.0],
+            })
+            .collect();
         Column { at, motions }
     }
 
     #[test]
     fn stretches_join_what_is_alike() {
         let (one, two) = (Kind::Periodic(1), Kind::Periodic(2));
-        let columns = [column(1.0, &[one]), column(2.0, &[one]), column(3.0, &[two, one]), column(4.0, &[one, two])];
+        let columns = [
+            column(1.0, &[one]),
+            column(2.0, &[one]),
+            column(3.0, &[two, one]),
+            column(4.0, &[one, two]),
+        ];
         let found = stretches(&columns);
-        assert_eq!(found, vec![(1.0, 2.0, vec![one]), (3.0, 4.0, vec![one, two])]);
+        assert_eq!(
+            found,
+            vec![(1.0, 2.0, vec![one]), (3.0, 4.0, vec![one, two])]
+        );
         assert_eq!(where_seen(&columns, |c| c.has(two)), "3.000–4.000");
         assert_eq!(where_seen(&columns, |c| c.has(Kind::Chaos)), "nowhere");
     }
@@ -261,9 +314,18 @@ mod tests {
     /// A period-2 orbit has two maxima, one a drive period, the same again later.
     #[test]
     fn maxima_are_one_a_drive_period() {
-        let model = Model::cantilever(&crate::case::Case::paper().with(crate::parameter::Parameter::Omega, 2.8)).unwrap();
-        let settled = settle(&mut Strobe::new(&model), &[0.0; 6], &SettleOptions::default());
-        let Verdict::Periodic(orbit) = settled.verdict else { panic!("Ω = 2.8 is periodic") };
+        let model = Model::cantilever(
+            &crate::case::Case::paper().with(crate::parameter::Parameter::Omega, 2.8),
+        )
+        .unwrap();
+        let settled = settle(
+            &mut Strobe::new(&model),
+            &[0.0; 6],
+            &SettleOptions::default(),
+        );
+        let Verdict::Periodic(orbit) = settled.verdict else {
+            panic!("Ω = 2.8 is periodic")
+        };
         assert_eq!(orbit.period, 2);
         let found = maxima(&model, &orbit.states[0], 4).unwrap();
         assert_eq!(found.len(), 4);

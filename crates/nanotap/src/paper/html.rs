@@ -40,8 +40,10 @@ pub(super) fn page(report: &Report) -> Result<String, PaperError> {
 }
 
 fn introduction(report: &Report) -> String {
-    let counts: Vec<String> =
-        Verdict::ALL.iter().map(|v| format!("{} {}", report.count(*v), v.name())).collect();
+    let counts: Vec<String> = Verdict::ALL
+        .iter()
+        .map(|v| format!("{} {}", report.count(*v), v.name()))
+        .collect();
     let hurry = if report.quick {
         "<p><strong>Made with --quick: fewer starts and parameter values, wider bounds.</strong></p>\n"
     } else {
@@ -82,7 +84,11 @@ fn overview(report: &Report) -> String {
 }
 
 fn part(section: &Section) -> Result<String, PaperError> {
-    let mut html = format!("<section id=\"{}\">\n<h2>{}</h2>\n", section.id, escaped(section.title));
+    let mut html = format!(
+        "<section id=\"{}\">\n<h2>{}</h2>\n",
+        section.id,
+        escaped(section.title)
+    );
     for text in &section.text {
         let _ = writeln!(html, "<p>{}</p>", escaped(text));
     }
@@ -90,7 +96,10 @@ fn part(section: &Section) -> Result<String, PaperError> {
         let svg = picture
             .bare()
             .to_svg()
-            .map_err(|source| PaperError::Figure { name: picture.name.clone(), source })?;
+            .map_err(|source| PaperError::Figure {
+                name: picture.name.clone(),
+                source,
+            })?;
         // An XML declaration has no place inside a page.
         let svg = svg.find("<svg").map_or(svg.as_str(), |start| &svg[start..]);
         let _ = writeln!(
@@ -129,7 +138,10 @@ fn statement(check: &Check) -> String {
 const FOLDED: usize = 24;
 
 fn tabulated(table: &Table) -> String {
-    let mut html = format!("<table>\n<caption>{}</caption>\n<tr>", escaped(&table.caption));
+    let mut html = format!(
+        "<table>\n<caption>{}</caption>\n<tr>",
+        escaped(&table.caption)
+    );
     for column in &table.columns {
         let _ = write!(html, "<th>{}</th>", escaped(column));
     }
@@ -143,14 +155,21 @@ fn tabulated(table: &Table) -> String {
     }
     html.push_str("</table>\n");
     if table.rows.len() > FOLDED {
-        format!("<details><summary>{} ({} rows)</summary>\n{html}</details>\n", escaped(&table.caption), table.rows.len())
+        format!(
+            "<details><summary>{} ({} rows)</summary>\n{html}</details>\n",
+            escaped(&table.caption),
+            table.rows.len()
+        )
     } else {
         html
     }
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -159,7 +178,8 @@ mod tests {
 
     #[test]
     fn what_is_written_cannot_break_the_page() {
-        let check = Check::new("a\"b", "x < y & z", "|μ| > 1", Verdict::Differs).rerun("nanotap --set a=<b>");
+        let check = Check::new("a\"b", "x < y & z", "|μ| > 1", Verdict::Differs)
+            .rerun("nanotap --set a=<b>");
         let html = statement(&check);
         assert!(html.contains("x &lt; y &amp; z") && html.contains("|μ| &gt; 1"));
         assert!(html.contains("id=\"a&quot;b\"") && html.contains("--set a=&lt;b&gt;"));

@@ -3,8 +3,8 @@
 //! and with a soft one, and the way from one to the other as the stop stiffens.
 
 use nanotap_dynamics::{
-    BifurcationKind, ContinuationOptions, Direction, PeriodicOrbit, SettleOptions, ShootingOptions, Verdict as Settled,
-    close_orbit, continue_orbit, settle,
+    BifurcationKind, ContinuationOptions, Direction, PeriodicOrbit, SettleOptions, ShootingOptions,
+    Verdict as Settled, close_orbit, continue_orbit, settle,
 };
 use nanotap_figures::{Axis, Colour, Dash, Figure, Legend, Line, Markers, Panel, Rule, Shape};
 use rayon::prelude::*;
@@ -37,7 +37,15 @@ const OMEGA: Key = Key::Oscillator(OscillatorParameter::Omega);
 
 /// ẍ + x = cos ωt with a stop at x = 0.
 const fn oscillator(stop: Stop) -> Oscillator {
-    Oscillator { mass: 1.0, stiffness: 1.0, damping: 0.0, forcing: 1.0, omega: ENTRY, gap: 0.0, stop }
+    Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.0,
+        forcing: 1.0,
+        omega: ENTRY,
+        gap: 0.0,
+        stop,
+    }
 }
 
 /// A soft stop of this stiffness that gives back the same part of the speed: an impact on
@@ -45,11 +53,16 @@ const fn oscillator(stop: Stop) -> Oscillator {
 fn soft(stiffness: f64) -> Oscillator {
     let loss = -RESTITUTION.ln();
     let ratio = loss / std::f64::consts::PI.hypot(loss);
-    oscillator(Stop::Soft { stiffness, damping: 2.0 * ratio * stiffness.sqrt() })
+    oscillator(Stop::Soft {
+        stiffness,
+        damping: 2.0 * ratio * stiffness.sqrt(),
+    })
 }
 
 const fn rigid() -> Oscillator {
-    oscillator(Stop::Rigid { restitution: RESTITUTION })
+    oscillator(Stop::Rigid {
+        restitution: RESTITUTION,
+    })
 }
 
 /// Flips of the rigid oscillator's period-1 branch, known to the digits given
@@ -57,27 +70,47 @@ const fn rigid() -> Oscillator {
 const KNOWN_FLIPS: [f64; 2] = [1.260_676_6, 2.653_347_7];
 
 /// The impact oscillator beside the soft sample.
-pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let (count, starts) = (laboratory.either(400, 30), laboratory.either(8, 2));
     let values = spaced(RANGE.0, RANGE.1, count);
-    let columns = |o: Oscillator| sweep(laboratory, &Subject::Oscillator(o), OMEGA, &values, starts);
+    let columns =
+        |o: Oscillator| sweep(laboratory, &Subject::Oscillator(o), OMEGA, &values, starts);
     let (hard, soft_columns) = (columns(rigid())?, columns(soft(SOFT))?);
     let limit = Orbit::find(rigid())?;
     let flips = limit.flips(laboratory)?;
     let way = way_to_rigid(laboratory, &limit)?;
-    let fits = KNOWN_FLIPS.iter().all(|known| flips.iter().any(|f| (f - known).abs() < 5e-8));
+    let fits = KNOWN_FLIPS
+        .iter()
+        .all(|known| flips.iter().any(|f| (f - known).abs() < 5e-8));
     let last = way.last();
     let slope = convergence_rate(&way);
-    let soft_flips = way.iter().find(|w| w.stiffness >= SOFT).map(|w| w.flips.clone()).unwrap_or_default();
+    let soft_flips = way
+        .iter()
+        .find(|w| w.stiffness >= SOFT)
+        .map(|w| w.flips.clone())
+        .unwrap_or_default();
     let sweep_rerun = |o: &Oscillator| {
         rerun::on_oscillator(
             "sweep",
             o,
-            &format!("--over omega={}:{}:{count} --starts {starts} --seed {SEED}", RANGE.0, RANGE.1),
+            &format!(
+                "--over omega={}:{}:{count} --starts {starts} --seed {SEED}",
+                RANGE.0, RANGE.1
+            ),
         )
     };
     let branch_rerun = |o: &Oscillator| {
-        rerun::on_oscillator("branch", o, &format!("--parameter omega --from {ENTRY} --to {} --period 1", RANGE.1))
+        rerun::on_oscillator(
+            "branch",
+            o,
+            &format!(
+                "--parameter omega --from {ENTRY} --to {} --period 1",
+                RANGE.1
+            ),
+        )
     };
     let contact = Orbit::find(soft(SOFT)).ok().map(|o| o.contact);
     Ok(section
@@ -136,13 +169,21 @@ fn list(values: &[f64]) -> String {
     if values.is_empty() {
         return "nowhere".to_owned();
     }
-    values.iter().map(|v| format!("{v:.7}")).collect::<Vec<_>>().join(", ")
+    values
+        .iter()
+        .map(|v| format!("{v:.7}"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// The largest distance of a member of `b` to the nearest of `a`.
 fn nearest(a: &[f64], b: &[f64]) -> f64 {
     b.iter()
-        .map(|b| a.iter().map(|a| (a - b).abs()).fold(f64::INFINITY, f64::min))
+        .map(|b| {
+            a.iter()
+                .map(|a| (a - b).abs())
+                .fold(f64::INFINITY, f64::min)
+        })
         .fold(0.0, f64::max)
 }
 
@@ -158,7 +199,10 @@ struct Orbit {
 impl Orbit {
     /// From where starts settle.
     fn find(oscillator: Oscillator) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed { what: format!("a period-1 orbit at ω = {ENTRY}"), why };
+        let failed = |why: String| PaperError::Failed {
+            what: format!("a period-1 orbit at ω = {ENTRY}"),
+            why,
+        };
         let model = oscillator.model()?;
         let mut map = Strobe::new(&model);
         let area = default_box(&model).map_err(|error| failed(error.to_string()))?;
@@ -168,23 +212,48 @@ impl Orbit {
                 _ => None,
             }
         });
-        Self::look(oscillator, &model, found.ok_or_else(|| failed("no start settles on one".into()))?)
+        Self::look(
+            oscillator,
+            &model,
+            found.ok_or_else(|| failed("no start settles on one".into()))?,
+        )
     }
 
     /// By Newton, near the orbit of a neighbour.
     fn near(oscillator: Oscillator, guess: &Self) -> Result<Self, PaperError> {
         let model = oscillator.model()?;
-        let orbit = close_orbit(&mut Strobe::new(&model), &guess.orbit.states[0], 1, &ShootingOptions::default())
-            .map_err(|error| PaperError::Failed { what: format!("the orbit of {oscillator:?}"), why: error.to_string() })?;
+        let orbit = close_orbit(
+            &mut Strobe::new(&model),
+            &guess.orbit.states[0],
+            1,
+            &ShootingOptions::default(),
+        )
+        .map_err(|error| PaperError::Failed {
+            what: format!("the orbit of {oscillator:?}"),
+            why: error.to_string(),
+        })?;
         Self::look(oscillator, &model, orbit)
     }
 
-    fn look(oscillator: Oscillator, model: &Model, orbit: PeriodicOrbit) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed { what: "the orbit's extrema".into(), why };
+    fn look(
+        oscillator: Oscillator,
+        model: &Model,
+        orbit: PeriodicOrbit,
+    ) -> Result<Self, PaperError> {
+        let failed = |why: String| PaperError::Failed {
+            what: "the orbit's extrema".into(),
+            why,
+        };
         let trajectory = nanotap_flow::Trajectory::record(&model.system, &orbit.states[0], 1)
             .map_err(|error| failed(error.to_string()))?;
-        let o = Observables::of(model, &trajectory).ok_or_else(|| failed("nothing was recorded".into()))?;
-        Ok(Self { oscillator, orbit, reach: o.gap_range[1], contact: o.contact_fraction })
+        let o = Observables::of(model, &trajectory)
+            .ok_or_else(|| failed("nothing was recorded".into()))?;
+        Ok(Self {
+            oscillator,
+            orbit,
+            reach: o.gap_range[1],
+            contact: o.contact_fraction,
+        })
     }
 
     /// Flips of the branch through it, over [`RANGE`].
@@ -193,14 +262,26 @@ impl Orbit {
     }
 
     fn flips_under(&self, control: &nanotap_dynamics::Control<'_>) -> Result<Vec<f64>, PaperError> {
-        let family = Family { subject: Subject::Oscillator(self.oscillator), key: OMEGA };
+        let family = Family {
+            subject: Subject::Oscillator(self.oscillator),
+            key: OMEGA,
+        };
         let options = ContinuationOptions::over(RANGE.0, RANGE.1);
         let mut flips = Vec::new();
         for direction in [Direction::Decreasing, Direction::Increasing] {
             let branch = continue_orbit(&family, ENTRY, &self.orbit, direction, &options, control)
-                .map_err(|error| PaperError::Failed { what: "a period-1 branch".into(), why: error.to_string() })?;
+                .map_err(|error| PaperError::Failed {
+                    what: "a period-1 branch".into(),
+                    why: error.to_string(),
+                })?;
             // Beyond its first flip a branch may lead anywhere.
-            flips.extend(branch.bifurcations.iter().find(|b| matches!(b.kind, BifurcationKind::Flip)).map(|b| b.parameter));
+            flips.extend(
+                branch
+                    .bifurcations
+                    .iter()
+                    .find(|b| matches!(b.kind, BifurcationKind::Flip))
+                    .map(|b| b.parameter),
+            );
         }
         flips.sort_by(f64::total_cmp);
         Ok(flips)
@@ -225,7 +306,9 @@ fn way_to_rigid(laboratory: &Laboratory<'_>, limit: &Orbit) -> Result<Vec<Waypoi
         let stiffness = STIFFNESSES.0 * 10f64.powf(k as f64 / per_decade as f64);
         let guess = orbits.last().map_or(limit, |(_, orbit)| orbit);
         // Softer stops may have no such orbit any more.
-        let Ok(orbit) = Orbit::near(soft(stiffness), guess) else { break };
+        let Ok(orbit) = Orbit::near(soft(stiffness), guess) else {
+            break;
+        };
         orbits.push((stiffness, orbit));
     }
     orbits.reverse();
@@ -246,15 +329,27 @@ fn way_to_rigid(laboratory: &Laboratory<'_>, limit: &Orbit) -> Result<Vec<Waypoi
 
 /// The power of κ by which the distance falls over the last decade.
 fn convergence_rate(way: &[Waypoint]) -> f64 {
-    let Some(last) = way.last() else { return f64::NAN };
-    let before = way.iter().rev().find(|w| w.stiffness <= 0.11 * last.stiffness);
-    before.map_or(f64::NAN, |w| (last.distance / w.distance).ln() / (last.stiffness / w.stiffness).ln())
+    let Some(last) = way.last() else {
+        return f64::NAN;
+    };
+    let before = way
+        .iter()
+        .rev()
+        .find(|w| w.stiffness <= 0.11 * last.stiffness);
+    before.map_or(f64::NAN, |w| {
+        (last.distance / w.distance).ln() / (last.stiffness / w.stiffness).ln()
+    })
 }
 
 fn way_table(way: &[Waypoint], flips: &[f64]) -> Table {
     let mut table = Table::new(
         "The period-1 orbit of one impact while the stop stiffens",
-        ["stiffness κ", "reach, from the rigid one's", "time in contact", "first flips of its branch (ω)"],
+        [
+            "stiffness κ",
+            "reach, from the rigid one's",
+            "time in contact",
+            "first flips of its branch (ω)",
+        ],
     );
     for w in way {
         table.row([
@@ -271,7 +366,9 @@ fn way_table(way: &[Waypoint], flips: &[f64]) -> Table {
 fn diagrams(hard: &[Column], soft: &[Column], starts: usize) -> Picture {
     let panel = |title: &str, columns: &[Column], legend| {
         let axis = Axis::linear("drive frequency $ω$").range(RANGE.0, RANGE.1);
-        let empty = Panel::new(axis, Axis::linear("reach from the stop").range(0.0, 3.0)).title(title).legend(legend);
+        let empty = Panel::new(axis, Axis::linear("reach from the stop").range(0.0, 3.0))
+            .title(title)
+            .legend(legend);
         draw(empty, columns, 0.5)
     };
     Picture::new(
@@ -300,16 +397,41 @@ fn limit_picture(way: &[Waypoint], flips: &[f64]) -> Picture {
     let left = Panel::new(stiffness(), Axis::log("part"))
         .legend(Legend::Above)
         .with(Line::new(distance.clone()).colour(Colour::BLUE).width(0.5))
-        .with(Markers::new(distance).colour(Colour::BLUE).label("reach beside the rigid one's"))
+        .with(
+            Markers::new(distance)
+                .colour(Colour::BLUE)
+                .label("reach beside the rigid one's"),
+        )
         .with(Line::new(contact.clone()).colour(Colour::GREEN).width(0.5))
-        .with(Markers::new(contact).colour(Colour::GREEN).shape(Shape::Square).label("time in contact"))
-        .with(Line::new(slope.unwrap_or_default()).colour(Colour::BLACK).dash(Dash::Dashed).width(0.5).label("$κ^{−1/2}$"));
-    let mut right = Panel::new(stiffness(), Axis::linear("first flips of period 1, $ω$").range(RANGE.0, RANGE.1));
+        .with(
+            Markers::new(contact)
+                .colour(Colour::GREEN)
+                .shape(Shape::Square)
+                .label("time in contact"),
+        )
+        .with(
+            Line::new(slope.unwrap_or_default())
+                .colour(Colour::BLACK)
+                .dash(Dash::Dashed)
+                .width(0.5)
+                .label("$κ^{−1/2}$"),
+        );
+    let mut right = Panel::new(
+        stiffness(),
+        Axis::linear("first flips of period 1, $ω$").range(RANGE.0, RANGE.1),
+    );
     for flip in flips {
         right = right.with(Rule::horizontal(*flip));
     }
-    let points = way.iter().flat_map(|w| w.flips.iter().map(|f| (w.stiffness, *f)));
-    right = right.with(Markers::new(points).colour(Colour::VERMILLION).shape(Shape::Diamond).size(1.8));
+    let points = way
+        .iter()
+        .flat_map(|w| w.flips.iter().map(|f| (w.stiffness, *f)));
+    right = right.with(
+        Markers::new(points)
+            .colour(Colour::VERMILLION)
+            .shape(Shape::Diamond)
+            .size(1.8),
+    );
     Picture::new(
         "impact-limit",
         "From the soft stop to the rigid one",
@@ -331,7 +453,9 @@ mod tests {
     /// coefficient of restitution.
     #[test]
     fn the_soft_stop_gives_back_what_the_rigid_one_does() {
-        let Stop::Soft { stiffness, damping } = soft(50.0).stop else { panic!("soft") };
+        let Stop::Soft { stiffness, damping } = soft(50.0).stop else {
+            panic!("soft")
+        };
         // ẍ = −κx − cẋ from x = 0, ẋ = 1, until x = 0 again: closed form.
         let decay = 0.5 * damping;
         let frequency = (stiffness - decay * decay).sqrt();

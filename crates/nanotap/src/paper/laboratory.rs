@@ -5,8 +5,8 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, Control, Fraction, Lifetime, LyapunovOptions, LyapunovSpectrum,
-    OrbitSearch, PeriodicOrbit, SettleOptions, StartBox, census, find_orbits,
+    AttractorKind, Census, CensusOptions, Control, Fraction, Lifetime, LyapunovOptions,
+    LyapunovSpectrum, OrbitSearch, PeriodicOrbit, SettleOptions, StartBox, census, find_orbits,
 };
 
 use nanotap_flow::Trajectory;
@@ -71,9 +71,16 @@ impl<'a> Laboratory<'a> {
         let (before, own) = self.share.get();
         let (control, told) = (self.control, &self.told);
         let hear = |done: usize, total: usize| {
-            tell(control, told, before + own * done as f64 / total.max(1) as f64);
+            tell(
+                control,
+                told,
+                before + own * done as f64 / total.max(1) as f64,
+            );
         };
-        work(&Control { cancel: control.cancel, progress: Some(&hear) })
+        work(&Control {
+            cancel: control.cancel,
+            progress: Some(&hear),
+        })
     }
 
     /// The census of `case`, taken when it is first asked for.
@@ -96,27 +103,47 @@ impl<'a> Laboratory<'a> {
             ..CensusOptions::default()
         };
         let map = Strobe::new(&model);
-        let census = self.controlled(|control| census(&map, &starts.starts(SEED, count), &options, control));
+        let census =
+            self.controlled(|control| census(&map, &starts.starts(SEED, count), &options, control));
         if census.cancelled {
             return Err(PaperError::Cancelled);
         }
-        let counted = Rc::new(Counted { case: case.clone(), model, census, starts: count });
+        let counted = Rc::new(Counted {
+            case: case.clone(),
+            model,
+            census,
+            starts: count,
+        });
         self.counts.borrow_mut().push(Rc::clone(&counted));
         Ok(counted)
     }
 
     /// Every periodic orbit up to `longest`, stable or not, that Newton reaches from
     /// starts in the box and from near returns of runs of `run` periods.
-    pub(super) fn orbits(&self, counted: &Counted, longest: usize, run: usize) -> Result<Vec<PeriodicOrbit>, PaperError> {
+    pub(super) fn orbits(
+        &self,
+        counted: &Counted,
+        longest: usize,
+        run: usize,
+    ) -> Result<Vec<PeriodicOrbit>, PaperError> {
         let starts = start_box(&counted.model)?;
-        let search = OrbitSearch { max_period: longest, run, ..OrbitSearch::default() };
+        let search = OrbitSearch {
+            max_period: longest,
+            run,
+            ..OrbitSearch::default()
+        };
         let map = Strobe::new(&counted.model);
         let count = self.either(64, 12);
-        Ok(self.controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control)))
+        Ok(self
+            .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control)))
     }
 
     /// `count` starts in the box of a case.
-    pub(super) fn starts(&self, counted: &Counted, count: usize) -> Result<Vec<Vec<f64>>, PaperError> {
+    pub(super) fn starts(
+        &self,
+        counted: &Counted,
+        count: usize,
+    ) -> Result<Vec<Vec<f64>>, PaperError> {
         let starts = start_box(&counted.model)?;
         Ok(starts.starts(SEED, count))
     }
@@ -145,8 +172,10 @@ fn tell(control: &Control<'_>, told: &AtomicUsize, part: f64) {
 
 /// The box that starts are taken from.
 fn start_box(model: &Model) -> Result<StartBox, PaperError> {
-    default_box(model)
-        .map_err(|error| PaperError::Failed { what: "the box of starts".into(), why: error.to_string() })
+    default_box(model).map_err(|error| PaperError::Failed {
+        what: "the box of starts".into(),
+        why: error.to_string(),
+    })
 }
 
 /// Chaos that nothing was seen to leave.
@@ -170,7 +199,10 @@ pub(super) struct Counted {
 impl Counted {
     /// Stable orbits of `period`.
     pub(super) fn stable(&self, period: usize) -> Vec<(&PeriodicOrbit, Fraction)> {
-        self.all_stable().into_iter().filter(|(orbit, _)| orbit.period == period).collect()
+        self.all_stable()
+            .into_iter()
+            .filter(|(orbit, _)| orbit.period == period)
+            .collect()
     }
 
     /// Every stable orbit.
@@ -191,9 +223,12 @@ impl Counted {
             .attractors
             .iter()
             .filter_map(|a| match &a.kind {
-                AttractorKind::Chaotic { spectrum, lifetime } => {
-                    Some(Chaos { spectrum, lifetime: *lifetime, fraction: a.fraction, state: &a.state })
-                }
+                AttractorKind::Chaotic { spectrum, lifetime } => Some(Chaos {
+                    spectrum,
+                    lifetime: *lifetime,
+                    fraction: a.fraction,
+                    state: &a.state,
+                }),
                 _ => None,
             })
             .collect()
@@ -201,15 +236,22 @@ impl Counted {
 
     /// What a motion that never repeats looks like over [`WATCHED`] periods from `state`.
     pub(super) fn watch(&self, state: &[f64]) -> Result<Observables, PaperError> {
-        let failed = |why: String| PaperError::Failed { what: "a run to observe".into(), why };
-        let trajectory = Trajectory::record(&self.model.system, state, WATCHED).map_err(|e| failed(e.to_string()))?;
-        Observables::of(&self.model, &trajectory).ok_or_else(|| failed("nothing was recorded".into()))
+        let failed = |why: String| PaperError::Failed {
+            what: "a run to observe".into(),
+            why,
+        };
+        let trajectory = Trajectory::record(&self.model.system, state, WATCHED)
+            .map_err(|e| failed(e.to_string()))?;
+        Observables::of(&self.model, &trajectory)
+            .ok_or_else(|| failed("nothing was recorded".into()))
     }
 
     /// What a closed orbit of this case looks like.
     pub(super) fn look(&self, orbit: &PeriodicOrbit) -> Result<OrbitReport, PaperError> {
-        report(&self.model, orbit, HARMONICS)
-            .map_err(|source| PaperError::Orbit { what: format!("a period-{} orbit", orbit.period), source })
+        report(&self.model, orbit, HARMONICS).map_err(|source| PaperError::Orbit {
+            what: format!("a period-{} orbit", orbit.period),
+            source,
+        })
     }
 
     /// What kinds of motion attract, most frequent first.
@@ -222,7 +264,12 @@ impl Counted {
                 AttractorKind::QuasiPeriodic(_) => "torus".to_owned(),
                 AttractorKind::Chaotic { .. } => "chaos".to_owned(),
             })
-            .chain(self.census.transient_chaos.iter().map(|_| "transient chaos".to_owned()))
+            .chain(
+                self.census
+                    .transient_chaos
+                    .iter()
+                    .map(|_| "transient chaos".to_owned()),
+            )
             .collect()
     }
 
@@ -249,7 +296,10 @@ impl Counted {
             });
         }
         if let Some(chaos) = &self.census.transient_chaos {
-            parts.push(format!("transient chaos ({} starts still on it)", chaos.wandering.count));
+            parts.push(format!(
+                "transient chaos ({} starts still on it)",
+                chaos.wandering.count
+            ));
         }
         if !self.census.undecided.is_empty() {
             parts.push(format!("{} starts undecided", self.census.undecided.len()));
@@ -268,7 +318,11 @@ impl Counted {
 
     /// The command line that takes this census.
     pub(super) fn rerun(&self) -> String {
-        rerun::on_case("attractors", &self.case, &format!("--starts {} --seed {SEED}", self.starts))
+        rerun::on_case(
+            "attractors",
+            &self.case,
+            &format!("--starts {} --seed {SEED}", self.starts),
+        )
     }
 }
 

@@ -7,8 +7,10 @@ use super::check::Verdict;
 
 /// The document.
 pub(super) fn document(report: &Report) -> String {
-    let counts: Vec<String> =
-        Verdict::ALL.iter().map(|v| format!("{} {}", report.count(*v), v.name())).collect();
+    let counts: Vec<String> = Verdict::ALL
+        .iter()
+        .map(|v| format!("{} {}", report.count(*v), v.name()))
+        .collect();
     let mut text = format!(
         "# The paper computed again\n\n{} statements: {}. The page `report.html` beside this file shows the pictures \
          and tables.\n\n| id | the paper | here | verdict | evidence | run it again |\n|---|---|---|---|---|---|\n",
@@ -29,14 +31,21 @@ pub(super) fn document(report: &Report) -> String {
         );
     }
     for picture in report.sections.iter().flat_map(|s| &s.pictures) {
-        let _ = write!(text, "\n![{}]({}.png)\n\n{}\n", picture.title, picture.name, picture.caption);
+        let _ = write!(
+            text,
+            "\n![{}]({}.png)\n\n{}\n",
+            picture.title, picture.name, picture.caption
+        );
     }
     text
 }
 
 /// Words that stay in their cell.
 fn cell(text: &str) -> String {
-    text.replace('\\', "\\\\").replace('|', "\\|").replace('*', "\\*").replace('\n', " ")
+    text.replace('\\', "\\\\")
+        .replace('|', "\\|")
+        .replace('*', "\\*")
+        .replace('\n', " ")
 }
 
 #[cfg(test)]
@@ -46,8 +55,13 @@ mod tests {
 
     #[test]
     fn every_row_has_six_cells() {
-        let check = Check::new("x", "|μ| = 1", "a | b", Verdict::Ambiguous).evidence("E*").rerun("nanotap");
-        let report = Report { sections: vec![Section::new("x", "X").check(check)], quick: true };
+        let check = Check::new("x", "|μ| = 1", "a | b", Verdict::Ambiguous)
+            .evidence("E*")
+            .rerun("nanotap");
+        let report = Report {
+            sections: vec![Section::new("x", "X").check(check)],
+            quick: true,
+        };
         let text = document(&report);
         let row = text.lines().find(|l| l.starts_with("| x ")).unwrap();
         let bars = row.replace("\\|", "").matches('|').count();

@@ -131,32 +131,162 @@ struct Topic {
 
 /// Every section, in the order of the paper; evidence that serves several comes last.
 const TOPICS: &[Topic] = &[
-    Topic { id: "eq7", title: "Eq. (7): the damping parameters", weight: 1, make: equations::damping_units },
-    Topic { id: "eq14", title: "Eq. (14): the drive's cosine term", weight: 6, make: equations::cosine_term },
-    Topic { id: "eq23", title: "Eq. (23): frequencies of the bare beam", weight: 1, make: equations::bare_frequencies },
-    Topic { id: "eq25", title: "Eq. (25): frequencies in contact", weight: 1, make: equations::contact_frequencies },
-    Topic { id: "alpha4", title: "Section 4: contact stiffness of ten samples", weight: 1, make: equations::samples },
-    Topic { id: "scaling", title: "Section 3: frequencies that do not depend on amplitude", weight: 1, make: equations::scaling },
-    Topic { id: "fig2e", title: "Fig. 2e: the first three modes", weight: 1, make: frequencies::mode_shapes },
-    Topic { id: "fig2f", title: "Fig. 2f: does another part of the beam touch?", weight: 2, make: clearance::section },
-    Topic { id: "fig3", title: "Fig. 3: frequencies against tip mass and contact stiffness", weight: 1, make: frequencies::maps },
-    Topic { id: "fig4", title: "Fig. 4: how many modes are enough at Ω = 4.1", weight: 2, make: convergence_study::section },
-    Topic { id: "fig5", title: "Fig. 5: the bifurcation diagram", weight: 25, make: bifurcation_diagram::section },
-    Topic { id: "fig6", title: "Fig. 6: two period-1 motions at Ω = 2.6, α₁ = 0.1", weight: 6, make: slow_drive::fig6 },
-    Topic { id: "fig7", title: "Fig. 7: period 2 and period 3 at Ω = 2.6, α₁ = 0.1", weight: 1, make: slow_drive::fig7 },
-    Topic { id: "fig8", title: "Fig. 8: a period-1 motion at Ω = 20, α₁ = 0.1", weight: 20, make: fast_drive::fig8 },
-    Topic { id: "fig9", title: "Fig. 9: another period-1 motion at Ω = 20, α₁ = 0.1", weight: 1, make: fast_drive::fig9 },
-    Topic { id: "fig10", title: "Fig. 10: period 11 at Ω = 20, α₁ = 0.1", weight: 1, make: fast_drive::fig10 },
-    Topic { id: "fig11", title: "Fig. 11: period 28 at Ω = 20, α₁ = 0.1", weight: 1, make: fast_drive::fig11 },
-    Topic { id: "fig12", title: "Fig. 12: period 21 at Ω = 20, α₁ = 0.1", weight: 1, make: fast_drive::fig12 },
-    Topic { id: "fig13", title: "Fig. 13: another period 21 at Ω = 20, α₁ = 0.1", weight: 1, make: fast_drive::fig13 },
-    Topic { id: "fig14", title: "Fig. 14: a nonperiodic motion at Ω = 20, α₁ = 0.1", weight: 1, make: fast_drive::fig14 },
-    Topic { id: "fig15", title: "Fig. 15: two period-1 motions with α₁ = 0", weight: 1, make: bare_tip::fig15 },
-    Topic { id: "fig16", title: "Fig. 16: period 2 with α₁ = 0", weight: 1, make: bare_tip::fig16 },
-    Topic { id: "fig17", title: "Fig. 17: two period-4 motions with α₁ = 0", weight: 1, make: bare_tip::fig17 },
-    Topic { id: "impact", title: "Fig. 1: rigid and soft stops", weight: 15, make: impact::section },
-    Topic { id: "attractors", title: "Evidence: every motion that attracts, N = 1 … 5", weight: 15, make: attractors::section },
-    Topic { id: "time-step", title: "Evidence: what fixed time steps add", weight: 1, make: time_step::section },
+    Topic {
+        id: "eq7",
+        title: "Eq. (7): the damping parameters",
+        weight: 1,
+        make: equations::damping_units,
+    },
+    Topic {
+        id: "eq14",
+        title: "Eq. (14): the drive's cosine term",
+        weight: 6,
+        make: equations::cosine_term,
+    },
+    Topic {
+        id: "eq23",
+        title: "Eq. (23): frequencies of the bare beam",
+        weight: 1,
+        make: equations::bare_frequencies,
+    },
+    Topic {
+        id: "eq25",
+        title: "Eq. (25): frequencies in contact",
+        weight: 1,
+        make: equations::contact_frequencies,
+    },
+    Topic {
+        id: "alpha4",
+        title: "Section 4: contact stiffness of ten samples",
+        weight: 1,
+        make: equations::samples,
+    },
+    Topic {
+        id: "scaling",
+        title: "Section 3: frequencies that do not depend on amplitude",
+        weight: 1,
+        make: equations::scaling,
+    },
+    Topic {
+        id: "fig2e",
+        title: "Fig. 2e: the first three modes",
+        weight: 1,
+        make: frequencies::mode_shapes,
+    },
+    Topic {
+        id: "fig2f",
+        title: "Fig. 2f: does another part of the beam touch?",
+        weight: 2,
+        make: clearance::section,
+    },
+    Topic {
+        id: "fig3",
+        title: "Fig. 3: frequencies against tip mass and contact stiffness",
+        weight: 1,
+        make: frequencies::maps,
+    },
+    Topic {
+        id: "fig4",
+        title: "Fig. 4: how many modes are enough at Ω = 4.1",
+        weight: 2,
+        make: convergence_study::section,
+    },
+    Topic {
+        id: "fig5",
+        title: "Fig. 5: the bifurcation diagram",
+        weight: 25,
+        make: bifurcation_diagram::section,
+    },
+    Topic {
+        id: "fig6",
+        title: "Fig. 6: two period-1 motions at Ω = 2.6, α₁ = 0.1",
+        weight: 6,
+        make: slow_drive::fig6,
+    },
+    Topic {
+        id: "fig7",
+        title: "Fig. 7: period 2 and period 3 at Ω = 2.6, α₁ = 0.1",
+        weight: 1,
+        make: slow_drive::fig7,
+    },
+    Topic {
+        id: "fig8",
+        title: "Fig. 8: a period-1 motion at Ω = 20, α₁ = 0.1",
+        weight: 20,
+        make: fast_drive::fig8,
+    },
+    Topic {
+        id: "fig9",
+        title: "Fig. 9: another period-1 motion at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig9,
+    },
+    Topic {
+        id: "fig10",
+        title: "Fig. 10: period 11 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig10,
+    },
+    Topic {
+        id: "fig11",
+        title: "Fig. 11: period 28 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig11,
+    },
+    Topic {
+        id: "fig12",
+        title: "Fig. 12: period 21 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig12,
+    },
+    Topic {
+        id: "fig13",
+        title: "Fig. 13: another period 21 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig13,
+    },
+    Topic {
+        id: "fig14",
+        title: "Fig. 14: a nonperiodic motion at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig14,
+    },
+    Topic {
+        id: "fig15",
+        title: "Fig. 15: two period-1 motions with α₁ = 0",
+        weight: 1,
+        make: bare_tip::fig15,
+    },
+    Topic {
+        id: "fig16",
+        title: "Fig. 16: period 2 with α₁ = 0",
+        weight: 1,
+        make: bare_tip::fig16,
+    },
+    Topic {
+        id: "fig17",
+        title: "Fig. 17: two period-4 motions with α₁ = 0",
+        weight: 1,
+        make: bare_tip::fig17,
+    },
+    Topic {
+        id: "impact",
+        title: "Fig. 1: rigid and soft stops",
+        weight: 15,
+        make: impact::section,
+    },
+    Topic {
+        id: "attractors",
+        title: "Evidence: every motion that attracts, N = 1 … 5",
+        weight: 15,
+        make: attractors::section,
+    },
+    Topic {
+        id: "time-step",
+        title: "Evidence: what fixed time steps add",
+        weight: 1,
+        make: time_step::section,
+    },
 ];
 
 /// Makes the report. Progress is told in percent of the whole.
@@ -173,13 +303,19 @@ pub fn report(options: &Options, control: &Control<'_>) -> Result<Report, PaperE
     for topic in topics {
         let share = |weight: u32| f64::from(weight) / f64::from(whole);
         laboratory.begin(share(begun), share(topic.weight));
-        sections.push((topic.make)(&laboratory, Section::new(topic.id, topic.title))?);
+        sections.push((topic.make)(
+            &laboratory,
+            Section::new(topic.id, topic.title),
+        )?);
         if control.is_cancelled() {
             return Err(PaperError::Cancelled);
         }
         begun += topic.weight;
     }
-    Ok(Report { sections, quick: options.quick })
+    Ok(Report {
+        sections,
+        quick: options.quick,
+    })
 }
 
 /// Names of all sections.
@@ -193,14 +329,21 @@ fn chosen(only: &[String]) -> Result<Vec<&'static Topic>, PaperError> {
         return Ok(TOPICS.iter().collect());
     }
     for given in only {
-        if TOPICS.iter().all(|topic| !topic.id.eq_ignore_ascii_case(given)) {
+        if TOPICS
+            .iter()
+            .all(|topic| !topic.id.eq_ignore_ascii_case(given))
+        {
             let hint = section_names()
                 .map(|id| (strsim::damerau_levenshtein(id, &given.to_lowercase()), id))
                 .min()
                 .filter(|(distance, _)| *distance <= 2)
                 .map_or_else(String::new, |(_, id)| format!(" (did you mean `{id}`?)"));
             let known = section_names().collect::<Vec<_>>().join(", ");
-            return Err(PaperError::UnknownSection { given: given.clone(), hint, known });
+            return Err(PaperError::UnknownSection {
+                given: given.clone(),
+                hint,
+                known,
+            });
         }
     }
     let wanted = |topic: &&Topic| only.iter().any(|id| topic.id.eq_ignore_ascii_case(id));
@@ -220,8 +363,14 @@ mod tests {
     #[test]
     fn unknown_sections_are_refused_with_the_nearest() {
         let error = chosen(&["fgi4".to_owned()]).err().unwrap().to_string();
-        assert!(error.contains("`fgi4`") && error.contains("did you mean `fig4`?"), "{error}");
+        assert!(
+            error.contains("`fgi4`") && error.contains("did you mean `fig4`?"),
+            "{error}"
+        );
         let some = chosen(&["FIG17".to_owned(), "eq7".to_owned()]).unwrap();
-        assert_eq!(some.iter().map(|t| t.id).collect::<Vec<_>>(), ["eq7", "fig17"]);
+        assert_eq!(
+            some.iter().map(|t| t.id).collect::<Vec<_>>(),
+            ["eq7", "fig17"]
+        );
     }
 }

@@ -32,8 +32,12 @@ struct Stretch {
 impl<'a> View<'a> {
     /// `periods` drive periods of `model` from the state `start`.
     pub(super) fn new(model: &'a Model, start: &[f64], periods: usize) -> Result<Self, PaperError> {
-        let trajectory = Trajectory::record(&model.system, start, periods)
-            .map_err(|error| PaperError::Failed { what: "a motion to draw".into(), why: error.to_string() })?;
+        let trajectory = Trajectory::record(&model.system, start, periods).map_err(|error| {
+            PaperError::Failed {
+                what: "a motion to draw".into(),
+                why: error.to_string(),
+            }
+        })?;
         Ok(Self { model, trajectory })
     }
 
@@ -45,16 +49,23 @@ impl<'a> View<'a> {
         let mut stretches: Vec<Stretch> = Vec::new();
         for (i, (segment, piece)) in self.trajectory.segments().iter().zip(&y.pieces).enumerate() {
             let contact = self.model.contact[segment.regime];
-            let count = (POINTS_PER_PERIOD * piece.length / period).max(FEWEST_POINTS).ceil();
+            let count = (POINTS_PER_PERIOD * piece.length / period)
+                .max(FEWEST_POINTS)
+                .ceil();
             let points = (0..=count as usize).map(|k| {
                 let s = piece.length * k as f64 / count;
-                let across = x.as_ref().map_or((piece.start + s) / period, |x| x.pieces[i].signal.at(s));
+                let across = x
+                    .as_ref()
+                    .map_or((piece.start + s) / period, |x| x.pieces[i].signal.at(s));
                 (across, piece.signal.at(s))
             });
             match stretches.last_mut() {
                 // A drive period ended within the stretch.
                 Some(last) if last.contact == contact => last.points.extend(points),
-                _ => stretches.push(Stretch { contact, points: points.collect() }),
+                _ => stretches.push(Stretch {
+                    contact,
+                    points: points.collect(),
+                }),
             }
         }
         stretches
@@ -71,18 +82,33 @@ impl<'a> View<'a> {
 
     /// The tip against time.
     pub(super) fn tip_line(&self) -> Line {
-        Line::new(self.stretches(None, &self.model.tip).into_iter().flat_map(|s| s.points))
+        Line::new(
+            self.stretches(None, &self.model.tip)
+                .into_iter()
+                .flat_map(|s| s.points),
+        )
     }
 
     /// A panel with the tip against time, contacts shaded.
     pub(super) fn time_panel(&self, title: impl Into<String>) -> Panel {
-        let surface = self.stretches(None, &self.model.surface()).into_iter().flat_map(|s| s.points);
-        Panel::new(Axis::linear("time $τ / T$ (drive periods)").tight(), Axis::linear("tip deflection $W$"))
-            .title(title)
-            .legend(Legend::Hidden)
-            .with(Band::x(self.contacts()))
-            .with(Line::new(surface).colour(Colour::GREY).dash(Dash::Dashed).width(0.6))
-            .with(self.tip_line().colour(FLIGHT))
+        let surface = self
+            .stretches(None, &self.model.surface())
+            .into_iter()
+            .flat_map(|s| s.points);
+        Panel::new(
+            Axis::linear("time $τ / T$ (drive periods)").tight(),
+            Axis::linear("tip deflection $W$"),
+        )
+        .title(title)
+        .legend(Legend::Hidden)
+        .with(Band::x(self.contacts()))
+        .with(
+            Line::new(surface)
+                .colour(Colour::GREY)
+                .dash(Dash::Dashed)
+                .width(0.6),
+        )
+        .with(self.tip_line().colour(FLIGHT))
     }
 
     /// A panel with the phase portrait, the strobe states marked.
@@ -99,16 +125,24 @@ impl<'a> View<'a> {
     /// The phase portrait of a motion that fills an area, as one thin line a regime.
     pub(super) fn tangle_into(&self, panel: Panel, colour: Colour) -> Panel {
         let rate = self.model.tip_rate();
-        let points = self.stretches(Some(&self.model.tip), &rate).into_iter().flat_map(|s| s.points);
+        let points = self
+            .stretches(Some(&self.model.tip), &rate)
+            .into_iter()
+            .flat_map(|s| s.points);
         panel.with(Line::new(points).colour(colour).width(0.2))
     }
 
     /// (W, dW/dτ) at drive phase 0.
     pub(super) fn strobes(&self) -> Vec<(f64, f64)> {
         let period = self.model.period();
-        let (tip, rate) = (self.trajectory.signal(&self.model.tip), self.trajectory.signal(&self.model.tip_rate()));
+        let (tip, rate) = (
+            self.trajectory.signal(&self.model.tip),
+            self.trajectory.signal(&self.model.tip_rate()),
+        );
         let count = (self.trajectory.end() / period).round() as usize;
-        (0..count).filter_map(|k| Some((tip.at(k as f64 * period)?, rate.at(k as f64 * period)?))).collect()
+        (0..count)
+            .filter_map(|k| Some((tip.at(k as f64 * period)?, rate.at(k as f64 * period)?)))
+            .collect()
     }
 
     /// The strobe states as dots.
@@ -119,9 +153,12 @@ impl<'a> View<'a> {
 
 /// A phase portrait without a motion yet.
 pub(super) fn empty_portrait(title: impl Into<String>) -> Panel {
-    Panel::new(Axis::linear("tip deflection $W$"), Axis::linear("tip velocity $dW/dτ$"))
-        .title(title)
-        .legend(Legend::Hidden)
+    Panel::new(
+        Axis::linear("tip deflection $W$"),
+        Axis::linear("tip velocity $dW/dτ$"),
+    )
+    .title(title)
+    .legend(Legend::Hidden)
 }
 
 /// What shading and colours mean, for captions.

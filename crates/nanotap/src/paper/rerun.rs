@@ -83,7 +83,10 @@ mod tests {
     #[test]
     fn so_does_one_on_an_oscillator() {
         for stop in [
-            Stop::Soft { stiffness: 20.0, damping: 0.2 },
+            Stop::Soft {
+                stiffness: 20.0,
+                damping: 0.2,
+            },
             Stop::Rigid { restitution: 0.8 },
         ] {
             let oscillator = Oscillator {
@@ -105,7 +108,10 @@ mod tests {
     fn states_come_back_to_the_last_digit() {
         let x = [0.1, -1.0 / 3.0, 1e-17];
         let text = state(&x);
-        let back: Vec<f64> = text["--state ".len()..].split(',').map(|v| v.parse().unwrap()).collect();
+        let back: Vec<f64> = text["--state ".len()..]
+            .split(',')
+            .map(|v| v.parse().unwrap())
+            .collect();
         assert_eq!(back, x);
     }
 }

@@ -76,10 +76,7 @@ pub struct Table {
 
 impl Table {
     /// A table without rows yet.
-    pub fn new<'a>(
-        caption: impl Into<String>,
-        columns: impl IntoIterator<Item = &'a str>,
-    ) -> Self {
+    pub fn new<'a>(caption: impl Into<String>, columns: impl IntoIterator<Item = &'a str>) -> Self {
         Self {
             caption: caption.into(),
             columns: columns.into_iter().map(str::to_owned).collect(),

@@ -43,7 +43,11 @@ impl Slow {
         let mut parts = Vec::new();
         for orbit in &orbits {
             let o = self.counted.look(orbit)?.observables;
-            let stability = if orbit.is_stable() { "stable" } else { "unstable" };
+            let stability = if orbit.is_stable() {
+                "stable"
+            } else {
+                "unstable"
+            };
             parts.push(format!(
                 "W from {} to {}, {stability}, μ = {}",
                 digits(o.tip_min, 4),
@@ -54,7 +58,11 @@ impl Slow {
         Ok(if orbits.is_empty() {
             format!("no period-{period} orbit found")
         } else {
-            format!("{} ({})", how_many(orbits.len(), &format!("period-{period} orbit")), parts.join("; "))
+            format!(
+                "{} ({})",
+                how_many(orbits.len(), &format!("period-{period} orbit")),
+                parts.join("; ")
+            )
         })
     }
 
@@ -70,7 +78,13 @@ impl Slow {
     }
 
     /// The check of "so many motions of this period".
-    fn check(&self, id: &str, paper: &str, period: usize, claimed: usize) -> Result<Check, PaperError> {
+    fn check(
+        &self,
+        id: &str,
+        paper: &str,
+        period: usize,
+        claimed: usize,
+    ) -> Result<Check, PaperError> {
         let found = self.counted.stable(period).len();
         let here = format!(
             "{} attracts; {}",
@@ -78,7 +92,11 @@ impl Slow {
             self.describe(period)?
         );
         Ok(Check::new(id, paper, here, Verdict::of(found >= claimed))
-            .evidence(format!("{}; {}", self.counted.summary(), self.counted.missed()))
+            .evidence(format!(
+                "{}; {}",
+                self.counted.summary(),
+                self.counted.missed()
+            ))
             .rerun(self.rerun_orbit(period)))
     }
 }
@@ -86,7 +104,11 @@ impl Slow {
 /// The largest multiplier in words.
 fn multiplier(orbit: &PeriodicOrbit) -> String {
     orbit.multipliers.first().map_or_else(String::new, |m| {
-        if m.im == 0.0 { digits(m.re, 4) } else { format!("{} ± {}i", digits(m.re, 4), digits(m.im.abs(), 4)) }
+        if m.im == 0.0 {
+            digits(m.re, 4)
+        } else {
+            format!("{} ± {}i", digits(m.re, 4), digits(m.im.abs(), 4))
+        }
     })
 }
 
@@ -100,16 +122,26 @@ pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
         let series = View::new(model, chaos.state, SHOWN.0)?;
         let tangle = View::new(model, chaos.state, laboratory.either(SHOWN.1, 60))?;
         let dots = View::new(model, chaos.state, laboratory.either(3000, 300))?.strobe_dots();
-        let portrait = tangle.tangle_into(empty_portrait("chaos"), Colour::SKY).with(dots.colour(Colour::BLACK));
-        figure = figure.with(series.time_panel("the attractor: chaos")).with(portrait);
+        let portrait = tangle
+            .tangle_into(empty_portrait("chaos"), Colour::SKY)
+            .with(dots.colour(Colour::BLACK));
+        figure = figure
+            .with(series.time_panel("the attractor: chaos"))
+            .with(portrait);
         words.push("(a, b) The one attractor that any start found: chaos; dots are states at drive phase 0.");
     } else if let Some((orbit, _)) = slow.counted.all_stable().first() {
         let view = View::new(model, &orbit.states[0], orbit.period)?;
-        figure = figure.with(view.time_panel("the attractor")).with(view.portrait_panel("", 0.8));
+        figure = figure
+            .with(view.time_panel("the attractor"))
+            .with(view.portrait_panel("", 0.8));
         words.push("(a, b) The attractor.");
     }
     if let Some(orbit) = slow.of_period(1).first() {
-        let stability = if orbit.is_stable() { "stable" } else { "unstable" };
+        let stability = if orbit.is_stable() {
+            "stable"
+        } else {
+            "unstable"
+        };
         let series = View::new(model, &orbit.states[0], 2)?;
         let loop_view = View::new(model, &orbit.states[0], 1)?;
         figure = figure
@@ -125,7 +157,12 @@ pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             figure,
             128.0,
         ))
-        .check(slow.check("fig6", "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1", 1, 2)?))
+        .check(slow.check(
+            "fig6",
+            "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1",
+            1,
+            2,
+        )?))
 }
 
 /// Fig. 7.
@@ -135,13 +172,21 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     let mut figure = Figure::new(2, 2).column_widths([1.7, 1.0]);
     let mut captions = vec!["Eq. (26), N = 3.".to_owned()];
     for (period, letters) in [(2, "(a, b)"), (3, "(c, d)")] {
-        let Some(orbit) = slow.of_period(period).first().copied() else { continue };
-        let stability = if orbit.is_stable() { "stable" } else { "unstable" };
+        let Some(orbit) = slow.of_period(period).first().copied() else {
+            continue;
+        };
+        let stability = if orbit.is_stable() {
+            "stable"
+        } else {
+            "unstable"
+        };
         let view = View::new(model, &orbit.states[0], period)?;
         figure = figure
             .with(view.time_panel(format!("period {period}, {stability}")))
             .with(view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
-        captions.push(format!("{letters} The period-{period} orbit, closed by Newton; no run stays on it."));
+        captions.push(format!(
+            "{letters} The period-{period} orbit, closed by Newton; no run stays on it."
+        ));
     }
     let mut no_three = String::new();
     if slow.of_period(3).is_empty() {
@@ -158,7 +203,12 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
         }
     }
     captions.push(KEY.to_owned());
-    let mut three = slow.check("fig7-period-3", "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1", 3, 1)?;
+    let mut three = slow.check(
+        "fig7-period-3",
+        "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1",
+        3,
+        1,
+    )?;
     if !no_three.is_empty() {
         three.evidence = format!("{}; {no_three}", three.evidence);
     }
@@ -170,7 +220,12 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             figure,
             128.0,
         ))
-        .check(slow.check("fig7-period-2", "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1", 2, 1)?)
+        .check(slow.check(
+            "fig7-period-2",
+            "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1",
+            2,
+            1,
+        )?)
         .check(three))
 }
 
@@ -200,16 +255,38 @@ impl Returns {
         }
         let norm = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
         let size = states.iter().map(|x| norm(x)).fold(0.0, f64::max);
-        let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        let distance = |a: &[f64], b: &[f64]| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| (a - b).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
         let nearest = (1..=LONGEST_RETURN)
-            .map(|n| states.iter().zip(&states[n..]).map(|(a, b)| distance(a, b)).fold(f64::INFINITY, f64::min) / size)
+            .map(|n| {
+                states
+                    .iter()
+                    .zip(&states[n..])
+                    .map(|(a, b)| distance(a, b))
+                    .fold(f64::INFINITY, f64::min)
+                    / size
+            })
             .collect();
-        Ok(Self { nearest, states, watched })
+        Ok(Self {
+            nearest,
+            states,
+            watched,
+        })
     }
 
     /// Nearest returns after odd numbers of periods (`parity` 1) or even ones (0).
     fn best(&self, parity: usize) -> f64 {
-        self.nearest.iter().enumerate().filter(|(i, _)| (i + 1) % 2 == parity).map(|(_, d)| *d).fold(f64::INFINITY, f64::min)
+        self.nearest
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| (i + 1) % 2 == parity)
+            .map(|(_, d)| *d)
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn words(&self) -> String {
@@ -224,17 +301,30 @@ impl Returns {
 
     fn panel(&self) -> Panel {
         let of = |parity: usize| {
-            let points = self.nearest.iter().enumerate().filter(move |(i, _)| (i + 1) % 2 == parity);
-            points.map(|(i, d)| ((i + 1) as f64, *d)).collect::<Vec<_>>()
+            let points = self
+                .nearest
+                .iter()
+                .enumerate()
+                .filter(move |(i, _)| (i + 1) % 2 == parity);
+            points
+                .map(|(i, d)| ((i + 1) as f64, *d))
+                .collect::<Vec<_>>()
         };
         Panel::new(
-            Axis::linear("drive periods $n$").range(0.0, LONGEST_RETURN as f64 + 1.0).marks((1..=LONGEST_RETURN).map(|n| (n as f64, n.to_string()))),
+            Axis::linear("drive periods $n$")
+                .range(0.0, LONGEST_RETURN as f64 + 1.0)
+                .marks((1..=LONGEST_RETURN).map(|n| (n as f64, n.to_string()))),
             Axis::log("nearest return / size of motion"),
         )
         .title("no near return after an odd number of periods")
         .legend(Legend::Hidden)
         .with(Markers::new(of(0)).colour(Colour::BLUE))
-        .with(Markers::new(of(1)).colour(Colour::VERMILLION).shape(Shape::Diamond).size(1.9))
+        .with(
+            Markers::new(of(1))
+                .colour(Colour::VERMILLION)
+                .shape(Shape::Diamond)
+                .size(1.9),
+        )
     }
 
     /// The strobe states, those of even and of odd periods apart.
@@ -242,7 +332,9 @@ impl Returns {
         let (drive, rate) = (model.system.drive(), model.tip_rate());
         let of = |parity: usize| {
             let states = self.states.iter().skip(parity).step_by(2);
-            states.map(|x| (model.tip.at(drive, x, 0.0), rate.at(drive, x, 0.0))).collect::<Vec<_>>()
+            states
+                .map(|x| (model.tip.at(drive, x, 0.0), rate.at(drive, x, 0.0)))
+                .collect::<Vec<_>>()
         };
         empty_portrait("states at drive phase 0")
             .with(Points::new(of(0)).diameter(0.4).colour(Colour::BLUE))

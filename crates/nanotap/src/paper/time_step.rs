@@ -86,12 +86,24 @@ fn grids(quick: bool) -> Vec<Grid> {
     };
     let (step, stage) = (Switching::EveryStep, Switching::EveryStage);
     if quick {
-        return vec![grid(1, 20, 1, step, 700, 6), grid(1, 19, 2, step, 700, 6), grid(3, 25, 1, step, 1200, 3)];
+        return vec![
+            grid(1, 20, 1, step, 700, 6),
+            grid(1, 19, 2, step, 700, 6),
+            grid(3, 25, 1, step, 1200, 3),
+        ];
     }
     let mut grids: Vec<Grid> = (10..=64).map(|n| grid(1, n, 1, step, 700, 8)).collect();
     grids.extend((10..=24).map(|n| grid(1, n, 2, step, 700, 12)));
     grids.extend([20, 32, 40, 64].map(|n| grid(1, n, 1, stage, 700, 8)));
-    for (n, starts) in [(80, 6), (100, 6), (128, 5), (200, 5), (400, 4), (1000, 3), (2000, 2)] {
+    for (n, starts) in [
+        (80, 6),
+        (100, 6),
+        (128, 5),
+        (200, 5),
+        (400, 4),
+        (1000, 3),
+        (2000, 2),
+    ] {
         grids.push(grid(1, n, 1, step, 700, starts));
         if n <= 400 {
             grids.push(grid(1, n, 1, stage, 700, starts));
@@ -99,7 +111,11 @@ fn grids(quick: bool) -> Vec<Grid> {
     }
     // The larger systems decay more slowly.
     for modes in [2, 3] {
-        grids.extend((8..=32).chain([40, 50, 64, 80, 100]).map(|n| grid(modes, n, 1, step, 1500, 4)));
+        grids.extend(
+            (8..=32)
+                .chain([40, 50, 64, 80, 100])
+                .map(|n| grid(modes, n, 1, step, 1500, 4)),
+        );
         grids.extend((8..=16).map(|n| grid(modes, n, 2, step, 1500, 4)));
     }
     grids
@@ -119,8 +135,10 @@ impl Scan {
             }
         }
         let models: Vec<Model> = counted.iter().map(|c| c.model.clone()).collect();
-        let seeds: Vec<Vec<Vec<f64>>> =
-            counted.iter().map(|c| laboratory.starts(c, 16)).collect::<Result<_, _>>()?;
+        let seeds: Vec<Vec<Vec<f64>>> = counted
+            .iter()
+            .map(|c| laboratory.starts(c, 16))
+            .collect::<Result<_, _>>()?;
         let motions: Vec<GridMotion> = laboratory.controlled(|control| {
             let done = std::sync::atomic::AtomicUsize::new(0);
             let total = grids.len();
@@ -140,8 +158,11 @@ impl Scan {
                 })
                 .collect()
         });
-        let fates: Vec<(bool, bool)> =
-            motions.par_iter().filter(|m| m.period != Some(1)).map(|m| m.exactly(&models[m.grid.modes - 1])).collect();
+        let fates: Vec<(bool, bool)> = motions
+            .par_iter()
+            .filter(|m| m.period != Some(1))
+            .map(|m| m.exactly(&models[m.grid.modes - 1]))
+            .collect();
         Ok(Self {
             grids: grids.len(),
             exact,
@@ -157,19 +178,35 @@ impl Scan {
         self.motions
             .iter()
             .filter(|m| m.period == period)
-            .min_by(|a, b| (a.amplitude - amplitude).abs().total_cmp(&(b.amplitude - amplitude).abs()))
+            .min_by(|a, b| {
+                (a.amplitude - amplitude)
+                    .abs()
+                    .total_cmp(&(b.amplitude - amplitude).abs())
+            })
     }
 
     /// Different motions of `period`.
     pub(super) fn of_period(&self, period: usize) -> usize {
-        self.motions.iter().filter(|m| m.period == Some(period)).count()
+        self.motions
+            .iter()
+            .filter(|m| m.period == Some(period))
+            .count()
     }
 
     /// Amplitudes of the motions of `period`, in words.
     pub(super) fn amplitudes(&self, period: usize) -> String {
         let of = |m: &GridMotion| format!("{} with N = {}", digits(m.amplitude, 3), m.grid.modes);
-        let all: Vec<String> = self.motions.iter().filter(|m| m.period == Some(period)).map(of).collect();
-        if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+        let all: Vec<String> = self
+            .motions
+            .iter()
+            .filter(|m| m.period == Some(period))
+            .map(of)
+            .collect();
+        if all.is_empty() {
+            "none".to_owned()
+        } else {
+            all.join(", ")
+        }
     }
 
     /// The subharmonic whose amplitude is nearest to `amplitude`.
@@ -177,7 +214,11 @@ impl Scan {
         self.motions
             .iter()
             .filter(|m| m.period.is_some_and(|n| n > 1))
-            .min_by(|a, b| (a.amplitude - amplitude).abs().total_cmp(&(b.amplitude - amplitude).abs()))
+            .min_by(|a, b| {
+                (a.amplitude - amplitude)
+                    .abs()
+                    .total_cmp(&(b.amplitude - amplitude).abs())
+            })
     }
 }
 
@@ -186,12 +227,15 @@ impl Grid {
     fn motions(&self, model: &Model, starts: &[Vec<f64>]) -> Vec<GridMotion> {
         let mut found: Vec<GridMotion> = Vec::new();
         for start in starts.iter().take(self.starts) {
-            let Some(motion) = self.settle(model, start) else { continue };
+            let Some(motion) = self.settle(model, start) else {
+                continue;
+            };
             let near = |a: f64, b: f64| (a - b).abs() <= SAME * motion.amplitude;
             let same = |m: &&mut GridMotion| {
                 m.period == motion.period
                     && (m.period.is_none()
-                        || near(m.tip_range.0, motion.tip_range.0) && near(m.tip_range.1, motion.tip_range.1))
+                        || near(m.tip_range.0, motion.tip_range.0)
+                            && near(m.tip_range.1, motion.tip_range.1))
             };
             match found.iter_mut().find(same) {
                 Some(known) => known.count += 1,
@@ -219,7 +263,10 @@ impl Grid {
             });
             strobes.push(run.state().to_vec());
         }
-        let scale = strobes.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let scale = strobes
+            .iter()
+            .flatten()
+            .fold(0.0, |m: f64, v| m.max(v.abs()));
         if !scale.is_finite() || scale > 1e6 {
             return None;
         }
@@ -249,10 +296,16 @@ impl Grid {
     /// What the grid is, in words.
     pub(super) fn words(&self) -> String {
         let [free, contact] = self.steps;
-        let steps = if free == contact { format!("{free} steps a period") } else { format!("{free} steps a period in flight, {contact} in contact") };
+        let steps = if free == contact {
+            format!("{free} steps a period")
+        } else {
+            format!("{free} steps a period in flight, {contact} in contact")
+        };
         match self.switching {
             Switching::EveryStep => format!("N = {}, {steps}", self.modes),
-            Switching::EveryStage => format!("N = {}, {steps}, switching at every stage", self.modes),
+            Switching::EveryStage => {
+                format!("N = {}, {steps}, switching at every stage", self.modes)
+            }
         }
     }
 }
@@ -260,7 +313,12 @@ impl Grid {
 /// The smallest n for which every one of the first half of the states comes back after n.
 fn apparent_period(strobes: &[Vec<f64>], tolerance: f64) -> Option<usize> {
     let half = strobes.len() / 2;
-    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let distance = |a: &[f64], b: &[f64]| {
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+    };
     (1..=half).find(|&n| (0..half).all(|k| distance(&strobes[k], &strobes[k + n]) <= tolerance))
 }
 
@@ -272,8 +330,13 @@ impl GridMotion {
         let settled = settle(&mut map, &self.state, &SettleOptions::default());
         let vanishes = matches!(&settled.verdict, Settled::Periodic(orbit) if orbit.period == 1);
         let closes = self.period.is_some_and(|period| {
-            close_orbit(&mut map, &self.strobes[0], period, &ShootingOptions::default())
-                .is_ok_and(|orbit| orbit.period == period)
+            close_orbit(
+                &mut map,
+                &self.strobes[0],
+                period,
+                &ShootingOptions::default(),
+            )
+            .is_ok_and(|orbit| orbit.period == period)
         });
         (vanishes, closes)
     }
@@ -281,13 +344,22 @@ impl GridMotion {
     /// (τ/T, W, dW/dτ) of `periods` drive periods, from its own state.
     pub(super) fn curve(&self, model: &Model, periods: usize) -> Vec<[f64; 3]> {
         let (drive, rate) = (model.system.drive(), model.tip_rate());
-        let at = |tau: f64, phase: f64, x: &[f64]| [tau, model.tip.at(drive, x, phase), rate.at(drive, x, phase)];
+        let at = |tau: f64, phase: f64, x: &[f64]| {
+            [tau, model.tip.at(drive, x, phase), rate.at(drive, x, phase)]
+        };
         let mut curve = vec![at(0.0, 0.0, &self.state)];
-        let Ok(mut run) = FixedStep::new(&model.system, &self.state, &self.grid.steps, self.grid.switching) else {
+        let Ok(mut run) = FixedStep::new(
+            &model.system,
+            &self.state,
+            &self.grid.steps,
+            self.grid.switching,
+        ) else {
             return curve;
         };
         for period in 0..periods {
-            run.run_period(|phase, x| curve.push(at(period as f64 + phase / model.period(), phase, x)));
+            run.run_period(|phase, x| {
+                curve.push(at(period as f64 + phase / model.period(), phase, x))
+            });
         }
         curve
     }
@@ -316,32 +388,55 @@ impl GridMotion {
 }
 
 /// The evidence that long periods at Ω = 20 can come from the time step.
-pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
     let scan = laboratory.spurious()?;
     let mut periods: Vec<usize> = scan.motions.iter().filter_map(|m| m.period).collect();
     periods.sort_unstable();
     periods.dedup();
     let claimed: Vec<String> = CLAIMED
         .iter()
-        .map(|&n| format!("period {n} {}", match scan.of_period(n) {
-            0 => "not at all".to_owned(),
-            1 => "once".to_owned(),
-            k => format!("{k} times"),
-        }))
+        .map(|&n| {
+            format!(
+                "period {n} {}",
+                match scan.of_period(n) {
+                    0 => "not at all".to_owned(),
+                    1 => "once".to_owned(),
+                    k => format!("{k} times"),
+                }
+            )
+        })
         .collect();
     let mut table = Table::new(
         "Motions that fixed steps settle on at Ω = 20, α₁ = 0.1; the exact flow has one, of period 1",
-        ["N", "steps in flight", "in contact", "switching", "period", "amplitude", "exact amplitude", "starts"],
+        [
+            "N",
+            "steps in flight",
+            "in contact",
+            "switching",
+            "period",
+            "amplitude",
+            "exact amplitude",
+            "starts",
+        ],
     );
     for m in &scan.motions {
         table.row([
             m.grid.modes.to_string(),
             m.grid.steps[0].to_string(),
             m.grid.steps[1].to_string(),
-            if m.grid.switching == Switching::EveryStep { "step".into() } else { "stage".to_owned() },
-            m.period.map_or_else(|| format!("none to {LONGEST}"), |n| n.to_string()),
+            if m.grid.switching == Switching::EveryStep {
+                "step".into()
+            } else {
+                "stage".to_owned()
+            },
+            m.period
+                .map_or_else(|| format!("none to {LONGEST}"), |n| n.to_string()),
             format!("{:.5}", m.amplitude),
-            scan.exact_amplitude(m.grid.modes).map_or_else(String::new, |a| format!("{a:.5}")),
+            scan.exact_amplitude(m.grid.modes)
+                .map_or_else(String::new, |a| format!("{a:.5}")),
             format!("{} of {}", m.count, m.grid.starts),
         ]);
     }
@@ -383,7 +478,10 @@ pub(super) fn section(laboratory: &Laboratory<'_>, section: Section) -> Result<S
 
 impl Scan {
     pub(super) fn exact_amplitude(&self, modes: usize) -> Option<f64> {
-        self.exact.iter().find(|(n, _)| *n == modes).map(|(_, a)| *a)
+        self.exact
+            .iter()
+            .find(|(n, _)| *n == modes)
+            .map(|(_, a)| *a)
     }
 }
 
@@ -404,17 +502,33 @@ fn picture(scan: &Scan) -> Picture {
         ("none up to 64", Colour::BLACK, Shape::Cross),
     ];
     let layers = |panel: Panel, modes: usize, y: &dyn Fn(&GridMotion) -> f64| {
-        looks.iter().enumerate().fold(panel, |panel, (k, (label, colour, shape))| {
-            let points = of(modes).filter(|m| class(m) == k).map(|m| point(m, y(m)));
-            panel.with(Markers::new(points).shape(*shape).colour(*colour).size(1.2).label(*label))
-        })
+        looks
+            .iter()
+            .enumerate()
+            .fold(panel, |panel, (k, (label, colour, shape))| {
+                let points = of(modes).filter(|m| class(m) == k).map(|m| point(m, y(m)));
+                panel.with(
+                    Markers::new(points)
+                        .shape(*shape)
+                        .colour(*colour)
+                        .size(1.2)
+                        .label(*label),
+                )
+            })
     };
     let period = |m: &GridMotion| m.period.map_or(LONGEST as f64 + 3.0, |n| n as f64);
-    let mut periods = Panel::new(steps(), Axis::linear("period (drive periods)").range(0.0, LONGEST as f64 + 6.0))
-        .title("N = 1: periods found")
-        .legend(Legend::Above);
+    let mut periods = Panel::new(
+        steps(),
+        Axis::linear("period (drive periods)").range(0.0, LONGEST as f64 + 6.0),
+    )
+    .title("N = 1: periods found")
+    .legend(Legend::Above);
     for claimed in CLAIMED {
-        periods = periods.with(Rule::horizontal(claimed as f64).colour(Colour::VERMILLION).width(0.4));
+        periods = periods.with(
+            Rule::horizontal(claimed as f64)
+                .colour(Colour::VERMILLION)
+                .width(0.4),
+        );
     }
     let amplitude = |modes: usize| {
         let mut panel = Panel::new(steps(), Axis::linear("amplitude of $W$"))
@@ -434,7 +548,11 @@ fn picture(scan: &Scan) -> Picture {
              top have none up to {LONGEST}. (b)–(d) Amplitudes with 1, 2 and 3 modes. The exact flow has one \
              attractor, of period 1 (line): every other mark is a product of the step."
         ),
-        Figure::new(2, 2).with(layers(periods, 1, &period)).with(amplitude(1)).with(amplitude(2)).with(amplitude(3)),
+        Figure::new(2, 2)
+            .with(layers(periods, 1, &period))
+            .with(amplitude(1))
+            .with(amplitude(2))
+            .with(amplitude(3)),
         130.0,
     )
 }
@@ -462,13 +580,27 @@ mod tests {
     #[test]
     fn a_coarse_grid_shows_a_subharmonic_that_the_exact_flow_does_not_have() {
         let model = Model::cantilever(&fast_case(1)).unwrap();
-        let grid = Grid { modes: 1, steps: [20, 20], switching: Switching::EveryStep, transient: 700, starts: 1 };
-        let starts: Vec<Vec<f64>> =
-            (0..12).map(|k| f64::from(k)).map(|k| vec![0.05 * k - 0.3, 2.0 - 0.31 * k]).collect();
+        let grid = Grid {
+            modes: 1,
+            steps: [20, 20],
+            switching: Switching::EveryStep,
+            transient: 700,
+            starts: 1,
+        };
+        let starts: Vec<Vec<f64>> = (0..12)
+            .map(|k| f64::from(k))
+            .map(|k| vec![0.05 * k - 0.3, 2.0 - 0.31 * k])
+            .collect();
         let found = Grid { starts: 12, ..grid }.motions(&model, &starts);
-        let subharmonic = found.iter().find(|m| m.period == Some(4)).expect("a period 4");
+        let subharmonic = found
+            .iter()
+            .find(|m| m.period == Some(4))
+            .expect("a period 4");
         assert_eq!(subharmonic.exactly(&model), (true, false));
-        let true_one = found.iter().find(|m| m.period == Some(1)).expect("a period 1");
+        let true_one = found
+            .iter()
+            .find(|m| m.period == Some(1))
+            .expect("a period 1");
         assert!((true_one.amplitude - 0.1447).abs() < 1e-3);
     }
 }

@@ -29,15 +29,20 @@ impl Report {
     /// # Errors
     /// When a picture cannot be drawn or a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Written, PaperError> {
-        fs::create_dir_all(folder).map_err(|source| PaperError::Write { path: folder.to_path_buf(), source })?;
+        fs::create_dir_all(folder).map_err(|source| PaperError::Write {
+            path: folder.to_path_buf(),
+            source,
+        })?;
         let pictures: Vec<&Picture> = self.sections.iter().flat_map(|s| &s.pictures).collect();
         let pictures: Vec<PathBuf> = pictures
             .par_iter()
             .flat_map(|picture| ["svg", "png"].map(|ending| draw(picture, folder, ending)))
             .collect::<Result<_, PaperError>>()?;
         let checks: Vec<&Check> = self.checks().collect();
-        let json = serde_json::to_string_pretty(&checks)
-            .map_err(|error| PaperError::Failed { what: "checks.json".into(), why: error.to_string() })?;
+        let json = serde_json::to_string_pretty(&checks).map_err(|error| PaperError::Failed {
+            what: "checks.json".into(),
+            why: error.to_string(),
+        })?;
         Ok(Written {
             html: put(folder.join("report.html"), &html::page(self)?)?,
             markdown: put(folder.join("report.md"), &markdown::document(self))?,
@@ -52,7 +57,10 @@ fn draw(picture: &Picture, folder: &Path, ending: &str) -> Result<PathBuf, Paper
     picture
         .whole()
         .write(&path)
-        .map_err(|source| PaperError::Figure { name: picture.name.clone(), source })?;
+        .map_err(|source| PaperError::Figure {
+            name: picture.name.clone(),
+            source,
+        })?;
     Ok(path)
 }
 
@@ -61,6 +69,9 @@ fn put(path: PathBuf, text: &str) -> Result<PathBuf, PaperError> {
     let temporary = path.with_extension(format!("{}.tmp", std::process::id()));
     fs::write(&temporary, text)
         .and_then(|()| fs::rename(&temporary, &path))
-        .map_err(|source| PaperError::Write { path: path.clone(), source })?;
+        .map_err(|source| PaperError::Write {
+            path: path.clone(),
+            source,
+        })?;
     Ok(path)
 }

@@ -23,9 +23,7 @@ impl Summary {
     pub(super) fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let mut summary = Self::default();
-        summary
-            .counts
-            .extend(CLASSES.iter().map(|c| (c.name(), 0)));
+        summary.counts.extend(CLASSES.iter().map(|c| (c.name(), 0)));
         for chunk in 0..store.chunks() {
             let Motions { codes, periods } = Motions::read(store, chunk)?;
             summary.runs += codes.len();

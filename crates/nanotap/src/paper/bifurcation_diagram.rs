@@ -1,23 +1,19 @@
 //! Fig. 5: what attracts at each drive frequency, and the period-1 branch through all of
 //! it, stable or not.
 
-use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, ContinuationOptions, Direction, SettleOptions,
-    Verdict as Settled, continue_orbit, settle,
+use nanotap_figures::{
+    Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel, Rule, Shape,
 };
-use nanotap_figures::{Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel, Shape};
-use nanotap_flow::Trajectory;
 
 use super::check::{Check, Verdict};
+use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::frequency_sweep::{Column, Kind, draw, spaced, stretches, sweep, where_seen};
 use super::laboratory::{Laboratory, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use crate::case::Case;
-use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::strobe::Strobe;
-use crate::subject::{Family, Key, Subject};
+use crate::subject::Subject;
 
 /// Range of Ω drawn. The paper's axis cannot be read from its text, which names 2.0 to
 /// 2.15, 2.6, and what happens at higher frequencies.
@@ -28,9 +24,8 @@ const CLOSE: (f64, f64) = (2.4, 3.3);
 const WINDOW: (f64, f64) = (2.0, 2.15);
 /// Where the period-1 branch is entered: it is stable there.
 const ENTRY: f64 = 3.5;
-
-/// The key of the drive frequency.
-const OMEGA: Key = Key::Cantilever(Parameter::Omega);
+/// Where the period-2 branch around Ω = 2.6 is entered.
+const ENTRY_TWO: f64 = 2.75;
 
 /// Fig. 5.
 pub(super) fn section(
@@ -62,7 +57,8 @@ pub(super) fn section(
         &spaced(WINDOW.0, WINDOW.1, laboratory.either(31, 4)),
         starts,
     )?;
-    let branch = PeriodOne::follow(laboratory, &subject)?;
+    let one = FollowedBranch::from_rest(laboratory, &subject, (ENTRY, 1), RANGE)?;
+    let two = FollowedBranch::from_rest(laboratory, &subject, (ENTRY_TWO, 2), CLOSE)?;
     let mut table = Table::new(
         format!(
             "What attracts, N = 3, {starts} seeded starts a value of Ω; shorter stretches than five values left out"
@@ -83,6 +79,16 @@ pub(super) fn section(
             RANGE.0, RANGE.1
         ),
     );
+    let window_again = rerun::on_case(
+        "sweep",
+        &case,
+        &format!(
+            "--over omega={}:{}:{} --starts {starts} --seed {SEED}",
+            WINDOW.0,
+            WINDOW.1,
+            window.len()
+        ),
+    );
     let branch_again = rerun::on_case(
         "branch",
         &case.with(Parameter::Omega, ENTRY),
@@ -92,9 +98,9 @@ pub(super) fn section(
         ),
     );
     let checks = [
-        subharmonics(&wide, &branch, &again),
-        nonperiodic_window(&window, &close, &again),
-        further(&wide, &branch, &branch_again),
+        subharmonics(&wide, [&one, &two], &again),
+        nonperiodic_window(&window, &close, &window_again),
+        further(&wide, &one, &branch_again),
         period_three(&wide, &again),
         coexistence(&wide, &again),
     ];
@@ -104,125 +110,14 @@ pub(super) fn section(
              one point a drive period, the greatest tip deflection in it. The line is the period-1 branch, followed by \
              arclength continuation through its bifurcations, whether it attracts or not.",
         )
-        .picture(picture(&wide, &close, &branch, starts))
-        .table(branch.table())
+        .picture(picture(&wide, &close, [&one, &two], starts))
+        .table(one.table("Bifurcations of the period-1 branch"))
+        .table(two.table("Bifurcations of the period-2 branch around Ω = 2.6"))
         .table(table);
     for check in checks {
         section = section.check(check);
     }
     Ok(section)
-}
-
-/// The period-1 branch over the whole range.
-struct PeriodOne {
-    /// (Ω, greatest W, stable), by Ω.
-    points: Vec<(f64, f64, bool)>,
-    bifurcations: Vec<Bifurcation>,
-}
-
-impl PeriodOne {
-    fn follow(laboratory: &Laboratory<'_>, subject: &Subject) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: format!("the period-1 branch from Ω = {ENTRY}"),
-            why,
-        };
-        let model = subject.with(OMEGA, ENTRY).model()?;
-        let settled = settle(
-            &mut Strobe::new(&model),
-            &vec![0.0; model.dimension()],
-            &SettleOptions::default(),
-        );
-        let Settled::Periodic(orbit) = settled.verdict else {
-            return Err(failed("no periodic motion was found there".into()));
-        };
-        let family = Family {
-            subject: subject.clone(),
-            key: OMEGA,
-        };
-        let options = ContinuationOptions::over(RANGE.0, RANGE.1);
-        let follow = |direction| -> Result<Branch, PaperError> {
-            laboratory
-                .controlled(|control| {
-                    continue_orbit(&family, ENTRY, &orbit, direction, &options, control)
-                })
-                .map_err(|error| failed(error.to_string()))
-        };
-        let (down, up) = (
-            follow(Direction::Decreasing)?,
-            follow(Direction::Increasing)?,
-        );
-        let mut points = Vec::new();
-        for point in down.points.iter().rev().chain(up.points.iter().skip(1)) {
-            let model = subject.with(OMEGA, point.parameter).model()?;
-            points.push((
-                point.parameter,
-                greatest(&model, &point.orbit.states[0])?,
-                point.orbit.is_stable(),
-            ));
-        }
-        let mut bifurcations: Vec<Bifurcation> = down
-            .bifurcations
-            .into_iter()
-            .chain(up.bifurcations)
-            .collect();
-        bifurcations.sort_by(|a, b| a.parameter.total_cmp(&b.parameter));
-        Ok(Self {
-            points,
-            bifurcations,
-        })
-    }
-
-    /// Where its stability changes, of one kind.
-    fn of_kind(&self, kind: impl Fn(&BifurcationKind) -> bool) -> Vec<f64> {
-        self.bifurcations
-            .iter()
-            .filter(|b| kind(&b.kind))
-            .map(|b| b.parameter)
-            .collect()
-    }
-
-    fn flips(&self) -> Vec<f64> {
-        self.of_kind(|k| matches!(k, BifurcationKind::Flip))
-    }
-
-    fn tori(&self) -> Vec<f64> {
-        self.of_kind(|k| matches!(k, BifurcationKind::NeimarkSacker { .. }))
-    }
-
-    fn table(&self) -> Table {
-        let mut table = Table::new(
-            "Bifurcations of the period-1 branch",
-            ["Ω", "what happens", "known to"],
-        );
-        for b in &self.bifurcations {
-            let what = match b.kind {
-                BifurcationKind::Fold => "fold",
-                BifurcationKind::Crossing => "another branch crosses",
-                BifurcationKind::Flip => "flip (period doubling)",
-                BifurcationKind::NeimarkSacker { .. } => "Neimark–Sacker: a torus is born",
-                BifurcationKind::Grazing { .. } => "grazing: a contact is born or dies",
-            };
-            table.row([
-                format!("{:.10}", b.parameter),
-                what.to_owned(),
-                format!("{:.0e}", b.uncertainty),
-            ]);
-        }
-        table
-    }
-}
-
-/// Greatest tip deflection over the period from `state`.
-fn greatest(model: &Model, state: &[f64]) -> Result<f64, PaperError> {
-    let trajectory =
-        Trajectory::record(&model.system, state, 1).map_err(|error| PaperError::Failed {
-            what: "a point of the branch".into(),
-            why: error.to_string(),
-        })?;
-    Ok(trajectory
-        .signal(&model.tip)
-        .range()
-        .map_or(f64::NAN, |(_, high)| high.value))
 }
 
 fn numbers(values: &[f64]) -> String {
@@ -237,7 +132,7 @@ fn numbers(values: &[f64]) -> String {
 }
 
 /// "Period-1 and period-2 bifurcations are shown."
-fn subharmonics(wide: &[Column], branch: &PeriodOne, again: &str) -> Check {
+fn subharmonics(wide: &[Column], [branch, doubled]: [&FollowedBranch; 2], again: &str) -> Check {
     let (one, two) = (Kind::Periodic(1), Kind::Periodic(2));
     let holds = wide.iter().any(|c| c.has(one))
         && wide.iter().any(|c| c.has(two))
@@ -253,8 +148,9 @@ fn subharmonics(wide: &[Column], branch: &PeriodOne, again: &str) -> Check {
         Verdict::of(holds),
     )
     .evidence(format!(
-        "the period-1 branch doubles its period at Ω = {}",
-        numbers(&branch.flips())
+        "the period-1 branch doubles its period at Ω = {}; the period-2 branch around Ω = 2.6 attracts at {}",
+        numbers(&branch.flips()),
+        in_words(&doubled.attracting())
     ))
     .rerun(again)
 }
@@ -287,7 +183,7 @@ fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check
 }
 
 /// "If the driving frequency further increases, nonperiodic motions will evolve from period-1."
-fn further(wide: &[Column], branch: &PeriodOne, again: &str) -> Check {
+fn further(wide: &[Column], branch: &FollowedBranch, again: &str) -> Check {
     let tori: Vec<f64> = branch
         .tori()
         .into_iter()
@@ -344,90 +240,70 @@ fn coexistence(wide: &[Column], again: &str) -> Check {
     .rerun(again)
 }
 
-fn picture(wide: &[Column], close: &[Column], branch: &PeriodOne, starts: usize) -> Picture {
-    let panel = |range: (f64, f64)| {
+fn picture(
+    wide: &[Column],
+    close: &[Column],
+    branches: [&FollowedBranch; 2],
+    starts: usize,
+) -> Picture {
+    let panel = |y: Axis, range: (f64, f64)| {
         Panel::new(
             Axis::linear("drive frequency $Ω$").range(range.0, range.1),
-            Axis::linear("$W_{max}$ in each drive period"),
+            y,
         )
     };
-    let shown = |panel: Panel, columns: &[Column], diameter: f64, range: (f64, f64)| {
-        let panel = draw(panel, columns, diameter);
-        let unstable = gaps(&branch.points, range, false);
-        let panel = panel.with(
-            Line::new(unstable)
-                .colour(Colour::BLUE)
-                .dash(Dash::Dashed)
-                .width(0.5),
-        );
-        let marks = |omegas: Vec<f64>| -> Vec<(f64, f64)> {
-            omegas
-                .into_iter()
-                .filter(|o| (range.0..=range.1).contains(o))
-                .filter_map(|o| Some((o, branch.height(o)?)))
-                .collect()
-        };
-        panel
-            .with(
-                Markers::new(marks(branch.flips()))
-                    .shape(Shape::Diamond)
-                    .colour(Colour::BLACK)
-                    .size(1.6)
-                    .label("flip"),
-            )
-            .with(
-                Markers::new(marks(branch.tori()))
-                    .shape(Shape::Square)
-                    .open()
-                    .colour(Colour::BLACK)
-                    .size(1.4)
-                    .label("Neimark–Sacker"),
-            )
-    };
-    let whole = panel(RANGE).legend(Legend::Above).with(Band::x([WINDOW]));
-    let near = panel(CLOSE)
+    let label = "$W_{max}$ in each drive period";
+    let whole = panel(Axis::log(label), RANGE)
+        .legend(Legend::Above)
+        .with(Band::x([WINDOW]));
+    let near = panel(Axis::linear(label), CLOSE)
         .legend(Legend::Hidden)
-        .with(nanotap_figures::Rule::vertical(2.6));
+        .with(Rule::vertical(2.6));
+    let whole = with_branch(draw(whole, wide, 0.5), branches[0], Colour::BLUE, RANGE);
+    let near = with_branch(draw(near, close, 0.4), branches[0], Colour::BLUE, CLOSE);
+    let near = with_branch(near, branches[1], Colour::VERMILLION, CLOSE);
     Picture::new(
         "fig05",
         "What attracts at each drive frequency, α₁ = 0.1 (Fig. 5)",
         format!(
             "Eq. (26), N = 3, {starts} seeded starts at each Ω; the ranges are chosen here. One point a drive period. \
-             Dashed: the period-1 branch where it repels. Band in (a): 2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic \
-             motions. (b) Around Ω = 2.6 (line), the frequency of Figs. 6 and 7."
+             Dashed: the period-1 branch and, in (b), the period-2 branch where they repel. Band in (a): \
+             2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic motions. (b) Around Ω = 2.6 (upright line), the frequency of \
+             Figs. 6 and 7."
         ),
-        Figure::new(2, 1)
-            .with(shown(whole, wide, 0.5, RANGE))
-            .with(shown(near, close, 0.4, CLOSE)),
+        Figure::new(2, 1).with(whole).with(near),
         140.0,
     )
 }
 
-impl PeriodOne {
-    /// Greatest W on the branch at Ω.
-    fn height(&self, omega: f64) -> Option<f64> {
-        let near = |p: &&(f64, f64, bool)| (p.0 - omega).abs();
-        self.points
-            .iter()
-            .min_by(|a, b| near(a).total_cmp(&near(b)))
-            .map(|p| p.1)
+/// Adds a branch where it repels, and where it bifurcates.
+fn with_branch(
+    mut panel: Panel,
+    branch: &FollowedBranch,
+    colour: Colour,
+    range: (f64, f64),
+) -> Panel {
+    for line in branch.repelling(range) {
+        panel = panel.with(Line::new(line).colour(colour).dash(Dash::Dashed).width(0.5));
     }
-}
-
-/// The part of a branch with the given stability, gaps between its stretches.
-fn gaps(points: &[(f64, f64, bool)], range: (f64, f64), stable: bool) -> Vec<(f64, f64)> {
-    points
-        .iter()
-        .map(|p| {
-            let inside = (range.0..=range.1).contains(&p.0);
-            (
-                p.0,
-                if p.2 == stable && inside {
-                    p.1
-                } else {
-                    f64::NAN
-                },
-            )
-        })
-        .collect()
+    let marks = |omegas: Vec<f64>| -> Vec<(f64, f64)> {
+        let inside = omegas
+            .into_iter()
+            .filter(|o| (range.0..=range.1).contains(o));
+        inside
+            .filter_map(|o| Some((o, branch.height(o)?)))
+            .collect()
+    };
+    let flips = Markers::new(marks(branch.flips()))
+        .shape(Shape::Diamond)
+        .colour(Colour::BLACK)
+        .size(1.6);
+    let tori = Markers::new(marks(branch.tori()))
+        .shape(Shape::Square)
+        .open()
+        .colour(Colour::BLACK)
+        .size(1.4);
+    panel
+        .with(flips.label("flip"))
+        .with(tori.label("Neimark–Sacker"))
 }

@@ -11,6 +11,7 @@ use crate::parameter::Parameter;
 use crate::physical::sample::{Elastic, reduced_modulus};
 
 /// Eq. (7): α3 and α6 as printed are not pure numbers.
+#[allow(clippy::unnecessary_wraps)] // One signature for every section.
 pub(super) fn damping_units(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
     let lever = DampedLever {
         length: 100e-6,
@@ -304,6 +305,7 @@ const SILICON: Elastic = Elastic {
 };
 
 /// Section 4: α4 of ten samples from Hertz's contact.
+#[allow(clippy::unnecessary_wraps)] // One signature for every section.
 pub(super) fn samples(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
     let (low, high) = slopes(|modulus| modulus);
     let rigid = low <= high;

@@ -10,7 +10,7 @@ use nanotap_figures::{Axis, Colour, Dash, Figure, Legend, Line, Markers, Panel, 
 use rayon::prelude::*;
 
 use super::check::{Check, Verdict, digits};
-use super::frequency_sweep::{Column, Kind, draw, spaced, sweep, where_seen};
+use super::frequency_sweep::{Column, Kind, draw, spaced, sweep};
 use super::laboratory::{Laboratory, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
@@ -25,8 +25,11 @@ use crate::subject::{Family, Key, Subject};
 const RESTITUTION: f64 = 0.8;
 /// Range of the drive frequency; at 1 the undamped oscillator itself resonates.
 const RANGE: (f64, f64) = (1.05, 5.0);
-/// Where the period-1 branch of one impact is entered.
+/// Where the period-1 branch of one impact is entered: between its flips for every stop.
 const ENTRY: f64 = 2.0;
+/// Where the distance of the soft stop's orbit from the rigid one's is measured: above the
+/// resonances of all stops (2ω₁ω₂/(ω₁ + ω₂) < 2).
+const MEASURED_AT: f64 = 2.3;
 /// Stiffness of the soft stop that stands for the paper's soft sample: in the paper
 /// α₄/3 = K₁/K_c is 6.7.
 const SOFT: f64 = 20.0 / 3.0;
@@ -80,7 +83,7 @@ pub(super) fn section(
         |o: Oscillator| sweep(laboratory, &Subject::Oscillator(o), OMEGA, &values, starts);
     let (hard, soft_columns) = (columns(rigid())?, columns(soft(SOFT))?);
     let limit = Orbit::find(rigid())?;
-    let flips = limit.flips(laboratory)?;
+    let flips = laboratory.controlled(|control| limit.flips(control))?;
     let way = way_to_rigid(laboratory, &limit)?;
     let fits = KNOWN_FLIPS
         .iter()
@@ -112,7 +115,7 @@ pub(super) fn section(
             ),
         )
     };
-    let contact = Orbit::find(soft(SOFT)).ok().map(|o| o.contact);
+    let contact = Orbit::find(soft(SOFT))?.contact;
     Ok(section
         .text(
             "The oscillators of the paper's Fig. 1, ẍ + x = cos ωt with a stop at x = 0: a rigid one that gives back 0.8 \
@@ -136,7 +139,7 @@ pub(super) fn section(
                 Verdict::of(fits && last.is_some_and(|w| nearest(&w.flips, &flips) < 1e-2)),
             )
             .evidence(format!(
-                "the period-1 orbit at ω = {ENTRY} differs from the rigid one's as κ^{} over the last decade: the length \
+                "the period-1 orbit at ω = {MEASURED_AT} differs from the rigid one's as κ^{} over the last decade: the length \
                  of the contact, π/√κ, vanishes like that",
                 digits(slope, 2)
             ))
@@ -148,21 +151,26 @@ pub(super) fn section(
                 "section 4: Fig. 5 is very different from the bifurcation diagram of an impact oscillator",
                 format!(
                     "so it is for these oscillators: with κ = {} the period-1 branch flips at ω = {}, with the rigid stop at \
-                     {}; chaos at ω = {} and {}",
+                     {}; chaos at {} and at {} of {count} frequencies",
                     digits(SOFT, 3),
                     list(&soft_flips),
                     list(&flips),
-                    where_seen(&soft_columns, |c| c.has(Kind::Chaos)),
-                    where_seen(&hard, |c| c.has(Kind::Chaos)),
+                    chaotic(&soft_columns),
+                    chaotic(&hard),
                 ),
                 Verdict::of(nearest(&soft_flips, &flips) > 0.05),
             )
             .evidence(format!(
                 "at ω = {ENTRY} the soft stop is touched for {:.0} % of the time, the rigid one for an instant",
-                100.0 * contact.unwrap_or(f64::NAN)
+                100.0 * contact
             ))
             .rerun(sweep_rerun(&soft(SOFT))),
         ))
+}
+
+/// At how many frequencies there is chaos.
+fn chaotic(columns: &[Column]) -> usize {
+    columns.iter().filter(|c| c.has(Kind::Chaos)).count()
 }
 
 fn list(values: &[f64]) -> String {
@@ -190,7 +198,7 @@ fn nearest(a: &[f64], b: &[f64]) -> f64 {
 /// The period-1 orbit of one impact at [`ENTRY`].
 struct Orbit {
     oscillator: Oscillator,
-    orbit: PeriodicOrbit,
+    closed: PeriodicOrbit,
     /// Greatest distance from the stop.
     reach: f64,
     contact: f64,
@@ -224,7 +232,7 @@ impl Orbit {
         let model = oscillator.model()?;
         let orbit = close_orbit(
             &mut Strobe::new(&model),
-            &guess.orbit.states[0],
+            &guess.closed.states[0],
             1,
             &ShootingOptions::default(),
         )
@@ -250,18 +258,14 @@ impl Orbit {
             .ok_or_else(|| failed("nothing was recorded".into()))?;
         Ok(Self {
             oscillator,
-            orbit,
+            closed: orbit,
             reach: o.gap_range[1],
             contact: o.contact_fraction,
         })
     }
 
     /// Flips of the branch through it, over [`RANGE`].
-    fn flips(&self, laboratory: &Laboratory<'_>) -> Result<Vec<f64>, PaperError> {
-        laboratory.controlled(|control| self.flips_under(control))
-    }
-
-    fn flips_under(&self, control: &nanotap_dynamics::Control<'_>) -> Result<Vec<f64>, PaperError> {
+    fn flips(&self, control: &nanotap_dynamics::Control<'_>) -> Result<Vec<f64>, PaperError> {
         let family = Family {
             subject: Subject::Oscillator(self.oscillator),
             key: OMEGA,
@@ -269,7 +273,7 @@ impl Orbit {
         let options = ContinuationOptions::over(RANGE.0, RANGE.1);
         let mut flips = Vec::new();
         for direction in [Direction::Decreasing, Direction::Increasing] {
-            let branch = continue_orbit(&family, ENTRY, &self.orbit, direction, &options, control)
+            let branch = continue_orbit(&family, ENTRY, &self.closed, direction, &options, control)
                 .map_err(|error| PaperError::Failed {
                     what: "a period-1 branch".into(),
                     why: error.to_string(),
@@ -297,34 +301,48 @@ struct Waypoint {
     flips: Vec<f64>,
 }
 
-/// From the stiffest stop down, each orbit near the last.
+/// Orbits of ever softer stops at one frequency, from the rigid one's down, each by Newton
+/// near the last.
+fn softened(limit: &Orbit, omega: f64, stiffnesses: &[f64]) -> Result<Vec<Orbit>, PaperError> {
+    let at = |o: Oscillator| o.with(OscillatorParameter::Omega, omega);
+    let mut orbits = vec![Orbit::near(at(limit.oscillator), limit)?];
+    for stiffness in stiffnesses {
+        orbits.push(Orbit::near(
+            at(soft(*stiffness)),
+            &orbits[orbits.len() - 1],
+        )?);
+    }
+    Ok(orbits)
+}
+
+/// Every stop on the way, softest first.
 fn way_to_rigid(laboratory: &Laboratory<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperError> {
     let per_decade = laboratory.either(2, 1);
     let decades = (STIFFNESSES.1 / STIFFNESSES.0).log10().round() as usize;
-    let mut orbits: Vec<(f64, Orbit)> = Vec::new();
-    for k in (0..=decades * per_decade).rev() {
-        let stiffness = STIFFNESSES.0 * 10f64.powf(k as f64 / per_decade as f64);
-        let guess = orbits.last().map_or(limit, |(_, orbit)| orbit);
-        // Softer stops may have no such orbit any more.
-        let Ok(orbit) = Orbit::near(soft(stiffness), guess) else {
-            break;
-        };
-        orbits.push((stiffness, orbit));
-    }
-    orbits.reverse();
-    laboratory.controlled(|control| {
-        orbits
+    let stiffnesses: Vec<f64> = (0..=decades * per_decade)
+        .rev()
+        .map(|k| STIFFNESSES.0 * 10f64.powf(k as f64 / per_decade as f64))
+        .collect();
+    let entries = softened(limit, ENTRY, &stiffnesses)?;
+    let measured = softened(limit, MEASURED_AT, &stiffnesses)?;
+    let reach = measured[0].reach;
+    let mut way: Vec<Waypoint> = laboratory.controlled(|control| {
+        stiffnesses
             .par_iter()
-            .map(|(stiffness, orbit)| {
+            .zip(&entries[1..])
+            .zip(&measured[1..])
+            .map(|((stiffness, entry), measured)| {
                 Ok(Waypoint {
                     stiffness: *stiffness,
-                    distance: (orbit.reach / limit.reach - 1.0).abs(),
-                    contact: orbit.contact,
-                    flips: orbit.flips_under(control)?,
+                    distance: (measured.reach / reach - 1.0).abs(),
+                    contact: measured.contact,
+                    flips: entry.flips(control)?,
                 })
             })
-            .collect()
-    })
+            .collect::<Result<_, PaperError>>()
+    })?;
+    way.reverse();
+    Ok(way)
 }
 
 /// The power of κ by which the distance falls over the last decade.
@@ -366,7 +384,7 @@ fn way_table(way: &[Waypoint], flips: &[f64]) -> Table {
 fn diagrams(hard: &[Column], soft: &[Column], starts: usize) -> Picture {
     let panel = |title: &str, columns: &[Column], legend| {
         let axis = Axis::linear("drive frequency $ω$").range(RANGE.0, RANGE.1);
-        let empty = Panel::new(axis, Axis::linear("reach from the stop").range(0.0, 3.0))
+        let empty = Panel::new(axis, Axis::log("reach from the stop"))
             .title(title)
             .legend(legend);
         draw(empty, columns, 0.5)
@@ -436,7 +454,7 @@ fn limit_picture(way: &[Waypoint], flips: &[f64]) -> Picture {
         "impact-limit",
         "From the soft stop to the rigid one",
         format!(
-            "The period-1 orbit of one impact at ω = {ENTRY} and its branch, while the stop stiffens and gives back the \
+            "The period-1 orbit of one impact at ω = {MEASURED_AT} and its branch, while the stop stiffens and gives back the \
              same 0.8 of the speed in a free impact. (a) Distance from the rigid stop's orbit. (b) Where the branch first \
              doubles its period; lines: rigid stop."
         ),

@@ -139,11 +139,7 @@ impl<'a> Laboratory<'a> {
     }
 
     /// `count` starts in the box of a case.
-    pub(super) fn starts(
-        &self,
-        counted: &Counted,
-        count: usize,
-    ) -> Result<Vec<Vec<f64>>, PaperError> {
+    pub(super) fn starts(counted: &Counted, count: usize) -> Result<Vec<Vec<f64>>, PaperError> {
         let starts = start_box(&counted.model)?;
         Ok(starts.starts(SEED, count))
     }

@@ -14,6 +14,7 @@ mod convergence_study;
 mod damped_limit;
 mod equations;
 mod fast_drive;
+mod followed_branch;
 mod frequencies;
 mod frequency_sweep;
 mod html;

@@ -2,21 +2,28 @@
 
 use std::rc::Rc;
 
-use nanotap_dynamics::{PeriodicOrbit, StroboscopicMap as _};
+use nanotap_dynamics::{
+    PeriodicOrbit, SettleOptions, StroboscopicMap as _, Verdict as Settled, settle,
+};
 use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Points, Shape};
 
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
-use super::laboratory::{Counted, Laboratory, how_many};
+use super::followed_branch::{FollowedBranch, OMEGA, in_words};
+use super::laboratory::{Counted, Laboratory, SEED, how_many};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
 use super::section::{Picture, Section};
 use crate::case::Case;
 use crate::model::Model;
+use crate::start_box::default_box;
 use crate::strobe::Strobe;
+use crate::subject::Subject;
 
 /// Longest period of the unstable orbits looked for.
 const LONGEST: usize = 3;
+/// Range of Ω over which the orbits are followed.
+const BRANCH_RANGE: (f64, f64) = (2.3, 3.6);
 /// Drive periods of chaos drawn against time, and in the phase portrait.
 const SHOWN: (usize, usize) = (16, 200);
 
@@ -64,6 +71,17 @@ impl Slow {
                 parts.join("; ")
             )
         })
+    }
+
+    /// The branch of an orbit that exists at Ω = `omega`.
+    fn branch(
+        &self,
+        laboratory: &Laboratory<'_>,
+        omega: f64,
+        orbit: &PeriodicOrbit,
+    ) -> Result<FollowedBranch, PaperError> {
+        let subject = Subject::Cantilever(self.counted.case.clone());
+        FollowedBranch::from_orbit(laboratory, &subject, omega, orbit, BRANCH_RANGE)
     }
 
     fn rerun_orbit(&self, period: usize) -> String {
@@ -149,6 +167,20 @@ pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             .with(loop_view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         words.push("(c, d) The only period-1 orbit that Newton found.");
     }
+    let mut check = slow.check(
+        "fig6",
+        "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1",
+        1,
+        2,
+    )?;
+    if let Some(orbit) = slow.of_period(1).first() {
+        let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
+        check.evidence = format!(
+            "{}; the orbit attracts at Ω = {}",
+            check.evidence,
+            in_words(&branch.attracting())
+        );
+    }
     Ok(section
         .picture(Picture::new(
             "fig06",
@@ -189,20 +221,34 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
         ));
     }
     let mut no_three = String::new();
-    if slow.of_period(3).is_empty() {
-        if let Some(chaos) = slow.counted.chaos().first() {
-            let returns = Returns::of(model, chaos.state, laboratory.either(4000, 400))?;
-            figure = figure.with(returns.panel()).with(returns.pieces(model));
-            no_three = returns.words();
-            captions.push(format!(
-                "(c) How near any state of the chaotic motion comes back after n drive periods, {} periods watched: \
-                 after an odd number never, because (d) the attractor has two pieces that are visited in turn. No \
-                 period-3 orbit lies on it.",
-                returns.watched
-            ));
-        }
+    if slow.of_period(3).is_empty()
+        && let Some(chaos) = slow.counted.chaos().first()
+    {
+        let returns = Returns::of(model, chaos.state, laboratory.either(4000, 400))?;
+        figure = figure.with(returns.panel()).with(returns.pieces(model));
+        no_three = returns.words();
+        captions.push(format!(
+            "(c) How near any state of the chaotic motion comes back after n drive periods, {} periods watched: \
+             after an odd number never, because (d) the attractor has two pieces that are visited in turn. No \
+             period-3 orbit lies on it.",
+            returns.watched
+        ));
     }
     captions.push(KEY.to_owned());
+    let mut two = slow.check(
+        "fig7-period-2",
+        "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1",
+        2,
+        1,
+    )?;
+    if let Some(orbit) = slow.of_period(2).first() {
+        let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
+        two.evidence = format!(
+            "{}; the orbit attracts at Ω = {}",
+            two.evidence,
+            in_words(&branch.attracting())
+        );
+    }
     let mut three = slow.check(
         "fig7-period-3",
         "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1",
@@ -211,6 +257,16 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     )?;
     if !no_three.is_empty() {
         three.evidence = format!("{}; {no_three}", three.evidence);
+    }
+    let subject = Subject::Cantilever(slow.counted.case.clone());
+    if let Some((omega, orbit)) = period_three(&subject)? {
+        let branch = slow.branch(laboratory, omega, &orbit)?;
+        let (from, to) = branch.extent();
+        three.evidence = format!(
+            "{}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and attracts at {}",
+            three.evidence,
+            in_words(&branch.attracting())
+        );
     }
     Ok(section
         .picture(Picture::new(
@@ -227,6 +283,24 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             1,
         )?)
         .check(three))
+}
+
+/// A stable period-3 orbit near the frequency where the bifurcation diagram shows one.
+fn period_three(subject: &Subject) -> Result<Option<(f64, PeriodicOrbit)>, PaperError> {
+    let omega = 3.15;
+    let model = subject.with(OMEGA, omega).model()?;
+    let area = default_box(&model).map_err(|error| PaperError::Failed {
+        what: "the box of starts".into(),
+        why: error.to_string(),
+    })?;
+    let mut map = Strobe::new(&model);
+    let found = area.starts(SEED, 32).into_iter().find_map(|start| {
+        match settle(&mut map, &start, &SettleOptions::default()).verdict {
+            Settled::Periodic(orbit) if orbit.period == 3 => Some(orbit),
+            _ => None,
+        }
+    });
+    Ok(found.map(|orbit| (omega, orbit)))
 }
 
 /// Longest return looked at.

@@ -137,7 +137,7 @@ impl Scan {
         let models: Vec<Model> = counted.iter().map(|c| c.model.clone()).collect();
         let seeds: Vec<Vec<Vec<f64>>> = counted
             .iter()
-            .map(|c| laboratory.starts(c, 16))
+            .map(|c| Laboratory::starts(c, 16))
             .collect::<Result<_, _>>()?;
         let motions: Vec<GridMotion> = laboratory.controlled(|control| {
             let done = std::sync::atomic::AtomicUsize::new(0);
@@ -358,7 +358,7 @@ impl GridMotion {
         };
         for period in 0..periods {
             run.run_period(|phase, x| {
-                curve.push(at(period as f64 + phase / model.period(), phase, x))
+                curve.push(at(period as f64 + phase / model.period(), phase, x));
             });
         }
         curve
@@ -588,7 +588,7 @@ mod tests {
             starts: 1,
         };
         let starts: Vec<Vec<f64>> = (0..12)
-            .map(|k| f64::from(k))
+            .map(f64::from)
             .map(|k| vec![0.05 * k - 0.3, 2.0 - 0.31 * k])
             .collect();
         let found = Grid { starts: 12, ..grid }.motions(&model, &starts);

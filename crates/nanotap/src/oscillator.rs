@@ -203,7 +203,7 @@ impl Oscillator {
                 ];
                 (vec![free, contact], exits)
             }
-            Stop::Rigid { restitution } => self.rigid(restitution, free, &gap, &drive)?,
+            Stop::Rigid { restitution } => Self::rigid(restitution, free, &gap, &drive)?,
         };
         let system = Arc::new(System::new(drive, regimes, exits)?);
         Ok(self.outputs(system, gap))
@@ -228,7 +228,6 @@ impl Oscillator {
     /// Flight with impacts, and sticking, in which the wall carries the spring and the
     /// drive until they would pull the mass away.
     fn rigid(
-        &self,
         restitution: f64,
         free: nanotap_flow::Regime,
         gap: &Output,

@@ -128,9 +128,9 @@ fn the_shortest_contacts_that_doubles_can_tell_are_found() {
         while (0.5 * (miss + touch) != miss) && (0.5 * (miss + touch) != touch) {
             let middle = 0.5 * (miss + touch);
             if contacts(middle).is_empty() {
-                miss = middle
+                miss = middle;
             } else {
-                touch = middle
+                touch = middle;
             }
         }
         let durations = contacts(touch);

@@ -1,0 +1,177 @@
+//! Systems that are no microscope: several tones, several regimes, every kind of damping,
+//! and what is refused.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::fixed_step::{FixedStep, Switching};
+use nanotap_flow::{Drive, Exit, Flow, FlowError, HarmonicVector, Output, Regime, System};
+
+/// m = 1 between two springy stops at ±0.5 of different stiffness: three regimes, driven
+/// by a tone and its third harmonic.
+fn between_stops(damping: f64, stops: [f64; 2]) -> System {
+    let drive = Drive::new(TAU / 1.3, &[1, 3]).unwrap();
+    let lower = |v: f64| DVector::from_vec(vec![0.0, v]);
+    let regime = |index: usize, stiffness: f64, at: f64| {
+        let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0 - stiffness, -damping]);
+        let forcing = HarmonicVector::zeros(2, 2)
+            .with_tone(0, &lower(0.2), &lower(1.4))
+            .with_tone(1, &lower(0.9), &lower(0.0))
+            .with_constant(&lower(stiffness * at));
+        Regime::new(index, matrix, forcing, &drive).unwrap()
+    };
+    let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 2);
+    let right = x.scaled(-1.0).with_constant(0.5);
+    let left = x.with_constant(0.5);
+    System::new(
+        drive.clone(),
+        vec![
+            regime(0, 0.0, 0.0),
+            regime(1, stops[0], 0.5),
+            regime(2, stops[1], -0.5),
+        ],
+        vec![
+            vec![Exit::new(right.clone(), 1), Exit::new(left.clone(), 2)],
+            vec![Exit::new(right.scaled(-1.0), 0)],
+            vec![Exit::new(left.scaled(-1.0), 0)],
+        ],
+    )
+    .unwrap()
+}
+
+/// Two tones and three regimes against Runge–Kutta with steps so fine that its late
+/// switching (first order in the step) no longer matters at the tolerance; with light,
+/// critical (in flight: ẍ + 2ẋ + x) and heavy damping.
+#[test]
+fn two_tones_and_three_regimes_agree_with_fine_runge_kutta() {
+    for (damping, tolerance) in [(0.1, 2e-4), (2.0, 5e-5), (9.0, 5e-5)] {
+        let system = Arc::new(between_stops(damping, [20.0, 11.0]));
+        let start = [0.3, -0.4];
+        let mut flow = Flow::new(Arc::clone(&system));
+        flow.start(&start, 0.0).unwrap();
+        let mut steps =
+            FixedStep::new(&system, &start, &[200_000; 3], Switching::EveryStage).unwrap();
+        for _ in 0..3 {
+            flow.run_period(&mut ()).unwrap();
+            steps.run_period(|_, _| {});
+        }
+        let mut state = [0.0; 2];
+        flow.state(&mut state);
+        for (exact, stepped) in state.iter().zip(steps.state()) {
+            assert!(
+                (exact - stepped).abs() < tolerance,
+                "damping {damping}: {exact} {stepped}"
+            );
+        }
+        assert!(damping > 5.0 || flow.switches() > 4, "{}", flow.switches());
+    }
+}
+
+/// The same map whether the period is run in one piece or cut in many: a cut is nothing
+/// that happens.
+#[test]
+fn a_run_may_be_cut_anywhere() {
+    let system = Arc::new(between_stops(0.1, [20.0, 11.0]));
+    let period = system.drive().period();
+    let run = |cuts: u32| {
+        let mut flow = Flow::new(Arc::clone(&system));
+        flow.start(&[0.3, -0.4], 0.0).unwrap();
+        for cut in 1..=cuts {
+            flow.run_until(period * f64::from(cut) / f64::from(cuts), &mut ())
+                .unwrap();
+        }
+        let mut state = [0.0; 2];
+        flow.state(&mut state);
+        state
+    };
+    let whole = run(1);
+    for cuts in [2, 7, 100] {
+        for (a, b) in whole.iter().zip(run(cuts)) {
+            assert!((a - b).abs() < 1e-12, "{cuts} cuts: {a} {b}");
+        }
+    }
+}
+
+/// An undamped mode driven at its own frequency has no bounded response; beside it, or
+/// with any damping, there is one.
+#[test]
+fn undamped_resonance_is_refused_with_a_reason() {
+    let build = |omega: f64, damping: f64| {
+        let drive = Drive::single(omega).unwrap();
+        let force = DVector::from_vec(vec![0.0, 1.0]);
+        let forcing = HarmonicVector::zeros(2, 1).with_tone(0, &force, &DVector::zeros(2));
+        let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -4.0, -damping]);
+        Regime::new(0, matrix, forcing, &drive)
+    };
+    let refused = build(2.0, 0.0);
+    assert!(
+        matches!(refused, Err(FlowError::Resonance { .. })),
+        "{refused:?}"
+    );
+    assert!(refused.unwrap_err().to_string().contains("add damping"));
+    let beside = build(2.0 + 1e-6, 0.0).unwrap();
+    // x = sin ωt / (4 − ω²)
+    let omega = 2.0 + 1e-6;
+    let expected = 1.0 / (4.0 - omega * omega);
+    assert!((beside.response().tones[0][0].im / -expected - 1.0).abs() < 1e-6);
+    assert!(build(2.0, 1e-9).is_ok());
+}
+
+/// Every way to misuse the constructors is an error that says what is wrong.
+#[test]
+fn bad_input_is_refused() {
+    assert!(matches!(
+        Drive::single(f64::NAN),
+        Err(FlowError::Drive { .. })
+    ));
+    assert!(matches!(
+        Drive::new(1.0, &[0]),
+        Err(FlowError::Drive { .. })
+    ));
+    let drive = Drive::single(1.0).unwrap();
+    let regime = |matrix: DMatrix<f64>, n: usize| {
+        Regime::new(0, matrix, HarmonicVector::zeros(n, 1), &drive)
+    };
+    assert!(matches!(
+        regime(DMatrix::zeros(0, 0), 0),
+        Err(FlowError::Shape { .. })
+    ));
+    assert!(matches!(
+        regime(DMatrix::zeros(2, 3), 2),
+        Err(FlowError::Shape { .. })
+    ));
+    assert!(matches!(
+        regime(DMatrix::zeros(2, 2), 3),
+        Err(FlowError::Shape { .. })
+    ));
+    let infinite = DMatrix::from_element(1, 1, f64::INFINITY);
+    assert!(matches!(
+        regime(infinite, 1),
+        Err(FlowError::NotFinite { .. })
+    ));
+    let one = regime(DMatrix::from_element(1, 1, -1.0), 1).unwrap();
+    let guard = Output::linear(RowDVector::from_row_slice(&[1.0]), 1);
+    let lost = System::new(
+        drive.clone(),
+        vec![one.clone()],
+        vec![vec![Exit::new(guard, 7)]],
+    );
+    assert!(matches!(
+        lost,
+        Err(FlowError::Target {
+            target: 7,
+            regimes: 1
+        })
+    ));
+    let system = Arc::new(System::new(drive, vec![one], vec![Vec::new()]).unwrap());
+    let mut flow = Flow::new(system);
+    assert!(matches!(
+        flow.start(&[f64::NAN], 0.0),
+        Err(FlowError::NotFinite { .. })
+    ));
+    assert!(matches!(
+        flow.start(&[1.0, 2.0], 0.0),
+        Err(FlowError::Shape { .. })
+    ));
+}

@@ -203,8 +203,12 @@ fn drawn(error: &CaseFileError) -> String {
                 }
                 _ => Group::with_title(title),
             };
-            // What stands under the place already need not be said again.
-            let help = problem.help.as_ref().filter(|help| **help != problem.label);
+            // What stands under the place in the file already need not be said again.
+            let shown = matches!(problem.place, Place::Span(_)) && error.source.is_some();
+            let help = problem
+                .help
+                .as_ref()
+                .filter(|help| !shown || **help != problem.label);
             let group = match help {
                 Some(help) => group.element(Level::HELP.message(help.as_str())),
                 None => group,

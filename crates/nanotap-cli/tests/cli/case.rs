@@ -128,6 +128,8 @@ fn a_wrong_case_is_shown_with_its_line() {
         "said once: {}",
         refused.stderr
     );
+    // Without a line to point at, the nearest key is offered below.
+    case(PAPER, &["--set", "omga=3"]).refused(&["--set omga=3", "did you mean `omega`?"]);
     case(PAPER.replace("0.2", "\"0.2\""), &["--json"])
         .refused(&["`alpha6` = \"0.2\" is text", "without quotes: alpha6 = 0.2"]);
     let both = case(

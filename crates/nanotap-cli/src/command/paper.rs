@@ -49,6 +49,10 @@ struct Document<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
+    // Before the work, not after it.
+    std::fs::create_dir_all(&arguments.out).map_err(|error| {
+        Failure::Failed(format!("cannot make {}: {error}", arguments.out.display()))
+    })?;
     let options = Options {
         only: arguments.only.clone(),
         quick: arguments.quick,
@@ -108,4 +112,35 @@ fn text(document: &Document<'_>, report: &Report, written: &Written) -> String {
         written.html.display()
     );
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+    use nanotap::control::Control;
+    use nanotap::paper::{Options, report};
+
+    /// Every command that the report tells to run again can be typed.
+    #[test]
+    fn commands_to_run_again_are_understood() {
+        let only = [
+            "eq14", "eq25", "fig2f", "fig4", "fig5", "fig7", "fig9", "impact",
+        ];
+        let options = Options {
+            only: only.map(str::to_owned).to_vec(),
+            quick: true,
+        };
+        let report = report(&options, &Control::default()).unwrap();
+        for check in report.checks() {
+            let words = check.rerun.split_whitespace();
+            let parsed = crate::arguments::Arguments::try_parse_from(words);
+            assert!(
+                parsed.is_ok(),
+                "{}: {}\n{:?}",
+                check.id,
+                check.rerun,
+                parsed.err()
+            );
+        }
+    }
 }

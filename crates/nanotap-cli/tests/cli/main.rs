@@ -5,6 +5,7 @@ mod case;
 mod existing_motions;
 mod modes;
 mod motions;
+mod paper;
 mod physical;
 mod sweeps;
 mod terminal;

@@ -22,6 +22,8 @@ const RANGE: (f64, f64) = (1.5, 7.5);
 const CLOSE: (f64, f64) = (2.4, 3.3);
 /// Where the paper has nonperiodic motions evolving from period 2.
 const WINDOW: (f64, f64) = (2.0, 2.15);
+/// Deflections marked at the axis of the whole diagram.
+const MARKS: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 2.0];
 /// Where the period-1 branch is entered: it is stable there.
 const ENTRY: f64 = 3.5;
 /// Where the period-2 branch around Ω = 2.6 is entered.
@@ -253,9 +255,12 @@ fn picture(
         )
     };
     let label = "$W_{max}$ in each drive period";
-    let whole = panel(Axis::log(label), RANGE)
-        .legend(Legend::Above)
-        .with(Band::x([WINDOW]));
+    let whole = panel(
+        Axis::log(label).marks(MARKS.map(|w| (w, w.to_string()))),
+        RANGE,
+    )
+    .legend(Legend::Above)
+    .with(Band::x([WINDOW]));
     let near = panel(Axis::linear(label), CLOSE)
         .legend(Legend::Hidden)
         .with(Rule::vertical(2.6));
@@ -268,7 +273,7 @@ fn picture(
         format!(
             "Eq. (26), N = 3, {starts} seeded starts at each Ω; the ranges are chosen here. One point a drive period. \
              Dashed: the period-1 branch and, in (b), the period-2 branch where they repel. Band in (a): \
-             2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic motions. (b) Around Ω = 2.6 (upright line), the frequency of \
+             2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic motions. (b) Colours as in (a); around Ω = 2.6 (upright line), the frequency of \
              Figs. 6 and 7."
         ),
         Figure::new(2, 1).with(whole).with(near),

@@ -232,18 +232,22 @@ fn stable_stretches(points: impl Iterator<Item = (f64, bool, Option<f64>)>) -> V
         .collect()
 }
 
-/// Stretches in words: "2.6076–2.6133, 2.6401–2.6512".
+/// Stretches in words, those that overlap joined: "2.6076–2.6133, 2.6401–2.6512".
 pub(super) fn in_words(stretches: &[(f64, f64)]) -> String {
-    if stretches.is_empty() {
-        return "nowhere".to_owned();
-    }
     let mut sorted = stretches.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    sorted
-        .iter()
-        .map(|(from, to)| format!("{from:.4}–{to:.4}"))
-        .collect::<Vec<_>>()
-        .join(", ")
+    let mut joined: Vec<(f64, f64)> = Vec::new();
+    for (from, to) in sorted {
+        match joined.last_mut() {
+            Some(last) if from <= last.1 => last.1 = last.1.max(to),
+            _ => joined.push((from, to)),
+        }
+    }
+    if joined.is_empty() {
+        return "nowhere".to_owned();
+    }
+    let words = joined.iter().map(|(from, to)| format!("{from:.4}–{to:.4}"));
+    words.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -267,6 +271,10 @@ mod tests {
         assert_eq!(
             in_words(&[(3.5, 3.8), (1.0, 2.4)]),
             "1.0000–2.4000, 3.5000–3.8000"
+        );
+        assert_eq!(
+            in_words(&[(1.0, 2.5), (2.0, 3.0), (1.2, 1.3)]),
+            "1.0000–3.0000"
         );
         assert_eq!(in_words(&[]), "nowhere");
     }

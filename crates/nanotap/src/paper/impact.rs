@@ -147,7 +147,7 @@ pub(super) fn section(
         )
         .check(
             Check::new(
-                "fig5-impact-oscillator",
+                "impact-diagram",
                 "section 4: Fig. 5 is very different from the bifurcation diagram of an impact oscillator",
                 format!(
                     "so it is for these oscillators: with κ = {} the period-1 branch flips at ω = {}, with the rigid stop at \

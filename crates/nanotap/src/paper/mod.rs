@@ -324,30 +324,35 @@ pub fn section_names() -> impl Iterator<Item = &'static str> {
     TOPICS.iter().map(|topic| topic.id)
 }
 
-/// The topics whose names are in `only`, in the order of the paper.
+/// Whether `given` names this topic, or one of its checks (`fig8-amplitude` is of `fig8`).
+fn names(given: &str, topic: &Topic) -> bool {
+    let given = given.to_lowercase();
+    given
+        .strip_prefix(topic.id)
+        .is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+}
+
+/// The topics that `only` names, in the order of the paper; all, if it is empty.
 fn chosen(only: &[String]) -> Result<Vec<&'static Topic>, PaperError> {
     if only.is_empty() {
         return Ok(TOPICS.iter().collect());
     }
     for given in only {
-        if TOPICS
-            .iter()
-            .all(|topic| !topic.id.eq_ignore_ascii_case(given))
-        {
-            let hint = section_names()
-                .map(|id| (strsim::damerau_levenshtein(id, &given.to_lowercase()), id))
-                .min()
-                .filter(|(distance, _)| *distance <= 2)
-                .map_or_else(String::new, |(_, id)| format!(" (did you mean `{id}`?)"));
-            let known = section_names().collect::<Vec<_>>().join(", ");
-            return Err(PaperError::UnknownSection {
-                given: given.clone(),
-                hint,
-                known,
-            });
+        if TOPICS.iter().any(|topic| names(given, topic)) {
+            continue;
         }
+        let hint = section_names()
+            .map(|id| (strsim::damerau_levenshtein(id, &given.to_lowercase()), id))
+            .min()
+            .filter(|(distance, _)| *distance <= 2)
+            .map_or_else(String::new, |(_, id)| format!(" (did you mean `{id}`?)"));
+        return Err(PaperError::UnknownSection {
+            given: given.clone(),
+            hint,
+            known: section_names().collect::<Vec<_>>().join(", "),
+        });
     }
-    let wanted = |topic: &&Topic| only.iter().any(|id| topic.id.eq_ignore_ascii_case(id));
+    let wanted = |topic: &&Topic| only.iter().any(|given| names(given, topic));
     Ok(TOPICS.iter().filter(wanted).collect())
 }
 
@@ -373,5 +378,65 @@ mod tests {
             some.iter().map(|t| t.id).collect::<Vec<_>>(),
             ["eq7", "fig17"]
         );
+        let of_check = chosen(&["fig8-amplitude".to_owned()]).unwrap();
+        assert_eq!(of_check.iter().map(|t| t.id).collect::<Vec<_>>(), ["fig8"]);
+    }
+
+    /// What is known beforehand of the paper, from the equations themselves.
+    #[test]
+    fn quick_sections_say_what_is_known() {
+        let only = ["eq7", "eq23", "eq25", "alpha4", "fig2e", "fig3", "fig17"];
+        let options = Options {
+            only: only.map(str::to_owned).to_vec(),
+            quick: true,
+        };
+        let report = report(&options, &Control::default()).unwrap();
+        assert_eq!(report.sections.len(), only.len());
+        let verdict = |id: &str| report.checks().find(|c| c.id == id).unwrap().verdict;
+        assert_eq!(verdict("eq7"), Verdict::Differs);
+        assert_eq!(verdict("eq23"), Verdict::Reproduced);
+        // 7.79, 20.33, 55.81 are the digits of five modes.
+        assert_eq!(verdict("eq25"), Verdict::Reproduced);
+        assert_eq!(verdict("alpha4-samples"), Verdict::Differs);
+        // One period-4 orbit attracts at Ω = 20, α1 = 0, and its saddle partner does not.
+        assert_eq!(verdict("fig17"), Verdict::Ambiguous);
+        for check in report.checks() {
+            assert!(!check.evidence.is_empty(), "{}", check.id);
+            assert!(check.rerun.starts_with("nanotap "), "{}", check.id);
+            assert!(
+                names(&check.id, section_of(&report, &check.id)),
+                "{}",
+                check.id
+            );
+        }
+    }
+
+    /// The topic of the section that holds a check.
+    fn section_of(report: &Report, id: &str) -> &'static Topic {
+        let section = report
+            .sections
+            .iter()
+            .find(|s| s.checks.iter().any(|c| c.id == id))
+            .unwrap();
+        TOPICS.iter().find(|t| t.id == section.id).unwrap()
+    }
+
+    #[test]
+    fn work_that_was_stopped_gives_no_report() {
+        let stop = std::sync::atomic::AtomicBool::new(true);
+        let control = Control {
+            cancel: Some(&stop),
+            progress: None,
+        };
+        assert!(matches!(
+            report(
+                &Options {
+                    quick: true,
+                    ..Options::default()
+                },
+                &control
+            ),
+            Err(PaperError::Cancelled)
+        ));
     }
 }

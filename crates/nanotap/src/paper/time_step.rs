@@ -393,7 +393,12 @@ pub(super) fn section(
     section: Section,
 ) -> Result<Section, PaperError> {
     let scan = laboratory.spurious()?;
-    let mut periods: Vec<usize> = scan.motions.iter().filter_map(|m| m.period).collect();
+    let mut periods: Vec<usize> = scan
+        .motions
+        .iter()
+        .filter_map(|m| m.period)
+        .filter(|n| *n > 1)
+        .collect();
     periods.sort_unstable();
     periods.dedup();
     let claimed: Vec<String> = CLAIMED
@@ -404,6 +409,7 @@ pub(super) fn section(
                 match scan.of_period(n) {
                     0 => "not at all".to_owned(),
                     1 => "once".to_owned(),
+                    2 => "twice".to_owned(),
                     k => format!("{k} times"),
                 }
             )

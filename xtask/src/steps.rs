@@ -105,7 +105,7 @@ fn test_python(workspace: &Workspace) -> Result<Tally, String> {
         return Err("the program could not be built".into());
     }
     let mut command = workspace.python_tool("pytest")?;
-    command.args(["--quiet", "python-tests"]);
+    command.arg("python-tests");
     if let Ok(target) = std::env::var("CARGO_TARGET_DIR") {
         let program = std::path::Path::new(&target)
             .join("release")

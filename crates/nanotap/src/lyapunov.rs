@@ -186,7 +186,7 @@ fn sum_by_trace(
 }
 
 /// `points` points of the section of the motion from `start`, and fewer where contacts
-/// are rarer than one in [`RAREST`] periods.
+/// are rarer than one in eight periods.
 ///
 /// # Errors
 /// When the flow fails.

@@ -15,7 +15,7 @@
 //!   so that nothing can come between (a kill between two variables, a lost page after a
 //!   power failure) without being noticed: the chunk is computed again;
 //! - stores made of the same attributes on several machines are put together by
-//!   [`merge`], to the same bytes as one machine makes;
+//!   [`merge()`], to the same bytes as one machine makes;
 //! - several processes may even work on one store on a shared disk, each on its
 //!   [`Share`].
 //!

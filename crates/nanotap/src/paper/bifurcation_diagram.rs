@@ -96,7 +96,7 @@ pub(super) fn section(
         &case.with(Parameter::Omega, ENTRY),
         &format!(
             "--parameter omega --from {ENTRY} --to {} --period 1",
-            RANGE.0
+            RANGE.1
         ),
     );
     let checks = [

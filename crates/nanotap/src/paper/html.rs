@@ -70,8 +70,8 @@ fn overview(report: &Report) -> String {
         for check in &section.checks {
             let _ = writeln!(
                 html,
-                "<tr><td><a href=\"#{}\">{}</a></td><td>{}</td><td>{}</td><td class=\"verdict {v}\">{v}</td></tr>",
-                section.id,
+                "<tr><td><a href=\"#check-{}\">{}</a></td><td>{}</td><td>{}</td><td class=\"verdict {v}\">{v}</td></tr>",
+                escaped(&check.id),
                 escaped(&check.id),
                 escaped(&check.paper),
                 escaped(&check.here),
@@ -123,7 +123,7 @@ fn part(section: &Section) -> Result<String, PaperError> {
 
 fn statement(check: &Check) -> String {
     format!(
-        "<dl class=\"{v}\" id=\"{id}\"><dt>The paper</dt><dd>{}</dd><dt>Here: <span class=\"verdict {v}\">{v}</span></dt>\
+        "<dl class=\"{v}\" id=\"check-{id}\"><dt>The paper</dt><dd>{}</dd><dt>Here: <span class=\"verdict {v}\">{v}</span></dt>\
          <dd>{}</dd><dt>Evidence</dt><dd>{}</dd><dt>Run it again</dt><dd><code>{}</code></dd></dl>\n",
         escaped(&check.paper),
         escaped(&check.here),
@@ -182,6 +182,6 @@ mod tests {
             .rerun("nanotap --set a=<b>");
         let html = statement(&check);
         assert!(html.contains("x &lt; y &amp; z") && html.contains("|μ| &gt; 1"));
-        assert!(html.contains("id=\"a&quot;b\"") && html.contains("--set a=&lt;b&gt;"));
+        assert!(html.contains("id=\"check-a&quot;b\"") && html.contains("--set a=&lt;b&gt;"));
     }
 }

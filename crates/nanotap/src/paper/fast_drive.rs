@@ -122,7 +122,7 @@ fn grid_panels(motion: &GridMotion, model: &Model, periods: usize) -> [Panel; 2]
         .with(
             Line::new(curve.iter().map(|p| (p[1], p[2])))
                 .colour(GRID)
-                .width(0.6),
+                .width(0.3),
         )
         .with(Markers::new(strobes).colour(Colour::BLACK).size(0.9));
     [time, portrait]
@@ -315,7 +315,9 @@ fn long_period(
 ) -> Result<Section, PaperError> {
     let fast = Fast::new(laboratory)?;
     let (period, amplitude) = (figure.period, figure.amplitude);
-    let grid = fast.scan.nearest(Some(period), amplitude);
+    let grid = fast
+        .scan
+        .nearest(Some(period), amplitude, figure.claimed - 1);
     let found = fast.counted.stable(period).len();
     let orbits = laboratory.orbits(&fast.counted, period, 0)?;
     let unstable = orbits.iter().filter(|o| o.period == period).count();
@@ -410,7 +412,7 @@ pub(super) fn fig13(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
 /// Fig. 14.
 pub(super) fn fig14(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
     let fast = Fast::new(laboratory)?;
-    let grid = fast.scan.nearest(None, 1.3);
+    let grid = fast.scan.nearest(None, 1.3, 0);
     let rest = vec![0.0; fast.counted.model.dimension()];
     let nonperiodic = !fast.counted.chaos().is_empty();
     let transient = View::new(&fast.counted.model, &rest, SHOWN)?;

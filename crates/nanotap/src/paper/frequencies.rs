@@ -43,7 +43,7 @@ pub(super) fn mode_shapes(_: &Laboratory<'_>, section: Section) -> Result<Sectio
             "fig02e",
             "The first three modes of the bare cantilever (Fig. 2e)",
             "Clamped at ξ = 0, free at ξ = 1, no tip mass; normalised so that the mean square of each is 1, \
-             hence φ_j(1) = ±2.",
+             hence ±2 at the tip.",
             Figure::single(panel),
             80.0,
         ))

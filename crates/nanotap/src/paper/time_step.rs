@@ -173,16 +173,20 @@ impl Scan {
         })
     }
 
-    /// The motion of `period` whose amplitude is nearest to `amplitude`.
-    pub(super) fn nearest(&self, period: Option<usize>, amplitude: f64) -> Option<&GridMotion> {
-        self.motions
-            .iter()
-            .filter(|m| m.period == period)
-            .min_by(|a, b| {
-                (a.amplitude - amplitude)
-                    .abs()
-                    .total_cmp(&(b.amplitude - amplitude).abs())
-            })
+    /// The motion of `period` whose amplitude is nearest to `amplitude`, or the one after
+    /// `skipped` nearer ones, as far as there are so many.
+    pub(super) fn nearest(
+        &self,
+        period: Option<usize>,
+        amplitude: f64,
+        skipped: usize,
+    ) -> Option<&GridMotion> {
+        let mut found: Vec<&GridMotion> =
+            self.motions.iter().filter(|m| m.period == period).collect();
+        let distance = |m: &GridMotion| (m.amplitude - amplitude).abs();
+        found.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let last = found.len().checked_sub(1)?;
+        found.get(skipped.min(last)).copied()
     }
 
     /// Different motions of `period`.

@@ -268,7 +268,7 @@ pub(super) fn fig9(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     let near = grid.filter(|m| rounds_to(m.amplitude, 0.148, 3));
     let amplitude = match near {
         Some(m) => format!(
-            "no attractor has it; fixed steps ({}) show {} of amplitude {}; their true period 1 has {}",
+            "no attractor has it; fixed steps ({}) show {} of amplitude {}; the exact orbit of as many modes has {}",
             m.grid.words(),
             m.words(),
             digits(m.amplitude, 4),

@@ -586,7 +586,7 @@ mod tests {
     }
 
     /// The exact flow at Ω = 20 with one mode has a period-1 attractor and nothing else
-    /// (MODEL: (W_max − W_min)/2 = 0.1447); 20 steps a period show a period 4 beside it.
+    /// ((W_max − W_min)/2 = 0.1447, closed by Newton); 20 steps a period show a period 4 beside it.
     #[test]
     fn a_coarse_grid_shows_a_subharmonic_that_the_exact_flow_does_not_have() {
         let model = Model::cantilever(&fast_case(1)).unwrap();

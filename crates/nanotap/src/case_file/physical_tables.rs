@@ -8,61 +8,7 @@ use crate::case::CosineTerm;
 use crate::physical::{Catalogue, PhysicalCase, PhysicalError, Resolved, Sections};
 
 /// The tables of a physical case and their keys.
-pub const PHYSICAL_KEYS: [(&str, &[&str]); 5] = [
-    (
-        "cantilever",
-        &[
-            "lever",
-            "k",
-            "f0",
-            "f2",
-            "Q",
-            "length",
-            "width",
-            "thickness",
-            "modulus",
-            "density",
-        ],
-    ),
-    (
-        "tip",
-        &[
-            "mass",
-            "mass_ratio",
-            "shape",
-            "height",
-            "half_angle",
-            "density",
-            "radius",
-            "material",
-            "modulus",
-            "poisson",
-        ],
-    ),
-    (
-        "sample",
-        &[
-            "material",
-            "stiffness",
-            "damping",
-            "loss_tangent",
-            "modulus",
-            "poisson",
-            "indentation",
-        ],
-    ),
-    (
-        "drive",
-        &[
-            "frequency",
-            "frequency_ratio",
-            "amplitude",
-            "free_amplitude",
-            "setpoint",
-        ],
-    ),
-    ("gap", &["tip", "beam"]),
-];
+pub use crate::physical::SECTIONS as PHYSICAL_KEYS;
 
 /// A physical case whose keys are known and whose quantities are still text.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,0 +1,20 @@
+//! A census of coexisting motions.
+
+use divan::Bencher;
+use nanotap::attractors::{AttractorsOptions, attractors};
+use nanotap::control::Control;
+
+use crate::cases;
+
+/// 64 starts at Ω = 20 without a tip mass.
+#[divan::bench(args = [2, 3, 5], sample_count = 5, sample_size = 1)]
+fn starts_64(bencher: Bencher<'_, '_>, modes: usize) {
+    let model = cases::model(&cases::coexisting(modes));
+    let options = AttractorsOptions {
+        starts: 64,
+        ..AttractorsOptions::default()
+    };
+    bencher.bench_local(|| {
+        attractors(&model, &options, &Control::default()).expect("options that make sense")
+    });
+}

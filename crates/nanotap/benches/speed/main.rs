@@ -1,0 +1,19 @@
+//! What the exact flow and what is built upon it cost: `cargo bench -p nanotap`.
+//!
+//! A name after `--` picks benches (`cargo bench -p nanotap -- setup`). `cargo test` runs
+//! each once. `docs/performance.md` says what was found.
+
+mod basin;
+mod cases;
+mod census;
+mod folder;
+mod jacobian;
+mod orbit;
+mod period;
+mod setup;
+mod sweep;
+mod switch;
+
+fn main() {
+    divan::main();
+}

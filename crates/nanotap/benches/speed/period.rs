@@ -1,0 +1,59 @@
+//! One drive period.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use nanotap::case::Case;
+use nanotap_flow::Flow;
+
+use crate::cases::{self, DAMPINGS, MODES};
+
+/// Periods a run: chaotic motion differs from period to period.
+const PERIODS: usize = 100;
+
+/// Times [`PERIODS`] periods from where `flow` is.
+fn periods(bencher: Bencher<'_, '_>, flow: &Flow) {
+    bencher
+        .counter(ItemsCount::new(PERIODS))
+        .with_inputs(|| flow.clone())
+        .bench_local_refs(|flow| cases::run(flow, PERIODS));
+}
+
+/// The paper's case at Ω = 2.6, α3 = 0.1. Items are periods.
+#[divan::bench(args = MODES)]
+fn medium_damping(bencher: Bencher<'_, '_>, modes: usize) {
+    periods(bencher, &damped(modes, DAMPINGS[1]));
+}
+
+/// The same with α3 = 0.01: fast modes ring on.
+#[divan::bench(args = MODES)]
+fn low_damping(bencher: Bencher<'_, '_>, modes: usize) {
+    periods(bencher, &damped(modes, DAMPINGS[0]));
+}
+
+/// The same with α3 = 1.
+#[divan::bench(args = MODES)]
+fn high_damping(bencher: Bencher<'_, '_>, modes: usize) {
+    periods(bencher, &damped(modes, DAMPINGS[2]));
+}
+
+/// A fast drive: Ω = 20.
+#[divan::bench(args = MODES)]
+fn fast_drive(bencher: Bencher<'_, '_>, modes: usize) {
+    periods(bencher, &cases::settled(&cases::coexisting(modes)));
+}
+
+/// The period-1 orbit that touches without pressing (N = 3), just misses, or presses a little.
+#[divan::bench(args = [0.0, 1e-6, -1e-6])]
+fn grazing(bencher: Bencher<'_, '_>, gap: f64) {
+    let (case, state) = cases::grazing(gap);
+    let mut flow = cases::at_rest(&cases::model(&case));
+    flow.start(&state, 0.0).expect("a free motion");
+    periods(bencher, &flow);
+}
+
+fn damped(modes: usize, alpha3: f64) -> Flow {
+    cases::settled(&Case {
+        alpha3,
+        ..cases::paper(modes)
+    })
+}

@@ -1,0 +1,28 @@
+//! Setting up a model for one value of the parameters.
+
+use divan::{Bencher, black_box};
+use nanotap::model::Model;
+use nanotap::parameter::Parameter;
+use nanotap::subject::Key;
+
+use crate::cases::{self, MODES};
+
+/// From case to a model that is ready to run.
+#[divan::bench(args = MODES)]
+fn model(bencher: Bencher<'_, '_>, modes: usize) {
+    let case = cases::paper(modes);
+    bencher.bench_local(|| Model::cantilever(black_box(&case)).expect("a valid case"));
+}
+
+/// The derivative of the system with respect to Ω.
+#[divan::bench(args = MODES)]
+fn tangent(bencher: Bencher<'_, '_>, modes: usize) {
+    let case = cases::paper(modes);
+    let (subject, model) = (cases::subject(&case), cases::model(&case));
+    let key = Key::Cantilever(Parameter::Omega);
+    bencher.bench_local(|| {
+        black_box(&subject)
+            .tangent(&model, key)
+            .expect("a smooth family")
+    });
+}

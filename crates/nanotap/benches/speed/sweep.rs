@@ -1,0 +1,41 @@
+//! A sweep into a dataset.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use nanotap::control::Control;
+use nanotap::dataset::{Share, Store, Work};
+use nanotap::sweep::{Over, Starts, Sweep, SweepOptions};
+
+use crate::cases;
+use crate::folder::Folder;
+
+/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods thrown away and 100 recorded, by one
+/// thread or two. Items are runs.
+#[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
+fn runs_96(bencher: Bencher<'_, '_>, threads: usize) {
+    let subject = cases::subject(&cases::paper(3));
+    let over = Over::parse("omega=2:4:24", &subject).expect("a range");
+    let options = SweepOptions {
+        transient: Some(400),
+        starts: Starts::Seeded {
+            count: 4,
+            seed: 1,
+            sides: Vec::new(),
+        },
+        ..SweepOptions::new(vec![over])
+    };
+    let sweep = Sweep::new(subject, options).expect("options that make sense");
+    let how = Work {
+        share: Share::default(),
+        threads,
+        control: Control::default(),
+    };
+    bencher
+        .counter(ItemsCount::new(sweep.runs()))
+        .with_inputs(Folder::new)
+        .bench_local_refs(|folder| {
+            let store = Store::create_or_resume(folder.path(), sweep.schema().clone())
+                .expect("an empty folder");
+            sweep.compute(&store, &how).expect("room on the disk");
+        });
+}

@@ -7,7 +7,7 @@ use crate::pack::Fused;
 use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
 use crate::regime::Regime;
 use crate::signal::Signal;
-use crate::system::{Switch, System};
+use crate::system::{Exit, ON_SURFACE, Onset, Switch, System, rounding};
 use crate::{Complex, FlowError};
 use std::sync::Arc;
 
@@ -432,21 +432,56 @@ impl Flow {
                 modal: &self.modal,
             });
         }
+        let onset = description
+            .onset
+            .and_then(|onset| self.onset(system, description, onset, crossing));
         self.change_basis::<M>(switch);
-        self.surface = twin.map(|twin| {
-            let start = if description.release {
-                Start::Release
-            } else if description.reset.is_none() && crossing.refined {
-                // The rate is continuous and here known better than from the sums.
-                Start::Surface {
-                    rate: Some(-crossing.rate),
-                }
-            } else {
-                Start::Surface { rate: None }
-            };
-            (twin, start)
+        self.surface = onset.or_else(|| {
+            twin.map(|twin| {
+                let start = if description.release {
+                    Start::Release
+                } else if description.reset.is_none() && crossing.refined {
+                    // The rate is continuous and here known better than from the sums.
+                    Start::Surface {
+                        rate: Some(-crossing.rate),
+                    }
+                } else {
+                    Start::Surface { rate: None }
+                };
+                (twin, start)
+            })
         });
         self.regime = switch.to;
+    }
+
+    /// How the guard of the next regime starts of which something is known; `None` where
+    /// it is well inside.
+    fn onset(
+        &mut self,
+        system: &System,
+        taken: &Exit,
+        onset: Onset,
+        crossing: Crossing,
+    ) -> Option<(usize, Start)> {
+        let mut state = std::mem::take(&mut self.state);
+        self.state(&mut state);
+        let found = match onset {
+            Onset::AtRest(exit) => {
+                // A start beyond the guard's zero leaves at the rate that it has.
+                let beyond = crossing.at == 0.0
+                    && taken.guard.at(system.drive(), &state, self.phase)
+                        < -ON_SURFACE * rounding(&taken.guard, &state);
+                let rate = (!beyond).then_some(0.0);
+                Some((exit, Start::Surface { rate }))
+            }
+            Onset::Proportional { exit, factor } => {
+                let guard = &system.exits()[taken.target][exit].guard;
+                (factor * crossing.rate <= ON_SURFACE * rounding(guard, &state))
+                    .then_some((exit, Start::Surface { rate: None }))
+            }
+        };
+        self.state = state;
+        found
     }
 
     /// Whether this impact is so slow, and pressed so firmly, that the rest of the

@@ -50,5 +50,5 @@ pub use flow::{Flow, Observer};
 pub use harmonic::{HarmonicVector, Output};
 pub use regime::Regime;
 pub use spectral::SpectralBasis;
-pub use system::{Exit, Reset, Sticking, System};
+pub use system::{Exit, Onset, Reset, Sticking, System};
 pub use trajectory::{Event, Trajectory};

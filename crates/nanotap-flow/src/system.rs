@@ -26,6 +26,33 @@ pub struct Sticking {
     pub reset: Reset,
 }
 
+/// What is known by definition of a guard of the next regime at a switch. Sums of
+/// exponentials know it to rounding only, which would make it cross at once or never.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Onset {
+    /// The guard of this exit starts with value and rate zero: two bodies part that no
+    /// longer press on each other. (Of a start beyond the guard of the exit taken, with
+    /// value zero only.)
+    AtRest(usize),
+    /// The guard of exit `exit` starts at `factor` times the rate of the guard of the exit
+    /// taken: a damper is met. At a grazing touch that is zero.
+    Proportional {
+        /// Which exit of the next regime.
+        exit: usize,
+        /// Zero or negative, since the rate is.
+        factor: f64,
+    },
+}
+
+impl Onset {
+    /// The exit of the next regime that it speaks of.
+    pub const fn exit(self) -> usize {
+        match self {
+            Self::AtRest(exit) | Self::Proportional { exit, .. } => exit,
+        }
+    }
+}
+
 /// A way out of a regime: when `guard` falls to zero, the motion goes on in
 /// `target`, after `reset` if there is one.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +68,9 @@ pub struct Exit {
     /// Whether the next regime begins with guard, rate and acceleration all zero
     /// by definition (release from sticking).
     pub release: bool,
+    /// What is known of the next regime's guards, where none of them is this exit's own
+    /// (which is recognised and starts at zero).
+    pub onset: Option<Onset>,
 }
 
 impl Exit {
@@ -52,6 +82,7 @@ impl Exit {
             reset: None,
             sticking: None,
             release: false,
+            onset: None,
         }
     }
 
@@ -66,6 +97,13 @@ impl Exit {
     #[must_use]
     pub fn with_sticking(mut self, sticking: Sticking) -> Self {
         self.sticking = Some(sticking);
+        self
+    }
+
+    /// With what is known of the next regime's guards.
+    #[must_use]
+    pub fn with_onset(mut self, onset: Onset) -> Self {
+        self.onset = Some(onset);
         self
     }
 
@@ -235,6 +273,15 @@ impl System {
                     });
                 }
             }
+            if let Some(onset) = exit.onset
+                && onset.exit() >= exits[exit.target].len()
+            {
+                return Err(FlowError::Shape {
+                    what: "the exits of a regime whose guard's onset is known",
+                    found: exits[exit.target].len(),
+                    expected: onset.exit() + 1,
+                });
+            }
             for reset in exit
                 .reset
                 .iter()
@@ -318,7 +365,9 @@ impl System {
     /// The regime in which a motion starts at state `x` and time `t`: the first
     /// whose guards are all positive, a guard that is zero within rounding counting
     /// as positive when its first non-zero derivative is. Says as well which guard
-    /// starts at zero. A sticking regime is entered only from a state that sticks.
+    /// starts at zero. A sticking regime is entered only from a state that sticks. Where
+    /// no regime holds the state, it is one whose passed exit resets it to a state that
+    /// the next regime holds; the exit is taken at once.
     ///
     /// # Errors
     /// [`FlowError::NoRegime`] when there is none.
@@ -333,6 +382,9 @@ impl System {
             |r: usize, output: &Output| ON_SURFACE * self.motion_rounding(r, output, x, t);
         if let Some(found) = self.regime_within(x, t, &computed) {
             return Ok(found);
+        }
+        if let Some(regime) = self.left_at_once(x, t, &exact) {
+            return Ok((regime, None));
         }
         // Moving into the stop: in flight, and the impact is now.
         (0..self.regimes.len())
@@ -368,6 +420,25 @@ impl System {
             });
             inside.then_some((r, surface))
         })
+    }
+
+    /// The regime whose passed exit resets the state to one that the next regime holds.
+    fn left_at_once(
+        &self,
+        x: &[f64],
+        t: f64,
+        tolerance: &impl Fn(usize, &Output) -> f64,
+    ) -> Option<usize> {
+        let state = DVector::from_column_slice(x);
+        let leads_on = |exit: &Exit| {
+            let Some(reset) = exit.reset.as_ref().filter(|_| exit.sticking.is_none()) else {
+                return false;
+            };
+            let after = &reset.matrix * &state + reset.offset.at(&self.drive, t);
+            let held = self.regime_within(after.as_slice(), t, tolerance);
+            exit.guard.at(&self.drive, x, t) <= 0.0 && held.is_some_and(|(r, _)| r == exit.target)
+        };
+        (0..self.regimes.len()).find(|&r| self.exits[r].iter().any(leads_on))
     }
 
     /// Whether regime `r` is no sticking regime, or one in which this state sticks:
@@ -626,10 +697,10 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<[Pack; 2]> {
 
 /// A state is on a surface when its guard is within this many rounding errors of zero: a
 /// state computed a moment after a switch is no nearer.
-const ON_SURFACE: f64 = 32.0;
+pub(crate) const ON_SURFACE: f64 = 32.0;
 
 /// The size of rounding errors in an output's value.
-fn rounding(output: &Output, x: &[f64]) -> f64 {
+pub(crate) fn rounding(output: &Output, x: &[f64]) -> f64 {
     let linear: f64 = output.row.iter().zip(x).map(|(r, x)| (r * x).abs()).sum();
     let harmonic: f64 = output.tones.iter().map(|z| z.norm()).sum();
     f64::EPSILON * (linear + output.constant.abs() + harmonic)

@@ -22,7 +22,7 @@ use serde_json::json;
 use crate::dataset::schema::Kind;
 use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
-    attributes, work,
+    attributes, chunk_files, work,
 };
 use crate::model::ModelError;
 use crate::simulate::{Classification, SimulateError, starting_state};
@@ -343,19 +343,44 @@ impl Basin {
     /// # Errors
     /// When the work was stopped (what is finished stays), or the store refuses.
     pub fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
-        let columns = self.schema.grid.axes[1].length;
-        let row = |block: &Block, item: usize| {
-            let y = block.ranges[0].start + item;
-            let range = y * columns..(y + 1) * columns;
-            Some(self.basins.chunk(&mut self.map.clone(), range))
-        };
-        let assemble = |_: &Block, rows: Vec<Vec<Label>>| {
-            vec![Values::Whole(
-                rows.concat().into_iter().map(number).collect(),
-            )]
-        };
-        work(store, how, |block| block.ranges[0].len(), row, assemble)
+        work(
+            store,
+            how,
+            rows,
+            |block, item| Some(self.row(block, item)),
+            |_, rows| columns(&rows),
+        )
     }
+
+    /// The files of one chunk, computed on this thread: the same bytes wherever that is.
+    /// `None` when it was stopped, and for a chunk that there is not.
+    pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        let grid = &self.schema.grid;
+        let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
+        let labels = (0..rows(&block))
+            .map(|item| (!control.is_cancelled()).then(|| self.row(&block, item)))
+            .collect::<Option<Vec<_>>>()?;
+        Some(chunk_files(&self.schema, &block, &columns(&labels)))
+    }
+
+    /// The labels of one row of the slice.
+    fn row(&self, block: &Block, item: usize) -> Vec<Label> {
+        let length = self.schema.grid.axes[1].length;
+        let y = block.ranges[0].start + item;
+        let range = y * length..(y + 1) * length;
+        self.basins.chunk(&mut self.map.clone(), range)
+    }
+}
+
+/// Rows of the slice in a chunk.
+fn rows(block: &Block) -> usize {
+    block.ranges[0].len()
+}
+
+fn columns(rows: &[Vec<Label>]) -> Vec<Values> {
+    vec![Values::Whole(
+        rows.iter().flatten().copied().map(number).collect(),
+    )]
 }
 
 /// Quasi-random starts in the slice.

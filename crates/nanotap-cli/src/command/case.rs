@@ -1,15 +1,13 @@
 //! `nanotap case`: the case, checked and resolved.
 
-use std::collections::BTreeMap;
-use std::f64::consts::TAU;
-
 use clap::Args;
 use nanotap::case::{Case, CosineTerm};
-use nanotap::case_file::{self, CaseFile};
+use nanotap::case_document::CaseDocument;
+use nanotap::case_file;
 use nanotap::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::parameter::Parameter;
 use nanotap::physical::{Kind, Resolved, Severity};
-use serde::Serialize;
+use nanotap::subject::Subject;
 
 use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;
@@ -26,134 +24,34 @@ pub(crate) struct Arguments {
     out: OutArgument,
 }
 
-/// The JSON of a cantilever.
-#[derive(Serialize)]
-struct Cantilever<'a> {
-    kind: &'static str,
-    #[serde(flatten)]
-    case: &'a Case,
-    period: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    physical: Option<Physical>,
-}
-
-/// The physical quantities behind a case, in SI, frequencies in Hz.
-#[derive(Serialize)]
-struct Physical {
-    k: f64,
-    f0: f64,
-    #[serde(rename = "Q")]
-    quality_factor: f64,
-    beam_mass: f64,
-    tip_mass: f64,
-    drive_amplitude: f64,
-    drive_frequency: f64,
-    free_amplitude: f64,
-    free_phase_degrees: f64,
-    setpoint: Option<f64>,
-    contact_stiffness: f64,
-    contact_damping: f64,
-    tip_gap: f64,
-    beam_gap: f64,
-    length_unit: f64,
-    time_unit: f64,
-    force_unit: f64,
-    energy_unit: f64,
-}
-
-impl Physical {
-    fn of(resolved: &Resolved) -> Self {
-        let Resolved {
-            lever,
-            parameters,
-            scales,
-            ..
-        } = resolved;
-        Self {
-            k: lever.k,
-            f0: lever.f0,
-            quality_factor: lever.quality_factor,
-            beam_mass: lever.beam_mass,
-            tip_mass: parameters.tip_mass,
-            drive_amplitude: parameters.drive_amplitude,
-            drive_frequency: parameters.drive_frequency,
-            free_amplitude: resolved.free_amplitude,
-            free_phase_degrees: resolved.free_phase,
-            setpoint: resolved.setpoint,
-            contact_stiffness: parameters.contact_stiffness,
-            contact_damping: parameters.contact_damping,
-            tip_gap: parameters.tip_gap,
-            beam_gap: scales.length,
-            length_unit: scales.length,
-            time_unit: scales.time,
-            force_unit: scales.force,
-            energy_unit: scales.energy,
-        }
-    }
-}
-
-/// The JSON of an oscillator, its keys those of the case file.
-#[derive(Serialize)]
-struct OscillatorDocument {
-    kind: &'static str,
-    #[serde(flatten)]
-    values: BTreeMap<&'static str, f64>,
-    period: f64,
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let title = super::title(&arguments.case);
-    match super::case_file(&arguments.case)? {
-        CaseFile::Dimensionless(case) => {
-            write_out(&arguments.out, &case)?;
-            remark(&case, output);
-            let document = Cantilever {
-                kind: "cantilever",
-                case: &case,
-                period: case.period(),
-                physical: None,
-            };
-            output.result(&document, |_| cantilever(&title, &case))
-        }
-        CaseFile::Physical(tables) => {
-            let resolved = super::resolve(&tables, &arguments.case)?;
-            write_out(&arguments.out, &resolved.case)?;
-            for remark in &resolved.remarks {
+    let studied = super::studied(&arguments.case)?;
+    let document = CaseDocument::of(&studied);
+    match &studied.subject {
+        Subject::Cantilever(case) => {
+            write_out(&arguments.out, case)?;
+            for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
                 match remark.severity {
                     Severity::Note => output.note(&remark.text),
                     Severity::Warning => output.warning(&remark.text),
                 }
             }
-            remark(&resolved.case, output);
-            let document = Cantilever {
-                kind: "cantilever",
-                case: &resolved.case,
-                period: resolved.case.period(),
-                physical: Some(Physical::of(&resolved)),
-            };
-            output.result(&document, |_| physical(&title, &resolved))
+            remark(case, output);
+            output.result(&document, |_| {
+                studied.resolved.as_ref().map_or_else(
+                    || cantilever(&studied.title, case),
+                    |resolved| physical(&studied.title, resolved),
+                )
+            })
         }
-        CaseFile::Oscillator(given) => {
+        Subject::Oscillator(given) => {
             if let Some(path) = &arguments.out.out {
                 return Err(Failure::request(
                     format!("--out {}: an oscillator is not written out", path.display()),
                     "leave --out away, or take --json",
                 ));
             }
-            let values = OscillatorParameter::ALL
-                .into_iter()
-                .filter_map(|parameter| Some((parameter.name(), given.get(parameter)?)))
-                .collect();
-            let kind = match given.stop {
-                Stop::Soft { .. } => "vibro_impact",
-                Stop::Rigid { .. } => "impact",
-            };
-            let document = OscillatorDocument {
-                kind,
-                values,
-                period: TAU / given.omega,
-            };
-            output.result(&document, |_| oscillator(&title, &given))
+            output.result(&document, |_| oscillator(&studied.title, given))
         }
     }
 }

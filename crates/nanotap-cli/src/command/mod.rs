@@ -15,8 +15,10 @@ mod sweep;
 
 use clap::Subcommand;
 use nanotap::case::Case;
-use nanotap::case_file::{CaseFile, PhysicalTables};
-use nanotap::physical::{Catalogue, Resolved, Severity};
+use nanotap::case_file::CaseFile;
+use nanotap::physical::Catalogue;
+use nanotap::studied::Studied;
+use nanotap::subject::Subject;
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -69,11 +71,6 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
     }
 }
 
-/// The case file that the arguments name, with what they set.
-pub(crate) fn case_file(arguments: &CaseArguments) -> Result<CaseFile, Failure> {
-    Ok(CaseFile::load(arguments.file.as_deref(), &arguments.set)?)
-}
-
 /// What the case is called in a heading: its file, or that it was typed.
 pub(crate) fn title(arguments: &CaseArguments) -> String {
     arguments.file.as_ref().map_or_else(
@@ -82,36 +79,26 @@ pub(crate) fn title(arguments: &CaseArguments) -> String {
     )
 }
 
-/// A physical case resolved with the built-in catalogue and those that the arguments add.
-pub(crate) fn resolve(
-    tables: &PhysicalTables,
-    arguments: &CaseArguments,
-) -> Result<Resolved, Failure> {
+/// The case of the arguments, resolved with the built-in catalogue and those that they add.
+pub(crate) fn studied(arguments: &CaseArguments) -> Result<Studied, Failure> {
     let mut catalogue = Catalogue::builtin()?;
     for path in &arguments.catalogue {
         catalogue.extend_from_file(path)?;
     }
-    Ok(tables.resolve(&catalogue)?)
+    let file = CaseFile::load(arguments.file.as_deref(), &arguments.set)?;
+    Ok(Studied::resolve(title(arguments), file, &catalogue)?)
 }
 
 /// The dimensionless cantilever that the arguments describe, for `command`. What puts a
 /// physical case in doubt is said; its notes are `nanotap case`'s.
 fn cantilever(arguments: &CaseArguments, command: &str, output: &Output) -> Result<Case, Failure> {
-    match case_file(arguments)? {
-        CaseFile::Dimensionless(case) => Ok(case),
-        CaseFile::Physical(tables) => {
-            let resolved = resolve(&tables, arguments)?;
-            for remark in &resolved.remarks {
-                if remark.severity == Severity::Warning {
-                    output.warning(&remark.text);
-                }
-            }
-            Ok(resolved.case)
-        }
-        CaseFile::Oscillator(_) => Err(Failure::request(
+    let studied = crate::studied::Studied::of(arguments, output)?;
+    match &studied.subject {
+        Subject::Cantilever(case) => Ok(case.clone()),
+        Subject::Oscillator(_) => Err(Failure::request(
             format!(
                 "{}: `{command}` needs a cantilever; this is an oscillator",
-                title(arguments)
+                studied.title
             ),
             "an oscillator has one degree of freedom and no beam modes",
         )),

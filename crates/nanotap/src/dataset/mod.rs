@@ -39,5 +39,5 @@ pub use grid::{Axis, Block, Grid};
 pub use merge::{Merged, merge};
 pub use schema::{Coordinate, Schema, Values, Variable};
 pub use share::{Share, ShareError};
-pub use store::Store;
+pub use store::{Store, chunk_files};
 pub use work::{Work, WorkError, work};

@@ -176,22 +176,34 @@ impl Store {
     /// # Panics
     /// When a column has the wrong length or kind: a mistake of the caller.
     pub fn write_chunk(&self, block: &Block, columns: &[Values]) -> Result<(), StoreError> {
-        assert_eq!(columns.len(), self.schema.variables.len());
-        let mut files = Vec::with_capacity(columns.len());
-        for (variable, column) in self.schema.variables.iter().zip(columns) {
-            let stride = variable.stride();
-            assert_eq!(
-                (column.len(), column.kind()),
-                (block.len() * stride, variable.kind)
-            );
-            files.push(zarr::encode(&padded(
-                &self.schema.grid,
-                block,
-                column,
-                stride,
+        self.write_files(block, &chunk_files(&self.schema, block, columns))
+    }
+
+    /// Takes a finished chunk that was computed elsewhere: the files that [`chunk_files`]
+    /// made of it.
+    ///
+    /// # Errors
+    /// When they are not the files of such a chunk, or the file system refuses.
+    pub fn take_files(&self, chunk: usize, files: &[Vec<u8>]) -> Result<(), StoreError> {
+        let damaged = |what: String| StoreError::Damaged {
+            path: self.marker(chunk),
+            what,
+        };
+        let variables = &self.schema.variables;
+        if chunk >= self.chunks() || files.len() != variables.len() {
+            return Err(damaged(format!(
+                "{} files of chunk {chunk} where {} files of one of {} chunks are expected",
+                files.len(),
+                variables.len(),
+                self.chunks()
             )));
         }
-        self.write_files(block, &files)
+        let entries = self.schema.grid.chunk_entries();
+        for (variable, file) in variables.iter().zip(files) {
+            zarr::decode(file, variable.kind, entries * variable.stride())
+                .map_err(|what| damaged(format!("{}: {what}", variable.name)))?;
+        }
+        self.write_files(&self.schema.grid.block(chunk), files)
     }
 
     fn write_files(&self, block: &Block, files: &[Vec<u8>]) -> Result<(), StoreError> {
@@ -278,6 +290,24 @@ impl Store {
         }
         Ok(true)
     }
+}
+
+/// The files of a chunk, one a variable: `columns` has the values of each, in order, for the
+/// block's entries row-major.
+///
+/// # Panics
+/// When a column has the wrong length or kind: a mistake of the caller.
+pub fn chunk_files(schema: &Schema, block: &Block, columns: &[Values]) -> Vec<Vec<u8>> {
+    assert_eq!(columns.len(), schema.variables.len());
+    let file = |(variable, column): (&Variable, &Values)| {
+        let stride = variable.stride();
+        assert_eq!(
+            (column.len(), column.kind()),
+            (block.len() * stride, variable.kind)
+        );
+        zarr::encode(&padded(&schema.grid, block, column, stride))
+    };
+    schema.variables.iter().zip(columns).map(file).collect()
 }
 
 fn marker_line(name: &str, bytes: &[u8]) -> String {

@@ -39,10 +39,12 @@ pub use over::{Over, OverError, Spacing, SweepKey};
 pub use run::Starts;
 pub use summary::Summary;
 
-use nanotap_dynamics::{LyapunovOptions, SettleOptions};
+use nanotap_dynamics::{Control, LyapunovOptions, SettleOptions};
 use nanotap_figures::Figure;
 
-use crate::dataset::{Schema, Store, StoreError, Values, Work, WorkError, work};
+use crate::dataset::{
+    Block, Schema, Store, StoreError, Values, Work, WorkError, chunk_files, work,
+};
 use crate::subject::Subject;
 
 /// How to sweep.
@@ -146,18 +148,51 @@ impl Sweep {
     /// # Errors
     /// When the work was stopped (what is finished stays), or the store refuses.
     pub fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
-        let assemble = |_: &_, results: Vec<Vec<run::Outcome>>| -> Vec<Values> {
-            dataset::columns(&self.schema, &results.concat())
-        };
         let cancelled = || how.control.is_cancelled();
+        work(
+            store,
+            how,
+            |block| self.items(block),
+            |block, item| self.item(block, item, &cancelled),
+            |_, items| self.columns(&items),
+        )
+    }
+
+    /// The files of one chunk, computed on this thread: the same bytes wherever that is.
+    /// `None` when it was stopped, and for a chunk that there is not.
+    pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        let grid = &self.schema.grid;
+        let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
+        let items = (0..self.items(&block))
+            .map(|item| self.item(&block, item, &|| control.is_cancelled()))
+            .collect::<Option<Vec<_>>>()?;
+        Some(chunk_files(&self.schema, &block, &self.columns(&items)))
+    }
+
+    /// Pieces of work in a chunk: values, or the whole line that is followed.
+    fn items(&self, block: &Block) -> usize {
         if self.options.follow == Follow::Off {
-            let values = |block: &crate::dataset::Block| block.ranges[self.axis()].len();
-            let compute = |block: &_, item| run::at_value(self, block, item, &cancelled);
-            work(store, how, values, compute, assemble)
+            block.ranges[self.axis()].len()
         } else {
-            let compute = |block: &_, _| run::along_line(self, block, &cancelled);
-            work(store, how, |_| 1, compute, assemble)
+            1
         }
+    }
+
+    fn item(
+        &self,
+        block: &Block,
+        item: usize,
+        cancelled: &impl Fn() -> bool,
+    ) -> Option<Vec<run::Outcome>> {
+        if self.options.follow == Follow::Off {
+            run::at_value(self, block, item, cancelled)
+        } else {
+            run::along_line(self, block, cancelled)
+        }
+    }
+
+    fn columns(&self, items: &[Vec<run::Outcome>]) -> Vec<Values> {
+        dataset::columns(&self.schema, &items.concat())
     }
 
     /// The axis of the grid along which the first parameter varies.

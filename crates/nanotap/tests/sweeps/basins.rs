@@ -52,6 +52,21 @@ fn computed(
 /// Ω = 20, α1 = 0: a period-1 and a period-4 coexist. Every point's label must be where a
 /// plain run from that very state settles.
 #[test]
+fn chunks_computed_elsewhere_are_the_same_bytes() {
+    let folder = Folder::new();
+    let (here, there) = (folder.join("here"), folder.join("there"));
+    let (subject, options) = (bistable(), slice(9, 7));
+    computed(&subject, &options, &here, 2);
+    let basin = Basin::new(&subject, &options, &Control::default()).unwrap();
+    let store = Store::create_or_resume(&there, basin.schema().clone()).unwrap();
+    for chunk in 0..store.chunks() {
+        let files = basin.chunk_files(chunk, &Control::default()).unwrap();
+        store.take_files(chunk, &files).unwrap();
+    }
+    assert_same(&here, &there);
+}
+
+#[test]
 fn labels_are_where_runs_settle() {
     let folder = Folder::new();
     let store = computed(&bistable(), &slice(14, 12), &folder.join("a"), 2);

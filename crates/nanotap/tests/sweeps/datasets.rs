@@ -58,6 +58,41 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
+fn chunks_computed_elsewhere_are_the_same_bytes() {
+    let folder = Folder::new();
+    let nowhere = Control::default();
+    for follow in [Follow::Off, Follow::Both] {
+        let sweep = sweep(follow);
+        let (here, there) = (folder.join("here"), folder.join("there"));
+        computed(&sweep, &here, 2);
+        let store = Store::create_or_resume(&there, sweep.schema().clone()).unwrap();
+        for chunk in (0..store.chunks()).rev() {
+            let files = sweep.chunk_files(chunk, &nowhere).unwrap();
+            // What was cut short on its way, or belongs elsewhere, is refused.
+            let mut short = files.clone();
+            short[3].truncate(5);
+            for wrong in [&short[..], &files[1..]] {
+                let refused = store.take_files(chunk, wrong);
+                assert!(matches!(refused, Err(StoreError::Damaged { .. })));
+            }
+            assert!(store.take_files(store.chunks(), &files).is_err());
+            store.take_files(chunk, &files).unwrap();
+        }
+        assert_eq!(store.missing(), 0);
+        assert_same(&here, &there);
+        assert!(sweep.chunk_files(store.chunks(), &nowhere).is_none());
+        let cancel = AtomicBool::new(true);
+        let stopped = Control {
+            cancel: Some(&cancel),
+            progress: None,
+        };
+        assert!(sweep.chunk_files(0, &stopped).is_none());
+        std::fs::remove_dir_all(here).unwrap();
+        std::fs::remove_dir_all(there).unwrap();
+    }
+}
+
+#[test]
 fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     let folder = Folder::new();
     let sweep = sweep(Follow::Off);

@@ -4,10 +4,10 @@
 use std::fmt::Write as _;
 
 use nanotap::observables::{Observables, Spectrum};
-use nanotap::physical::{Kind, Resolved};
+use nanotap::physical::Kind;
+use nanotap::physical::quantity::format_electronvolts;
 use nanotap::simulate::Classification;
 use nanotap::units::Units;
-use serde::Serialize;
 
 use crate::output::Output;
 use crate::table::{Align, Table};
@@ -20,53 +20,6 @@ pub(crate) fn parse_state(text: &str) -> Result<f64, String> {
         _ => Err(format!(
             "`{text}` is no finite number; write the state as 0.1,-0.02,0.3"
         )),
-    }
-}
-
-/// A motion in the words and units of the laboratory.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct PhysicalMotion {
-    /// Greatest, least and half of peak to peak of the tip deflection, m.
-    tip_max: f64,
-    tip_min: f64,
-    amplitude: f64,
-    mean_deflection: f64,
-    /// Greatest and mean force of the sample on the tip, N.
-    #[serde(rename = "F_max")]
-    peak_force: f64,
-    mean_force: f64,
-    /// Time in contact in one drive period, s.
-    contact_time: f64,
-    /// Energy that the sample takes in one drive period, J.
-    #[serde(rename = "E_dis")]
-    dissipation: f64,
-    /// Power of the drive, W.
-    drive_power: f64,
-    /// Speed at which contacts begin, m/s.
-    impact_speed: f64,
-    /// Drive frequency, Hz.
-    frequency: f64,
-}
-
-impl PhysicalMotion {
-    /// `o` in SI, if the case is physical.
-    pub(crate) fn of(o: &Observables, resolved: Option<&Resolved>) -> Option<Self> {
-        let resolved = resolved?;
-        let scales = &resolved.scales;
-        let period = resolved.case.period() * scales.time;
-        Some(Self {
-            tip_max: o.tip_max * scales.length,
-            tip_min: o.tip_min * scales.length,
-            amplitude: o.amplitude * scales.length,
-            mean_deflection: o.mean_deflection * scales.length,
-            peak_force: o.peak_force * scales.force,
-            mean_force: o.mean_force * scales.force,
-            contact_time: o.contact_fraction * period,
-            dissipation: o.energy_balance.sample_damping / o.periods * scales.energy,
-            drive_power: o.energy_balance.drive_work / o.periods * scales.energy / period,
-            impact_speed: o.impact_speed * scales.velocity,
-            frequency: resolved.case.omega * scales.frequency,
-        })
     }
 }
 
@@ -139,6 +92,12 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
         "half of peak to peak",
     ]);
     table.row([
+        "at the drive's frequency",
+        &number::significant(o.first_harmonic, 6),
+        &si(Kind::Length, o.first_harmonic),
+        &format!("{}° behind the drive", number::significant(o.phase, 4)),
+    ]);
+    table.row([
         "gap",
         &range(o.gap_range[0], o.gap_range[1]),
         &si_range(Kind::Length, o.gap_range[0], o.gap_range[1]),
@@ -178,6 +137,20 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
                 &si(Kind::Force, o.peak_force),
                 &format!("mean {}", number::significant(o.mean_force, 4)),
             ]);
+            table.row([
+                "indentation",
+                &number::significant(o.indentation, 5),
+                &si(Kind::Length, o.indentation),
+                "greatest depth below the resting surface",
+            ]);
+            table.row([
+                "virial ⟨F·W⟩",
+                &number::significant(o.virial, 5),
+                &units
+                    .si(Kind::Energy)
+                    .map_or_else(String::new, |u| format_electronvolts(u * o.virial)),
+                "mean of force times deflection",
+            ]);
         }
     } else {
         table.row(["contact", "none", "", ""]);
@@ -196,11 +169,17 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
         ]);
     }
     if let Some([low, high]) = o.slope_range {
+        table.row(["slope at the tip", &range(low, high), "", ""]);
+    }
+    if let Some(lever) = &o.optical_lever {
         table.row([
-            "slope at the tip",
-            &range(low, high),
-            "",
-            "what an optical lever reads",
+            "an optical lever reads",
+            &number::significant(lever.amplitude, 6),
+            &si(Kind::Length, lever.amplitude),
+            &format!(
+                "{}° behind the drive, calibrated by a static force",
+                number::significant(lever.phase, 4)
+            ),
         ]);
     }
     table.render()
@@ -224,7 +203,10 @@ pub(crate) fn energy(o: &Observables, units: &Units) -> String {
     };
     row("drive work", balance.drive_work, String::new());
     row("beam damping", -balance.beam_damping, String::new());
-    row("sample damping", -balance.sample_damping, String::new());
+    let electronvolts = units.si(Kind::Energy).map_or_else(String::new, |u| {
+        format!(" = {}", format_electronvolts(u * -o.dissipation + 0.0))
+    });
+    row("sample damping", -balance.sample_damping, electronvolts);
     row("stored", -balance.stored, String::new());
     let mut text = format!(
         "  {}\n{}",

@@ -5,13 +5,14 @@ use std::fmt::Write as _;
 use clap::Args;
 use nanotap::model::Model;
 use nanotap::motion_figure::orbit_figure;
+use nanotap::observables::PhysicalMotion;
 use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::time_series;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
-use crate::motion::{self, PhysicalMotion};
+use crate::motion;
 use crate::output::Output;
 use crate::studied::Studied;
 use crate::table::{Align, Table};
@@ -100,7 +101,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         orbit_figure(&model, &found, &studied.units()).write(path)?;
     }
     motion::warn(&found.observables, "", output);
-    let physical = PhysicalMotion::of(&found.observables, studied.resolved.as_ref());
+    let physical = studied
+        .resolved
+        .as_ref()
+        .map(|resolved| PhysicalMotion::of(&found.observables, Some(&found.spectrum), resolved));
     let document = Document {
         orbit: &found,
         physical,

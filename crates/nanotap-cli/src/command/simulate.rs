@@ -6,13 +6,14 @@ use clap::{Args, ValueEnum};
 use nanotap::fixed_step_run::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
 use nanotap::model::Model;
 use nanotap::motion_figure::{fixed_step_figure, simulation_figure};
+use nanotap::observables::PhysicalMotion;
 use nanotap::simulate::{Classification, SettleOptions, SimulateOptions, Simulation, simulate};
 use nanotap::units::Units;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
-use crate::motion::{self, PhysicalMotion};
+use crate::motion;
 use crate::output::Output;
 use crate::studied::Studied;
 use crate::table::{Align, Table};
@@ -157,7 +158,10 @@ fn exact(
         simulation_figure(model, &run, &studied.units()).write(path)?;
     }
     motion::warn(&run.observables, "", output);
-    let physical = PhysicalMotion::of(&run.observables, studied.resolved.as_ref());
+    let physical = studied
+        .resolved
+        .as_ref()
+        .map(|resolved| PhysicalMotion::of(&run.observables, None, resolved));
     let document = Document {
         run: &run,
         physical,

@@ -90,3 +90,55 @@ fn modes_of_a_lever() {
         .json();
     assert_eq!(json["free"].as_array().unwrap().len(), 4);
 }
+
+/// What stands under `physical` is what stands beside it, in SI: lengths times g0 = 10 µm,
+/// energies times g0² k/3 and in electronvolts, times by √(mL⁴/(EI)).
+#[test]
+fn motions_of_a_lever_are_told_in_si() {
+    let folder = Folder::new();
+    folder.write("lever.toml", LEVER);
+    let orbit = folder
+        .run(&[
+            "orbit",
+            "lever.toml",
+            "--json",
+            "--set",
+            "drive.frequency=75 kHz",
+            "--set",
+            "cantilever.length=225 um",
+            "--set",
+            "cantilever.width=28 um",
+            "--set",
+            "cantilever.thickness=3 um",
+        ])
+        .json();
+    let physical = &orbit["physical"];
+    let pair = |key: &str, si: &str, unit: f64| {
+        let (value, si) = (orbit[key].as_f64().unwrap(), physical[si].as_f64().unwrap());
+        assert!(
+            (si - value * unit).abs() <= 1e-9 * si.abs(),
+            "{key}: {value} is not {si}"
+        );
+    };
+    let energy = 10e-6 * 10e-6 * 2.8 / 3.0;
+    // Ω₁ = 3.516015 of the bare beam is 75 kHz.
+    let time = 3.516_015_268_5 / (std::f64::consts::TAU * 75e3);
+    for (key, si, unit) in [
+        ("first_harmonic", "A", 10e-6),
+        ("indentation", "indentation", 10e-6),
+        ("optical_amplitude", "optical_amplitude", 10e-6),
+        ("phase", "phase", 1.0),
+        ("contact_time", "contact_time", time),
+        ("dissipation", "E_dis", energy),
+        ("dissipation", "E_dis_eV", energy / 1.602_176_634e-19),
+        ("virial", "virial_eV", energy / 1.602_176_634e-19),
+        ("sample_power", "sample_power", energy / time),
+    ] {
+        pair(key, si, unit);
+    }
+    let second = &physical["harmonics"][1];
+    assert_eq!(second["order"].as_f64(), Some(2.0));
+    assert!((second["frequency"].as_f64().unwrap() - 150e3).abs() < 1e-6);
+    let slope = orbit["harmonics"][1]["slope"].as_f64().unwrap() * 10e-6 / 225e-6;
+    assert!((second["slope"].as_f64().unwrap() / slope - 1.0).abs() < 1e-9);
+}

@@ -32,9 +32,12 @@ pub struct Spectrum {
     /// the paper's total harmonic distortion. From the exact variance, not a truncated sum.
     pub thd: f64,
     /// Phase lag of the tip deflection behind the drive, degrees in (−180, 180]; 90 at
-    /// the free resonance of a lever with high Q.
+    /// the free resonance of a lever with high Q. Written out with the
+    /// [`Observables`](super::Observables), which stand beside the spectrum.
+    #[serde(skip)]
     pub phase: f64,
-    /// Amplitude of the tip deflection at the drive's frequency.
+    /// Amplitude of the tip deflection at the drive's frequency; written out as `phase`.
+    #[serde(skip)]
     pub first_harmonic: f64,
 }
 

@@ -280,6 +280,11 @@ impl Resolved {
         mapping_table(&self.case, &self.scales)
     }
 
+    /// What phases are counted from.
+    pub const fn phase_reference(&self) -> &'static str {
+        "displacement of the clamped end"
+    }
+
     /// Whether another part of the beam would touch. The trajectory decides in the end; what
     /// can be said beforehand is how deep the tip sinks when it brings its energy along,
     /// ½kA₀² = ½K₁δ², but no deeper than it swings.

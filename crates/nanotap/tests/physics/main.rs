@@ -5,5 +5,6 @@ mod derivatives;
 mod facts;
 mod impact_oscillator;
 mod motions;
+mod observables;
 mod references;
 mod short_contacts;

@@ -1,0 +1,172 @@
+//! What an experimenter reads off a motion, against closed forms.
+
+use std::f64::consts::TAU;
+
+use nanotap::case::Case;
+use nanotap::model::Model;
+use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::physical::free_response::free_response;
+use nanotap_dynamics::Complex;
+
+/// The period-1 orbit of a case, and its model.
+fn period_1(case: &Case) -> (Model, OrbitReport) {
+    let model = Model::cantilever(case).unwrap();
+    let options = OrbitOptions {
+        period: Some(1),
+        ..OrbitOptions::default()
+    };
+    let found = orbit(&model, &options).unwrap();
+    (model, found)
+}
+
+fn near(found: f64, expected: f64, relative: f64) {
+    assert!(
+        (found - expected).abs() <= relative * expected.abs(),
+        "{found} instead of {expected}"
+    );
+}
+
+/// Far from the sample, amplitude and phase are those of the closed form, below, at and
+/// above resonance, with and without a tip mass.
+#[test]
+fn free_amplitude_and_phase_are_the_closed_form() {
+    for alpha1 in [0.0, 0.1] {
+        for omega in [1.0, 2.9, 3.0, 3.516, 4.0, 20.0, 23.0] {
+            let case = Case {
+                alpha1,
+                alpha3: 0.02,
+                alpha5: 100.0,
+                omega,
+                ..Case::paper()
+            };
+            let z = free_response(&case).unwrap();
+            let (_, found) = period_1(&case);
+            let o = &found.observables;
+            near(o.first_harmonic, z.norm() * case.alpha2, 1e-10);
+            near(o.amplitude, o.first_harmonic, 1e-10);
+            near(o.phase, -z.arg().to_degrees(), 1e-9);
+            assert_eq!(
+                (o.dissipation, o.virial, o.indentation, o.contact_time),
+                (0.0, 0.0, 0.0, 0.0)
+            );
+        }
+    }
+}
+
+/// A lever of high Q lags by 90° at its resonance. Driven through the base the tip's mode
+/// also feels the base's own motion, so that the lag differs from 90° by terms of order 1/Q.
+#[test]
+fn the_phase_is_90_degrees_at_the_free_resonance() {
+    for q in [50.0, 200.0, 1000.0] {
+        // β₁² of the bare beam.
+        let omega = 3.516_015_268_5;
+        let case = Case {
+            alpha1: 0.0,
+            alpha3: omega / q,
+            alpha5: 1000.0,
+            omega,
+            ..Case::paper()
+        };
+        let (_, found) = period_1(&case);
+        assert!(
+            (found.observables.phase - 90.0).abs() < 60.0 / q,
+            "{}",
+            found.observables.phase
+        );
+    }
+}
+
+/// A tip pressed in for good moves linearly: force, virial and dissipation follow from the
+/// amplitudes, F = −(α4 V + α6 V̇) with V = W + α2 sin Ωτ + α5.
+#[test]
+fn virial_and_dissipation_of_a_permanent_contact() {
+    let case = Case {
+        alpha2: 0.01,
+        alpha5: -1.0,
+        omega: 5.0,
+        ..Case::paper()
+    };
+    let (model, found) = period_1(&case);
+    let o = &found.observables;
+    assert_eq!(o.contact_fraction, 1.0);
+    near(o.contact_time, TAU / case.omega, 1e-12);
+    let tip = found.trajectory.signal(&model.tip).fourier(case.omega);
+    // α2 sin Ωτ = Re(−iα2 e^{iΩτ})
+    let gap = tip + Complex::new(0.0, -case.alpha2);
+    let force = -gap * Complex::new(case.alpha4, case.alpha6 * case.omega);
+    let mean_force = -case.alpha4 * (o.mean_deflection + case.alpha5);
+    near(o.mean_force, mean_force, 1e-12);
+    near(
+        o.virial,
+        mean_force * o.mean_deflection + 0.5 * (force * tip.conj()).re,
+        1e-11,
+    );
+    let power = 0.5 * case.alpha6 * (case.omega * gap.norm()).powi(2);
+    near(o.sample_power, power, 1e-11);
+    near(o.dissipation, power * TAU / case.omega, 1e-11);
+    near(
+        o.indentation,
+        gap.norm() - case.alpha5 - o.mean_deflection,
+        1e-11,
+    );
+    near(
+        o.drive_power * TAU / case.omega,
+        o.energy_balance.drive_work,
+        1e-12,
+    );
+}
+
+/// An optical lever is calibrated by a static force at the tip: a beam so bent reads its own
+/// deflection. Here the base moves so slowly that only the sample's force bends the beam.
+#[test]
+fn an_optical_lever_reads_a_static_deflection_as_it_is() {
+    let case = Case {
+        modes: 40,
+        alpha1: 0.0,
+        alpha2: 0.01,
+        alpha3: 0.001,
+        alpha5: -1.0,
+        omega: 0.01,
+        ..Case::paper()
+    };
+    let (_, found) = period_1(&case);
+    let o = &found.observables;
+    let lever = o.optical_lever.unwrap();
+    // The series of slopes ends with its 40th mode: Σ_{j>40} φφ'/β⁴ ≈ 4/(2π³·40²).
+    near(lever.amplitude, o.first_harmonic, 1e-4);
+    let turn = (lever.phase - o.phase).rem_euclid(360.0);
+    assert!(turn.min(360.0 - turn) < 0.01, "{} {}", lever.phase, o.phase);
+}
+
+/// A run's observables over many blocks are those of one orbit.
+#[test]
+fn a_long_run_reads_what_its_orbit_reads() {
+    use nanotap::simulate::{SimulateOptions, simulate};
+    let case = Case {
+        omega: 20.0,
+        alpha1: 0.0,
+        ..Case::paper()
+    };
+    let model = Model::cantilever(&case).unwrap();
+    let run = simulate(
+        &model,
+        &SimulateOptions {
+            // More than one block of 512, a whole number of any period up to 4.
+            periods: 1200,
+            ..SimulateOptions::default()
+        },
+    )
+    .unwrap();
+    let orbit = orbit(&model, &OrbitOptions::default()).unwrap();
+    let (a, b) = (&run.observables, &orbit.observables);
+    near(a.first_harmonic, b.first_harmonic, 1e-9);
+    near(a.phase, b.phase, 1e-9);
+    near(a.virial, b.virial, 1e-9);
+    near(a.dissipation, b.dissipation, 1e-9);
+    near(a.contact_time, b.contact_time, 1e-9);
+    near(
+        a.optical_lever.unwrap().amplitude,
+        b.optical_lever.unwrap().amplitude,
+        1e-9,
+    );
+}

@@ -250,21 +250,22 @@ fn forced_response(
     };
     let mut tones = Vec::with_capacity(forcing.tones.len());
     for (tone, &omega) in forcing.tones.iter().zip(drive.frequencies()) {
-        // A pair stands for itself and its conjugate. Re(R y) with R's factor 2
-        // covers both for real right-hand sides; for a complex F, solve for its
-        // real and imaginary parts as two real forcings and combine.
-        let solve = |part: &DVector<f64>| -> Result<DVector<Complex>, FlowError> {
-            let b = &basis.left * part.map(|v| Complex::new(v, 0.0));
-            let z = Complex::new(0.0, omega);
-            let plus = basis.resolvent(z, &b).map_err(resonance(omega))?;
-            let minus = basis.resolvent(-z, &b).map_err(resonance(omega))?;
-            // (R y₊ + conj(R y₋)) / 2 is the response to e^{iωt} with all eigenvalues.
-            let half = Complex::new(0.5, 0.0);
-            Ok((&basis.right * plus + (&basis.right * minus).map(|v| v.conj())) * half)
-        };
-        let real = solve(&tone.map(|z| z.re))?;
-        let imaginary = solve(&tone.map(|z| z.im))?;
-        tones.push(real + imaginary * Complex::new(0.0, 1.0));
+        // A pair stands for itself and its conjugate: Re(R y), with R's factor 2, covers
+        // both for a real right-hand side only. Re(F e^{iωt}) is half the sum of F e^{iωt}
+        // and F̄ e^{−iωt}, and the response to the second is the conjugate of that to
+        // the first with all eigenvalues: (R y₊ + conj(R y₋)) / 2.
+        let z = Complex::new(0.0, omega);
+        let plus = basis
+            .resolvent(z, &(&basis.left * tone))
+            .map_err(resonance(omega))?;
+        let minus = basis
+            .resolvent(-z, &(&basis.left * tone.map(|f| f.conj())))
+            .map_err(resonance(omega))?;
+        let mut response = &basis.right * plus;
+        response.zip_apply(&(&basis.right * minus), |plus, minus| {
+            *plus = (*plus + minus.conj()) * 0.5;
+        });
+        tones.push(response);
     }
     let b = &basis.left * forcing.constant.map(|v| Complex::new(v, 0.0));
     let y = basis

@@ -188,40 +188,43 @@ impl PackedSwitch {
         let (to, from) = (matrix.nrows() / 2, matrix.ncols() / 2);
         let tones = shift.tones.len();
         let packs = (to + tones).div_ceil(WIDTH);
+        let count = 2 * (from + tones) + 1;
         let mut switch = Self {
-            columns: Vec::new(),
+            columns: Vec::with_capacity(count * packs),
             packs,
         };
-        let mut push = |column: &[f64], phasor: Option<(usize, usize)>| {
-            let start = switch.columns.len();
-            switch.columns.resize(start + packs, [[0.0; WIDTH]; 2]);
-            for k in 0..to {
-                for part in 0..2 {
-                    switch.columns[start + k / WIDTH][part][k % WIDTH] = column[part * to + k];
-                }
-            }
-            // A phasor goes on as it is.
-            if let Some((tone, part)) = phasor {
-                let k = to + tone;
-                switch.columns[start + k / WIDTH][part][k % WIDTH] = 1.0;
-            }
-        };
+        let mut change = DVector::zeros(2 * to);
         for part in 0..2 {
             for k in 0..from {
-                push(matrix.column(part * from + k).as_slice(), None);
+                switch.push(matrix.column(part * from + k).as_slice(), None);
             }
             for (tone, z) in shift.tones.iter().enumerate() {
                 // Re(z e^{iωt}) = Re z cos − Im z sin.
-                let column = if part == 0 {
-                    to_modal * z.map(|z| z.re)
-                } else {
-                    to_modal * z.map(|z| -z.im)
-                };
-                push(column.as_slice(), Some((tone, part)));
+                let part_of = |z: &Complex| if part == 0 { z.re } else { -z.im };
+                change.gemv(1.0, to_modal, &z.map(|z| part_of(&z)), 0.0);
+                // A phasor goes on as it is.
+                switch.push(change.as_slice(), Some((to + tone, part)));
             }
         }
-        push((to_modal * &shift.constant).as_slice(), None);
+        change.gemv(1.0, to_modal, &shift.constant, 0.0);
+        switch.push(change.as_slice(), None);
         switch
+    }
+
+    /// Adds a column, real parts first, with a one in coordinate and part `one`.
+    fn push(&mut self, column: &[f64], one: Option<(usize, usize)>) {
+        let start = self.columns.len();
+        self.columns.resize(start + self.packs, [[0.0; WIDTH]; 2]);
+        let packs = &mut self.columns[start..];
+        let (real, imaginary) = column.split_at(column.len() / 2);
+        for (part, values) in [real, imaginary].into_iter().enumerate() {
+            for (values, pack) in values.chunks(WIDTH).zip(packs.iter_mut()) {
+                pack[part][..values.len()].copy_from_slice(values);
+            }
+        }
+        if let Some((k, part)) = one {
+            packs[k / WIDTH][part][k % WIDTH] = 1.0;
+        }
     }
 }
 
@@ -546,35 +549,40 @@ impl System {
     fn switch(&self, from: usize, to: usize, reset: Option<&Reset>, guard: &Output) -> Switch {
         let (a, b) = (&self.regimes[from], &self.regimes[to]);
         let n = self.dimension;
-        let (ma, mb) = (a.basis().len(), b.basis().len());
-        let identity = DMatrix::identity(n, n);
-        let jump = reset.map_or(&identity, |r| &r.matrix);
+        let (right, left) = (&a.basis().right, &b.basis().left);
+        let (ma, mb) = (right.ncols(), left.nrows());
         // x⁻ = Re(R q) = [Re R, −Im R] [Re q; Im q]
-        let mut from_modal = DMatrix::zeros(n, 2 * ma);
-        from_modal
-            .view_mut((0, 0), (n, ma))
-            .copy_from(&a.basis().right.map(|z| z.re));
-        from_modal
-            .view_mut((0, ma), (n, ma))
-            .copy_from(&a.basis().right.map(|z| -z.im));
-        let mut to_modal = DMatrix::zeros(2 * mb, n);
-        to_modal
-            .view_mut((0, 0), (mb, n))
-            .copy_from(&b.basis().left.map(|z| z.re));
-        to_modal
-            .view_mut((mb, 0), (mb, n))
-            .copy_from(&b.basis().left.map(|z| z.im));
-        let mut shift = a.response().mapped(jump);
-        if let Some(reset) = reset {
-            shift = shift.plus(1.0, &reset.offset);
-        }
+        let from_modal = DMatrix::from_fn(n, 2 * ma, |i, k| {
+            if k < ma {
+                right[(i, k)].re
+            } else {
+                -right[(i, k - ma)].im
+            }
+        });
+        let to_modal = DMatrix::from_fn(2 * mb, n, |k, i| {
+            if k < mb {
+                left[(k, i)].re
+            } else {
+                left[(k - mb, i)].im
+            }
+        });
+        let (matrix, shift) = match reset {
+            None => (&to_modal * &from_modal, a.response().clone()),
+            Some(reset) => (
+                &to_modal * &reset.matrix * &from_modal,
+                a.response().mapped(&reset.matrix).plus(1.0, &reset.offset),
+            ),
+        };
         let shift = shift.plus(-1.0, b.response());
-        let matrix = &to_modal * jump * &from_modal;
         let packed = PackedSwitch::new(&matrix, &to_modal, &shift);
         let saltation = self.constant_saltation(from, to, reset, guard);
-        let tangent = saltation
-            .as_ref()
-            .map(|u| &to_modal * (jump + u * &guard.row) * &from_modal);
+        // With J the jump, L (J + u hᵀ) R = L J R + (L u)(hᵀ R).
+        let tangent = saltation.as_ref().map(|u| {
+            let mut tangent = matrix.clone();
+            let row = (&guard.row * &from_modal).transpose();
+            tangent.ger(1.0, &(&to_modal * u), &row, 1.0);
+            tangent
+        });
         Switch {
             from,
             to,
@@ -599,26 +607,30 @@ impl System {
         let (a, b) = (&self.regimes[from], &self.regimes[to]);
         let (matrix, forcing) = self.field_jump(from, to, reset);
         let rate = guard.rate(a.matrix(), a.forcing(), &self.drive);
-        debug_assert_eq!(matrix.nrows(), b.matrix().nrows());
-        let rate_row = flat(&rate.row.transpose(), rate.constant, &rate.tones);
-        let guard_row = flat(&guard.row.transpose(), guard.constant, &guard.tones);
+        let rate = flat(rate.row.iter(), rate.constant, rate.tones.iter());
         // Orthonormal basis of the span of ġ and g.
-        let e1 = &guard_row / guard_row.norm();
-        let across = &rate_row - &e1 * e1.dot(&rate_row);
-        if across.norm() <= 1e-12 * rate_row.norm() {
+        let mut e1 = flat(guard.row.iter(), guard.constant, guard.tones.iter());
+        e1 /= e1.norm();
+        let mut e2 = rate.clone();
+        e2.axpy(-e1.dot(&rate), &e1, 1.0);
+        let across = e2.norm();
+        if across <= 1e-12 * rate.norm() {
             return None;
         }
-        let e2 = &across / across.norm();
+        e2 /= across;
         let mut u = DVector::zeros(self.dimension);
         for i in 0..self.dimension {
-            let tones: Vec<Complex> = forcing.tones.iter().map(|z| z[i]).collect();
-            let row = flat(&matrix.row(i).transpose(), forcing.constant[i], &tones);
-            let rest = &row - &e1 * e1.dot(&row) - &e2 * e2.dot(&row);
+            let tones = forcing.tones.iter().map(|z| &z[i]);
+            let mut rest = flat(matrix.row(i).iter(), forcing.constant[i], tones);
+            let (size, along) = (rest.norm(), e2.dot(&rest));
+            rest.axpy(-e1.dot(&rest), &e1, 1.0);
+            rest.axpy(-along, &e2, 1.0);
             let (af, bf) = (a.matrix().row(i).norm(), b.matrix().row(i).norm());
-            if rest.norm() > 1e-12 * row.norm() && rest.norm() > 1e-14 * (af + bf) {
+            let rest = rest.norm();
+            if rest > 1e-12 * size && rest > 1e-14 * (af + bf) {
                 return None;
             }
-            u[i] = e2.dot(&row) / across.norm();
+            u[i] = along / across;
         }
         Some(u)
     }
@@ -707,13 +719,14 @@ pub(crate) fn rounding(output: &Output, x: &[f64]) -> f64 {
 }
 
 /// An affine-harmonic scalar as one vector, for projections.
-fn flat(row: &DVector<f64>, constant: f64, tones: &[Complex]) -> DVector<f64> {
-    let harmonic = tones.iter().flat_map(|z| [z.re, z.im]);
-    DVector::from_iterator(
-        row.len() + 1 + 2 * tones.len(),
-        row.iter()
-            .copied()
-            .chain(std::iter::once(constant))
-            .chain(harmonic),
-    )
+fn flat<'a>(
+    row: impl ExactSizeIterator<Item = &'a f64>,
+    constant: f64,
+    tones: impl ExactSizeIterator<Item = &'a Complex>,
+) -> DVector<f64> {
+    let mut all = Vec::with_capacity(row.len() + 1 + 2 * tones.len());
+    all.extend(row);
+    all.push(constant);
+    all.extend(tones.flat_map(|z| [z.re, z.im]));
+    DVector::from_vec(all)
 }

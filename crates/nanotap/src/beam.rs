@@ -5,6 +5,7 @@
 //! above about j = 12; here every formula is free of cancellation and overflow.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DVector;
 
@@ -216,6 +217,23 @@ impl Modes {
             integral: vector(Mode::integral),
             all: modes,
         })
+    }
+
+    /// The first `count` modes, computed once in the life of the program: they depend on
+    /// nothing else, and a fine sweep asks for them at each of its values.
+    ///
+    /// # Errors
+    /// As [`Modes::new`].
+    pub fn shared(count: usize) -> Result<Arc<Self>, ModeCountError> {
+        static KNOWN: [OnceLock<Arc<Modes>>; MAX_MODES] = [const { OnceLock::new() }; MAX_MODES];
+        let Some(known) = count.checked_sub(1).and_then(|k| KNOWN.get(k)) else {
+            return Err(ModeCountError { given: count });
+        };
+        if let Some(modes) = known.get() {
+            return Ok(Arc::clone(modes));
+        }
+        let modes = Arc::new(Self::new(count)?);
+        Ok(Arc::clone(known.get_or_init(|| modes)))
     }
 
     /// The number of modes N.

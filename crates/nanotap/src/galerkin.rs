@@ -4,6 +4,8 @@
 //! In either regime M Ẍ + C Ẋ + K X = s sin Ωτ + c cos Ωτ + k, and the gap between
 //! tip and sample is V_T = p·X + α2 sin Ωτ + α5, Eq. (8).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::beam::Modes;
@@ -60,7 +62,7 @@ pub struct Galerkin {
     /// The case.
     pub case: Case,
     /// The beam's modes.
-    pub modes: Modes,
+    pub modes: Arc<Modes>,
     /// M, N×N, the same in both regimes: Eqs. (11), (15).
     pub mass: DMatrix<f64>,
     /// C, N×N: Eqs. (12), (16).
@@ -96,7 +98,7 @@ impl Galerkin {
     /// [`CaseError`] if the case is not valid.
     pub fn new(case: &Case) -> Result<Self, CaseError> {
         case.validate()?;
-        let modes = Modes::new(case.modes)?;
+        let modes = Modes::shared(case.modes)?;
         let GalerkinDerivative {
             mass,
             damping,
@@ -237,12 +239,19 @@ impl Coefficients {
     fn assemble(&self, modes: &Modes) -> GalerkinDerivative {
         let count = modes.count();
         let (p, i) = (&modes.tip, &modes.integral);
-        let tip = p * p.transpose();
-        let identity = DMatrix::<f64>::identity(count, count);
-        let bending = DMatrix::from_diagonal(&DVector::from_column_slice(&modes.stiffness));
-
-        let free_damping = &identity * self.beam_damping;
-        let free_stiffness = bending * self.beam_stiffness;
+        // diag(d) + load ppᵀ
+        let loaded = |diagonal: &dyn Fn(usize) -> f64, load: f64| {
+            DMatrix::from_fn(count, count, |row, column| {
+                let tip = load * (p[row] * p[column]);
+                if row == column {
+                    diagonal(row) + tip
+                } else {
+                    tip
+                }
+            })
+        };
+        let damping = |_: usize| self.beam_damping;
+        let stiffness = |j: usize| modes.stiffness[j] * self.beam_stiffness;
         let free = Forcing {
             sine: p * self.sine[0] + i * self.sine[1],
             cosine: i * self.cosine,
@@ -254,14 +263,14 @@ impl Coefficients {
             constant: p * self.contact[2],
         };
         GalerkinDerivative {
-            mass: identity * self.beam_mass + &tip * self.tip_mass,
+            mass: loaded(&|_| self.beam_mass, self.tip_mass),
             damping: [
-                free_damping.clone(),
-                free_damping + &tip * self.contact_damping,
+                loaded(&damping, 0.0),
+                loaded(&damping, self.contact_damping),
             ],
             stiffness: [
-                free_stiffness.clone(),
-                free_stiffness + &tip * self.contact_stiffness,
+                loaded(&stiffness, 0.0),
+                loaded(&stiffness, self.contact_stiffness),
             ],
             forcing: [free, contact],
             gap: Gap {

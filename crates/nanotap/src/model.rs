@@ -5,9 +5,9 @@
 //! Regime 0 is free flight. Everything that analyses or shows a motion works on a
 //! [`Model`] and asks no more where it came from.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 pub use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::{RegimeTangent, SystemTangent};
 use nanotap_flow::{Drive, Exit, HarmonicVector, Output, SpectralBasis, System};
@@ -46,8 +46,8 @@ pub struct Model {
     /// Force of the sample on the tip, positive when it pushes the tip away; an entry
     /// a regime.
     pub force: Vec<Output>,
-    /// What feeds and drains energy; an entry a regime.
-    pub power: Vec<Powers>,
+    /// What feeds and drains energy: see [`Model::power`].
+    pub(crate) power: PowersOnDemand,
     /// What an impact takes, as a factor of the square of the gap's rate: ½ m (1 − r²)
     /// for a rigid stop, 0 otherwise.
     pub impact_loss: f64,
@@ -69,6 +69,41 @@ pub struct Powers {
     pub stored: Vec<Product>,
 }
 
+/// [`Powers`] of every regime, worked out when first asked for: of the thousands of models
+/// that a sweep sets up, few ever are.
+#[derive(Clone, Debug)]
+pub(crate) struct PowersOnDemand {
+    known: OnceLock<Vec<Powers>>,
+    /// What they follow from, where they are not known from the start.
+    equations: Option<Arc<Galerkin>>,
+}
+
+impl PowersOnDemand {
+    /// Of these equations.
+    fn of(equations: Galerkin) -> Self {
+        Self {
+            known: OnceLock::new(),
+            equations: Some(Arc::new(equations)),
+        }
+    }
+}
+
+impl From<Vec<Powers>> for PowersOnDemand {
+    fn from(known: Vec<Powers>) -> Self {
+        Self {
+            known: known.into(),
+            equations: None,
+        }
+    }
+}
+
+impl PartialEq for PowersOnDemand {
+    /// Whether they are the same, worked out or not.
+    fn eq(&self, other: &Self) -> bool {
+        self.equations == other.equations && (self.equations.is_some() || self.known == other.known)
+    }
+}
+
 /// `weight · a · b`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Product {
@@ -84,7 +119,7 @@ pub struct Product {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamOutputs {
     /// Its modes.
-    pub modes: Modes,
+    pub modes: Arc<Modes>,
     /// Slope ∂W/∂ξ at the tip: what an optical lever reads.
     pub slope: Output,
     /// Displacement of the base, α2 sin Ωτ.
@@ -120,7 +155,7 @@ impl Model {
             .into());
         };
         let n = case.modes;
-        let mut regimes = Vec::new();
+        let mut regimes = Vec::with_capacity(2);
         for regime in Regime::ALL {
             let r = regime.index();
             let matrix = companion(
@@ -148,11 +183,11 @@ impl Model {
             vec![Exit::new(gap.scaled(-1.0), 0)],
         ];
         let system = Arc::new(System::new(drive, regimes, exits)?);
-        Ok(Self::with_outputs(case, &galerkin, system, gap))
+        Ok(Self::with_outputs(galerkin, system, gap))
     }
 
-    fn with_outputs(case: &Case, galerkin: &Galerkin, system: Arc<System>, gap: Output) -> Self {
-        let modes = &galerkin.modes;
+    fn with_outputs(galerkin: Galerkin, system: Arc<System>, gap: Output) -> Self {
+        let (case, modes) = (&galerkin.case, &galerkin.modes);
         let displacement = |v: &DVector<f64>| state_row(v, 0);
         let base =
             Output::linear(RowDVector::zeros(2 * case.modes), 1).with_tone(0, case.alpha2, 0.0);
@@ -163,23 +198,32 @@ impl Model {
             gap.scaled(-case.alpha4).plus(-case.alpha6, &rate)
         };
         let force = vec![gap.scaled(0.0), contact_force];
-        let power = Regime::ALL
-            .map(|r| powers(case, galerkin, &system, r, &gap, &base, &force[r.index()]))
-            .into();
         Self {
             contact: vec![false, true],
             tip: displacement(&modes.tip),
             force,
-            power,
             impact_loss: 0.0,
             beam: Some(BeamOutputs {
-                modes: modes.clone(),
+                modes: Arc::clone(modes),
                 slope: displacement(&modes.tip_slope),
                 base,
             }),
             gap,
             system,
+            power: PowersOnDemand::of(galerkin),
         }
+    }
+
+    /// What feeds and drains energy; an entry a regime.
+    pub fn power(&self) -> &[Powers] {
+        self.power.known.get_or_init(|| {
+            let (Some(galerkin), Some(beam)) = (&self.power.equations, &self.beam) else {
+                return Vec::new();
+            };
+            Regime::ALL
+                .map(|regime| powers(galerkin, &self.system, regime, &self.gap, beam, &self.force))
+                .into()
+        })
     }
 
     /// Dimension of the state.
@@ -262,31 +306,34 @@ pub fn cantilever_tangent(
 /// `[[0, 1], [−M⁻¹K, −M⁻¹C]]`.
 fn companion(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> DMatrix<f64> {
     let n = stiffness.nrows();
-    let mut matrix = DMatrix::zeros(2 * n, 2 * n);
-    matrix.view_mut((0, n), (n, n)).fill_with_identity();
-    matrix.view_mut((n, 0), (n, n)).copy_from(&(-stiffness));
-    matrix.view_mut((n, n), (n, n)).copy_from(&(-damping));
-    matrix
+    DMatrix::from_fn(2 * n, 2 * n, |row, column| match (row < n, column < n) {
+        (true, _) => f64::from(u8::from(column == row + n)),
+        (false, true) => -stiffness[(row - n, column)],
+        (false, false) => -damping[(row - n, column - n)],
+    })
 }
 
 /// A generalised force as the forcing of the state equation.
 fn accelerations(force: &Forcing, solve: impl Fn(&DVector<f64>) -> DVector<f64>) -> HarmonicVector {
-    let lower = |v: &DVector<f64>| {
-        let n = v.len();
-        let mut state = DVector::zeros(2 * n);
-        state.rows_mut(n, n).copy_from(&solve(v));
-        state
-    };
-    HarmonicVector::zeros(2 * force.sine.len(), 1)
-        .with_tone(0, &lower(&force.sine), &lower(&force.cosine))
-        .with_constant(&lower(&force.constant))
+    let n = force.sine.len();
+    let (sine, cosine) = (solve(&force.sine), solve(&force.cosine));
+    let constant = solve(&force.constant);
+    let lower = |row: usize| row.checked_sub(n);
+    HarmonicVector {
+        constant: DVector::from_fn(2 * n, |row, _| lower(row).map_or(0.0, |j| constant[j])),
+        tones: vec![DVector::from_fn(2 * n, |row, _| {
+            lower(row).map_or(Complex::new(0.0, 0.0), |j| {
+                Complex::new(cosine[j], -sine[j])
+            })
+        })],
+    }
 }
 
 /// A row acting on the displacements (`block` 0) or velocities (`block` 1).
 fn state_row(v: &DVector<f64>, block: usize) -> Output {
     let n = v.len();
     let mut row = RowDVector::zeros(2 * n);
-    row.columns_mut(block * n, n).copy_from(&v.transpose());
+    row.columns_mut(block * n, n).tr_copy_from(v);
     Output::linear(row, 1)
 }
 
@@ -303,14 +350,14 @@ fn gap_output(gap: &Gap, n: usize) -> Output {
 /// through the medium, takes α3 ∫(Ẇ + ẏ)² dξ; the sample's takes α6 V̇_T². The
 /// printed Eq. (14) is a further force on the modes, whose work counts as the drive's.
 fn powers(
-    case: &Case,
     galerkin: &Galerkin,
     system: &System,
     regime: Regime,
     gap: &Output,
-    base: &Output,
-    force: &Output,
+    beam: &BeamOutputs,
+    force: &[Output],
 ) -> Powers {
+    let (case, base, force) = (&galerkin.case, &beam.base, &force[regime.index()]);
     let flow = &system.regimes()[regime.index()];
     let rate = |o: &Output| o.rate(flow.matrix(), flow.forcing(), system.drive());
     let modes = &galerkin.modes;

@@ -293,7 +293,7 @@ impl Oscillator {
             contact: vec![false, true],
             tip: tip.clone(),
             force: vec![zero, force],
-            power: vec![power(0.0, 0.0), power(contact_stiffness, contact_damping)],
+            power: vec![power(0.0, 0.0), power(contact_stiffness, contact_damping)].into(),
             impact_loss,
             beam: None,
             gap,

@@ -30,7 +30,7 @@ impl EnergyBalance {
     pub fn of(model: &Model, trajectory: &Trajectory) -> Self {
         let work = |select: fn(&crate::model::Powers) -> &[Product]| -> f64 {
             let count = model
-                .power
+                .power()
                 .iter()
                 .map(|p| select(p).len())
                 .max()
@@ -105,7 +105,7 @@ fn product_work(
 ) -> f64 {
     let zero = model.tip.scaled(0.0);
     let weighted: Vec<_> = model
-        .power
+        .power()
         .iter()
         .map(|p| {
             select(p)
@@ -114,7 +114,7 @@ fn product_work(
         })
         .collect();
     let other: Vec<_> = model
-        .power
+        .power()
         .iter()
         .map(|p| {
             select(p)
@@ -133,7 +133,7 @@ fn stored(model: &Model, trajectory: &Trajectory, segment: &Segment, time: f64) 
     let Some(state) = trajectory.state_at(time) else {
         return 0.0;
     };
-    model.power[segment.regime]
+    model.power()[segment.regime]
         .stored
         .iter()
         .map(|p| p.weight * p.a.at(drive, &state, phase) * p.b.at(drive, &state, phase))

@@ -304,9 +304,10 @@ impl Secular<'_> {
             let (mut sum, mut slope) = (0.0, 0.0);
             for (j, p) in self.tip.iter().enumerate() {
                 if j != k {
-                    let part = p * p / (self.stiffness[j] - own - c);
+                    let inverse = (self.stiffness[j] - own - c).recip();
+                    let part = p * p * inverse;
                     sum += part;
-                    slope += part / (self.stiffness[j] - own - c);
+                    slope += part * inverse;
                 }
             }
             let p2 = self.tip[k] * self.tip[k];
@@ -471,7 +472,8 @@ impl Nodes {
     fn relative_change(&self, slope: f64, constant: f64) -> f64 {
         match self {
             Self::Conjugate { node, .. } => {
-                (node * slope + constant).norm() / (2.0 * node.im * node.norm())
+                let moved = (node * slope + constant).norm_sqr() / node.norm_sqr();
+                moved.sqrt() / (2.0 * node.im)
             }
             Self::Real([near, far]) => {
                 let gap = (far - near).abs();

@@ -11,7 +11,7 @@ use nanotap_flow::{FlowError, Trajectory};
 use serde::Serialize;
 
 use crate::model::{Model, ModelError};
-use crate::observables::begins_contact;
+use crate::observables::{EnergyBalance, begins_contact, lag, virial};
 use crate::orbit::{OrbitError, OrbitOptions, orbit};
 use crate::start_box::default_box;
 use crate::strobe::Strobe;
@@ -84,6 +84,24 @@ impl BranchOptions {
             max_step: continuation.max_step,
             max_points: 20_000,
             max_branches: 64,
+        }
+    }
+
+    fn continuation(&self) -> ContinuationOptions {
+        let over = ContinuationOptions::over(self.from, self.to);
+        ContinuationOptions {
+            max_step: self.max_step,
+            initial_step: over.initial_step.min(self.max_step),
+            max_points: self.max_points,
+            ..over
+        }
+    }
+
+    fn diagram(&self) -> DiagramOptions {
+        DiagramOptions {
+            continuation: self.continuation(),
+            doublings: self.doublings,
+            max_branches: self.max_branches,
         }
     }
 }
@@ -241,6 +259,18 @@ pub struct Sight {
     pub first_harmonic: f64,
     /// Its phase behind the drive, degrees.
     pub phase: f64,
+    /// Time mean of the tip deflection.
+    pub mean_deflection: f64,
+    /// Time mean of the force of the sample on the tip.
+    pub mean_force: f64,
+    /// Greatest depth of the tip below the resting surface.
+    pub indentation: f64,
+    /// Time in contact in one drive period.
+    pub contact_time: f64,
+    /// Energy that the sample takes in one drive period.
+    pub dissipation: f64,
+    /// Mean of force times deflection, ⟨F W⟩.
+    pub virial: f64,
 }
 
 impl Sight {
@@ -251,13 +281,20 @@ impl Sight {
     pub fn of(model: &Model, orbit: &PeriodicOrbit) -> Result<Self, FlowError> {
         let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
         let trajectory = Trajectory::record(&model.system, start, orbit.period)?;
+        Ok(Self::of_recording(model, &trajectory, orbit.period))
+    }
+
+    /// Of `trajectory`, a recording of `periods` drive periods of any motion.
+    pub fn of_recording(model: &Model, trajectory: &Trajectory, periods: usize) -> Self {
         let tip = trajectory.signal(&model.tip);
         let range = |s: &nanotap_flow::trajectory::PiecewiseSignal| {
             s.range()
                 .map_or((0.0, 0.0), |(low, high)| (low.value, high.value))
         };
         let (tip_min, tip_max) = range(&tip);
-        let (_, peak) = range(&trajectory.signal_by_regime(&model.force));
+        let (gap_min, _) = range(&trajectory.signal(&model.gap));
+        let force = trajectory.signal_by_regime(&model.force);
+        let (_, peak) = range(&force);
         let contact: f64 = (0..model.contact.len())
             .filter(|&r| model.contact[r])
             .map(|r| trajectory.time_in(r))
@@ -269,17 +306,24 @@ impl Sight {
                 .filter(|e| begins_contact(model, e.from, e.to))
         };
         let first = tip.fourier(std::f64::consts::TAU / model.period());
-        Ok(Self {
+        let periods = periods as f64;
+        Self {
             tip_max,
             tip_min,
             amplitude: 0.5 * (tip_max - tip_min),
             contact_fraction: contact / trajectory.end(),
-            contacts_per_period: begins().count() as f64 / orbit.period as f64,
+            contacts_per_period: begins().count() as f64 / periods,
             peak_force: peak.max(0.0),
             impact_speed: begins().map(|e| -e.rate).fold(0.0, f64::max),
             first_harmonic: first.norm(),
-            phase: crate::observables::lag(first),
-        })
+            phase: lag(first),
+            mean_deflection: tip.mean(),
+            mean_force: force.mean(),
+            indentation: (-gap_min).max(0.0),
+            contact_time: contact / periods,
+            dissipation: EnergyBalance::sample_work(model, trajectory) / periods,
+            virial: virial(model, &force, &tip),
+        }
     }
 }
 
@@ -360,6 +404,29 @@ pub const fn kind_name(kind: BifurcationKind) -> &'static str {
     }
 }
 
+/// Follows the branches on which given orbits lie, each with its value of the parameter,
+/// both ways over the whole range; `period`, `state` and `census` of the options do not
+/// matter.
+///
+/// # Errors
+/// As [`branch`].
+pub fn branches_through(
+    subject: &Subject,
+    seeds: &[(f64, PeriodicOrbit)],
+    options: &BranchOptions,
+    control: &Control<'_>,
+) -> Result<BranchReport, BranchError> {
+    check(subject, options)?;
+    let family = Family {
+        subject: subject.clone(),
+        key: options.key,
+    };
+    let diagram = assemble_diagram(&family, seeds, &options.diagram(), control);
+    let mut report = described(subject, options, &diagram)?;
+    report.cancelled = control.is_cancelled();
+    Ok(report)
+}
+
 /// Follows branches of `subject`.
 ///
 /// # Errors
@@ -374,14 +441,7 @@ pub fn branch(
         subject: subject.clone(),
         key: options.key,
     };
-    let continuation = ContinuationOptions {
-        max_step: options.max_step,
-        initial_step: ContinuationOptions::over(options.from, options.to)
-            .initial_step
-            .min(options.max_step),
-        max_points: options.max_points,
-        ..ContinuationOptions::over(options.from, options.to)
-    };
+    let continuation = options.continuation();
     let seeds = match &options.census {
         Some(census) => census_seeds(subject, options, census, control)?,
         None => vec![(options.from, first_orbit(subject, options)?)],
@@ -410,12 +470,7 @@ pub fn branch(
             failures: Vec::new(),
         }
     } else {
-        let diagram = DiagramOptions {
-            continuation,
-            doublings: options.doublings,
-            max_branches: options.max_branches,
-        };
-        assemble_diagram(&family, &seeds, &diagram, control)
+        assemble_diagram(&family, &seeds, &options.diagram(), control)
     };
     let mut report = described(subject, options, &diagram)?;
     if let Some((key, low, high)) = options.second {

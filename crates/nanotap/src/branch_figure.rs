@@ -29,6 +29,10 @@ pub enum Shown {
     ContactFraction,
     /// Greatest force.
     PeakForce,
+    /// Energy that the sample takes in one drive period.
+    Dissipation,
+    /// Greatest depth below the resting surface.
+    Indentation,
     /// Greatest speed of approach.
     ImpactSpeed,
     /// Largest modulus of a multiplier.
@@ -48,12 +52,14 @@ impl Shown {
             Self::Phase => ("phase (°)", Kind::Number),
             Self::ContactFraction => ("part of the time in contact", Kind::Number),
             Self::PeakForce => ("greatest force", Kind::Force),
+            Self::Dissipation => ("dissipation $E_{dis}$", Kind::Energy),
+            Self::Indentation => ("indentation", Kind::Length),
             Self::ImpactSpeed => ("speed of approach", Kind::Velocity),
             Self::SpectralRadius => ("largest |$μ$|", Kind::Number),
         }
     }
 
-    fn of(self, sight: &Sight, multipliers: &[[f64; 2]]) -> f64 {
+    pub(crate) fn of(self, sight: &Sight, multipliers: &[[f64; 2]]) -> f64 {
         match self {
             Self::TipMax => sight.tip_max,
             Self::TipMin => sight.tip_min,
@@ -62,6 +68,8 @@ impl Shown {
             Self::Phase => sight.phase,
             Self::ContactFraction => sight.contact_fraction,
             Self::PeakForce => sight.peak_force,
+            Self::Dissipation => sight.dissipation,
+            Self::Indentation => sight.indentation,
             Self::ImpactSpeed => sight.impact_speed,
             Self::SpectralRadius => multipliers
                 .iter()
@@ -94,7 +102,7 @@ impl ParameterAxis {
     }
 }
 
-const MARKS: [(&str, Shape, Colour); 5] = [
+pub(crate) const MARKS: [(&str, Shape, Colour); 5] = [
     ("fold", Shape::Square, Colour::BLACK),
     ("flip", Shape::Diamond, Colour::VERMILLION),
     ("neimark-sacker", Shape::Triangle, Colour::PURPLE),
@@ -209,7 +217,7 @@ fn branches_panel(
 }
 
 /// Stretches of one stability, each beginning where the last one ended.
-fn runs<'a>(points: &[&'a PointReport]) -> Vec<(bool, Vec<&'a PointReport>)> {
+pub(crate) fn runs<'a>(points: &[&'a PointReport]) -> Vec<(bool, Vec<&'a PointReport>)> {
     let mut runs: Vec<(bool, Vec<&'a PointReport>)> = Vec::new();
     for &p in points {
         match runs.last_mut() {
@@ -223,7 +231,7 @@ fn runs<'a>(points: &[&'a PointReport]) -> Vec<(bool, Vec<&'a PointReport>)> {
     runs
 }
 
-fn word(kind: &str) -> &'static str {
+pub(crate) fn word(kind: &str) -> &'static str {
     match kind {
         "fold" => "fold",
         "flip" => "period doubling",

@@ -13,6 +13,7 @@ pub mod case_file;
 pub mod convergence;
 pub mod dataset;
 pub mod exact_beam;
+pub mod experiment;
 pub mod fixed_step_run;
 pub mod galerkin;
 pub mod lyapunov;

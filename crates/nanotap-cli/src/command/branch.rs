@@ -101,6 +101,8 @@ enum Show {
     Phase,
     ContactFraction,
     PeakForce,
+    Dissipation,
+    Indentation,
     ImpactSpeed,
     /// Largest modulus of a multiplier
     SpectralRadius,
@@ -116,6 +118,8 @@ impl From<Show> for Shown {
             Show::Phase => Self::Phase,
             Show::ContactFraction => Self::ContactFraction,
             Show::PeakForce => Self::PeakForce,
+            Show::Dissipation => Self::Dissipation,
+            Show::Indentation => Self::Indentation,
             Show::ImpactSpeed => Self::ImpactSpeed,
             Show::SpectralRadius => Self::SpectralRadius,
         }
@@ -257,7 +261,8 @@ fn axis(studied: &Studied, key: Key, size: f64) -> ParameterAxis {
 fn csv(report: &BranchReport, names: &[String]) -> String {
     let mut csv = format!(
         "branch,kind,period,{},stable,spectral_radius,tip_max,tip_min,amplitude,contact_fraction,\
-         contacts_per_period,peak_force,impact_speed,first_harmonic,phase,{}\n",
+         contacts_per_period,peak_force,impact_speed,first_harmonic,phase,mean_deflection,mean_force,\
+         indentation,contact_time,dissipation,virial,{}\n",
         report.parameter,
         names.join(",")
     );
@@ -265,7 +270,7 @@ fn csv(report: &BranchReport, names: &[String]) -> String {
         let s = &p.sight;
         let _ = write!(
             csv,
-            "{branch},{kind},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{branch},{kind},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.period,
             p.parameter,
             p.stable,
@@ -278,7 +283,13 @@ fn csv(report: &BranchReport, names: &[String]) -> String {
             s.peak_force,
             s.impact_speed,
             s.first_harmonic,
-            s.phase
+            s.phase,
+            s.mean_deflection,
+            s.mean_force,
+            s.indentation,
+            s.contact_time,
+            s.dissipation,
+            s.virial
         );
         for value in &p.state {
             let _ = write!(csv, ",{value}");

@@ -1,5 +1,6 @@
 //! The commands, one a file.
 
+mod approach;
 mod attractors;
 mod basin;
 mod branch;
@@ -39,6 +40,8 @@ pub(crate) enum Command {
     Attractors(attractors::Arguments),
     /// Periodic orbits followed in a parameter, stable and unstable
     Branch(branch::Arguments),
+    /// Amplitude, phase, force and energy against the distance, both ways
+    Approach(approach::Arguments),
     /// How the motion changes with one or two parameters, from any number of starts
     Sweep(sweep::Arguments),
     /// Basins of attraction on a slice of initial states
@@ -62,6 +65,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Orbit(arguments) => orbit::run(arguments, output),
         Command::Attractors(arguments) => attractors::run(arguments, output),
         Command::Branch(arguments) => branch::run(arguments, output),
+        Command::Approach(arguments) => approach::run(arguments, output),
         Command::Sweep(arguments) => sweep::run(arguments, output),
         Command::Basin(arguments) => basin::run(arguments, output),
         Command::Merge(arguments) => merge::run(arguments, output),

@@ -3,6 +3,7 @@
 mod branches;
 mod case;
 mod existing_motions;
+mod experiments;
 mod modes;
 mod motions;
 mod paper;

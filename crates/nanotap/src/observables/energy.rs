@@ -28,26 +28,10 @@ pub struct EnergyBalance {
 impl EnergyBalance {
     /// The balance of `trajectory`, a recording of `model`.
     pub fn of(model: &Model, trajectory: &Trajectory) -> Self {
-        let work = |select: fn(&crate::model::Powers) -> &[Product]| -> f64 {
-            let count = model
-                .power()
-                .iter()
-                .map(|p| select(p).len())
-                .max()
-                .unwrap_or(0);
-            (0..count)
-                .map(|i| product_work(model, trajectory, select, i))
-                .sum()
-        };
+        let work = |select| work(model, trajectory, select);
         let drive_work = work(|p| &p.drive);
         let beam_damping = work(|p| &p.beam);
-        let impacts: f64 = trajectory
-            .events()
-            .iter()
-            .filter(|e| e.from == 0)
-            .map(|e| e.rate * e.rate)
-            .sum();
-        let sample_damping = work(|p| &p.sample) + model.impact_loss * impacts;
+        let sample_damping = Self::sample_work(model, trajectory);
         let ends = trajectory
             .segments()
             .first()
@@ -61,6 +45,17 @@ impl EnergyBalance {
         // Signed works cancel; the damping and the stored energy say how much moved.
         let moved = drive_work.abs() + beam_damping + sample_damping + (end - start).abs();
         Self::closed(drive_work, beam_damping, sample_damping, end - start, moved)
+    }
+
+    /// What the sample alone takes: its damping, and the impacts of a rigid stop.
+    pub fn sample_work(model: &Model, trajectory: &Trajectory) -> f64 {
+        let impacts: f64 = trajectory
+            .events()
+            .iter()
+            .filter(|e| e.from == 0)
+            .map(|e| e.rate * e.rate)
+            .sum();
+        work(model, trajectory, |p| &p.sample) + model.impact_loss * impacts
     }
 
     fn closed(
@@ -93,6 +88,23 @@ impl EnergyBalance {
             self.moved + next.moved,
         )
     }
+}
+
+/// The integral of a sum of products.
+fn work(
+    model: &Model,
+    trajectory: &Trajectory,
+    select: fn(&crate::model::Powers) -> &[Product],
+) -> f64 {
+    let count = model
+        .power()
+        .iter()
+        .map(|p| select(p).len())
+        .max()
+        .unwrap_or(0);
+    (0..count)
+        .map(|i| product_work(model, trajectory, select, i))
+        .sum()
 }
 
 /// The integral of the `i`-th product of a sum, which may differ from regime to regime

@@ -37,6 +37,7 @@ pub use error::SweepError;
 pub use follow::Follow;
 pub use over::{Over, OverError, Spacing, SweepKey};
 pub use run::Starts;
+pub(crate) use run::nearest;
 pub use summary::Summary;
 
 use nanotap_dynamics::{Control, LyapunovOptions, SettleOptions};

@@ -298,7 +298,7 @@ impl<'a> Runner<'a> {
 }
 
 /// The state of the orbit that is nearest to `state`.
-fn nearest<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> &'a [f64] {
+pub(crate) fn nearest<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> &'a [f64] {
     let distance = |x: &Vec<f64>| {
         x.iter()
             .zip(state)

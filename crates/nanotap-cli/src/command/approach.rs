@@ -1,0 +1,329 @@
+//! `nanotap approach`: amplitude, phase, force and energy against the distance, both ways.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use nanotap::branch::Sight;
+use nanotap::experiment::approach::{
+    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, approach, gap_key,
+};
+use nanotap::experiment::approach_figure;
+use nanotap::physical::Kind;
+use nanotap::physical::quantity::format_electronvolts;
+use nanotap::studied::ParameterUnit;
+use serde::Serialize;
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::studied::Studied;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{file, motion, number, progress, style};
+
+/// Amplitude, phase, force and energy against the distance to the sample, both ways, with the
+/// branches that coexist.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
+    /// times what the free tip swings towards the sample
+    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
+    from: Option<String>,
+
+    /// Distance at which to turn back; without it, 0
+    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
+    to: Option<String>,
+
+    /// Distances each way
+    #[arg(long, value_name = "P", default_value_t = 80)]
+    points: usize,
+
+    /// Only follow the motion: continue no branches
+    #[arg(long)]
+    no_branches: bool,
+
+    /// Doublings of branches to follow
+    #[arg(long, value_name = "DEPTH", default_value_t = 1)]
+    switch: usize,
+
+    /// Longest period looked for
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    max_period: usize,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    /// The table, if it was written to a file.
+    path: Option<PathBuf>,
+    #[serde(flatten)]
+    report: &'a ApproachReport,
+    /// Of a physical case: what a distance is to be multiplied with for SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameter_unit: Option<ParameterUnit>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if let Some(path) = &arguments.out.out {
+        file::ending(path, &["csv"])?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        file::ending(path, &["svg", "png", "pdf"])?;
+    }
+    let studied = Studied::of(&arguments.case, output)?;
+    let key = gap_key(&studied.subject);
+    let distance = |option: &str, given: &Option<String>| {
+        given
+            .as_ref()
+            .map(|text| studied.value(key, option, text))
+            .transpose()
+    };
+    let options = ApproachOptions {
+        from: distance("--from", &arguments.from)?,
+        to: distance("--to", &arguments.to)?,
+        points: arguments.points,
+        branches: !arguments.no_branches,
+        doublings: arguments.switch,
+        max_period: arguments.max_period,
+        ..ApproachOptions::default()
+    };
+    let report = progress::watched(output, "distances", |control| {
+        arguments
+            .threads
+            .install(|| approach(&studied, &options, control))
+    })???;
+    if report.cancelled {
+        output.warning("stopped before it was done");
+    }
+    if let Some(path) = &arguments.out.out {
+        file::write(path, csv(&report).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        approach_figure(&report, &studied.units()).write(path)?;
+    }
+    let document = Document {
+        path: arguments.out.out.clone(),
+        report: &report,
+        parameter_unit: studied.parameter_unit(key),
+    };
+    output.result(&document, |_| text(&studied, &report))
+}
+
+/// A row a distance, there and back; of a physical case the SI columns follow.
+fn csv(report: &ApproachReport) -> String {
+    let mut csv = format!(
+        "way,{},classification,period,spectral_radius,first_harmonic,phase,amplitude,mean_deflection,\
+         peak_force,mean_force,indentation,contact_time,dissipation,virial",
+        report.parameter
+    );
+    let physical = report.table.iter().any(|p| p.zc.is_some());
+    if physical {
+        csv.push_str(
+            ",zc_m,A_m,A_ratio,amplitude_m,mean_deflection_m,F_max_N,mean_force_N,indentation_m,\
+             contact_time_s,E_dis_J,E_dis_eV,virial_J",
+        );
+    }
+    csv.push('\n');
+    for p in &report.table {
+        let of = |value: fn(&Sight) -> f64| p.sight.as_ref().map(value);
+        let mut row = vec![
+            p.spectral_radius,
+            of(|s| s.first_harmonic),
+            of(|s| s.phase),
+            of(|s| s.amplitude),
+            of(|s| s.mean_deflection),
+            of(|s| s.peak_force),
+            of(|s| s.mean_force),
+            of(|s| s.indentation),
+            of(|s| s.contact_time),
+            of(|s| s.dissipation),
+            of(|s| s.virial),
+        ];
+        if physical {
+            let si = p.physical.as_ref();
+            row.push(p.zc);
+            row.extend([
+                si.map(|s| s.first_harmonic),
+                si.map(|s| s.amplitude_ratio),
+                si.map(|s| s.amplitude),
+                si.map(|s| s.mean_deflection),
+                si.map(|s| s.peak_force),
+                si.map(|s| s.mean_force),
+                si.map(|s| s.indentation),
+                si.map(|s| s.contact_time),
+                si.map(|s| s.dissipation),
+                si.map(|s| s.dissipation_ev),
+                si.map(|s| s.virial),
+            ]);
+        }
+        let period = p.period.map_or_else(String::new, |n| n.to_string());
+        let _ = write!(
+            csv,
+            "{},{},{},{period}",
+            p.way.name(),
+            p.gap,
+            p.classification.name()
+        );
+        for value in row {
+            csv.push(',');
+            if let Some(value) = value {
+                let _ = write!(csv, "{value}");
+            }
+        }
+        csv.push('\n');
+    }
+    csv
+}
+
+/// Rows of the table that a terminal shows of each way.
+const SHOWN: usize = 16;
+
+fn text(studied: &Studied, report: &ApproachReport) -> String {
+    let units = studied.units();
+    let shown = |kind: Kind, value: f64| {
+        units.si(kind).map_or_else(
+            || number::significant(value, 5),
+            |unit| kind.format(unit * value),
+        )
+    };
+    let heading = format!(
+        "{}: {}, distances from {} to {} and back",
+        studied.title,
+        studied.summary(),
+        shown(Kind::Length, report.from),
+        shown(Kind::Length, report.to)
+    );
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    text.push_str(&motion::paragraph(&format!(
+        "free: amplitude {}, {}° behind the drive; it touches from {} on",
+        shown(Kind::Length, report.free_amplitude),
+        number::significant(report.free_phase, 4),
+        shown(Kind::Length, report.free_reach)
+    )));
+    let mut table = Table::new([
+        ("way", Align::Left),
+        ("distance", Align::Right),
+        ("motion", Align::Left),
+        ("A", Align::Right),
+        ("A/A0", Align::Point),
+        ("phase (°)", Align::Point),
+        ("E_dis", Align::Right),
+        ("F_max", Align::Right),
+        ("contact (%)", Align::Point),
+    ]);
+    let step = (report.table.len() / (2 * SHOWN)).max(1);
+    let row = |p: &ApproachPoint| {
+        let what = p.period.map_or_else(
+            || p.classification.name().to_owned(),
+            |n| format!("period {n}"),
+        );
+        let of =
+            |value: &dyn Fn(&Sight) -> String| p.sight.as_ref().map_or_else(String::new, value);
+        [
+            p.way.name().to_owned(),
+            shown(Kind::Length, p.gap),
+            what,
+            of(&|s| shown(Kind::Length, s.first_harmonic)),
+            of(&|s| number::significant(s.first_harmonic / report.free_amplitude, 4)),
+            of(&|s| number::significant(s.phase, 4)),
+            of(&|s| {
+                units.si(Kind::Energy).map_or_else(
+                    || number::significant(s.dissipation, 4),
+                    |unit| format_electronvolts(unit * s.dissipation),
+                )
+            }),
+            of(&|s| shown(Kind::Force, s.peak_force)),
+            of(&|s| number::significant(100.0 * s.contact_fraction, 3)),
+        ]
+    };
+    for p in report.table.iter().step_by(step) {
+        table.row(row(p));
+    }
+    text.push_str(&table.render());
+    if step > 1 {
+        let _ = writeln!(
+            text,
+            "  every {step}th of {} (--out writes all)",
+            report.table.len()
+        );
+    }
+    text.push('\n');
+    if report.hysteresis.is_empty() {
+        text.push_str("  both ways show the same motions\n");
+    }
+    for interval in &report.hysteresis {
+        text.push_str(&motion::paragraph(&format!(
+            "hysteresis from {} to {}: the amplitudes of the two ways differ by up to {}",
+            shown(Kind::Length, interval.near),
+            shown(Kind::Length, interval.far),
+            shown(Kind::Length, interval.difference)
+        )));
+    }
+    if !report.returned && !report.cancelled {
+        text.push_str(&motion::paragraph(
+            "the way back does not end in the motion with which the way there began: begin farther \
+             away, with --from",
+        ));
+    }
+    if let Some(branches) = &report.branches
+        && !branches.bifurcations.is_empty()
+    {
+        let _ = writeln!(text, "\n  {}", style::bold("bifurcations of the branches"));
+        let mut table = Table::new([
+            ("", Align::Left),
+            ("distance", Align::Right),
+            ("period", Align::Right),
+            ("A", Align::Right),
+            ("phase (°)", Align::Point),
+        ]);
+        for b in &branches.bifurcations {
+            table.row([
+                b.kind.to_owned(),
+                shown(Kind::Length, b.parameter),
+                b.period.to_string(),
+                shown(Kind::Length, b.sight.first_harmonic),
+                number::significant(b.sight.phase, 4),
+            ]);
+        }
+        text.push_str(&table.render());
+    }
+    for p in report.table.iter().filter(|p| p.reason.is_some()).take(2) {
+        text.push_str(&motion::paragraph(&format!(
+            "{} at {}: {}",
+            p.classification.name(),
+            shown(Kind::Length, p.gap),
+            p.reason.as_deref().unwrap_or_default()
+        )));
+    }
+    text
+}
+
+impl From<ApproachError> for Failure {
+    fn from(error: ApproachError) -> Self {
+        match error {
+            ApproachError::Points { .. } => Self::request(error.to_string(), "give --points 80"),
+            ApproachError::Range { .. } => {
+                Self::request(error.to_string(), "change --from or --to")
+            }
+            ApproachError::NoDrive => {
+                Self::request(error.to_string(), "give --from, or drive the lever")
+            }
+            ApproachError::NoPeriod | ApproachError::NoPeriods => {
+                Self::request(error.to_string(), "give --max-period 1 or more")
+            }
+            ApproachError::Model(error) => error.into(),
+            ApproachError::Branch(error) => error.into(),
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Approach curves.
+
+use nanotap::case::Case;
+use nanotap::case_file::{CaseFile, Source};
+use nanotap::control::Control;
+use nanotap::experiment::approach::{ApproachOptions, ApproachReport, Way, approach};
+use nanotap::physical::Catalogue;
+use nanotap::simulate::Classification;
+use nanotap::studied::Studied;
+
+/// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
+pub(crate) const STIFF: &str = "\
+[model]
+modes = 2
+[cantilever]
+lever = \"PPP-NCHR\"
+Q = 400
+[tip]
+radius = \"10 nm\"
+[sample]
+material = \"polystyrene\"
+loss_tangent = 0.1
+[drive]
+frequency_ratio = 1.001
+free_amplitude = \"20 nm\"
+[gap]
+tip = \"15 nm\"
+";
+
+pub(crate) fn studied(text: &str, set: &[&str]) -> Studied {
+    let source = Source {
+        name: "case.toml".into(),
+        text: text.into(),
+    };
+    let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
+    let file = CaseFile::parse(Some(source), &set).unwrap();
+    Studied::resolve("case".into(), file, &Catalogue::builtin().unwrap()).unwrap()
+}
+
+fn curve(studied: &Studied, options: &ApproachOptions) -> ApproachReport {
+    approach(studied, options, &Control::default()).unwrap()
+}
+
+/// The free motion stays until its tip touches at its reach, and not a step before; on the
+/// way back the tapping motion stays until its fold, which lies beyond. Between the two both
+/// attract, and their difference is the hysteresis.
+#[test]
+fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
+    let lever = studied(STIFF, &[]);
+    let report = curve(&lever, &ApproachOptions::default());
+    assert!(report.returned);
+    let branches = report.branches.as_ref().unwrap();
+    let fold = branches
+        .bifurcations
+        .iter()
+        .filter(|b| b.kind == "fold")
+        .map(|b| b.parameter)
+        .fold(0.0, f64::max);
+    assert!(fold > 1.1 * report.free_reach, "{fold}");
+    let step = (report.from - report.to) / 79.0;
+    for p in &report.table {
+        let sight = p.sight.as_ref().unwrap();
+        let taps = sight.contact_fraction > 0.0;
+        let expected = match p.way {
+            Way::Approach => p.gap < report.free_reach,
+            Way::Retract => p.gap < fold,
+        };
+        assert_eq!(taps, expected, "{:?} at {}", p.way, p.gap);
+        if !taps {
+            assert!((sight.first_harmonic / report.free_amplitude - 1.0).abs() < 1e-9);
+        }
+    }
+    let [interval] = report.hysteresis[..] else {
+        panic!("{:?}", report.hysteresis);
+    };
+    assert!(interval.near - report.free_reach < step && fold - interval.far < step);
+    // Every motion that was met lies on a branch that was followed: between two points of it.
+    let stable = |gap: f64, amplitude: f64| {
+        branches.points.windows(2).any(|pair| {
+            let (a, b) = (&pair[0], &pair[1]);
+            let t = (gap - a.parameter) / (b.parameter - a.parameter);
+            let between =
+                a.sight.first_harmonic + t * (b.sight.first_harmonic - a.sight.first_harmonic);
+            (0.0..=1.0).contains(&t) && (between / amplitude - 1.0).abs() < 1e-2
+        })
+    };
+    for p in &report.table {
+        let amplitude = p.sight.as_ref().unwrap().first_harmonic;
+        assert!(stable(p.gap, amplitude), "{:?} {}", p.way, p.gap);
+    }
+}
+
+/// SI columns are the model's columns times the units of the case.
+#[test]
+fn a_physical_curve_is_told_in_si() {
+    let lever = studied(STIFF, &[]);
+    let options = ApproachOptions {
+        points: 12,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let report = curve(&lever, &options);
+    let resolved = lever.resolved.as_ref().unwrap();
+    assert!((report.free_amplitude * resolved.scales.length / 20e-9 - 1.0).abs() < 1e-9);
+    for p in &report.table {
+        let (sight, si) = (p.sight.as_ref().unwrap(), p.physical.as_ref().unwrap());
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
+        assert!(near(p.zc.unwrap(), p.gap * resolved.scales.length));
+        assert!(near(
+            si.first_harmonic,
+            sight.first_harmonic * resolved.scales.length
+        ));
+        assert!(near(si.amplitude_ratio, si.first_harmonic / 20e-9));
+        assert!(near(
+            si.peak_force,
+            sight.peak_force * resolved.scales.length * 42.0 / 3.0
+        ));
+    }
+}
+
+/// In the paper's case at Ω = 2.6 the motion is one chaotic band for a range of distances
+/// that includes 0 (see the report of `nanotap paper`): it is named so and described by a
+/// recording.
+#[test]
+fn what_is_chaotic_is_called_so() {
+    let paper = Studied::resolve(
+        "paper".into(),
+        CaseFile::Dimensionless(Case::paper()),
+        &Catalogue::builtin().unwrap(),
+    )
+    .unwrap();
+    let options = ApproachOptions {
+        points: 4,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let report = curve(&paper, &options);
+    let at_zero = report.table.iter().filter(|p| p.gap == 0.0);
+    for p in at_zero {
+        assert_eq!(p.classification, Classification::Chaotic);
+        assert!(p.period.is_none() && p.sight.unwrap().contact_fraction > 0.0);
+    }
+    assert_eq!(report.table.len(), 8);
+}
+
+/// What makes no curve is refused.
+#[test]
+fn senseless_curves_are_refused() {
+    let lever = studied(STIFF, &[]);
+    let refused = |options: ApproachOptions, words: &str| {
+        let error = approach(&lever, &options, &Control::default()).unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let plain = ApproachOptions::default;
+    refused(
+        ApproachOptions {
+            points: 1,
+            ..plain()
+        },
+        "at least 2",
+    );
+    refused(
+        ApproachOptions {
+            periods: 0,
+            ..plain()
+        },
+        "at least one period",
+    );
+    refused(
+        ApproachOptions {
+            max_period: 0,
+            ..plain()
+        },
+        "at least 1",
+    );
+    for (from, to) in [
+        (0.0, 1.0),
+        (1.0, 1.0),
+        (f64::NAN, 0.0),
+        (f64::INFINITY, 0.0),
+    ] {
+        let options = ApproachOptions {
+            from: Some(from),
+            to: Some(to),
+            ..plain()
+        };
+        refused(options, "from far to near");
+    }
+    let still = studied(STIFF, &["drive.free_amplitude=0 nm"]);
+    let error = approach(&still, &plain(), &Control::default()).unwrap_err();
+    assert!(error.to_string().contains("does not move"), "{error}");
+}

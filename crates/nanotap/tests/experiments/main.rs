@@ -1,0 +1,3 @@
+//! Experiments against closed forms, invariants and independent methods.
+
+mod approach;

@@ -4,6 +4,7 @@
 //! comes, and counts what passed. A failed step does not stop the next one: one
 //! run tells everything that is wrong.
 
+mod peers;
 mod process;
 mod steps;
 mod tally;
@@ -24,6 +25,13 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Ok(Selection::Run(steps)) => run(&steps),
+        Ok(Selection::Peers(options)) => match peers::run(&Workspace::find(), &options) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(reason) => {
+                eprintln!("error: {reason}");
+                ExitCode::FAILURE
+            }
+        },
         Err(message) => {
             eprintln!("error: {message}\n");
             eprint!("{}", usage());
@@ -36,11 +44,16 @@ fn main() -> ExitCode {
 enum Selection {
     Help,
     Run(Vec<&'static Step>),
+    /// The comparison with other solvers, with its own options.
+    Peers(Vec<String>),
 }
 
 fn select(arguments: &[String]) -> Result<Selection, String> {
     if arguments.is_empty() {
         return Err("name at least one chore".into());
+    }
+    if arguments[0] == "peers" {
+        return Ok(Selection::Peers(arguments[1..].to_vec()));
     }
     let mut selected = Vec::new();
     for argument in arguments {
@@ -64,6 +77,8 @@ fn usage() -> String {
     for step in STEPS {
         let _ = writeln!(text, "  {:<10}  {}", step.name, step.about);
     }
+    text +=
+        "\n  peers       nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
     text
 }
 

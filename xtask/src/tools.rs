@@ -7,6 +7,9 @@ use std::process::Command;
 
 use crate::process;
 
+/// The Python of this machine.
+pub(crate) const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
+
 /// The checkout and the cargo that runs it.
 pub(crate) struct Workspace {
     pub(crate) root: PathBuf,
@@ -30,6 +33,17 @@ impl Workspace {
         let mut command = Command::new(&self.cargo);
         command.args(arguments);
         command
+    }
+
+    /// The cargo that runs this.
+    pub(crate) fn cargo_program(&self) -> &OsString {
+        &self.cargo
+    }
+
+    /// Where cargo builds.
+    pub(crate) fn target(&self) -> PathBuf {
+        std::env::var_os("CARGO_TARGET_DIR")
+            .map_or_else(|| self.root.join("target"), |path| self.root.join(path))
     }
 
     /// Is `cargo NAME` there?
@@ -71,10 +85,9 @@ impl Workspace {
         if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
             return Ok(());
         }
-        let python = if cfg!(windows) { "python" } else { "python3" };
         let created = process::succeeds(
             &self.root,
-            Command::new(python).args(["-m", "venv", ".venv"]),
+            Command::new(PYTHON).args(["-m", "venv", ".venv"]),
         )?;
         if !created {
             return Err("python3 -m venv .venv failed".into());

@@ -1,0 +1,1 @@
+"""Runs the peers and tells what they cost; see peers/README.md."""

@@ -1,0 +1,163 @@
+"""The table, the plot and the machine-readable result."""
+
+import json
+from pathlib import Path
+
+from .compare import Row, as_json
+
+# Colours that are told apart with every kind of colour vision (Okabe and Ito).
+COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
+MARKERS = "osD^vPX"
+STYLES = ["-", "--", ":"]
+
+
+def number(value: float | None) -> str:
+    """Two significant digits below a hundred, three above."""
+    if value is None:
+        return "–"
+    if value < 100:
+        return f"{value:.2g}"
+    return f"{round(value, 3 - len(str(int(value)))):,.0f}"
+
+
+def error(value: float | None) -> str:
+    return "–" if value is None else f"{value:.0e}".replace("e-0", "e-")
+
+
+def table(rows: list[Row], threads: list[int]) -> str:
+    """A Markdown table."""
+    head = ["peer", "setting", "error", "20 periods, ms", "periods a second"]
+    for work in ("sweep", "basin"):
+        head += [f"{work}, s" + (f" ({n} threads)" if n > 1 else "") for n in threads]
+    lines = [" | ".join(["", *head, ""]).strip()]
+    lines.append("|" + "---|" * 2 + "---:|" * (len(head) - 2))
+    for row in rows:
+        unit = " steps" if row.fixed_step else ""
+        setting = "–" if row.setting is None else f"{row.setting:g}{unit}"
+        cells = [
+            f"**{row.name}**" if row.name.startswith("nanotap") else row.name,
+            setting,
+            error(row.error),
+            number(row.first_seconds and 1e3 * row.first_seconds),
+            number(row.periods_per_second),
+        ]
+        for work, seconds in (
+            ("sweep", row.sweep_seconds),
+            ("basin", row.basin_seconds),
+        ):
+            mark = " ¹" if work in row.told_from_long else ""
+            cells += [
+                number(seconds[n]) + mark if n in seconds else "–" for n in threads
+            ]
+        lines.append(" | ".join(["", *cells, ""]).strip())
+    return "\n".join(lines)
+
+
+def page(result: dict, rows: list[Row], threads: list[int], plot: bool) -> str:
+    """The Markdown page."""
+    machine, versions = result["machine"], result["versions"]
+    vectors = machine["vector_registers"]
+    lines = [
+        "# nanotap beside general solvers",
+        "",
+        "<!-- Written by `cargo xtask peers`; edit peers/driver/report.py instead. -->",
+        "",
+        "The same work by nanotap and by the solvers that one would reach for otherwise,",
+        "measured in one run of `cargo xtask peers` (`peers/README.md` says who takes",
+        "part and how). All of it is the paper's cantilever with three modes, α1 = 0.1:",
+        "",
+        "- **20 periods**: the first 20 drive periods from rest at Ω = 2.6, 46 switches.",
+        "  The error is the largest in any entry of the state after 5, 10 and 20 periods,",
+        "  against a 50-digit reference. The motion is chaotic: errors grow by 240 in 20",
+        "  periods.",
+        "- **periods a second**: as many of 2000 such periods as fit into the time given.",
+        "- **sweep**: Ω from 2 to 4 in 400 values by 8 starts, 500 periods each, the",
+        "  states of the last 100 kept: 1.6 million periods.",
+        "- **basin**: 200 by 200 starts at Ω = 2.6, 300 periods each: 12 million periods.",
+        "",
+        "For each peer stands the cheapest setting with an error of at most 1e-9, or of",
+        "1e-6 where it does not reach that, or else its best. Sweeps and basins are",
+        "evenly spread samples, extrapolated. Times are of the processor on one thread,",
+        "of the wall on several; compilation and start-up are not counted.",
+        "",
+        table(rows, threads),
+        "",
+    ]
+    if any(row.told_from_long for row in rows):
+        lines += [
+            "¹ told from the periods a second: one run alone took longer than its time.",
+            "",
+        ]
+    if plot:
+        lines += ["![Error against time](peers.svg)", ""]
+    lines += [
+        "## Measured with",
+        "",
+        f"{machine['processor']}, {machine['cores']} cores"
+        + (f", {vectors}" if vectors else "")
+        + f", {machine['system']}. "
+        + ", ".join(f"{name} {version}" for name, version in versions.items())
+        + ".",
+        "",
+    ]
+    if result["missing"]:
+        lines += ["Left out, because this machine lacks something:", ""]
+        lines += [f"- {name}: {why}" for name, why in result["missing"].items()]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def draw(rows: list[Row], path: Path) -> bool:
+    """The plot of error against time; False where there is no Matplotlib."""
+    try:
+        import matplotlib
+    except ImportError:
+        return False
+    matplotlib.use("svg")
+    import matplotlib.pyplot as plt
+
+    # The same measurements give the same bytes.
+    plt.rcParams.update({"svg.hashsalt": "peers", "font.size": 8})
+    figure, axes = plt.subplots(figsize=(7.2, 4.4), layout="constrained")
+    others = 0
+    for row in rows:
+        times = [1e3 * rung["seconds"] for rung in row.ladder]
+        errors = [rung["error"] for rung in row.ladder]
+        if row.name.startswith("nanotap"):
+            axes.plot(times, errors, "k*", markersize=13, label=row.name, zorder=3)
+            continue
+        axes.plot(
+            times,
+            errors,
+            color=COLOURS[others % len(COLOURS)],
+            marker=MARKERS[others % len(MARKERS)],
+            linestyle=STYLES[others // len(COLOURS)],
+            markersize=4,
+            linewidth=1,
+            label=row.name,
+        )
+        others += 1
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="time for the first 20 drive periods (ms)",
+        ylabel="largest error of the state",
+    )
+    axes.grid(which="major", linewidth=0.3, color="#cccccc")
+    figure.legend(loc="outside right upper", frameon=False)
+    figure.savefig(path, metadata={"Date": None})
+    plt.close(figure)
+    return True
+
+
+def write(result: dict, rows: list[Row], threads: list[int], to: Path) -> None:
+    """Everything into one folder."""
+    to.mkdir(parents=True, exist_ok=True)
+    plot = draw(rows, to / "peers.svg")
+    result = {**result, "rows": as_json(rows)}
+    (to / "peers.json").write_text(json.dumps(result, indent=1) + "\n")
+    (to / "peers.md").write_text(page(result, rows, threads, plot))
+    print(table(rows, threads))
+    print(
+        f"\nwritten: {to / 'peers.md'}" + ("" if plot else " (no plot: no Matplotlib)")
+    )

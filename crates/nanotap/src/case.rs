@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::beam::{MAX_MODES, ModeCountError};
+use crate::contact::ContactLaw;
 use crate::parameter::Parameter;
 
 /// Which cosine term the drive has in Eq. (14) of the paper.
@@ -41,6 +42,13 @@ pub struct Case {
     pub omega: f64,
     /// Which form of Eq. (14) drives the beam.
     pub cosine_term: CosineTerm,
+    /// How the sample answers the tip.
+    pub contact: ContactLaw,
+    /// Stiffness of the standard linear solid's relaxing arm over bending stiffness, ≥ 0;
+    /// 0 with every other law.
+    pub relaxation_stiffness: f64,
+    /// Time in which that arm's force decays, ≥ 0; 0 with every other law.
+    pub relaxation_time: f64,
 }
 
 /// Largest size of α1 … α6. Beyond it a number is a slip (a value in SI units, say),
@@ -62,6 +70,9 @@ impl Case {
             alpha6: 0.2,
             omega: 2.6,
             cosine_term: CosineTerm::Corrected,
+            contact: ContactLaw::SpringDamper,
+            relaxation_stiffness: 0.0,
+            relaxation_time: 0.0,
         }
     }
 
@@ -77,6 +88,9 @@ impl Case {
             alpha6: 0.0,
             omega: 4.1,
             cosine_term: CosineTerm::Corrected,
+            contact: ContactLaw::SpringDamper,
+            relaxation_stiffness: 0.0,
+            relaxation_time: 0.0,
         }
     }
 
@@ -90,6 +104,8 @@ impl Case {
             Parameter::Alpha5 => self.alpha5,
             Parameter::Alpha6 => self.alpha6,
             Parameter::Omega => self.omega,
+            Parameter::RelaxationStiffness => self.relaxation_stiffness,
+            Parameter::RelaxationTime => self.relaxation_time,
         }
     }
 
@@ -104,6 +120,8 @@ impl Case {
             Parameter::Alpha5 => &mut self.alpha5,
             Parameter::Alpha6 => &mut self.alpha6,
             Parameter::Omega => &mut self.omega,
+            Parameter::RelaxationStiffness => &mut self.relaxation_stiffness,
+            Parameter::RelaxationTime => &mut self.relaxation_time,
         } = value;
         self
     }
@@ -115,9 +133,33 @@ impl Case {
         self
     }
 
+    /// The parameters that this case has: the paper's (without α6 where the damper is the
+    /// relaxing arm's) and those of its contact law.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let of_solid = self.contact == ContactLaw::StandardLinearSolid;
+        Parameter::every()
+            .filter(|parameter| match parameter {
+                Parameter::Alpha6 => !of_solid,
+                Parameter::RelaxationStiffness | Parameter::RelaxationTime => of_solid,
+                _ => true,
+            })
+            .collect()
+    }
+
     /// The period of the drive, 2π/Ω.
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
+    }
+
+    /// What is wrong with a value of a parameter that this case does not have.
+    pub(crate) fn misplaced(&self, parameter: Parameter) -> Option<Reason> {
+        if self.get(parameter) == 0.0 || self.parameters().contains(&parameter) {
+            return None;
+        }
+        Some(match parameter {
+            Parameter::Alpha6 => Reason::DamperOfSolid,
+            _ => Reason::NoSolid,
+        })
     }
 
     /// Checks every field.
@@ -129,8 +171,16 @@ impl Case {
         if !(1..=MAX_MODES).contains(&self.modes) {
             return Err(ModeCountError { given: self.modes }.into());
         }
-        for parameter in Parameter::ALL {
-            check(parameter, self.get(parameter))?;
+        for parameter in Parameter::every() {
+            let value = self.get(parameter);
+            check(parameter, value)?;
+            if let Some(reason) = self.misplaced(parameter) {
+                return Err(CaseError {
+                    key: parameter.name(),
+                    value,
+                    reason,
+                });
+            }
         }
         Ok(())
     }
@@ -209,6 +259,10 @@ pub enum Reason {
     FrequencyNotPositive,
     /// Ω outside 10⁻⁶ … 10⁶.
     FrequencyOutOfRange,
+    /// A damper beside a standard linear solid.
+    DamperOfSolid,
+    /// A relaxing arm of another law.
+    NoSolid,
 }
 
 impl fmt::Display for Reason {
@@ -235,6 +289,13 @@ impl fmt::Display for Reason {
                 "must lie between {:e} and {:e} (the first mode is at 3.516); \
                  is it in hertz?",
                 OMEGA_RANGE.0, OMEGA_RANGE.1
+            ),
+            Self::DamperOfSolid => formatter.write_str(
+                "must be 0 with contact = \"standard-linear-solid\", whose damper is its arm's: \
+                 relaxation_stiffness times relaxation_time",
+            ),
+            Self::NoSolid => formatter.write_str(
+                "belongs to contact = \"standard-linear-solid\"; leave it out with any other",
             ),
         }
     }

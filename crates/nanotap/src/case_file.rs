@@ -24,6 +24,7 @@ pub use physical_tables::{PHYSICAL_KEYS, PhysicalTables};
 pub use problem::{CaseFileError, Place, Problem, Source};
 
 use crate::case::{Case, CosineTerm};
+use crate::contact::ContactLaw;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::parameter::Parameter;
 use nearest::nearest;
@@ -76,12 +77,20 @@ impl CaseFile {
 pub fn to_toml(case: &Case) -> String {
     use std::fmt::Write as _;
     let mut text = format!("[model]\nmodes = {}\n", case.modes);
-    for parameter in Parameter::ALL {
+    for parameter in case.parameters() {
         let (name, value) = (parameter.name(), case.get(parameter));
         let _ = writeln!(text, "{name} = {value:?}  # {}", parameter.meaning());
     }
     if case.cosine_term == CosineTerm::Printed {
         text.push_str("cosine_term = \"printed\"\n");
+    }
+    if case.contact != ContactLaw::default() {
+        let _ = writeln!(
+            text,
+            "contact = \"{}\"  # {}",
+            case.contact,
+            case.contact.meaning()
+        );
     }
     text
 }
@@ -141,8 +150,7 @@ impl Kind {
     /// The names of the numbers that this kind takes, `modes` not among them.
     fn numbers(self) -> Vec<&'static str> {
         match self {
-            Self::Cantilever => Parameter::ALL
-                .iter()
+            Self::Cantilever => Parameter::every()
                 .map(|parameter| parameter.name())
                 .collect(),
             Self::VibroImpact | Self::Impact => OscillatorParameter::ALL
@@ -164,8 +172,9 @@ impl Kind {
         let mut keys = self.numbers();
         keys.push("kind");
         if self == Self::Cantilever {
-            keys.extend(["modes", "cosine_term"]);
-            keys.extend(Parameter::ALL.iter().map(|parameter| parameter.alias()));
+            keys.extend(["modes", "cosine_term", "contact"]);
+            let aliases = Parameter::every().map(|parameter| parameter.alias());
+            keys.extend(aliases.filter(|alias| !Parameter::every().any(|p| p.name() == *alias)));
         }
         keys
     }
@@ -181,10 +190,13 @@ impl Kind {
     }
 }
 
-/// The value of a key that need not be written.
-fn default_of(kind: Kind, key: &str) -> Option<f64> {
+/// The value of a key that need not be written, with a sample of this law.
+fn default_of(kind: Kind, law: ContactLaw, key: &str) -> Option<f64> {
+    let solid = law == ContactLaw::StandardLinearSolid;
     match (kind, key) {
         (Kind::Cantilever, "alpha5") => Some(0.0),
+        (Kind::Cantilever, "alpha6") if solid => Some(0.0),
+        (Kind::Cantilever, "relaxation_stiffness" | "relaxation_time") if !solid => Some(0.0),
         (Kind::VibroImpact | Kind::Impact, "mass") => Some(1.0),
         _ => None,
     }
@@ -231,7 +243,10 @@ fn resolve(document: &Document, problems: &mut Vec<Problem>) -> Option<CaseFile>
     let found = |name: &str| {
         known.contains_key(name) || meant.iter().any(|key| kind.canonical(key) == Some(name))
     };
-    let missing = all_placed.then(|| missing(document, kind, found)).flatten();
+    let law = contact(&known, &mut Vec::new()).unwrap_or_default();
+    let missing = all_placed
+        .then(|| missing(document, kind, law, found))
+        .flatten();
     match kind {
         Kind::Cantilever => {
             let case = cantilever(&known, problems);
@@ -499,11 +514,16 @@ fn refuse_mix(
 }
 
 /// The problem of keys that are not there, all in one.
-fn missing(document: &Document, kind: Kind, found: impl Fn(&str) -> bool) -> Option<Problem> {
+fn missing(
+    document: &Document,
+    kind: Kind,
+    law: ContactLaw,
+    found: impl Fn(&str) -> bool,
+) -> Option<Problem> {
     let missing: Vec<&str> = kind
         .numbers()
         .into_iter()
-        .filter(|name| !found(name) && default_of(kind, name).is_none())
+        .filter(|name| !found(name) && default_of(kind, law, name).is_none())
         .collect();
     if missing.is_empty() {
         return None;
@@ -544,6 +564,8 @@ fn missing(document: &Document, kind: Kind, found: impl Fn(&str) -> bool) -> Opt
 /// A sensible value to show: the paper's, or the impact oscillator of the tests.
 fn example_of(kind: Kind, name: &str) -> String {
     let number = match (kind, name.parse::<Parameter>()) {
+        (Kind::Cantilever, Ok(Parameter::RelaxationStiffness)) => 20.0,
+        (Kind::Cantilever, Ok(Parameter::RelaxationTime)) => 0.1,
         (Kind::Cantilever, Ok(parameter)) => Case::paper().get(parameter),
         _ => match name {
             "damping" | "gap" => 0.0,
@@ -630,6 +652,29 @@ fn cosine_term(
     }
 }
 
+fn contact(
+    known: &BTreeMap<&'static str, &Entry>,
+    problems: &mut Vec<Problem>,
+) -> Option<ContactLaw> {
+    let Some(entry) = known.get("contact") else {
+        return Some(ContactLaw::default());
+    };
+    let text = if let Value::Text(text) = &entry.value {
+        text.as_str()
+    } else {
+        ""
+    };
+    let law = text.parse().ok();
+    if law.is_none() {
+        problems.push(not_among(
+            entry,
+            text,
+            ContactLaw::ALL.map(ContactLaw::name).into_iter(),
+        ));
+    }
+    law
+}
+
 fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem>) -> Option<Case> {
     let (modes, cosine_term) = (modes(known, problems), cosine_term(known, problems));
     let mut case = Case {
@@ -637,9 +682,13 @@ fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem
         ..Case::paper()
     };
     let mut complete = true;
-    for parameter in Parameter::ALL {
+    let law = contact(known, problems);
+    case.contact = law.unwrap_or_default();
+    for parameter in Parameter::every() {
         let Some(entry) = known.get(parameter.name()) else {
-            complete &= default_of(Kind::Cantilever, parameter.name()).is_some();
+            let default = default_of(Kind::Cantilever, case.contact, parameter.name());
+            complete &= default.is_some();
+            case = case.with(parameter, default.unwrap_or(0.0));
             continue;
         };
         let checked = number(entry).and_then(|value| {
@@ -653,13 +702,18 @@ fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem
             Err(problem) => {
                 complete = false;
                 problems.push(problem);
+                continue;
             }
+        }
+        if let Some(reason) = case.misplaced(parameter) {
+            problems.push(out_of_range(entry, &reason.to_string()));
         }
     }
     complete.then_some(())?;
     Some(Case {
         modes: modes?,
         cosine_term: cosine_term?,
+        contact: law?,
         ..case
     })
 }
@@ -698,7 +752,10 @@ fn oscillator(
             continue;
         }
         let name = parameter.name();
-        let checked = match (known.get(name), default_of(kind, name)) {
+        let checked = match (
+            known.get(name),
+            default_of(kind, ContactLaw::default(), name),
+        ) {
             (Some(entry), _) => number(entry).and_then(|value| {
                 let alone = plain.with(parameter, value).validate();
                 alone

@@ -6,6 +6,7 @@ use crate::case::Case;
 use crate::model::{Model, ModelError};
 use crate::orbit::{OrbitOptions, OrbitReport, orbit};
 use crate::simulate::Classification;
+use crate::time_series::with_modes;
 
 /// A motion at each number of modes.
 #[derive(Clone, Debug, Serialize)]
@@ -109,11 +110,8 @@ pub fn convergence(
 /// the same motion is looked for. Only where a period was asked for or found.
 fn carried(previous: Option<&Option<OrbitReport>>, modes: usize) -> Option<Vec<f64>> {
     let previous = previous?.as_ref()?;
-    let n = modes - 1;
-    let mut state = vec![0.0; 2 * modes];
-    state[..n].copy_from_slice(&previous.state[..n]);
-    state[modes..modes + n].copy_from_slice(&previous.state[n..]);
-    Some(state)
+    let memory = previous.state.len() - 2 * (modes - 1);
+    Some(with_modes(&previous.state, memory, modes))
 }
 
 fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {

@@ -233,6 +233,8 @@ impl Coefficients {
                 contact: [0.0, -alpha2 * alpha6, 0.0],
                 ..zero
             },
+            // Of the sample's own equations only.
+            Parameter::RelaxationStiffness | Parameter::RelaxationTime => zero,
         }
     }
 
@@ -298,6 +300,7 @@ mod tests {
             alpha6: 0.41,
             omega: 3.7,
             cosine_term: CosineTerm::Corrected,
+            ..Case::paper()
         }
     }
 

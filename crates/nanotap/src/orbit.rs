@@ -1,5 +1,6 @@
 //! A periodic orbit by Newton, with its stability and what can be read off it.
 
+use nalgebra::DVector;
 use nanotap_dynamics::{
     Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
     Stability, Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
@@ -7,7 +8,7 @@ use nanotap_dynamics::{
 use nanotap_flow::{FlowError, Trajectory};
 use serde::Serialize;
 
-use crate::model::Model;
+use crate::model::{Forgetting, Model};
 use crate::observables::{Observables, Spectrum};
 use crate::simulate::{ContactEvent, Named, SimulateError, contact_events, starting_state};
 use crate::start_box::default_box;
@@ -93,7 +94,9 @@ pub struct OrbitReport {
     pub stable: bool,
     /// What the multipliers say, in a word: stable, unstable or marginal.
     pub stability: &'static str,
-    /// |log|det DPⁿ| − trace formula|: zero to rounding of an exact Jacobian.
+    /// |log|det DPⁿ| − trace formula|: zero to rounding of an exact Jacobian. Where a sample
+    /// forgets at the end of each contact, the product of the other multipliers stands for
+    /// the determinant, which is zero.
     pub determinant_defect: f64,
     /// Contacts begun and ended.
     pub events: Vec<ContactEvent>,
@@ -252,7 +255,7 @@ pub fn report(
             Stability::Unstable { .. } => "unstable",
             Stability::Marginal => "marginal",
         },
-        determinant_defect: (orbit.log_determinant - log_determinant(model, &trajectory)).abs(),
+        determinant_defect: determinant_defect(model, orbit, &trajectory),
         events: contact_events(model, &trajectory, 0.0),
         spectrum: Spectrum::of(model, &trajectory, orbit.period, harmonics),
         observables,
@@ -260,14 +263,84 @@ pub fn report(
     })
 }
 
+/// How far the multipliers are from Liouville's formula.
+fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Trajectory) -> f64 {
+    let expected = log_determinant(model, trajectory);
+    match &model.forgetting {
+        Some(forgetting) if !trajectory.events().is_empty() => {
+            // One direction is lost, and its multiplier is zero.
+            let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
+            let found: f64 = kept.iter().map(|m| m.norm().ln()).sum();
+            (found - expected - log_remembered(model, forgetting, trajectory)).abs()
+        }
+        _ => (orbit.log_determinant - expected).abs(),
+    }
+}
+
+/// What a memory that is set anew at the end of each contact adds to log|det| of the rest.
+///
+/// With S the saltation where contact begins, Φ the flow of a flight of length t and p the
+/// tip's row, a contact, a flight and the next contact's beginning map the beam's state by
+/// S Φ + κ e^{rt} pᵀ, κ the kick per change of memory. By the lemma on determinants its
+/// determinant is that of S Φ times 1 + e^{rt} pᵀ Φ⁻¹ κ, since S⁻¹κ = κ.
+fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajectory) -> f64 {
+    let flight = &model.system.regimes()[0];
+    let basis = flight.basis();
+    let tip = &model.height.row;
+    let back = |length: f64| {
+        if !basis.clusters.is_empty() {
+            return (flight.matrix() * -length).exp() * &forgetting.kick;
+        }
+        let kicked = &basis.left * forgetting.kick.map(|v| Complex::new(v, 0.0));
+        let turned = kicked.zip_map(
+            &DVector::from_column_slice(&basis.eigenvalues),
+            |q, rate| q * (rate * -length).exp(),
+        );
+        (&basis.right * turned).map(|z| z.re)
+    };
+    let factor = |length: f64| 1.0 + (forgetting.rate * length).exp() * (tip * back(length))[0];
+    flights(model, trajectory)
+        .map(|length| factor(length).abs().ln())
+        .sum()
+}
+
+/// Lengths of the flights between contacts of one repetition of an orbit.
+fn flights(model: &Model, trajectory: &Trajectory) -> impl Iterator<Item = f64> {
+    let begins: Vec<f64> = trajectory
+        .events()
+        .iter()
+        .filter(|e| model.contact[e.to])
+        .map(|e| e.time)
+        .collect();
+    let (end, whole) = (trajectory.end(), begins.len());
+    trajectory
+        .events()
+        .iter()
+        .filter(|e| !model.contact[e.to])
+        .map(move |e| {
+            let next = begins.iter().copied().find(|t| *t > e.time);
+            let around = || begins.first().map_or(end, |t| t + end);
+            (next.unwrap_or_else(around) - e.time) * f64::from(u8::from(whole > 0))
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
 /// log|det DPⁿ| from Liouville's formula: every switch has determinant ±(product of
 /// the resets), every segment e^{tr A · length}.
 fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
+    // A memory that is forgotten is left out, and its jump with it.
+    let forgets = model.forgetting.as_ref();
+    let forgotten = match forgets {
+        Some(f) if !trajectory.events().is_empty() => f.rate * trajectory.end(),
+        _ => 0.0,
+    };
     let flow: f64 = trajectory
         .segments()
         .iter()
         .map(|s| model.system.regimes()[s.regime].matrix().trace() * s.length)
-        .sum();
+        .sum::<f64>()
+        - forgotten;
     // A rigid impact's saltation has determinant r² (the reset once, the change of
     // time of flight once).
     let impacts: f64 = trajectory
@@ -277,7 +350,7 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
             let exit = model.system.exits()[e.from]
                 .iter()
                 .find(|x| x.target == e.to)?;
-            let reset = exit.reset.as_ref()?;
+            let reset = exit.reset.as_ref().filter(|_| forgets.is_none())?;
             Some(2.0 * reset.matrix.determinant().abs().ln())
         })
         .sum();

@@ -296,6 +296,9 @@ impl Oscillator {
             power: vec![power(0.0, 0.0), power(contact_stiffness, contact_damping)].into(),
             impact_loss,
             beam: None,
+            memory: 0,
+            forgetting: None,
+            height: gap.clone(),
             gap,
             system,
         }

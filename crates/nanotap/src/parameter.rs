@@ -1,4 +1,5 @@
-//! The seven numbers of the dimensionless model, under every name they go by.
+//! The numbers of the dimensionless model, under every name they go by: the paper's seven,
+//! and those that only some samples have.
 
 use std::fmt;
 use std::str::FromStr;
@@ -22,6 +23,12 @@ pub enum Parameter {
     Alpha6,
     /// Ω = ω√(mL⁴/(EI)): drive frequency.
     Omega,
+    /// k_m L³/(EI): stiffness of the standard linear solid's relaxing arm over bending
+    /// stiffness.
+    RelaxationStiffness,
+    /// Time in which the force of that arm decays at constant indentation, in the model's
+    /// unit of time √(mL⁴/(EI)).
+    RelaxationTime,
 }
 
 /// What is known of a parameter besides its value.
@@ -34,7 +41,7 @@ struct Entry {
 }
 
 impl Parameter {
-    /// All parameters, α1 to α6 and then Ω.
+    /// The paper's parameters, which every case has: α1 to α6 and then Ω.
     pub const ALL: [Self; 7] = [
         Self::Alpha1,
         Self::Alpha2,
@@ -44,6 +51,9 @@ impl Parameter {
         Self::Alpha6,
         Self::Omega,
     ];
+
+    /// Parameters that only some samples have; 0 where they are not said.
+    pub const FURTHER: [Self; 2] = [Self::RelaxationStiffness, Self::RelaxationTime];
 
     const fn entry(self) -> Entry {
         match self {
@@ -96,7 +106,26 @@ impl Parameter {
                 ascii_symbol: "Ω",
                 meaning: "drive frequency, ω·√(mL⁴/(EI))",
             },
+            Self::RelaxationStiffness => Entry {
+                name: "relaxation_stiffness",
+                alias: "relaxation_stiffness",
+                symbol: "kₘ",
+                ascii_symbol: "km",
+                meaning: "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)",
+            },
+            Self::RelaxationTime => Entry {
+                name: "relaxation_time",
+                alias: "relaxation_time",
+                symbol: "τₘ",
+                ascii_symbol: "τm",
+                meaning: "time in which the arm's force decays, over √(mL⁴/(EI))",
+            },
         }
+    }
+
+    /// Every parameter there is.
+    pub fn every() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().chain(Self::FURTHER)
     }
 
     /// The name in case files and in data: `alpha1` … `alpha6`, `omega`.
@@ -134,9 +163,10 @@ impl Parameter {
     /// The valid name that `word` was probably meant to be.
     fn nearest_name(word: &str) -> Option<&'static str> {
         let names = || {
-            Self::ALL
-                .into_iter()
-                .flat_map(|parameter| [parameter.name(), parameter.alias()])
+            Self::every().flat_map(|parameter| {
+                let alias = Some(parameter.alias()).filter(|alias| *alias != parameter.name());
+                std::iter::once(parameter.name()).chain(alias)
+            })
         };
         let slip = names()
             .map(|name| (strsim::damerau_levenshtein(word, name), name))
@@ -188,8 +218,7 @@ impl FromStr for Parameter {
     /// and neither do hyphens and blanks in place of underscores.
     fn from_str(given: &str) -> Result<Self, UnknownParameter> {
         let word = given.trim().to_lowercase().replace(['-', ' '], "_");
-        Self::ALL
-            .into_iter()
+        Self::every()
             .find(|parameter| parameter.answers_to(&word))
             .ok_or_else(|| UnknownParameter {
                 given: given.to_owned(),
@@ -204,7 +233,7 @@ mod tests {
 
     #[test]
     fn every_name_leads_back_to_its_parameter() {
-        for parameter in Parameter::ALL {
+        for parameter in Parameter::every() {
             for word in [parameter.name(), parameter.alias(), parameter.symbol()] {
                 assert_eq!(word.parse(), Ok(parameter), "{word}");
                 assert_eq!(word.to_uppercase().parse(), Ok(parameter), "{word}");
@@ -221,13 +250,13 @@ mod tests {
 
     #[test]
     fn names_are_all_different() {
-        let mut names: Vec<_> = Parameter::ALL
-            .iter()
+        let mut names: Vec<_> = Parameter::every()
             .flat_map(|p| [p.name(), p.alias()])
             .collect();
         names.sort_unstable();
         names.dedup();
-        assert_eq!(names.len(), 14);
+        // The arm's two names are readable as they are.
+        assert_eq!(names.len(), 16);
     }
 
     #[test]
@@ -238,6 +267,7 @@ mod tests {
             ("contact_stifness", "contact_stiffness"),
             ("drive_freqency", "drive_frequency"),
             ("tip_mass", "tip_mass_ratio"),
+            ("relaxation_tme", "relaxation_time"),
         ] {
             let error = slip.parse::<Parameter>().unwrap_err();
             assert_eq!(error.nearest, Some(meant), "{slip}");

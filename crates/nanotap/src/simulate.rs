@@ -203,7 +203,8 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     })
 }
 
-/// The state to start from: as given, or rest.
+/// The state to start from: as given, or rest. A sample with a memory is relaxed where the
+/// state does not say otherwise.
 ///
 /// # Errors
 /// [`SimulateError::State`] when its length does not fit.
@@ -212,8 +213,14 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
     let Some(state) = state else {
         return Ok(vec![0.0; n]);
     };
+    let mut state = state.to_vec();
+    if state.len() + model.memory == n {
+        state.resize(n, 0.0);
+    }
     if state.len() != n {
-        let layout = if model.beam.is_some() {
+        let layout = if model.memory > 0 {
+            "the modal amplitudes a_1 … a_N, then their rates, then (if not 0) the sample's memory"
+        } else if model.beam.is_some() {
             "the modal amplitudes a_1 … a_N, then their rates"
         } else {
             "x, then its rate"
@@ -230,7 +237,7 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
             value,
         });
     }
-    Ok(state.to_vec())
+    Ok(state)
 }
 
 /// Runs until the motion has been named and, if it goes to a periodic orbit, has

@@ -15,7 +15,8 @@
 //! below. Constant parts of the response add to it, and the tip must be able to start
 //! twice as far off as the sample is.
 //!
-//! Of a rigid stop the part beyond the stop is cut off.
+//! Of a rigid stop the part beyond the stop is cut off. A sample with a memory starts
+//! relaxed: it would forget within a contact or two.
 
 use nanotap_dynamics::{StartBox, StartBoxError};
 use nanotap_flow::Regime;
@@ -31,7 +32,7 @@ const WIDENING: (f64, f64) = (4.0, 40.0);
 /// # Errors
 /// [`StartBoxError`] if the response is beyond the range of floats.
 pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
-    let n = model.dimension() / 2;
+    let n = (model.dimension() - model.memory) / 2;
     let omega = model
         .system
         .drive()
@@ -46,8 +47,8 @@ pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
             .iter()
             .filter(|r| r.matrix().amax() > 0.0)
     };
-    let mut lower = vec![0.0; 2 * n];
-    let mut upper = vec![0.0; 2 * n];
+    let mut lower = vec![0.0; model.dimension()];
+    let mut upper = lower.clone();
     for j in 0..n {
         let swing = |r: &Regime| (-r.matrix()[(n + j, j)]).max(0.0).sqrt();
         let half = moving()
@@ -74,9 +75,9 @@ pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
 /// Twice the displacement `j` that brings the tip to the sample by itself; of the first
 /// mode of a beam, which bends most.
 fn reach(model: &Model, j: usize) -> f64 {
-    let slope = model.gap.row[j].abs();
+    let slope = model.height.row[j].abs();
     if j == 0 && slope > 0.0 {
-        2.0 * model.gap.constant.abs() / slope
+        2.0 * model.height.constant.abs() / slope
     } else {
         0.0
     }

@@ -78,7 +78,10 @@ impl Subject {
     /// Its parameters.
     pub fn keys(&self) -> Vec<Key> {
         match self {
-            Self::Cantilever(_) => Parameter::ALL.map(Key::Cantilever).to_vec(),
+            Self::Cantilever(case) => {
+                let parameters = case.parameters().into_iter();
+                parameters.map(Key::Cantilever).collect()
+            }
             Self::Oscillator(oscillator) => OscillatorParameter::ALL
                 .into_iter()
                 .filter(|p| oscillator.get(*p).is_some())
@@ -92,8 +95,9 @@ impl Subject {
     /// # Errors
     /// [`UnknownKey`] with what there is and the nearest name.
     pub fn key(&self, name: &str) -> Result<Key, UnknownKey> {
-        if let Self::Cantilever(_) = self
+        if let Self::Cantilever(case) = self
             && let Ok(parameter) = name.parse::<Parameter>()
+            && case.parameters().contains(&parameter)
         {
             return Ok(Key::Cantilever(parameter));
         }

@@ -8,7 +8,8 @@ use nanotap_flow::{Flow, FlowError, Output};
 use crate::model::Model;
 
 /// The columns of [`sample`], in order: `tau`, `tip` (W or x), `tip_rate`, `gap`, `force`,
-/// `contact` (1 in contact, else 0), then the state (`a1 … aN, v1 … vN`, or `x, v`).
+/// `contact` (1 in contact, else 0), then the state (`a1 … aN, v1 … vN` and `s1` of a sample
+/// with a memory, or `x, v`).
 pub fn columns(model: &Model) -> Vec<String> {
     let mut names: Vec<String> = ["tau", "tip", "tip_rate", "gap", "force", "contact"]
         .map(str::to_owned)
@@ -22,10 +23,25 @@ pub fn state_names(model: &Model) -> Vec<String> {
     if model.beam.is_none() {
         return vec!["x".to_owned(), "v".to_owned()];
     }
-    let n = model.dimension() / 2;
-    (0..2 * n)
-        .map(|i| format!("{}{}", if i < n { "a" } else { "v" }, i % n + 1))
+    let n = (model.dimension() - model.memory) / 2;
+    let named = |letter: char, count: usize| (1..=count).map(move |i| format!("{letter}{i}"));
+    named('a', n)
+        .chain(named('v', n))
+        .chain(named('s', model.memory))
         .collect()
+}
+
+/// A state of a beam as one with `modes` modes: more are at rest, fewer are cut off. The
+/// last `memory` numbers are the sample's.
+pub(crate) fn with_modes(state: &[f64], memory: usize, modes: usize) -> Vec<f64> {
+    let (beam, sample) = state.split_at(state.len().saturating_sub(memory));
+    let (displacements, velocities) = beam.split_at(beam.len() / 2);
+    let fitted = |block: &[f64]| {
+        let mut block = block.to_vec();
+        block.resize(modes, 0.0);
+        block
+    };
+    [fitted(displacements), fitted(velocities), sample.to_vec()].concat()
 }
 
 /// Hands `periods` drive periods from the state `start` at drive phase 0 to `row`,

@@ -5,7 +5,6 @@ use nanotap::case::{Case, CosineTerm};
 use nanotap::case_document::CaseDocument;
 use nanotap::case_file;
 use nanotap::oscillator::{Oscillator, OscillatorParameter, Stop};
-use nanotap::parameter::Parameter;
 use nanotap::physical::{Kind, Resolved, Severity};
 use nanotap::subject::Subject;
 
@@ -81,7 +80,7 @@ fn cantilever(title: &str, case: &Case) -> String {
         ("meaning", Align::Left),
     ]);
     table.row(["N", "modes", "", &case.modes.to_string(), "beam modes"]);
-    for parameter in Parameter::ALL {
+    for parameter in case.parameters() {
         table.row([
             parameter.symbol(),
             parameter.name(),
@@ -90,6 +89,13 @@ fn cantilever(title: &str, case: &Case) -> String {
             parameter.meaning(),
         ]);
     }
+    table.row([
+        "",
+        "contact",
+        "",
+        case.contact.name(),
+        case.contact.meaning(),
+    ]);
     let heading = format!(
         "{title}: a dimensionless cantilever, {}",
         number::counted(case.modes, "mode", "modes")
@@ -150,6 +156,7 @@ fn physical(title: &str, resolved: &Resolved) -> String {
         &format!("{:.4e} s", scales.time),
         "unit of time, √(mL⁴/(EI))",
     ]);
+    given.row(["", case.contact.name(), case.contact.meaning()]);
     let mut mapping = Table::new([
         ("", Align::Left),
         ("key", Align::Left),

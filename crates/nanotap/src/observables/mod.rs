@@ -44,7 +44,7 @@ pub struct Observables {
     pub mean_deflection: f64,
     /// Root mean square of W about its mean.
     pub rms_deflection: f64,
-    /// Least and greatest gap V_T.
+    /// Least and greatest gap V_T, the tip's height over the undeformed surface.
     pub gap_range: [f64; 2],
     /// Part of the time in contact.
     pub contact_fraction: f64,
@@ -57,6 +57,9 @@ pub struct Observables {
     /// Greatest force of the sample on the tip (0 without contact; impacts of a rigid
     /// stop are impulses and not counted).
     pub peak_force: f64,
+    /// Least force: below zero where the sample pulls, as the paper's damper does on a tip
+    /// that leaves.
+    pub least_force: f64,
     /// Time mean of that force.
     pub mean_force: f64,
     /// Energy that the sample takes in one drive period, E_dis.
@@ -121,9 +124,9 @@ impl Observables {
         }
         let tip = trajectory.signal(&model.tip);
         let (low, high) = tip.range()?;
-        let (gap_low, gap_high) = trajectory.signal(&model.gap).range()?;
+        let (gap_low, gap_high) = trajectory.signal(&model.height).range()?;
         let force = trajectory.signal_by_regime(&model.force);
-        let (_, peak) = force.range()?;
+        let (least, peak) = force.range()?;
         let mean = tip.mean();
         let mean_square = tip.product_integral(&tip) / duration;
         let begins = trajectory
@@ -165,6 +168,7 @@ impl Observables {
             indentation: (-gap_low.value).max(0.0),
             contacts_per_period: begins.clone().count() as f64 / (duration / model.period()),
             peak_force: peak.value.max(0.0),
+            least_force: least.value,
             mean_force: force.mean(),
             dissipation: energy_balance.sample_damping / periods,
             virial: virial(model, &force, &tip),
@@ -225,6 +229,7 @@ impl Observables {
             indentation: self.indentation.max(next.indentation),
             contacts_per_period: mean(self.contacts_per_period, next.contacts_per_period),
             peak_force: self.peak_force.max(next.peak_force),
+            least_force: self.least_force.min(next.least_force),
             mean_force: mean(self.mean_force, next.mean_force),
             dissipation: mean(self.dissipation, next.dissipation),
             virial: mean(self.virial, next.virial),

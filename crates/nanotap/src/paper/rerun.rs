@@ -4,17 +4,20 @@
 use std::fmt::Write as _;
 
 use crate::case::{Case, CosineTerm};
+use crate::contact::ContactLaw;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
-use crate::parameter::Parameter;
 
 /// `nanotap` with `command` on `case`, with `options` behind it.
 pub(super) fn on_case(command: &str, case: &Case, options: &str) -> String {
     let mut line = format!("nanotap {command} --set modes={}", case.modes);
-    for parameter in Parameter::ALL {
+    for parameter in case.parameters() {
         let _ = write!(line, " --set {}={}", parameter.name(), case.get(parameter));
     }
     if case.cosine_term == CosineTerm::Printed {
         line.push_str(" --set cosine_term=printed");
+    }
+    if case.contact != ContactLaw::default() {
+        let _ = write!(line, " --set contact={}", case.contact);
     }
     finish(line, options)
 }
@@ -57,6 +60,7 @@ fn finish(mut line: String, options: &str) -> String {
 mod tests {
     use super::*;
     use crate::case_file::CaseFile;
+    use crate::parameter::Parameter;
 
     /// The words behind `--set`, as the terminal hands them on.
     fn overrides(line: &str) -> Vec<String> {

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::lever::Lever;
 use super::quantity::Kind;
 use crate::case::{Case, CosineTerm};
+use crate::contact::ContactLaw;
 use crate::parameter::Parameter;
 
 /// The SI value of the model's unit of each kind.
@@ -60,19 +61,21 @@ impl Scales {
         }
     }
 
-    /// SI value of 1 of a dimensionless parameter: of α2 and α5 in m, of Ω in Hz.
+    /// SI value of 1 of a dimensionless parameter: of α2 and α5 in m, of Ω in Hz, of the
+    /// relaxation time in s.
     pub fn of(&self, parameter: Parameter) -> f64 {
         match parameter {
             Parameter::Alpha1 => self.mass,
             Parameter::Alpha2 | Parameter::Alpha5 => self.length,
             Parameter::Alpha3 | Parameter::Alpha6 => self.damping,
-            Parameter::Alpha4 => self.stiffness,
+            Parameter::Alpha4 | Parameter::RelaxationStiffness => self.stiffness,
             Parameter::Omega => self.frequency,
+            Parameter::RelaxationTime => self.time,
         }
     }
 }
 
-/// The seven parameters as physical quantities; SI units.
+/// The parameters as physical quantities; SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PhysicalParameters {
     /// Mass of the tip M, in kg: α1.
@@ -89,6 +92,10 @@ pub struct PhysicalParameters {
     pub contact_damping: f64,
     /// Frequency of the drive, in Hz: Ω.
     pub drive_frequency: f64,
+    /// Stiffness of a standard linear solid's relaxing arm, in N/m; 0 of other samples.
+    pub relaxation_stiffness: f64,
+    /// Its relaxation time, in s.
+    pub relaxation_time: f64,
 }
 
 impl PhysicalParameters {
@@ -103,11 +110,19 @@ impl PhysicalParameters {
             tip_gap: value(Parameter::Alpha5),
             contact_damping: value(Parameter::Alpha6),
             drive_frequency: value(Parameter::Omega),
+            relaxation_stiffness: value(Parameter::RelaxationStiffness),
+            relaxation_time: value(Parameter::RelaxationTime),
         }
     }
 
     /// The dimensionless case; not validated.
-    pub fn to_case(&self, scales: &Scales, modes: usize, cosine_term: CosineTerm) -> Case {
+    pub fn to_case(
+        &self,
+        scales: &Scales,
+        modes: usize,
+        cosine_term: CosineTerm,
+        contact: ContactLaw,
+    ) -> Case {
         let ratio = |parameter| self.get(parameter) / scales.of(parameter);
         Case {
             modes,
@@ -119,6 +134,9 @@ impl PhysicalParameters {
             alpha6: ratio(Parameter::Alpha6),
             omega: ratio(Parameter::Omega),
             cosine_term,
+            contact,
+            relaxation_stiffness: ratio(Parameter::RelaxationStiffness),
+            relaxation_time: ratio(Parameter::RelaxationTime),
         }
     }
 
@@ -132,6 +150,8 @@ impl PhysicalParameters {
             Parameter::Alpha5 => self.tip_gap,
             Parameter::Alpha6 => self.contact_damping,
             Parameter::Omega => self.drive_frequency,
+            Parameter::RelaxationStiffness => self.relaxation_stiffness,
+            Parameter::RelaxationTime => self.relaxation_time,
         }
     }
 }
@@ -153,10 +173,10 @@ pub struct MappingRow {
     pub si: f64,
 }
 
-/// All seven parameters with their physical quantities, α1 first.
+/// All parameters that the case has with their physical quantities, α1 first.
 pub fn mapping_table(case: &Case, scales: &Scales) -> Vec<MappingRow> {
     let physical = PhysicalParameters::from_case(case, scales);
-    Parameter::ALL
+    case.parameters()
         .into_iter()
         .map(|parameter| {
             let (formula, quantity, kind) = description(parameter);
@@ -197,5 +217,11 @@ const fn description(parameter: Parameter) -> (&'static str, &'static str, Kind)
             "drive frequency",
             Kind::Frequency,
         ),
+        Parameter::RelaxationStiffness => (
+            "km L^3/(EI) = 3 km/k",
+            "stiffness of the relaxing arm km",
+            Kind::Stiffness,
+        ),
+        Parameter::RelaxationTime => ("time/T", "relaxation time of the arm", Kind::Time),
     }
 }

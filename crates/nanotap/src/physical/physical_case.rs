@@ -166,8 +166,10 @@ impl PhysicalCase {
             tip_gap,
             contact_damping: self.sample.damper(TAU * frequency),
             drive_frequency: frequency,
+            relaxation_stiffness: self.sample.relaxation_stiffness,
+            relaxation_time: self.sample.relaxation_time,
         };
-        let case = parameters.to_case(&scales, self.modes, self.cosine_term);
+        let case = parameters.to_case(&scales, self.modes, self.cosine_term, self.sample.law);
         case.validate()?;
         let resolved = Resolved {
             case,
@@ -201,6 +203,7 @@ impl PhysicalCase {
             alpha6: 0.0,
             omega: TAU * frequency * lever.time_unit(),
             cosine_term: self.cosine_term,
+            ..Case::paper()
         }
     }
 

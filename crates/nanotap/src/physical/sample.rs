@@ -6,6 +6,7 @@ use super::quantity::Kind;
 use super::remark::Remark;
 use super::section::{Reader, Sections};
 use super::tip::Tip;
+use crate::contact::{ContactLaw, UnknownContactLaw};
 
 /// Elastic constants of an isotropic solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,15 +105,24 @@ pub struct Sample {
     pub hertz: Option<Hertz>,
     /// Its damping; none given counts as zero.
     pub damping: Option<SampleDamping>,
+    /// How it answers the tip.
+    pub law: ContactLaw,
+    /// Stiffness of a standard linear solid's relaxing arm in N/m; 0 of other samples.
+    pub relaxation_stiffness: f64,
+    /// Its relaxation time in s.
+    pub relaxation_time: f64,
     /// What had to be assumed.
     pub remarks: Vec<Remark>,
 }
 
 pub(crate) const KEYS: &[&str] = &[
+    "law",
     "material",
     "stiffness",
     "damping",
     "loss_tangent",
+    "relaxation_stiffness",
+    "relaxation_time",
     "modulus",
     "poisson",
     "indentation",
@@ -143,7 +153,9 @@ impl Sample {
         let damping = damper
             .map(SampleDamping::Damper)
             .or(tangent.map(SampleDamping::LossTangent));
-        if damping.is_none() {
+        let law = read_law(&reader)?;
+        let [relaxation_stiffness, relaxation_time] = read_relaxation(&reader, law)?;
+        if damping.is_none() && law != ContactLaw::StandardLinearSolid {
             remarks.push(Remark::note(
                 "sample.damping is not given: the contact dissipates nothing",
             ));
@@ -152,6 +164,9 @@ impl Sample {
             stiffness,
             hertz,
             damping,
+            law,
+            relaxation_stiffness,
+            relaxation_time,
             remarks,
         })
     }
@@ -164,6 +179,58 @@ impl Sample {
             Some(SampleDamping::LossTangent(tangent)) => tangent * self.stiffness / omega,
         }
     }
+}
+
+fn read_law(reader: &Reader<'_>) -> Result<ContactLaw, PhysicalError> {
+    reader
+        .text("law")
+        .map_or(Ok(ContactLaw::default()), |name| {
+            name.parse().map_err(|error: UnknownContactLaw| {
+                PhysicalError::impossible(reader.path("law"), name, error.to_string())
+            })
+        })
+}
+
+/// Stiffness and time of the relaxing arm, which the standard linear solid has in place of
+/// a damper and no other law has.
+fn read_relaxation(reader: &Reader<'_>, law: ContactLaw) -> Result<[f64; 2], PhysicalError> {
+    let stiffness = reader.not_negative("relaxation_stiffness", Kind::Stiffness)?;
+    let time = reader.not_negative("relaxation_time", Kind::Time)?;
+    let refuse = |keys: [&str; 2], reason: &str| {
+        let given = keys.into_iter().find(|key| reader.text(key).is_some());
+        given.map_or(Ok(()), |key| {
+            Err(PhysicalError::impossible(
+                reader.path(key),
+                reader.text(key).unwrap_or_default(),
+                reason,
+            ))
+        })
+    };
+    if law != ContactLaw::StandardLinearSolid {
+        refuse(
+            ["relaxation_stiffness", "relaxation_time"],
+            "it belongs to sample.law = \"standard-linear-solid\"",
+        )?;
+        return Ok([0.0; 2]);
+    }
+    refuse(
+        ["damping", "loss_tangent"],
+        "a standard linear solid has its damper in the relaxing arm: give \
+         sample.relaxation_stiffness and sample.relaxation_time",
+    )?;
+    let needed = |value: Option<f64>, key: &str| {
+        value.ok_or_else(|| {
+            PhysicalError::missing(
+                reader.path(key),
+                "a standard linear solid has a relaxing arm of this stiffness, as in \
+                 relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",
+            )
+        })
+    };
+    Ok([
+        needed(stiffness, "relaxation_stiffness")?,
+        needed(time, "relaxation_time")?,
+    ])
 }
 
 fn read_hertz(

@@ -10,6 +10,7 @@ use super::tip::{TipMass, TipShape};
 use super::*;
 use crate::beam::Modes;
 use crate::case::{Case, CosineTerm};
+use crate::contact::ContactLaw;
 use crate::exact_beam;
 
 fn sections(text: &[(&str, &str, &str)]) -> Sections {
@@ -335,8 +336,10 @@ fn units_are_those_of_the_beam_equation() {
         tip_gap: 20e-9,
         contact_damping: 3e-7,
         drive_frequency: 65.7e3,
+        relaxation_stiffness: 0.0,
+        relaxation_time: 0.0,
     };
-    let case = physical.to_case(&scales, 3, CosineTerm::Corrected);
+    let case = physical.to_case(&scales, 3, CosineTerm::Corrected, ContactLaw::SpringDamper);
     // Eqs. (5) and (7) of the paper, with the mass per length put back under the root.
     let time = (m * length.powi(4) / ei).sqrt();
     let root = (length.powi(4) / (m * ei)).sqrt();
@@ -393,10 +396,10 @@ proptest! {
             alpha5: -alphas[4],
             alpha6: alphas[5],
             omega,
-            cosine_term: CosineTerm::Corrected,
+            ..Case::paper()
         };
         let physical = PhysicalParameters::from_case(&case, &scales);
-        let back = physical.to_case(&scales, 3, CosineTerm::Corrected);
+        let back = physical.to_case(&scales, 3, CosineTerm::Corrected, ContactLaw::SpringDamper);
         for parameter in crate::parameter::Parameter::ALL {
             prop_assert!((back.get(parameter) / case.get(parameter) - 1.0).abs() < 1e-13);
         }

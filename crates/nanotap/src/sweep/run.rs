@@ -10,6 +10,7 @@ use crate::model::Model;
 use crate::simulate::{Classification, Named};
 use crate::start_box::box_with;
 use crate::strobe::Strobe;
+use crate::time_series::with_modes;
 
 /// Where motions start.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,7 +169,10 @@ pub(super) fn along_line(
         };
         let state = last.take().map_or_else(
             || sweep.options.starts.state(start, &model),
-            |state| with_modes(&state, model.dimension() / 2),
+            |state| {
+                let modes = (model.dimension() - model.memory) / 2;
+                with_modes(&state, model.memory, modes)
+            },
         );
         let (outcome, end) = Runner::new(&model, &sweep.options).run(&state);
         outcomes[index] = Some(outcome);
@@ -188,16 +192,6 @@ impl SweepOptions {
             directions.get(lane / starts).copied().unwrap_or(true),
         )
     }
-}
-
-/// The same state with `n` modes: more are at rest, fewer are cut off.
-fn with_modes(state: &[f64], n: usize) -> Vec<f64> {
-    let (displacements, velocities) = state.split_at(state.len() / 2);
-    let mut fitted = displacements.to_vec();
-    fitted.resize(n, 0.0);
-    fitted.extend_from_slice(&velocities[..velocities.len().min(n)]);
-    fitted.resize(2 * n, 0.0);
-    fitted
 }
 
 /// Runs one model again and again.

@@ -10,7 +10,7 @@ use nanotap::subject::{Key, Subject};
 use nanotap_dynamics::StroboscopicMap;
 use nanotap_flow::Flow;
 
-fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
+pub(crate) fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
     let mut x = state.to_vec();
     Strobe::new(&subject.model().unwrap())
         .advance(&mut x)
@@ -20,7 +20,7 @@ fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
 
 /// Largest relative difference between the exact derivative and a fourth-order central
 /// difference, over the Jacobian and every parameter.
-fn worst(subject: &Subject, state: &[f64]) -> f64 {
+pub(crate) fn worst(subject: &Subject, state: &[f64]) -> f64 {
     let model = subject.model().unwrap();
     let keys: Vec<Key> = subject.keys();
     let tangents: Vec<_> = keys

@@ -1,10 +1,14 @@
 //! The physics and the mathematics of nanotap against references, closed forms and
 //! independent methods.
 
+mod contact_laws;
 mod derivatives;
 mod facts;
 mod impact_oscillator;
+mod kelvin_voigt;
+mod located_runge_kutta;
 mod motions;
 mod observables;
 mod references;
 mod short_contacts;
+mod standard_linear_solid;

@@ -1,0 +1,228 @@
+//! What must hold of every contact law.
+
+use nanotap::case::Case;
+use nanotap::contact::ContactLaw;
+use nanotap::model::Model;
+use nanotap::observables::Observables;
+use nanotap::orbit::{OrbitOptions, orbit};
+use nanotap::parameter::Parameter;
+use nanotap::subject::Subject;
+use nanotap_flow::Trajectory;
+use proptest::prelude::*;
+
+use crate::derivatives::{advance, worst};
+use crate::located_runge_kutta::Independent;
+
+/// The paper's case on a sample of a law, with the paper's spring and damper.
+pub(crate) fn on(law: ContactLaw, omega: f64) -> Case {
+    let case = Case {
+        contact: law,
+        omega,
+        ..Case::paper()
+    };
+    if law == ContactLaw::StandardLinearSolid {
+        Case {
+            alpha6: 0.0,
+            relaxation_stiffness: 40.0,
+            relaxation_time: 0.05,
+            ..case
+        }
+    } else {
+        case
+    }
+}
+
+/// States, contacts, peak force and the energy that the sample takes, in flight as well,
+/// against an independent integration.
+#[test]
+fn every_law_agrees_with_located_runge_kutta() {
+    for law in ContactLaw::ALL {
+        for omega in [2.6, 20.0] {
+            let case = Case {
+                modes: 2,
+                alpha5: 0.05,
+                ..on(law, omega)
+            };
+            let start = [0.1, 0.01, 0.2, -0.3];
+            let independent = Independent::new(&case).run(&start, 5, 3000);
+            let model = Model::cantilever(&case).unwrap();
+            let mut state = start.to_vec();
+            state.resize(model.dimension(), 0.0);
+            let run = Trajectory::record(&model.system, &state, 5).unwrap();
+            let end = run.state_at(run.end()).unwrap();
+            for (exact, stepped) in end.iter().zip(independent.beam.iter()) {
+                assert!(
+                    (exact - stepped).abs() < 2e-8,
+                    "{law} {omega}: {end:?} {}",
+                    independent.beam
+                );
+            }
+            let seen = Observables::of(&model, &run).unwrap();
+            let contacts = (seen.contacts_per_period * 5.0).round() as usize;
+            assert_eq!(contacts, independent.contacts, "{law} {omega}");
+            let lost = seen.energy_balance.sample_damping;
+            assert!(
+                (lost / independent.dissipated - 1.0).abs() < 1e-6,
+                "{law} {omega}: {lost} {}",
+                independent.dissipated
+            );
+            // The integration sees forces at its steps only.
+            assert!((seen.peak_force / independent.force[1] - 1.0).abs() < 1e-2);
+            let pulls = independent.force[0] < -1e-6;
+            assert_eq!(
+                seen.least_force < -1e-12,
+                pulls,
+                "{law}: {}",
+                seen.least_force
+            );
+            assert_eq!(pulls, law == ContactLaw::SpringDamper);
+            assert!(seen.energy_balance.residual.abs() < 1e-11);
+        }
+    }
+}
+
+/// Jacobians and the derivatives to every parameter against differences of fourth order;
+/// states in flight over a surface that recovers, in contact, and parting at once.
+#[test]
+fn derivatives_of_every_law() {
+    for law in ContactLaw::ALL {
+        for modes in [1, 3] {
+            let case = Case {
+                alpha5: 0.02,
+                ..on(law, 2.6)
+            };
+            let subject = Subject::Cantilever(case.with_modes(modes));
+            let model = subject.model().unwrap();
+            let mut state = vec![0.0; model.dimension()];
+            for _ in 0..5 {
+                state = advance(&subject, &state);
+            }
+            let mut starts = vec![state.clone()];
+            // Deep in the sample, resting and moving out.
+            for speed in [0.0, 3.0] {
+                let mut state = vec![0.0; model.dimension()];
+                (state[0], state[modes]) = (-0.1, speed);
+                starts.push(state);
+            }
+            for start in starts {
+                let error = worst(&subject, &start);
+                assert!(error < 2e-6, "{law}, N = {modes}, {start:?}: {error:e}");
+            }
+        }
+    }
+}
+
+/// A periodic motion closes its energy balance and its volumes to rounding.
+#[test]
+fn orbits_of_every_law_close_their_balances() {
+    for law in ContactLaw::ALL {
+        for (omega, modes) in [(20.0, 3), (2.6, 3), (20.0, 6)] {
+            let model = Model::cantilever(&on(law, omega).with_modes(modes)).unwrap();
+            let options = OrbitOptions {
+                period: Some(1),
+                ..OrbitOptions::default()
+            };
+            let found = orbit(&model, &options).unwrap();
+            let balance = &found.observables.energy_balance;
+            assert!(balance.residual.abs() < 1e-11, "{law} {omega}: {balance:?}");
+            assert!(
+                found.determinant_defect < 1e-8,
+                "{law} {omega}: {:e}",
+                found.determinant_defect
+            );
+            assert!(!found.events.is_empty());
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Anything anywhere: the run goes on, the sample never gives energy, a surface that
+    /// recovers never pulls, and only contact ends contact.
+    #[test]
+    fn samples_are_passive(
+        law in 0..3_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
+        stiffness in 0.0..200.0_f64, damping in 1e-6..20.0_f64, gap in -0.2..0.3_f64,
+        a in -0.3..0.3_f64, v in -3.0..3.0_f64, memory in -0.3..0.3_f64,
+    ) {
+        let law = ContactLaw::ALL[law];
+        let mut case = Case { modes, omega, alpha4: stiffness, alpha5: gap, ..Case::paper() };
+        case.contact = law;
+        if law == ContactLaw::StandardLinearSolid {
+            case.alpha6 = 0.0;
+            case.relaxation_stiffness = 3.0 * damping;
+            case.relaxation_time = 0.1 * damping;
+        } else {
+            case.alpha6 = damping;
+        }
+        let model = Model::cantilever(&case).unwrap();
+        let mut state = vec![0.0; model.dimension()];
+        (state[0], state[modes]) = (a, v);
+        if model.memory > 0 {
+            state[2 * modes] = memory;
+        }
+        let run = Trajectory::record(&model.system, &state, 8).unwrap();
+        let seen = Observables::of(&model, &run).unwrap();
+        prop_assert!(seen.energy_balance.sample_damping >= 0.0);
+        if law != ContactLaw::SpringDamper {
+            let scale = seen.peak_force.max(stiffness * (a.abs() + memory.abs())) + 1e-3;
+            // A start in the sample may be given that pulls for no time at all.
+            prop_assert!(seen.least_force >= -1e-10 * scale, "{}", seen.least_force);
+        }
+        for pair in run.events().windows(2) {
+            prop_assert!(pair[0].to == pair[1].from);
+        }
+        // The map at each period's start finds the regime that the run was in.
+        for k in 0..8 {
+            let t = f64::from(k) * model.period();
+            let segment = run.segment_at(t).unwrap();
+            let (regime, _) = model.system.regime_at(&run.state_at(t).unwrap(), 0.0).unwrap();
+            let guard = &model.system.exits()[segment.regime][0].guard;
+            let inside = guard.at(model.system.drive(), &run.state_at(t).unwrap(), 0.0);
+            prop_assert!(regime == segment.regime || inside.abs() < 1e-9, "{k}: {inside}");
+        }
+    }
+}
+
+/// Without a damper, or with one that has no time to act, every law is the paper's spring.
+#[test]
+fn without_a_damper_every_law_is_the_papers_spring() {
+    let spring = Case {
+        alpha6: 0.0,
+        ..Case::paper()
+    };
+    let recovers = Case {
+        contact: ContactLaw::KelvinVoigt,
+        ..spring.clone()
+    };
+    let solid = Case {
+        contact: ContactLaw::StandardLinearSolid,
+        relaxation_stiffness: 30.0,
+        ..spring.clone()
+    };
+    let [expected, recovered, relaxed] = [spring, recovers, solid].map(|case| {
+        let subject = Subject::Cantilever(case);
+        let mut state = vec![0.0; subject.model().unwrap().dimension()];
+        (0..20).for_each(|_| state = advance(&subject, &state));
+        state
+    });
+    for (k, x) in expected.iter().enumerate() {
+        assert!((x - recovered[k]).abs() < 1e-13 && (x - relaxed[k]).abs() < 1e-13);
+    }
+    assert_eq!((recovered[6], relaxed[6]), (0.0, 0.0));
+}
+
+/// A law's further parameters can be varied like the paper's.
+#[test]
+fn a_case_has_the_parameters_of_its_law() {
+    let of = |law| Subject::Cantilever(on(law, 2.6));
+    let names = |law| -> Vec<&str> { of(law).keys().iter().map(|k| k.name()).collect() };
+    assert!(names(ContactLaw::KelvinVoigt).contains(&"alpha6"));
+    let solid = names(ContactLaw::StandardLinearSolid);
+    assert!(solid.contains(&"relaxation_time") && !solid.contains(&"alpha6"));
+    assert!(of(ContactLaw::SpringDamper).key("relaxation_time").is_err());
+    let wrong = Case::paper().with(Parameter::RelaxationTime, 0.1);
+    let refused = Model::cantilever(&wrong).unwrap_err().to_string();
+    assert!(refused.contains("standard-linear-solid"), "{refused}");
+}

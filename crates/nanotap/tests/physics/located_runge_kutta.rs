@@ -1,0 +1,201 @@
+//! An independent integration of a beam on any of the samples: Runge–Kutta of fourth order
+//! in small steps, switches located by bisection of the step, the equations written down
+//! from the samples' mechanics and not from the product's regimes.
+
+use nalgebra::DVector;
+use nanotap::case::Case;
+use nanotap::contact::ContactLaw;
+use nanotap::galerkin::Galerkin;
+
+/// The beam and where its sample is.
+#[derive(Clone)]
+pub(crate) struct Motion {
+    /// Displacements and velocities of the modes.
+    pub(crate) beam: DVector<f64>,
+    /// Position of the surface's free end, and elongation of the arm's damper.
+    pub(crate) surface: f64,
+    pub(crate) damper: f64,
+    pub(crate) touching: bool,
+    /// What the sample took, and the greatest and the least force.
+    pub(crate) dissipated: f64,
+    pub(crate) force: [f64; 2],
+    pub(crate) contacts: usize,
+}
+
+pub(crate) struct Independent {
+    case: Case,
+    galerkin: Galerkin,
+    inverse_mass: nalgebra::DMatrix<f64>,
+}
+
+/// Rates of (beam, surface, damper, dissipated energy).
+type Rates = (DVector<f64>, [f64; 3]);
+
+impl Independent {
+    pub(crate) fn new(case: &Case) -> Self {
+        let galerkin = Galerkin::new(case).unwrap();
+        Self {
+            case: case.clone(),
+            inverse_mass: galerkin.mass.clone().try_inverse().unwrap(),
+            galerkin,
+        }
+    }
+
+    fn height(&self, t: f64, beam: &DVector<f64>) -> [f64; 2] {
+        let (n, omega) = (self.case.modes, self.case.omega);
+        let (sin, cos) = (omega * t).sin_cos();
+        let p = &self.galerkin.modes.tip;
+        [
+            p.dot(&beam.rows(0, n)) + self.case.alpha2 * sin + self.case.alpha5,
+            p.dot(&beam.rows(n, n)) + self.case.alpha2 * omega * cos,
+        ]
+    }
+
+    /// Force of the touched sample on the tip at height `h` and speed `v`.
+    fn pressed(&self, h: f64, v: f64, damper: f64) -> f64 {
+        let c = &self.case;
+        match c.contact {
+            ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => -c.alpha4 * h - c.alpha6 * v,
+            ContactLaw::StandardLinearSolid => {
+                -c.alpha4 * h + c.relaxation_stiffness * (-h - damper)
+            }
+        }
+    }
+
+    /// Position of a free surface whose damper has this elongation.
+    fn free_surface(&self, m: &Motion) -> f64 {
+        let c = &self.case;
+        match c.contact {
+            ContactLaw::SpringDamper => 0.0,
+            ContactLaw::KelvinVoigt => m.surface,
+            // α4 u + k (u + w) = 0
+            ContactLaw::StandardLinearSolid => {
+                -c.relaxation_stiffness * m.damper / (c.alpha4 + c.relaxation_stiffness)
+            }
+        }
+    }
+
+    fn rates(&self, t: f64, m: &Motion) -> Rates {
+        let c = &self.case;
+        let n = c.modes;
+        let [h, v] = self.height(t, &m.beam);
+        let force = if m.touching {
+            self.pressed(h, v, m.damper)
+        } else {
+            0.0
+        };
+        let (sin, cos) = (c.omega * t).sin_cos();
+        let free = &self.galerkin.forcing[0];
+        let (x, speed) = (m.beam.rows(0, n), m.beam.rows(n, n));
+        let pull = &free.sine * sin + &free.cosine * cos + &free.constant
+            - &self.galerkin.stiffness[0] * x
+            - &self.galerkin.damping[0] * speed
+            + &self.galerkin.modes.tip * force;
+        let mut beam = DVector::zeros(2 * n);
+        beam.rows_mut(0, n).copy_from(&speed);
+        beam.rows_mut(n, n).copy_from(&(&self.inverse_mass * pull));
+        let (surface, damper, lost) = match c.contact {
+            ContactLaw::SpringDamper => (0.0, 0.0, if m.touching { c.alpha6 * v * v } else { 0.0 }),
+            ContactLaw::KelvinVoigt => {
+                let speed = if m.touching {
+                    v
+                } else {
+                    -c.alpha4 / c.alpha6 * m.surface
+                };
+                (speed, 0.0, c.alpha6 * speed * speed)
+            }
+            ContactLaw::StandardLinearSolid => {
+                let at = if m.touching { h } else { self.free_surface(m) };
+                let speed = (-at - m.damper) / c.relaxation_time;
+                let viscosity = c.relaxation_stiffness * c.relaxation_time;
+                (0.0, speed, viscosity * speed * speed)
+            }
+        };
+        (beam, [surface, damper, lost])
+    }
+
+    fn step(&self, t: f64, m: &Motion, h: f64) -> Motion {
+        let along = |k: &Rates, h: f64| {
+            let mut next = m.clone();
+            next.beam.axpy(h, &k.0, 1.0);
+            next.surface += h * k.1[0];
+            next.damper += h * k.1[1];
+            next.dissipated += h * k.1[2];
+            next
+        };
+        let a = self.rates(t, m);
+        let b = self.rates(t + 0.5 * h, &along(&a, 0.5 * h));
+        let c = self.rates(t + 0.5 * h, &along(&b, 0.5 * h));
+        let d = self.rates(t + h, &along(&c, h));
+        let mean = |i: usize| (a.1[i] + 2.0 * (b.1[i] + c.1[i]) + d.1[i]) / 6.0;
+        along(
+            &(
+                (&a.0 + (&b.0 + &c.0) * 2.0 + &d.0) / 6.0,
+                [mean(0), mean(1), mean(2)],
+            ),
+            h,
+        )
+    }
+
+    /// Positive while nothing changes.
+    fn inside(&self, t: f64, m: &Motion) -> f64 {
+        let [h, v] = self.height(t, &m.beam);
+        match (m.touching, self.case.contact) {
+            (false, _) => h - self.free_surface(m),
+            (true, ContactLaw::SpringDamper) => -h,
+            (true, _) => self.pressed(h, v, m.damper),
+        }
+    }
+
+    /// Runs `periods` drive periods from rest with a relaxed sample.
+    pub(crate) fn run(&self, beam: &[f64], periods: usize, steps: usize) -> Motion {
+        let mut m = Motion {
+            beam: DVector::from_column_slice(beam),
+            surface: 0.0,
+            damper: 0.0,
+            touching: false,
+            dissipated: 0.0,
+            force: [0.0; 2],
+            contacts: 0,
+        };
+        assert!(self.inside(0.0, &m) > 0.0, "the run starts in flight");
+        let h = self.case.period() / steps as f64;
+        for k in 0..periods * steps {
+            let (mut t, mut left) = (k as f64 * h, h);
+            while left > 0.0 {
+                let end = self.step(t, &m, left);
+                if self.inside(t + left, &end) > 0.0 {
+                    m = end;
+                    break;
+                }
+                let (mut low, mut high) = (0.0, left);
+                for _ in 0..52 {
+                    let middle = 0.5 * (low + high);
+                    if self.inside(t + middle, &self.step(t, &m, middle)) > 0.0 {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                m = self.step(t, &m, high);
+                (t, left) = (t + high, left - high);
+                m.touching = !m.touching;
+                m.contacts += usize::from(m.touching);
+                let [height, _] = self.height(t, &m.beam);
+                if m.touching {
+                    m.surface = height;
+                }
+                // A small step on, where the guard that is zero here has become positive.
+                let on = left.min(1e-4 * h);
+                m = self.step(t, &m, on);
+                (t, left) = (t + on, left - on);
+            }
+            if m.touching {
+                let [height, speed] = self.height(k as f64 * h + h, &m.beam);
+                let force = self.pressed(height, speed, m.damper);
+                m.force = [m.force[0].min(force), m.force[1].max(force)];
+            }
+        }
+        m
+    }
+}

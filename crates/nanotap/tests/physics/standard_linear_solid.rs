@@ -1,0 +1,129 @@
+//! The spring beside a relaxing arm.
+
+use std::f64::consts::TAU;
+
+use nanotap::case::Case;
+use nanotap::contact::ContactLaw;
+use nanotap::model::Model;
+use nanotap::observables::Observables;
+use nanotap::orbit::{OrbitOptions, orbit};
+use nanotap::parameter::Parameter;
+use nanotap::subject::Subject;
+use nanotap_flow::Trajectory;
+
+use crate::contact_laws::on;
+use crate::derivatives::advance;
+
+fn solid() -> Case {
+    on(ContactLaw::StandardLinearSolid, 20.0)
+}
+
+fn after(case: &Case, periods: usize) -> Vec<f64> {
+    let subject = Subject::Cantilever(case.clone());
+    let mut state = vec![0.0; subject.model().unwrap().dimension()];
+    (0..periods).for_each(|_| state = advance(&subject, &state));
+    state
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
+
+/// An arm that relaxes at once leaves the spring α4, one that never does adds its own.
+#[test]
+fn limits_of_the_relaxation_time_are_springs() {
+    let spring = |stiffness| Case {
+        alpha4: stiffness,
+        ..on(ContactLaw::SpringDamper, 20.0).with(Parameter::Alpha6, 0.0)
+    };
+    let (relaxed, instantaneous) = (after(&spring(20.0), 3), after(&spring(60.0), 3));
+    for (time, expected) in [(1e-6, &relaxed), (0.0, &relaxed), (1e6, &instantaneous)] {
+        let found = after(&solid().with(Parameter::RelaxationTime, time), 3);
+        assert!(
+            distance(&found, expected) < 1e-4,
+            "{time}: {found:?} {expected:?}"
+        );
+        let nearer = if time < 1.0 { time * 0.1 } else { time * 10.0 };
+        let near = after(&solid().with(Parameter::RelaxationTime, nearer), 3);
+        assert!(distance(&near, expected) <= 0.2 * distance(&found, expected) + 1e-12);
+    }
+}
+
+/// An ever stiffer arm of the same damper is a Kelvin–Voigt surface.
+#[test]
+fn a_stiff_arm_is_a_kelvin_voigt_surface() {
+    let expected = after(&on(ContactLaw::KelvinVoigt, 20.0), 3);
+    let mut last = f64::INFINITY;
+    for stiffness in [1e3, 1e4, 1e5, 1e6] {
+        let case = Case {
+            relaxation_stiffness: stiffness,
+            relaxation_time: Case::paper().alpha6 / stiffness,
+            ..solid()
+        };
+        let found = distance(&after(&case, 3)[..6], &expected[..6]);
+        assert!(found < 0.2 * last, "{stiffness}: {found}");
+        last = found;
+    }
+    assert!(last < 1e-5);
+}
+
+/// Pressed in at rest and shaken, the sample is indented harmonically: the loop of force and
+/// indentation has the area π δ₀² k ωτ/(1 + ω²τ²), and the spring seen is the storage
+/// modulus α4 + k ω²τ²/(1 + ω²τ²).
+#[test]
+fn harmonic_indentation_loses_what_the_loss_modulus_says() {
+    for (omega, time) in [(2.6, 0.01), (2.6, 0.4), (20.0, 0.05), (20.0, 3.0)] {
+        let case = Case {
+            alpha2: 1e-3,
+            alpha5: -0.4,
+            relaxation_time: time,
+            ..on(ContactLaw::StandardLinearSolid, omega)
+        };
+        let model = Model::cantilever(&case).unwrap();
+        let options = OrbitOptions {
+            period: Some(1),
+            ..OrbitOptions::default()
+        };
+        let found = orbit(&model, &options).unwrap();
+        assert!(found.events.is_empty(), "the tip stays in contact");
+        let height = found.trajectory.signal(&model.height);
+        let force = found.trajectory.signal_by_regime(&model.force);
+        let (indented, pushed) = (-height.fourier(omega), force.fourier(omega));
+        let turn = omega * time;
+        let arm = case.relaxation_stiffness;
+        let lost = TAU / 2.0 * indented.norm_sqr() * arm * turn / (1.0 + turn * turn);
+        let taken = found.observables.energy_balance.sample_damping;
+        assert!(
+            (taken / lost - 1.0).abs() < 1e-9,
+            "{omega} {time}: {taken} {lost}"
+        );
+        let modulus = pushed / indented;
+        let storage = case.alpha4 + arm * turn * turn / (1.0 + turn * turn);
+        assert!((modulus.re / storage - 1.0).abs() < 1e-9);
+    }
+}
+
+/// Force and gap vanish together, and the free surface recovers with the retardation time
+/// τ (α4 + k)/α4, slower than the force relaxes.
+#[test]
+fn the_free_surface_recovers_with_its_retardation_time() {
+    let case = solid().with(Parameter::RelaxationTime, 0.3);
+    let model = Model::cantilever(&case).unwrap();
+    let run = Trajectory::record(&model.system, &after(&case, 30), 4).unwrap();
+    let surface = |t: f64| {
+        let gap = run.signal(&model.gap).at(t).unwrap();
+        run.signal(&model.height).at(t).unwrap() - gap
+    };
+    let retardation =
+        case.relaxation_time * (case.alpha4 + case.relaxation_stiffness) / case.alpha4;
+    let mut flights = 0;
+    for pair in run.events().windows(2).filter(|p| !model.contact[p[0].to]) {
+        let (start, end) = (pair[0].time + 1e-9, pair[1].time - 1e-9);
+        let expected = surface(start) * (-(end - start) / retardation).exp();
+        assert!((surface(end) - expected).abs() < 1e-12);
+        flights += 1;
+    }
+    assert!(flights > 1);
+    let seen = Observables::of(&model, &run).unwrap();
+    assert!(seen.least_force > -1e-12 && seen.peak_force > 0.1);
+}

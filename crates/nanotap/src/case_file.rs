@@ -150,9 +150,7 @@ impl Kind {
     /// The names of the numbers that this kind takes, `modes` not among them.
     fn numbers(self) -> Vec<&'static str> {
         match self {
-            Self::Cantilever => Parameter::every()
-                .map(|parameter| parameter.name())
-                .collect(),
+            Self::Cantilever => Parameter::every().map(Parameter::name).collect(),
             Self::VibroImpact | Self::Impact => OscillatorParameter::ALL
                 .iter()
                 .filter(|parameter| match parameter {
@@ -173,7 +171,7 @@ impl Kind {
         keys.push("kind");
         if self == Self::Cantilever {
             keys.extend(["modes", "cosine_term", "contact"]);
-            let aliases = Parameter::every().map(|parameter| parameter.alias());
+            let aliases = Parameter::every().map(Parameter::alias);
             keys.extend(aliases.filter(|alias| !Parameter::every().any(|p| p.name() == *alias)));
         }
         keys

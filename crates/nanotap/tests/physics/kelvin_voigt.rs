@@ -94,7 +94,8 @@ fn a_vanishing_damper_leaves_the_spring() {
     let elastic = on(ContactLaw::SpringDamper, 20.0).with(Parameter::Alpha6, 0.0);
     let end = |case: &Case| {
         let model = Model::cantilever(case).unwrap();
-        let run = Trajectory::record(&model.system, &vec![0.0; model.dimension()], 3).unwrap();
+        let rest = vec![0.0; model.dimension()];
+        let run = Trajectory::record(&model.system, &rest, 30).unwrap();
         run.state_at(run.end()).unwrap()
     };
     let expected = end(&elastic);

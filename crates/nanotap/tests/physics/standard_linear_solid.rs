@@ -36,15 +36,15 @@ fn limits_of_the_relaxation_time_are_springs() {
         alpha4: stiffness,
         ..on(ContactLaw::SpringDamper, 20.0).with(Parameter::Alpha6, 0.0)
     };
-    let (relaxed, instantaneous) = (after(&spring(20.0), 3), after(&spring(60.0), 3));
+    let (relaxed, instantaneous) = (after(&spring(20.0), 30), after(&spring(60.0), 30));
     for (time, expected) in [(1e-6, &relaxed), (0.0, &relaxed), (1e6, &instantaneous)] {
-        let found = after(&solid().with(Parameter::RelaxationTime, time), 3);
+        let found = after(&solid().with(Parameter::RelaxationTime, time), 30);
         assert!(
-            distance(&found, expected) < 1e-4,
+            distance(&found, expected) < 2e-3,
             "{time}: {found:?} {expected:?}"
         );
         let nearer = if time < 1.0 { time * 0.1 } else { time * 10.0 };
-        let near = after(&solid().with(Parameter::RelaxationTime, nearer), 3);
+        let near = after(&solid().with(Parameter::RelaxationTime, nearer), 30);
         assert!(distance(&near, expected) <= 0.2 * distance(&found, expected) + 1e-12);
     }
 }
@@ -52,7 +52,7 @@ fn limits_of_the_relaxation_time_are_springs() {
 /// An ever stiffer arm of the same damper is a Kelvin–Voigt surface.
 #[test]
 fn a_stiff_arm_is_a_kelvin_voigt_surface() {
-    let expected = after(&on(ContactLaw::KelvinVoigt, 20.0), 3);
+    let expected = after(&on(ContactLaw::KelvinVoigt, 20.0), 30);
     let mut last = f64::INFINITY;
     for stiffness in [1e3, 1e4, 1e5, 1e6] {
         let case = Case {
@@ -60,11 +60,11 @@ fn a_stiff_arm_is_a_kelvin_voigt_surface() {
             relaxation_time: Case::paper().alpha6 / stiffness,
             ..solid()
         };
-        let found = distance(&after(&case, 3)[..6], &expected[..6]);
+        let found = distance(&after(&case, 30)[..6], &expected[..6]);
         assert!(found < 0.2 * last, "{stiffness}: {found}");
         last = found;
     }
-    assert!(last < 1e-5);
+    assert!(last < 1e-3, "{last}");
 }
 
 /// Pressed in at rest and shaken, the sample is indented harmonically: the loop of force and
@@ -109,7 +109,7 @@ fn harmonic_indentation_loses_what_the_loss_modulus_says() {
 fn the_free_surface_recovers_with_its_retardation_time() {
     let case = solid().with(Parameter::RelaxationTime, 0.3);
     let model = Model::cantilever(&case).unwrap();
-    let run = Trajectory::record(&model.system, &after(&case, 30), 4).unwrap();
+    let run = Trajectory::record(&model.system, &after(&case, 30), 12).unwrap();
     let surface = |t: f64| {
         let gap = run.signal(&model.gap).at(t).unwrap();
         run.signal(&model.height).at(t).unwrap() - gap

@@ -9,11 +9,12 @@ mod process;
 mod steps;
 mod tally;
 mod tools;
+mod wheel;
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use steps::{STEPS, Step};
+use steps::{BESIDE, STEPS, Step};
 use tally::Tally;
 use tools::Workspace;
 
@@ -63,6 +64,7 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
             name => selected.push(
                 STEPS
                     .iter()
+                    .chain(BESIDE)
                     .find(|step| step.name == name)
                     .ok_or_else(|| format!("no chore is called `{name}`"))?,
             ),
@@ -73,12 +75,15 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
 
 fn usage() -> String {
     use std::fmt::Write as _;
-    let mut text = String::from("usage: cargo xtask <chore>...\n\n  test        all of these:\n");
+    let mut text = String::from("usage: cargo xtask <chore>...\n\n  test         all of these:\n");
     for step in STEPS {
-        let _ = writeln!(text, "  {:<10}  {}", step.name, step.about);
+        let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
-    text +=
-        "\n  peers       nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
+    text.push_str("\n  beside them:\n");
+    for step in BESIDE {
+        let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
+    }
+    text += "  peers        nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
     text
 }
 
@@ -137,7 +142,7 @@ fn summarise(lines: &[Line]) -> ExitCode {
             String::new()
         };
         println!(
-            "{mark} {:<10} {passed:>5} passed {failed:>3} failed{skipped}  {:>6.1} s  {}",
+            "{mark} {:<11} {passed:>5} passed {failed:>3} failed{skipped}  {:>6.1} s  {}",
             line.name,
             line.time.as_secs_f64(),
             line.trouble.as_deref().unwrap_or_default(),

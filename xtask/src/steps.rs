@@ -3,6 +3,7 @@
 use crate::process::{shown_and_kept, succeeds};
 use crate::tally::Tally;
 use crate::tools::Workspace;
+use crate::wheel;
 
 /// One chore.
 pub(crate) struct Step {
@@ -25,7 +26,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "python",
-        about: "lint and format of the Python sources",
+        about: "lint, format and types of the Python sources",
         run: python,
     },
     Step {
@@ -45,7 +46,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "test-python",
-        about: "the Python tests, on the release build's datasets",
+        about: "the Python tests and notebooks, on the installed wheel",
         run: test_python,
     },
     Step {
@@ -59,6 +60,13 @@ pub(crate) static STEPS: &[Step] = &[
         run: doc,
     },
 ];
+
+/// Chores that are no checks.
+pub(crate) static BESIDE: &[Step] = &[Step {
+    name: "wheel",
+    about: "the Python package, installable, in target/wheels",
+    run: wheel,
+}];
 
 fn fmt(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["fmt", "--all", "--check"]);
@@ -80,6 +88,10 @@ fn python(workspace: &Workspace) -> Result<Tally, String> {
         let mut command = workspace.python_tool("ruff")?;
         tally += Tally::check(succeeds(&workspace.root, command.args(arguments))?);
     }
+    let mut types = workspace.python_tool("mypy")?;
+    types.args(["--config-file", "crates/nanotap-python/pyproject.toml"]);
+    types.arg("crates/nanotap-python/python/nanotap");
+    tally += Tally::check(succeeds(&workspace.root, &mut types)?);
     Ok(tally)
 }
 
@@ -99,19 +111,22 @@ fn lint(workspace: &Workspace) -> Result<Tally, String> {
     Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
 }
 
+fn wheel(workspace: &Workspace) -> Result<Tally, String> {
+    let path = wheel::build(workspace)?;
+    println!("{}", path.display());
+    Ok(Tally::passed_check())
+}
+
 fn test_python(workspace: &Workspace) -> Result<Tally, String> {
     let mut build = workspace.cargo(&["build", "--release"]);
     if !succeeds(&workspace.root, &mut build)? {
         return Err("the program could not be built".into());
     }
-    let mut command = workspace.python_tool("pytest")?;
+    let environment = wheel::installed(workspace)?;
+    let mut command = environment.program("pytest");
     command.arg("python-tests");
-    if let Ok(target) = std::env::var("CARGO_TARGET_DIR") {
-        let program = std::path::Path::new(&target)
-            .join("release")
-            .join("nanotap");
-        command.env("NANOTAP", program);
-    }
+    let program = workspace.target().join("release").join("nanotap");
+    command.env("NANOTAP", program);
     let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
     Ok(Tally::of_tests(&lines, succeeded))
 }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::process;
+use crate::{process, wheel};
 
 /// The Python of this machine.
 pub(crate) const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
@@ -14,6 +14,9 @@ pub(crate) const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" }
 pub(crate) struct Workspace {
     pub(crate) root: PathBuf,
     cargo: OsString,
+    target: PathBuf,
+    /// What PyO3 is told of the interpreter.
+    interpreter: Option<PathBuf>,
 }
 
 impl Workspace {
@@ -25,13 +28,24 @@ impl Workspace {
             .parent()
             .map_or_else(|| PathBuf::from("."), Path::to_path_buf);
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        Self { root, cargo }
+        let target = std::env::var_os("CARGO_TARGET_DIR")
+            .map_or_else(|| root.join("target"), |target| root.join(target));
+        let interpreter = wheel::interpreter(&root, &target);
+        Self {
+            root,
+            cargo,
+            target,
+            interpreter,
+        }
     }
 
     /// `cargo` with `arguments`.
     pub(crate) fn cargo(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(&self.cargo);
         command.args(arguments);
+        if let Some(interpreter) = &self.interpreter {
+            command.env("PYO3_CONFIG_FILE", interpreter);
+        }
         command
     }
 
@@ -42,8 +56,7 @@ impl Workspace {
 
     /// Where cargo builds.
     pub(crate) fn target(&self) -> PathBuf {
-        std::env::var_os("CARGO_TARGET_DIR")
-            .map_or_else(|| self.root.join("target"), |path| self.root.join(path))
+        self.target.clone()
     }
 
     /// Is `cargo NAME` there?
@@ -67,30 +80,38 @@ impl Workspace {
     /// # Errors
     /// Python or the installation failed; says which.
     pub(crate) fn python_tool(&self, name: &str) -> Result<Command, String> {
-        self.ensure_environment()?;
-        Ok(Command::new(self.environment_program(name)))
-    }
-
-    fn environment_program(&self, name: &str) -> PathBuf {
-        let folder = if cfg!(windows) { "Scripts" } else { "bin" };
-        self.root.join(".venv").join(folder).join(name)
-    }
-
-    /// Creates `.venv` and installs `xtask/tools.txt` unless this very list is in.
-    fn ensure_environment(&self) -> Result<(), String> {
         let list = self.root.join("xtask").join("tools.txt");
-        let wanted = fs::read_to_string(&list)
+        let environment = Environment::ensured(&self.root, self.root.join(".venv"), &list)?;
+        Ok(environment.program(name))
+    }
+}
+
+/// A Python environment.
+pub(crate) struct Environment {
+    folder: PathBuf,
+}
+
+impl Environment {
+    /// Creates it in `folder` and installs what `list` says, unless this very list is in.
+    ///
+    /// # Errors
+    /// Python or the installation failed; says which.
+    pub(crate) fn ensured(root: &Path, folder: PathBuf, list: &Path) -> Result<Self, String> {
+        let wanted = fs::read_to_string(list)
             .map_err(|error| format!("cannot read {}: {error}", list.display()))?;
-        let stamp = self.root.join(".venv").join("installed-tools.txt");
+        let stamp = folder.join("installed-tools.txt");
+        let environment = Self { folder };
         if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
-            return Ok(());
+            return Ok(environment);
         }
         let created = process::succeeds(
-            &self.root,
-            Command::new(PYTHON).args(["-m", "venv", ".venv"]),
+            root,
+            Command::new(PYTHON)
+                .args(["-m", "venv", "--clear"])
+                .arg(&environment.folder),
         )?;
         if !created {
-            return Err("python3 -m venv .venv failed".into());
+            return Err("python3 -m venv failed".into());
         }
         let pip = [
             "-m",
@@ -100,16 +121,21 @@ impl Workspace {
             "--disable-pip-version-check",
             "-r",
         ];
-        let installed = process::succeeds(
-            &self.root,
-            Command::new(self.environment_program("python"))
-                .args(pip)
-                .arg(&list),
-        )?;
+        let installed = process::succeeds(root, environment.program("python").args(pip).arg(list))?;
         if !installed {
-            return Err("the tools of xtask/tools.txt could not be installed".into());
+            return Err(format!(
+                "what {} names could not be installed",
+                list.display()
+            ));
         }
         fs::write(&stamp, wanted)
-            .map_err(|error| format!("cannot write {}: {error}", stamp.display()))
+            .map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
+        Ok(environment)
+    }
+
+    /// One of its programs.
+    pub(crate) fn program(&self, name: &str) -> Command {
+        let folder = if cfg!(windows) { "Scripts" } else { "bin" };
+        Command::new(self.folder.join(folder).join(name))
     }
 }

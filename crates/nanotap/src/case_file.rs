@@ -95,7 +95,11 @@ pub fn to_toml(case: &Case) -> String {
     text
 }
 
-fn read(path: &Path) -> Result<Source, CaseFileError> {
+/// Reads the text of a case file.
+///
+/// # Errors
+/// When there is none, it cannot be read or is no text.
+pub fn read(path: &Path) -> Result<Source, CaseFileError> {
     let name = path.display().to_string();
     let refuse = |why: String, help: &str| {
         CaseFileError::one(

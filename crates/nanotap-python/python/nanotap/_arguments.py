@@ -1,0 +1,161 @@
+"""Arguments as the extension takes them, with the reason where they cannot be."""
+
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+Progress: TypeAlias = bool | Callable[[int, int], object] | None
+Box: TypeAlias = Mapping[str, tuple[float, float]] | None
+
+# No machine counts further, and the extension takes no more.
+_MOST = 2**63 - 1
+
+
+def count(name: str, value: Any, least: int = 0) -> int:
+    """A whole number that is at least `least`."""
+    if isinstance(value, bool | np.bool_):
+        message = f"{name}: {value} is no number"
+        raise TypeError(message)
+    try:
+        number = operator.index(value)
+    except TypeError:
+        message = f"{name}: a whole number is needed, not {value!r}"
+        raise TypeError(message) from None
+    if not least <= number <= _MOST:
+        message = f"{name}: {number} is out of range; a whole number from {least} on is needed"
+        raise ValueError(message)
+    return number
+
+
+def optional_count(name: str, value: Any, least: int = 0) -> int | None:
+    """A whole number, or `None`."""
+    return None if value is None else count(name, value, least)
+
+
+def seed(value: Any) -> int:
+    """A seed, from 0 to 2⁶³ − 1."""
+    return count("seed", value)
+
+
+def number(name: str, value: Any) -> float:
+    """A real number, finite or not: what it may be is for the library to say."""
+    if isinstance(value, bool | np.bool_ | str | bytes | complex):
+        message = f"{name}: a number is needed, not {value!r}"
+        raise TypeError(message)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        message = f"{name}: a number is needed, not {value!r}"
+        raise TypeError(message) from None
+
+
+def state(value: Any) -> Floats | None:
+    """A state: one row of real numbers."""
+    if value is None:
+        return None
+    array = real(value, "state")
+    if array.ndim != 1:
+        message = f"state: one row of numbers is needed, not an array of {array.ndim} dimensions"
+        raise ValueError(message)
+    return array
+
+
+def real(value: Any, name: str) -> Floats:
+    """Real numbers, aligned and contiguous: what comes from elsewhere may be neither."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:  # rows of different lengths
+        message = f"{name}: {error}"
+        raise ValueError(message) from None
+    if array.dtype.kind not in "iuf" and array.size:
+        message = f"{name}: real numbers are needed, not {array.dtype}"
+        raise TypeError(message)
+    return np.require(array, np.float64, ["C", "A"])
+
+
+def box(value: Box) -> list[tuple[str, float, float]]:
+    """Sides of a box of states: `{"a1": (-1, 1)}`."""
+    if value is None:
+        return []
+    if not isinstance(value, Mapping):
+        message = 'box: name the sides with their ends, as in {"a1": (-1, 1)}'
+        raise TypeError(message)
+    sides = []
+    for name, ends in value.items():
+        low, high = _pair(f"box: {name}", ends)
+        sides.append(
+            (str(name), number(f"box: {name}", low), number(f"box: {name}", high))
+        )
+    return sides
+
+
+def _pair(name: str, value: Any) -> tuple[Any, Any]:
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        message = f"{name}: a lower and an upper end are needed, not {value!r}"
+        raise TypeError(message)
+    ends = tuple(value)
+    if len(ends) != 2:
+        message = f"{name}: a lower and an upper end are needed, not {len(ends)} values"
+        raise ValueError(message)
+    return ends[0], ends[1]
+
+
+def quantity(name: str, value: Any) -> str:
+    """A number, or a text with a unit, as the extension reads it."""
+    if isinstance(value, str):
+        return value
+    return repr(number(name, value))
+
+
+def axis(name: str, values: Any) -> str:
+    """An axis as the terminal writes it: `omega=2:4:400` or `alpha4=1:1000:50:log`."""
+    if isinstance(values, tuple):
+        if len(values) not in (3, 4):
+            message = f"{name}: first, last and how many are needed, as in (2, 4, 400)"
+            raise ValueError(message)
+        first, last, many, *spacing = values
+        words = [quantity(name, first), quantity(name, last), str(count(name, many))]
+        return f"{name}={':'.join([*words, *map(str, spacing)])}"
+    array = real(values, name)
+    if array.ndim != 1 or array.size == 0:
+        message = f"{name}: a row of values is needed, as in numpy.linspace(2, 4, 400)"
+        raise ValueError(message)
+    first, last, many = float(array[0]), float(array[-1]), array.size
+    if np.allclose(array, np.linspace(first, last, many), rtol=1e-12, atol=0):
+        return f"{name}={first!r}:{last!r}:{many}"
+    if (
+        first > 0
+        and last > 0
+        and np.allclose(array, np.geomspace(first, last, many), rtol=1e-12, atol=0)
+    ):
+        return f"{name}={first!r}:{last!r}:{many}:log"
+    message = (
+        f"{name}: the values go neither in equal steps nor in equal ratios; simulate and orbit "
+        "take any values"
+    )
+    raise ValueError(message)
+
+
+def axes(over: str | Sequence[str] | Mapping[str, Any]) -> list[str]:
+    """The axes of a sweep."""
+    if isinstance(over, str):
+        return [over]
+    if isinstance(over, Mapping):
+        return [axis(str(name), values) for name, values in over.items()]
+    if isinstance(over, Sequence) and all(isinstance(word, str) for word in over):
+        return list(over)
+    message = 'over: name parameters and values, as in {"omega": (2, 4, 400)} or "omega=2:4:400"'
+    raise TypeError(message)
+
+
+def slice_axis(name: str, value: str | Mapping[str, Any]) -> str:
+    """One axis of a slice of states: `"a1=-1:1:200"` or `{"a1": (-1, 1, 200)}`."""
+    words = axes(value) if isinstance(value, str | Mapping) else []
+    if len(words) != 1:
+        message = f'{name}: name one entry of the state, as in {{"a1": (-1, 1, 200)}} or "a1=-1:1:200"'
+        raise TypeError(message)
+    return words[0]

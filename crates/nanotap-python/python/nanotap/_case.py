@@ -1,0 +1,289 @@
+"""The case: which cantilever, sample and drive."""
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from . import _nanotap
+from ._results import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Path: TypeAlias = str | os.PathLike[str]
+Value: TypeAlias = float | int | str | Mapping[str, float | int | str]
+
+_OTHER_NAMES = {
+    alias: name
+    for table, keys in _nanotap.case_keys()
+    if table == "model"
+    for name, alias in keys
+}
+
+
+class Case:
+    """A checked case: a cantilever (dimensionless or in physical units) or an oscillator.
+
+    Keys are those of the case file. Dimensionless: `modes`, `alpha1` … `alpha6`, `omega`,
+    or their readable names (`tip_mass_ratio`, `drive_amplitude`, `beam_damping`,
+    `contact_stiffness`, `gap`, `contact_damping`, `drive_frequency`). Physical: the tables
+    as dictionaries, with quantities and their units.
+
+    >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
+    2.6
+    >>> case = Case(
+    ...     cantilever={"k": "2.8 N/m", "f0": "75 kHz", "Q": 200},
+    ...     sample={"stiffness": "20 N/m"},
+    ...     drive={"frequency": "65.7 kHz", "free_amplitude": "20 nm"},
+    ...     gap={"tip": "10 nm"},
+    ... )
+    >>> round(case.alpha4, 2)
+    21.43
+
+    Raises:
+        ValueError: a key or value is not right; the words say which and what would be.
+        TypeError: a value is neither number nor text.
+    """
+
+    __slots__ = ("_core", "_document", "_keys", "_remarks_said")
+    _core: _nanotap.CaseCore
+    _keys: dict[str, str]
+    _document: Record
+
+    def __init__(self, *, catalogue: Path | Iterable[Path] = (), **keys: Value) -> None:
+        texts = [(os.fspath(path), _text(path)) for path in _paths(catalogue)]
+        self._make(None, _words(keys), texts)
+
+    @classmethod
+    def from_file(
+        cls, path: Path, *, catalogue: Path | Iterable[Path] = (), **keys: Value
+    ) -> "Case":
+        """The case of a file (TOML), with `keys` in place of what it says.
+
+        `catalogue` names files of levers and materials beside the built-in ones.
+        """
+        case = cls.__new__(cls)
+        case._keys = _words(keys)
+        files = [os.fspath(path) for path in _paths(catalogue)]
+        case._core = _nanotap.CaseCore.from_file(
+            os.fspath(path), list(case._keys.values()), files
+        )
+        case._read()
+        return case
+
+    @classmethod
+    def from_toml(cls, text: str, *, name: str = "case", **keys: Value) -> "Case":
+        """The case of a TOML text, called `name` where something in it is not right."""
+        if not isinstance(text, str):
+            message = f"text: a TOML text is needed, not {text!r}"
+            raise TypeError(message)
+        return _again(cls, (name, text), _words(keys), [])
+
+    @classmethod
+    def paper(cls, **keys: Value) -> "Case":
+        """The paper's parameters for Figs. 5–17, Eq. (26), with α₁ = 0.1 and Ω = 2.6."""
+        own: dict[str, Value] = {
+            "modes": 3,
+            "alpha1": 0.1,
+            "alpha2": 0.1,
+            "alpha3": 0.1,
+            "alpha4": 20.0,
+            "alpha5": 0.0,
+            "alpha6": 0.2,
+            "omega": 2.6,
+        }
+        named = {_OTHER_NAMES.get(key, key): value for key, value in keys.items()}
+        return _again(cls, None, _words(own | named), [])
+
+    def with_(self, **keys: Value) -> "Case":
+        """The same case with some keys changed."""
+        if not keys:
+            return self
+        source, _, catalogues = self._core.made_of
+        return _again(type(self), source, self._keys | _words(keys), catalogues)
+
+    def _make(
+        self,
+        source: tuple[str, str] | None,
+        words: dict[str, str],
+        catalogues: list[tuple[str, str]],
+    ) -> None:
+        self._keys = words
+        self._core = _nanotap.CaseCore(source, list(words.values()), catalogues)
+        self._read()
+
+    def _read(self) -> None:
+        self._document = Record(json.loads(self._core.document))
+
+    @property
+    def kind(self) -> str:
+        """`cantilever`, `vibro_impact` or `impact`."""
+        return str(self._document["kind"])
+
+    @property
+    def period(self) -> float:
+        """The period of the drive, 2π/Ω, in the model's unit of time."""
+        return float(self._document["period"])
+
+    @property
+    def physical(self) -> Record | None:
+        """What is known of it in SI (frequencies in Hz), if it is a physical case."""
+        physical = self._document.get("physical")
+        return physical if isinstance(physical, Record) else None
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether it was given in physical units."""
+        return self._core.is_physical
+
+    @property
+    def remarks(self) -> list[tuple[str, str]]:
+        """What was assumed (`note`) and what puts it in doubt (`warning`)."""
+        return self._core.remarks
+
+    @property
+    def state_names(self) -> list[str]:
+        """The names of the entries of a state: a1 … aN, v1 … vN; or x, v."""
+        return self._core.state_names
+
+    @property
+    def mapping(self) -> "pd.DataFrame":
+        """Every dimensionless parameter beside the physical quantity that it stands for.
+
+        Columns: parameter, value, formula, quantity, si, unit. Empty without physical units.
+        """
+        import pandas as pd
+
+        columns = ["parameter", "value", "formula", "quantity", "si", "unit"]
+        table = pd.DataFrame(json.loads(self._core.mapping), columns=columns)
+        return table.set_index("parameter")
+
+    def to_toml(self) -> str:
+        """The dimensionless case file that says the same.
+
+        Raises:
+            ValueError: it is an oscillator.
+        """
+        text = self._core.toml
+        if text is None:
+            message = "an oscillator is not written out"
+            raise ValueError(message)
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that is known of it, as the terminal's `nanotap case --json`."""
+        return self._document.to_dict()
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._document[_OTHER_NAMES.get(name, name)]
+        except KeyError:
+            message = f"the case has no `{name}`; it has {', '.join(self._document)}"
+            raise AttributeError(message) from None
+
+    def __getitem__(self, name: str) -> Any:
+        return self._document[_OTHER_NAMES.get(name, name)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._document)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._document})
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Case):
+            return NotImplemented
+        return self._core.document == other._core.document
+
+    def __hash__(self) -> int:
+        return hash(self._core.document)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        source, _, catalogues = self._core.made_of
+        return _again, (type(self), source, self._keys, catalogues)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(
+            f"{key}={value!r}"
+            for key, value in self._document.items()
+            if key not in {"kind", "period", "physical"} and value is not None
+        )
+        name = "Case" if self.kind == "cantilever" else f"Case[{self.kind}]"
+        return f"{name}({shown})"
+
+    def _repr_html_(self) -> str:
+        symbols = {name: symbol for name, symbol, _ in self._core.parameters}
+        rows = "".join(
+            f"<tr><td>{escape(symbols.get(key, ''))}</td><td>{escape(key)}</td>"
+            f"<td style='text-align:right'>{escape(_short(value))}</td></tr>"
+            for key, value in self._document.items()
+            if key not in {"kind", "physical"} and value is not None
+        )
+        return f"<table><caption>{escape(self.kind)}</caption>{rows}</table>"
+
+
+def catalogue() -> "pd.DataFrame":
+    """The built-in levers and materials, usable by name, with their sources."""
+    import pandas as pd
+
+    return pd.DataFrame(_nanotap.catalogue(), columns=["kind", "name", "source"])
+
+
+def _again(
+    kind: type[Case],
+    source: tuple[str, str] | None,
+    words: dict[str, str],
+    catalogues: list[tuple[str, str]],
+) -> Case:
+    case = kind.__new__(kind)
+    case._make(source, words, catalogues)
+    return case
+
+
+def _paths(given: Path | Iterable[Path]) -> list[Path]:
+    return [given] if isinstance(given, str | os.PathLike) else list(given)
+
+
+def _text(path: Path) -> str:
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        message = f"{os.fspath(path)}: cannot be read: {error}"
+        raise ValueError(message) from None
+
+
+def _words(keys: Mapping[str, Any]) -> dict[str, str]:
+    """`key=value` words by the one name that each key has."""
+    words = {}
+    for key, value in keys.items():
+        if isinstance(value, Mapping):
+            for inner, quantity in value.items():
+                name = f"{key}.{inner}"
+                words[name] = f"{name}={_written(name, quantity)}"
+        else:
+            name = key.removeprefix("model.")
+            name = _OTHER_NAMES.get(name, name)
+            words[name] = f"{name}={_written(name, value)}"
+    return words
+
+
+def _written(name: str, value: Any) -> str:
+    if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:
+        value = value.item()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return repr(value)
+    message = f"{name}: a number or a text is needed, not {value!r}"
+    raise TypeError(message)
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

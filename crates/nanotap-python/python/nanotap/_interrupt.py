@@ -1,0 +1,16 @@
+"""Ctrl-C that keeps what is finished."""
+
+from typing import Generic, TypeVar
+
+R = TypeVar("R")
+
+
+class Interrupted(KeyboardInterrupt, Generic[R]):
+    """Ctrl-C stopped the work; `result` is what was finished until then.
+
+    A notebook still has it afterwards: `import sys; sys.last_value.result`.
+    """
+
+    def __init__(self, message: str, result: R) -> None:
+        super().__init__(message)
+        self.result = result

@@ -1,0 +1,48 @@
+"""Progress bars, where tqdm is installed and somebody looks."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ._arguments import Progress
+
+# Nothing is said of work shorter than this, in seconds.
+_PATIENCE = 0.7
+
+
+@contextmanager
+def bar(progress: Progress, noun: str) -> Iterator[Callable[[int, int], object] | None]:
+    """What hears of progress: a bar of tqdm's, the caller's own function, or nothing.
+
+    `None` shows a bar on a terminal and in a notebook, `True` everywhere.
+    """
+    if callable(progress):
+        yield progress
+        return
+    if progress is False or (progress is None and not _somebody_looks()):
+        yield None
+        return
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        if progress:
+            message = "progress=True needs tqdm: pip install 'nanotap[progress]'"
+            raise ImportError(message) from None
+        yield None
+        return
+    line = tqdm(unit=f" {noun}", delay=_PATIENCE, leave=False, dynamic_ncols=True)
+
+    def show(done: int, total: int) -> None:
+        line.total = total
+        line.update(done - line.n)
+
+    try:
+        yield show
+    finally:
+        line.close()
+
+
+def _somebody_looks() -> bool:
+    if "ipykernel" in sys.modules:
+        return True
+    return sys.stderr is not None and sys.stderr.isatty()

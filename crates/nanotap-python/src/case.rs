@@ -1,0 +1,191 @@
+//! The case: read, resolved, and shown.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nanotap::case_document::{CaseDocument, MappingDocument};
+use nanotap::case_file::{self, CaseFile, PHYSICAL_KEYS, Source};
+use nanotap::parameter::Parameter;
+use nanotap::physical::{Catalogue, Severity};
+use nanotap::studied::Studied;
+use nanotap::subject::Subject;
+use nanotap::time_series::state_names;
+use pyo3::prelude::*;
+
+use crate::failure::Failure;
+
+/// A checked case. It keeps what it was made of, text for text, so that it can be made
+/// again with changes, and elsewhere.
+#[pyclass(frozen, module = "nanotap._nanotap")]
+pub(crate) struct CaseCore {
+    studied: Arc<Studied>,
+    source: Option<Source>,
+    overrides: Vec<String>,
+    catalogues: Vec<(String, String)>,
+}
+
+impl CaseCore {
+    /// What it describes.
+    pub(crate) fn studied(&self) -> Arc<Studied> {
+        Arc::clone(&self.studied)
+    }
+
+    fn make(
+        source: Option<Source>,
+        overrides: Vec<String>,
+        catalogues: Vec<(String, String)>,
+    ) -> Result<Self, Failure> {
+        let mut catalogue = Catalogue::builtin()?;
+        for (origin, text) in &catalogues {
+            catalogue.extend(text, origin)?;
+        }
+        let title = source
+            .as_ref()
+            .map_or_else(|| "case".to_owned(), |source| source.name.clone());
+        let file = CaseFile::parse(source.clone(), &overrides)?;
+        Ok(Self {
+            studied: Arc::new(Studied::resolve(title, file, &catalogue)?),
+            source,
+            overrides,
+            catalogues,
+        })
+    }
+}
+
+#[pymethods]
+impl CaseCore {
+    /// From the name and text of a case file, if there is one, `key=value` words beside it,
+    /// and names and texts of catalogues.
+    #[new]
+    fn new(
+        source: Option<(String, String)>,
+        overrides: Vec<String>,
+        catalogues: Vec<(String, String)>,
+    ) -> PyResult<Self> {
+        let source = source.map(|(name, text)| Source { name, text });
+        Ok(Self::make(source, overrides, catalogues)?)
+    }
+
+    /// The same from paths.
+    #[staticmethod]
+    fn from_file(
+        path: PathBuf,
+        overrides: Vec<String>,
+        catalogues: Vec<PathBuf>,
+    ) -> PyResult<Self> {
+        let source = case_file::read(&path).map_err(Failure::from)?;
+        let catalogues = catalogues
+            .iter()
+            .map(|path| Ok((path.display().to_string(), text_of(path)?)))
+            .collect::<Result<_, Failure>>()?;
+        Ok(Self::make(Some(source), overrides, catalogues)?)
+    }
+
+    /// What it was made of.
+    #[getter]
+    #[expect(
+        clippy::type_complexity,
+        reason = "the arguments of `new`, as they are"
+    )]
+    fn made_of(&self) -> (Option<(String, String)>, Vec<String>, Vec<(String, String)>) {
+        let source = self.source.as_ref();
+        (
+            source.map(|source| (source.name.clone(), source.text.clone())),
+            self.overrides.clone(),
+            self.catalogues.clone(),
+        )
+    }
+
+    /// The document of the case, JSON.
+    #[getter]
+    fn document(&self) -> PyResult<String> {
+        Ok(serde_json::to_string(&CaseDocument::of(&self.studied)).map_err(Failure::from)?)
+    }
+
+    /// Of a physical case, every parameter beside its physical quantity, JSON.
+    #[getter]
+    fn mapping(&self) -> PyResult<String> {
+        let rows: Vec<MappingDocument> = self
+            .studied
+            .resolved
+            .iter()
+            .flat_map(nanotap::physical::Resolved::mapping)
+            .map(MappingDocument::from)
+            .collect();
+        Ok(serde_json::to_string(&rows).map_err(Failure::from)?)
+    }
+
+    /// Assumptions (`note`) and doubts (`warning`) about a physical case.
+    #[getter]
+    fn remarks(&self) -> Vec<(&'static str, String)> {
+        let remarks = self.studied.resolved.iter().flat_map(|r| &r.remarks);
+        remarks
+            .map(|remark| {
+                let severity = match remark.severity {
+                    Severity::Note => "note",
+                    Severity::Warning => "warning",
+                };
+                (severity, remark.text.clone())
+            })
+            .collect()
+    }
+
+    /// The dimensionless case file; `None` of an oscillator.
+    #[getter]
+    fn toml(&self) -> Option<String> {
+        match &self.studied.subject {
+            Subject::Cantilever(case) => Some(case_file::to_toml(case)),
+            Subject::Oscillator(_) => None,
+        }
+    }
+
+    /// Whether its parameters were given in physical units.
+    #[getter]
+    fn is_physical(&self) -> bool {
+        self.studied.resolved.is_some()
+    }
+
+    /// Keys, symbols and values of the parameters that can be varied.
+    #[getter]
+    fn parameters(&self) -> Vec<(&'static str, &'static str, f64)> {
+        let subject = &self.studied.subject;
+        let keys = subject.keys();
+        keys.into_iter()
+            .map(|key| (key.name(), key.symbol(), subject.get(key)))
+            .collect()
+    }
+
+    /// The names of the entries of a state.
+    #[getter]
+    fn state_names(&self) -> PyResult<Vec<String>> {
+        Ok(state_names(&self.studied.model().map_err(Failure::from)?))
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path)
+        .map_err(|error| Failure::Input(format!("{}: cannot be read: {error}", path.display())))
+}
+
+/// The keys of a case file by table, each with the other names that it goes by.
+#[pyfunction]
+pub(crate) fn case_keys() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
+    let model = Parameter::ALL.map(|p| (p.name(), p.alias())).to_vec();
+    let physical = PHYSICAL_KEYS
+        .iter()
+        .map(|(table, keys)| (*table, keys.iter().map(|key| (*key, *key)).collect()));
+    std::iter::once(("model", model)).chain(physical).collect()
+}
+
+/// The built-in levers and materials: kind, name, source.
+#[pyfunction]
+pub(crate) fn catalogue() -> PyResult<Vec<(&'static str, String, String)>> {
+    let catalogue = Catalogue::builtin().map_err(Failure::from)?;
+    let levers = catalogue
+        .levers()
+        .map(|lever| ("lever", lever.name.clone(), lever.source.clone()));
+    let materials = catalogue
+        .materials()
+        .map(|material| ("material", material.name.clone(), material.source.clone()));
+    Ok(levers.chain(materials).collect())
+}

@@ -1,0 +1,52 @@
+//! The Python door: what crosses between Python and the library. No physics and no
+//! numerics here, and nothing that Python itself says better.
+//!
+//! Results cross as the JSON documents of the terminal and as numpy arrays; the package
+//! `nanotap` makes typed objects, xarray Datasets and pandas tables of them. Work runs on
+//! a thread of its own while the caller waits outside the interpreter lock
+//! ([`watch`]), so that Ctrl-C is heard and a panic becomes an exception.
+
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "arguments come out of Python as values"
+)]
+
+mod case;
+mod dataset;
+mod failure;
+mod motion;
+mod study;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// The compiled part of nanotap.
+#[pymodule]
+fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<case::CaseCore>()?;
+    module.add_class::<dataset::Recipe>()?;
+    module.add_class::<dataset::Receiver>()?;
+    for function in [
+        wrap_pyfunction!(case::case_keys, module)?,
+        wrap_pyfunction!(case::catalogue, module)?,
+        wrap_pyfunction!(motion::modes, module)?,
+        wrap_pyfunction!(motion::simulate, module)?,
+        wrap_pyfunction!(motion::fixed_step, module)?,
+        wrap_pyfunction!(motion::orbit, module)?,
+        wrap_pyfunction!(motion::observe, module)?,
+        wrap_pyfunction!(study::attractors, module)?,
+        wrap_pyfunction!(study::branch, module)?,
+        wrap_pyfunction!(study::lyapunov, module)?,
+        wrap_pyfunction!(study::convergence, module)?,
+        wrap_pyfunction!(study::paper, module)?,
+        wrap_pyfunction!(study::paper_sections, module)?,
+        wrap_pyfunction!(dataset::merge, module)?,
+        wrap_pyfunction!(dataset::summary, module)?,
+        wrap_pyfunction!(dataset::figure, module)?,
+        wrap_pyfunction!(dataset::write_table, module)?,
+    ] {
+        module.add_function(function)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,238 @@
+//! What exists, and how it changes: census, branches, exponents, modes enough, the paper.
+
+use std::path::PathBuf;
+
+use nanotap::attractors::{AttractorsOptions, attractors as census};
+use nanotap::branch::{BranchOptions, BranchReport, SeedOptions, branch as follow};
+use nanotap::convergence::convergence as compare;
+use nanotap::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov as exponents};
+use nanotap::orbit::OrbitOptions;
+use nanotap::paper::{Check, Options as PaperOptions, Verdict, report, section_names};
+use nanotap::simulate::SettleOptions;
+use nanotap::start_box::box_with;
+use nanotap::studied::ParameterUnit;
+use nanotap::subject::Subject;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use serde::Serialize;
+
+use crate::case::CaseCore;
+use crate::failure::Failure;
+use crate::motion::{numbers, oscillator};
+use crate::watch::{on_threads, watched};
+
+/// A census of the motions that coexist: JSON, and whether Ctrl-C stopped it.
+#[pyfunction]
+#[pyo3(signature = (case, *, starts, seed, sides, max_period, unstable, threads, progress))]
+pub(crate) fn attractors(
+    py: Python<'_>,
+    case: &CaseCore,
+    starts: usize,
+    seed: u64,
+    sides: Vec<(String, f64, f64)>,
+    max_period: usize,
+    unstable: usize,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool)> {
+    let studied = case.studied();
+    let done = watched(py, progress, move |control| {
+        let model = studied.model()?;
+        let options = AttractorsOptions {
+            starts,
+            seed,
+            start_box: Some(box_with(&model, &sides)?),
+            settle: SettleOptions {
+                max_period,
+                ..SettleOptions::default()
+            },
+            unstable,
+            ..AttractorsOptions::default()
+        };
+        let found = on_threads(threads, || census(&model, &options, control))??;
+        Ok(serde_json::to_string(&found)?)
+    })?;
+    Ok((done.result, done.interrupted))
+}
+
+/// The document of branches.
+#[derive(Serialize)]
+struct Branches<'a> {
+    #[serde(flatten)]
+    report: &'a BranchReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameter_unit: Option<ParameterUnit>,
+}
+
+/// Orbits followed in a parameter: JSON, and whether Ctrl-C stopped it.
+#[pyfunction]
+#[pyo3(signature = (case, *, parameter, from_, to, period, state, doublings, census, second, max_step, threads, progress))]
+pub(crate) fn branch(
+    py: Python<'_>,
+    case: &CaseCore,
+    parameter: &str,
+    from_: &str,
+    to: &str,
+    period: Option<usize>,
+    state: Option<PyReadonlyArray1<'_, f64>>,
+    doublings: usize,
+    census: Option<(usize, usize, u64)>,
+    second: Option<(String, String, String)>,
+    max_step: f64,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool)> {
+    let studied = case.studied();
+    let key = studied.key(parameter).map_err(Failure::from)?;
+    let value = |key, text: &str| studied.value(key, text).map_err(Failure::from);
+    let second = second
+        .map(|(name, low, high)| {
+            let key = studied.key(&name)?;
+            Ok::<_, Failure>((key, value(key, &low)?, value(key, &high)?))
+        })
+        .transpose()?;
+    let options = BranchOptions {
+        period,
+        state: numbers(state),
+        doublings,
+        census: census.map(|(values, starts, seed)| SeedOptions {
+            values,
+            starts,
+            seed,
+            ..SeedOptions::default()
+        }),
+        second,
+        max_step,
+        ..BranchOptions::over(key, value(key, from_)?, value(key, to)?)
+    };
+    let done = watched(py, progress, move |control| {
+        let report = on_threads(threads, || follow(&studied.subject, &options, control))??;
+        Ok(serde_json::to_string(&Branches {
+            report: &report,
+            parameter_unit: studied.parameter_unit(key),
+        })?)
+    })?;
+    Ok((done.result, done.interrupted))
+}
+
+/// Lyapunov exponents (JSON) and the points of a section: phase in drive periods, tip, its
+/// rate, the gap's rate, then the state. `phase` is that of the section in degrees; without
+/// it, contacts are the section.
+#[pyfunction]
+#[pyo3(signature = (case, *, periods, transient, state, phase, points))]
+pub(crate) fn lyapunov<'py>(
+    py: Python<'py>,
+    case: &CaseCore,
+    periods: usize,
+    transient: usize,
+    state: Option<PyReadonlyArray1<'_, f64>>,
+    phase: Option<f64>,
+    points: usize,
+) -> PyResult<(String, Bound<'py, PyArray2<f64>>)> {
+    let studied = case.studied();
+    let options = LyapunovOptions {
+        transient,
+        state: numbers(state),
+        periods,
+        section: phase.map_or(Section::Contact, |degrees| {
+            Section::Phase((degrees / 360.0).rem_euclid(1.0))
+        }),
+        points,
+        ..LyapunovOptions::default()
+    };
+    let done = watched(py, None, move |_| {
+        let report: LyapunovReport = exponents(&studied.model()?, &options)?;
+        let rows = report.section.iter().flat_map(|p| {
+            [p.phase, p.tip, p.tip_rate, p.gap_rate]
+                .into_iter()
+                .chain(p.state.iter().copied())
+        });
+        let width = 4 + report.section.first().map_or(0, |p| p.state.len());
+        Ok((
+            serde_json::to_string(&report)?,
+            rows.collect::<Vec<f64>>(),
+            width,
+        ))
+    })?;
+    let (document, values, width) = done.result;
+    let shape = [values.len() / width, width];
+    Ok((document, PyArray1::from_vec(py, values).reshape(shape)?))
+}
+
+/// The same motion with more and more modes: JSON.
+#[pyfunction]
+#[pyo3(signature = (case, *, largest, tolerance, period))]
+pub(crate) fn convergence(
+    py: Python<'_>,
+    case: &CaseCore,
+    largest: usize,
+    tolerance: f64,
+    period: Option<usize>,
+) -> PyResult<String> {
+    let studied = case.studied();
+    let done = watched(py, None, move |_| {
+        let Subject::Cantilever(case) = &studied.subject else {
+            return Err(oscillator(&studied, "convergence"));
+        };
+        let options = OrbitOptions {
+            period,
+            ..OrbitOptions::default()
+        };
+        let result = compare(case, largest, tolerance, &options)?;
+        Ok(serde_json::to_string(&result)?)
+    })?;
+    Ok(done.result)
+}
+
+/// The document of the paper's report.
+#[derive(Serialize)]
+struct Paper<'a> {
+    out: &'a PathBuf,
+    html: &'a PathBuf,
+    markdown: &'a PathBuf,
+    pictures: &'a [PathBuf],
+    quick: bool,
+    reproduced: usize,
+    differs: usize,
+    ambiguous: usize,
+    checks: Vec<&'a Check>,
+}
+
+/// The paper computed again, its report and pictures in the folder `out`: JSON, and whether
+/// Ctrl-C stopped it.
+#[pyfunction]
+#[pyo3(signature = (*, out, only, quick, threads, progress))]
+pub(crate) fn paper(
+    py: Python<'_>,
+    out: PathBuf,
+    only: Vec<String>,
+    quick: bool,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool)> {
+    let done = watched(py, progress, move |control| {
+        // Before the work, not after it.
+        std::fs::create_dir_all(&out)
+            .map_err(|error| Failure::File(format!("cannot make {}: {error}", out.display())))?;
+        let report = on_threads(threads, || report(&PaperOptions { only, quick }, control))??;
+        let written = report.write(&out)?;
+        Ok(serde_json::to_string(&Paper {
+            out: &out,
+            html: &written.html,
+            markdown: &written.markdown,
+            pictures: &written.pictures,
+            quick: report.quick,
+            reproduced: report.count(Verdict::Reproduced),
+            differs: report.count(Verdict::Differs),
+            ambiguous: report.count(Verdict::Ambiguous),
+            checks: report.checks().collect(),
+        })?)
+    })?;
+    Ok((done.result, done.interrupted))
+}
+
+/// The names of the report's sections.
+#[pyfunction]
+pub(crate) fn paper_sections() -> Vec<&'static str> {
+    section_names().collect()
+}

@@ -1,0 +1,149 @@
+//! Work on a thread of its own, watched: progress is told, signals are heard, panics are
+//! caught, and the interpreter is free meanwhile.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use nanotap::control::Control;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
+use pyo3::prelude::*;
+
+use crate::failure::Failure;
+
+/// Time between two looks at signals and progress.
+const INTERVAL: Duration = Duration::from_millis(50);
+/// How long work that was told to stop may take to do so. What does not listen is left
+/// alone to end by itself: it holds nothing of Python's.
+const PATIENCE: Duration = Duration::from_millis(900);
+
+/// What came of watched work.
+pub(crate) struct Watched<R> {
+    /// The result, what was done of it if it was stopped.
+    pub(crate) result: R,
+    /// Whether Ctrl-C stopped it.
+    pub(crate) interrupted: bool,
+}
+
+/// Does `work` with a control that tells `progress(done, total)` and stops at Ctrl-C.
+///
+/// # Errors
+/// Those of the work, those that `progress` raises, `KeyboardInterrupt` where the work did
+/// not hear that it was to stop, and `RuntimeError` for a panic.
+pub(crate) fn watched<R: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&Control<'_>) -> Result<R, Failure> + Send + 'static,
+) -> PyResult<Watched<R>> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
+    let (sender, receiver) = channel();
+    let inside = (Arc::clone(&cancel), Arc::clone(&counts));
+    std::thread::Builder::new()
+        .name("nanotap".into())
+        .spawn(move || {
+            let (cancel, counts) = inside;
+            let report = |done: usize, total: usize| {
+                counts[0].fetch_max(done, Ordering::Relaxed);
+                counts[1].store(total, Ordering::Relaxed);
+            };
+            let control = Control {
+                cancel: Some(&cancel),
+                progress: Some(&report),
+            };
+            let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
+            // Nobody may be waiting any more.
+            let _ = sender.send(result);
+        })
+        .map_err(|error| PyRuntimeError::new_err(format!("cannot start a thread: {error}")))?;
+    py.detach(move || {
+        let mut stopped: Option<(Instant, PyErr)> = None;
+        let mut told = (0, 0);
+        loop {
+            let done = match receiver.recv_timeout(INTERVAL) {
+                Ok(done) => Some(done),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PyRuntimeError::new_err("the work ended without a result"));
+                }
+            };
+            let seen = (
+                counts[0].load(Ordering::Relaxed),
+                counts[1].load(Ordering::Relaxed),
+            );
+            if stopped.is_none() && (done.is_none() || seen != told) {
+                told = seen;
+                if let Err(error) = Python::attach(|py| look(py, progress.as_ref(), seen)) {
+                    cancel.store(true, Ordering::Relaxed);
+                    stopped = Some((Instant::now(), error));
+                }
+            }
+            match (done, stopped.take()) {
+                (None, Some((since, error))) if since.elapsed() > PATIENCE => return Err(error),
+                (None, still) => stopped = still,
+                (Some(done), stopped) => return ended(done, stopped.map(|(_, error)| error)),
+            }
+        }
+    })
+}
+
+/// Hears signals and tells progress.
+fn look(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    (done, total): (usize, usize),
+) -> PyResult<()> {
+    py.check_signals()?;
+    if let (Some(progress), true) = (progress, total > 0) {
+        progress.call1(py, (done, total))?;
+    }
+    Ok(())
+}
+
+type Outcome<R> = std::thread::Result<Result<R, Failure>>;
+
+fn ended<R>(done: Outcome<R>, stopped: Option<PyErr>) -> PyResult<Watched<R>> {
+    let interrupted = stopped.is_some();
+    if let Some(error) = stopped {
+        let by_hand = Python::attach(|py| error.is_instance_of::<PyKeyboardInterrupt>(py));
+        if !by_hand || !matches!(done, Ok(Ok(_))) {
+            return Err(error);
+        }
+    }
+    match done {
+        Ok(result) => Ok(Watched {
+            result: result?,
+            interrupted,
+        }),
+        Err(panic) => {
+            let words = panic
+                .downcast_ref::<&str>()
+                .map(|words| (*words).to_owned())
+                .or_else(|| panic.downcast_ref::<String>().cloned())
+                .unwrap_or_default();
+            Err(PyRuntimeError::new_err(format!(
+                "a mistake inside nanotap, please report it: {words}"
+            )))
+        }
+    }
+}
+
+/// Does `work` on `threads` threads; 0 is one a core.
+///
+/// # Errors
+/// When the threads cannot be started.
+pub(crate) fn on_threads<R: Send>(
+    threads: usize,
+    work: impl FnOnce() -> R + Send,
+) -> Result<R, Failure> {
+    if threads == 0 {
+        return Ok(work());
+    }
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map(|pool| pool.install(work))
+        .map_err(|error| Failure::Failed(format!("cannot start {threads} threads: {error}")))
+}

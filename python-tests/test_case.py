@@ -1,0 +1,170 @@
+"""Cases: what they say, how they change, what is refused and in which words."""
+
+import json
+import os
+import pathlib
+import pickle
+import subprocess
+
+import nanotap
+import numpy as np
+import pytest
+from conftest import PHYSICAL
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
+GIVEN = {
+    "modes": 3,
+    "alpha1": 0.1,
+    "alpha2": 0.1,
+    "alpha3": 0.1,
+    "alpha4": 20.0,
+    "alpha6": 0.2,
+    "omega": 2.6,
+}
+
+
+def test_a_case_says_what_the_terminal_says():
+    words = [f"--set={key}={value}" for key, value in GIVEN.items()]
+    said = subprocess.run(
+        [PROGRAM, "case", *words, "--json"], capture_output=True, check=True, text=True
+    )
+    assert nanotap.Case(**GIVEN).to_dict() == json.loads(said.stdout)
+
+
+def test_readable_names_are_the_same_keys():
+    case = nanotap.Case(**GIVEN)
+    assert case.with_(drive_frequency=5) == case.with_(omega=5)
+    assert case.with_(omega=4).with_(drive_frequency=5).omega == 5
+    assert case.contact_stiffness == case.alpha4 == case["contact_stiffness"] == 20
+    assert case.with_() is case
+    assert "omega=2.6" in repr(case)
+    assert "Ω" in case._repr_html_()
+
+
+def test_a_case_comes_back_from_its_own_file(tmp_path):
+    case = nanotap.Case(**GIVEN).with_(alpha5=-0.25, modes=7)
+    path = tmp_path / "case.toml"
+    path.write_text(case.to_toml())
+    assert nanotap.Case.from_file(path) == case
+    assert nanotap.Case.from_toml(case.to_toml(), omega=20).omega == 20
+    assert nanotap.Case.from_file(path, omega=20) == case.with_(omega=20)
+
+
+def test_a_case_does_not_need_its_file_again(tmp_path):
+    path, levers = tmp_path / "case.toml", tmp_path / "levers.toml"
+    levers.write_text(
+        '[lever."MINE"]\nk = "3 N/m"\nf0 = "75 kHz"\nsource = "measured"\n'
+    )
+    path.write_text(
+        '[cantilever]\nlever = "MINE"\nQ = 200\n[sample]\nstiffness = "20 N/m"\n'
+        '[drive]\nfrequency = "65.7 kHz"\namplitude = "1 nm"\n[gap]\ntip = "1 nm"\n'
+    )
+    case = nanotap.Case.from_file(path, catalogue=levers)
+    path.unlink()
+    levers.unlink()
+    again = pickle.loads(pickle.dumps(case))
+    assert again == case and hash(again) == hash(case)
+    further = again.with_(**{"gap.tip": "2 nm"})
+    assert further.physical.tip_gap == pytest.approx(2e-9, rel=1e-12)
+
+
+def test_a_physical_case_maps_both_ways(physical):
+    # K₁ and k from the label: α4 = 3 K₁/k (Eq. 7).
+    mapping = physical.mapping
+    assert physical.is_physical and not nanotap.Case(**GIVEN).is_physical
+    assert mapping.si["alpha4"] == pytest.approx(
+        physical.alpha4 * physical.physical.k / 3, rel=1e-12
+    )
+    assert mapping.si["omega"] == pytest.approx(65.7e3, rel=1e-12)
+    assert physical.physical.free_amplitude == pytest.approx(20e-9, rel=1e-9)
+    assert physical.alpha4 == pytest.approx(25.65, abs=0.01)
+    assert any(kind == "note" for kind, _ in physical.remarks)
+    assert nanotap.Case(**GIVEN).mapping.empty
+    assert "polystyrene" in set(nanotap.catalogue().name)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"omgea": 2}, "did you mean `omega`?"),
+        ({"omega": float("nan")}, "must be a finite number"),
+        ({"omega": float("inf")}, "must be a finite number"),
+        ({"omega": 0}, "omega"),
+        ({"omega": "2.6"}, "is text, not a number"),
+        ({"modes": -1}, "outside 1 … 50"),
+        ({"modes": 2**70}, "outside 1 … 50"),
+        ({"modes": 2.5}, "whole number"),
+        ({"alpha4": 1e300}, "alpha4"),
+        ({"alpha1": -1}, "alpha1"),
+        ({"cosine_term": "x"}, "cosine_term"),
+        ({"": 1}, "no key"),
+        ({"sample": {"stiffness": "20 N/m"}}, "one or the other"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_the_terminals_words(keys, words):
+    with pytest.raises(ValueError, match=".") as refused:
+        nanotap.Case(**(GIVEN | keys))
+    said = str(refused.value)
+    assert words in said
+    assert "--set" not in said
+    # The terminal says the same, but for how it marks where a key came from.
+    typed = []
+    for key, value in (GIVEN | keys).items():
+        inner = value if isinstance(value, dict) else {None: value}
+        for name, one in inner.items():
+            written = json.dumps(one) if isinstance(one, str) else repr(one)
+            typed.append(f"--set={key if name is None else f'{key}.{name}'}={written}")
+    shown = subprocess.run(
+        [PROGRAM, "case", *typed], capture_output=True, text=True, check=False
+    )
+    assert shown.returncode == 2
+    for line in said.splitlines():
+        problem = line.split(": ", 1)[-1].split("; ")[0]
+        assert problem in shown.stderr, (problem, shown.stderr)
+
+
+@pytest.mark.parametrize(
+    "value", [None, True, 1j, [1], object(), b"2", np.array([1, 2])]
+)
+def test_what_is_no_number_is_a_type_error(value):
+    with pytest.raises(TypeError, match="omega: a number or a text is needed"):
+        nanotap.Case(**(GIVEN | {"omega": value}))
+
+
+def test_numbers_of_numpy_are_numbers():
+    given = GIVEN | {"modes": np.int64(3), "omega": np.float32(2.5)}
+    assert nanotap.Case(**given).omega == 2.5
+    assert nanotap.Case(**(GIVEN | {"omega": np.array(2.5)})).omega == 2.5
+
+
+def test_dimensions_are_named(physical):
+    tables = {key: dict(table) for key, table in PHYSICAL.items()}
+    tables["drive"]["frequency"] = "65.7 nm"
+    with pytest.raises(ValueError, match="frequency"):
+        nanotap.Case(**tables)
+    with pytest.raises(ValueError, match="there is no such file"):
+        nanotap.Case.from_file("nowhere.toml")
+    with pytest.raises(ValueError, match="cannot be read"):
+        nanotap.Case(catalogue="nowhere.toml", **GIVEN)
+    with pytest.raises(AttributeError, match="the case has no `omgea`"):
+        _ = physical.omgea
+
+
+def test_an_oscillator_is_a_case_too():
+    text = (
+        '[model]\nkind = "impact"\nstiffness = 1\ndamping = 0.1\nforcing = 1\n'
+        "omega = 2.5\ngap = 1\nrestitution = 0.8\n"
+    )
+    case = nanotap.Case.from_toml(text)
+    assert case.kind == "impact" and case.state_names == ["x", "v"]
+    assert case.with_(restitution=0.5).restitution == 0.5
+    ds = nanotap.simulate(case, periods=5, transient=0, strobe=5)
+    assert ds.strobe.shape == (5, 2)
+    for refused in (
+        case.to_toml,
+        lambda: nanotap.modes(case),
+        lambda: nanotap.convergence(case),
+    ):
+        with pytest.raises(ValueError, match="oscillator"):
+            refused()

@@ -1,0 +1,215 @@
+"""Runs, orbits, censuses: the terminal's numbers, as Python's objects."""
+
+import json
+import os
+import pathlib
+import subprocess
+
+import nanotap
+import numpy as np
+import pytest
+import xarray as xr
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
+
+
+def terminal(tmp_path, case, *arguments):
+    (tmp_path / "case.toml").write_text(case.to_toml())
+    command = [PROGRAM, arguments[0], "case.toml", *map(str, arguments[1:]), "--json"]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+def test_a_run_has_the_terminals_numbers(regular, tmp_path):
+    said = terminal(
+        tmp_path, regular, "simulate", "--periods", 20, "--transient", 0, "--strobe", 20
+    )
+    ds = nanotap.simulate(regular, periods=20, transient=0, strobe=20)
+    assert ds.strobe.dims == ("strobe_period", "state")
+    assert ds.state.values.tolist() == ["a1", "a2", "a3", "v1", "v2", "v3"]
+    np.testing.assert_array_equal(ds.strobe, said["strobe"])
+    np.testing.assert_array_equal(ds.events, [event["tau"] for event in said["events"]])
+    assert ds.event_kind.values.tolist() == [event["kind"] for event in said["events"]]
+    assert ds.classification.item() == said["classification"] == "periodic"
+    for name in (
+        "period",
+        "tip_max",
+        "tip_min",
+        "amplitude",
+        "contact_fraction",
+        "beam_clearance",
+    ):
+        assert ds[name].item() == said[name], name
+    for key, value in said["energy_balance"].items():
+        assert ds.energy_balance.sel(energy=key) == value
+    assert json.loads(ds.attrs["case"])["omega"] == 3
+    for name, variable in ds.variables.items():
+        if name in {"tip", "gap", "force", "strobe", "tau", "amplitude", "events"}:
+            assert variable.attrs["long_name"] and variable.attrs["units"], name
+
+
+def test_a_time_series_fits_its_run(regular):
+    ds = nanotap.simulate(regular, periods=4, resolution=500)
+    assert ds.sizes["tau"] == 4 * 500 + 1
+    # W = 2 Σ ±a_j (the modes' ends), and no sample passes the exact extrema.
+    signs = xr.DataArray([2, -2, 2], dims="state")
+    tip = (ds.states.isel(state=slice(3)).drop_vars("state") * signs).sum("state")
+    np.testing.assert_allclose(tip, ds.tip, atol=1e-14)
+    assert ds.tip.max() <= ds.tip_max + 1e-14 and ds.tip.max() > ds.tip_max - 1e-4
+    # The gap: W + α2 sin Ωτ + α5; contact where it is closed.
+    np.testing.assert_allclose(ds.gap, ds.tip + 0.1 * np.sin(3 * ds.tau), atol=1e-13)
+    assert ((ds.gap < -1e-12) <= ds.contact).all()
+    assert float(ds.contact.mean()) == pytest.approx(
+        ds.contact_fraction.item(), abs=2e-3
+    )
+    assert (
+        nanotap.simulate(regular, periods=300, transient=0).sizes["tau"]
+        == 100 * 200 + 1
+    )
+    assert nanotap.simulate(regular, periods=3, series=0, transient=0).sizes["tau"] == 0
+
+
+def test_an_orbit_has_the_terminals_numbers(regular, tmp_path):
+    said = terminal(tmp_path, regular, "orbit")
+    orbit = nanotap.orbit(regular)
+    assert orbit.to_dict() == said
+    np.testing.assert_array_equal(orbit.state, said["state"])
+    assert orbit.multipliers.tolist() == [
+        complex(*pair) for pair in said["multipliers"]
+    ]
+    assert orbit.stable and orbit.spectral_radius == abs(orbit.multipliers[0])
+    assert abs(orbit.energy_balance.residual) < 1e-11
+    assert orbit.thd == orbit["thd"] == said["thd"]
+    assert orbit.harmonics[0].tip == said["harmonics"][0]["tip"]
+    assert orbit.rms_deflection == said["rms_deflection"]
+    assert list(orbit.spectrum().columns[:2]) == ["tip", "tip_phase"]
+    # It repeats: the series ends where it begins.
+    np.testing.assert_allclose(
+        orbit.series.states[0], orbit.series.states[-1], atol=1e-12
+    )
+
+
+def test_a_physical_orbit_is_told_in_si(physical):
+    orbit = nanotap.orbit(physical)
+    scale = physical.physical.length_unit
+    assert orbit.physical.amplitude == pytest.approx(orbit.amplitude * scale, rel=1e-12)
+    assert orbit.physical.frequency == pytest.approx(65.7e3, rel=1e-9)
+    ds = nanotap.simulate(physical, periods=5)
+    assert ds.physical_amplitude.attrs["units"] == "m"
+    assert ds.physical_amplitude == pytest.approx(orbit.physical.amplitude, rel=1e-6)
+
+
+def test_arrays_are_many_runs(regular):
+    omega = np.linspace(2.9, 3.1, 3)
+    ds = nanotap.orbit(regular, omega=omega, alpha6=[0.1, 0.2])
+    assert ds.tip_max.dims == ("omega", "alpha6")
+    np.testing.assert_array_equal(ds.omega, omega)
+    for k in range(3):
+        alone = nanotap.orbit(regular, omega=omega[k], alpha6=0.2)
+        assert ds.tip_max[k, 1] == alone.tip_max
+        assert float(ds.spectral_radius[k, 1]) == pytest.approx(
+            alone.spectral_radius, rel=1e-15
+        )
+        np.testing.assert_array_equal(ds.orbit_state[k, 1], alone.state)
+    runs = nanotap.simulate(regular, periods=6, strobe=2, transient=3, omega=omega)
+    assert runs.strobe.dims == ("omega", "strobe_period", "state")
+    assert runs.strobe_period.values.tolist() == [5, 6]
+    one = nanotap.simulate(regular, periods=6, strobe=2, transient=3, omega=omega[0])
+    np.testing.assert_array_equal(runs.strobe[0], one.strobe)
+    assert (runs.failure == "").all()
+
+
+def test_arrays_with_named_dimensions_go_together(regular):
+    # A path through two parameters, not their product.
+    path = np.linspace(0, 1, 4)
+    omega = xr.DataArray(3 + 0.1 * path, dims="step", coords={"step": path})
+    alpha4 = xr.DataArray(20 - 5 * path, dims="step", coords={"step": path})
+    ds = nanotap.orbit(regular, omega=omega, alpha4=alpha4)
+    assert ds.amplitude.dims == ("step",)
+    np.testing.assert_array_equal(ds.alpha4, alpha4)
+    assert ds.amplitude[3] == nanotap.orbit(regular, omega=3.1, alpha4=15).amplitude
+
+
+def test_where_there_is_no_orbit_the_reason_stands(regular):
+    ds = nanotap.orbit(regular, omega=[2.6, 3.0])
+    assert "not periodic" in ds.failure.values[0] and ds.failure.values[1] == ""
+    assert np.isnan(ds.tip_max[0]) and ds.tip_max[1] > 0
+
+
+def test_a_census_has_the_terminals_numbers(bistable, tmp_path):
+    said = terminal(tmp_path, bistable, "attractors", "--starts", 48)
+    found = nanotap.attractors(bistable, starts=48, threads=1)
+    assert found.to_dict() == said
+    assert sorted(one.period for one in found) == [1, 4]
+    assert sum(one.fraction for one in found) == pytest.approx(1)
+    assert found[0].states.shape == (found[0].period, 6)
+    assert len(found.attractors) == len(found) == 2 and not found.undecided
+    assert list(found.table().period) == [one.period for one in found]
+    fixed = nanotap.attractors(
+        bistable, starts=8, box={name: (0, 0) for name in bistable.state_names}
+    )
+    assert len(fixed) == 1 and fixed[0].fraction == 1
+
+
+def test_modes_have_the_terminals_numbers(regular, tmp_path):
+    said = terminal(tmp_path, regular, "modes")
+    modes = nanotap.modes(regular)
+    for name in ("free", "contact", "exact_free", "exact_contact"):
+        np.testing.assert_array_equal(modes[name], said[name])
+    # φ_j(1) = 2 (−1)^(j+1), clamped at 0.
+    np.testing.assert_allclose(modes.shapes[-1], [2, -2, 2], rtol=1e-12)
+    np.testing.assert_allclose(modes.shapes[0], 0, atol=1e-12)
+    assert modes.table().shape == (3, 4)
+
+
+def test_exponents_and_section(regular):
+    chaos = nanotap.lyapunov(regular.with_(omega=2.6), periods=2000, points=200)
+    assert chaos.classification == "chaotic" and chaos.exponents[0] > 0.1
+    # They differ by what is at the ends of the average only.
+    assert chaos.sum == pytest.approx(chaos.sum_by_trace, abs=0.01)
+    assert chaos.section.states.shape == (200, 6)
+    contact = nanotap.lyapunov(regular, periods=500, points=50, section="contact")
+    # At the beginning of a contact the gap closes.
+    assert (contact.section.gap_rate < 0).all()
+
+
+def test_more_modes(regular):
+    found = nanotap.convergence(regular, largest=4)
+    assert found.modes == [1, 2, 3, 4]
+    assert found.difference[-1] == 0 and found.difference[0] > found.difference[1]
+    assert found.table().index.name == "modes"
+
+
+def test_branches_have_the_terminals_numbers(regular, tmp_path):
+    said = terminal(
+        tmp_path, regular, "branch", "--parameter", "omega", "--from", 3.0, "--to", 2.9
+    )
+    ds = nanotap.branch(regular, parameter="omega", from_=3.0, to=2.9)
+    np.testing.assert_array_equal(
+        ds.omega, [point["parameter"] for point in said["points"]]
+    )
+    np.testing.assert_array_equal(
+        ds.tip_max, [point["tip_max"] for point in said["points"]]
+    )
+    np.testing.assert_array_equal(
+        ds.states, [point["state"] for point in said["points"]]
+    )
+    assert ds.bifurcation_kind.values.tolist() == [
+        b["kind"] for b in said["bifurcations"]
+    ]
+    flip = ds.bifurcation_parameter.values[0]
+    assert ds.bifurcation_kind.values[0] == "flip" and 2.9 < flip < 3.0
+    # Stable on one side of the flip, not on the other.
+    assert bool(ds.stable[0]) and not bool(ds.stable[-1])
+    np.testing.assert_array_equal(ds.spectral_radius < 1, ds.stable)
+
+
+def test_the_time_steps_of_the_paper(regular):
+    ds = nanotap.simulate(regular, method="rk4", steps=200, periods=10, strobe=10)
+    assert ds.attrs["exact_classification"] == "periodic"
+    assert ds.strobe.shape == (10, 6)
+    exact = nanotap.orbit(regular)
+    assert ds.tip_max.item() == pytest.approx(exact.tip_max, abs=0.02)

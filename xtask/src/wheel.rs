@@ -1,0 +1,101 @@
+//! The Python package: built as a wheel, installed where it is tested.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::process::{output, succeeds};
+use crate::tools::{Environment, Workspace};
+
+/// Builds the wheel and leaves it, alone of its kind, in `target/wheels`.
+///
+/// # Errors
+/// When the tools are missing or the build fails.
+pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
+    let folder = workspace.root.join("target").join("wheels");
+    fs::create_dir_all(&folder)
+        .map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
+    for old in wheels(&folder) {
+        // One that cannot be removed shows itself below.
+        let _ = fs::remove_file(old);
+    }
+    let mut command = workspace.python_tool("maturin")?;
+    command.args(["build", "--release", "--locked"]);
+    command.args(["--manifest-path", "crates/nanotap-python/Cargo.toml"]);
+    command
+        .args(["--interpreter", "python3", "--out"])
+        .arg(&folder);
+    if !succeeds(&workspace.root, &mut command)? {
+        return Err("the wheel could not be built".into());
+    }
+    match wheels(&folder).as_slice() {
+        [wheel] => Ok(wheel.clone()),
+        found => Err(format!(
+            "{} wheels in {} where one is expected",
+            found.len(),
+            folder.display()
+        )),
+    }
+}
+
+fn wheels(folder: &Path) -> Vec<PathBuf> {
+    let Ok(listing) = fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    listing
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "whl"))
+        .collect()
+}
+
+/// An environment of its own with the wheel of this very checkout, and what the tests need.
+/// It is kept from run to run; only the wheel is installed anew.
+///
+/// # Errors
+/// When the wheel cannot be built or installed.
+pub(crate) fn installed(workspace: &Workspace) -> Result<Environment, String> {
+    let wheel = build(workspace)?;
+    let list = workspace.root.join("xtask").join("test-requirements.txt");
+    let environment = Environment::ensured(
+        &workspace.root,
+        workspace.root.join("target").join("python-tests"),
+        &list,
+    )?;
+    let mut command = environment.program("python");
+    command
+        .args([
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+        ])
+        .args(["--force-reinstall", "--no-deps"])
+        .arg(&wheel);
+    if succeeds(&workspace.root, &mut command)? {
+        Ok(environment)
+    } else {
+        Err("the wheel could not be installed".into())
+    }
+}
+
+/// The file by which maturin tells PyO3 of the interpreter. Named to every other cargo too,
+/// it keeps the build of PyO3 the same for all of them; without it, each would build anew
+/// what the other has built.
+pub(crate) fn interpreter(root: &Path, target: &Path) -> Option<PathBuf> {
+    const CONTENT: &str = "implementation=CPython\nversion=3.11\n\
+        target_abi=CPython-abi3-3.11\nshared=true\nbuild_flags=\n\
+        suppress_build_script_link_lines=false";
+    let version = output(root, Command::new("rustc").arg("-vV"))?;
+    let host = version
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "))?;
+    let folder = target.join("maturin");
+    let path = folder.join(format!("pyo3-config-{host}-3.11-abi3.txt"));
+    if !path.exists() {
+        fs::create_dir_all(folder).ok()?;
+        fs::write(&path, CONTENT).ok()?;
+    }
+    Some(path)
+}

@@ -4,14 +4,18 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
+use std::time::Instant;
+
 use clap::Args;
 use nanotap::dataset::{Schema, Share, Store, StoreError, Work, WorkError, table};
+use nanotap_figures::Figure;
+use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::file;
 use crate::output::Output;
-use crate::progress;
 use crate::threads::ThreadsArgument;
+use crate::{number, progress, style};
 
 /// Where a dataset goes, and which part of it is computed here.
 #[derive(Args, Clone, Debug)]
@@ -107,6 +111,68 @@ impl DatasetArguments {
                 path.display()
             ))),
         }
+    }
+}
+
+/// Work on a dataset that was done: the JSON of every command that leaves one.
+#[derive(Serialize)]
+pub(crate) struct Finished<S> {
+    /// The dataset.
+    pub(crate) path: PathBuf,
+    /// Its chunks, and how many of them are finished.
+    pub(crate) chunks: usize,
+    pub(crate) finished: usize,
+    /// What it came to, once all is done.
+    #[serde(flatten)]
+    pub(crate) summary: Option<S>,
+    /// What this command took.
+    pub(crate) seconds: f64,
+}
+
+impl<S> Finished<S> {
+    /// Sums up a dataset, writes its table and draws it, as far as these were asked for.
+    pub(crate) fn of(
+        store: &Store,
+        destination: Destination,
+        plot: Option<&Path>,
+        begun: Instant,
+        summary: impl FnOnce(&Store) -> Result<S, StoreError>,
+        figure: impl FnOnce(&Store) -> Result<Figure, StoreError>,
+    ) -> Result<Self, Failure> {
+        let missing = store.missing();
+        let summary = (missing == 0).then(|| summary(store)).transpose()?;
+        if let Some(path) = &destination.table {
+            write_table(store, path)?;
+        }
+        if let Some(path) = plot {
+            figure(store)?.write(path)?;
+        }
+        Ok(Self {
+            path: destination.store,
+            chunks: store.chunks(),
+            finished: store.chunks() - missing,
+            summary,
+            seconds: begun.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// The text: `summed` of the summary, or how far the work is, and where the dataset lies.
+    pub(crate) fn text(&self, heading: &str, summed: impl FnOnce(&S) -> String) -> String {
+        let body = self.summary.as_ref().map_or_else(
+            || {
+                format!(
+                    "  {} of {} chunks are finished\n",
+                    self.finished, self.chunks
+                )
+            },
+            summed,
+        );
+        format!(
+            "{}\n\n{body}\n  {} in {} s\n",
+            style::bold(heading),
+            self.path.display(),
+            number::significant(self.seconds, 3)
+        )
     }
 }
 

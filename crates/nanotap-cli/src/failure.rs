@@ -72,6 +72,7 @@ impl From<ModelError> for Failure {
                 error.to_string(),
                 "change it in the case file or with --set",
             ),
+            ModelError::Physical(error) => Self::Case(*error),
             ModelError::Flow(error @ FlowError::Resonance { .. }) => Self::request(
                 error.to_string(),
                 "change it in the case file or with --set",

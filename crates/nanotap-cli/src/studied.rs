@@ -3,6 +3,7 @@
 
 use std::ops::Deref;
 
+use nanotap::experiment::setpoint::SetpointError;
 use nanotap::model::Model;
 use nanotap::physical::Severity;
 pub(crate) use nanotap::studied::ParameterUnit;
@@ -11,7 +12,7 @@ use nanotap::subject::{Key, Subject};
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::{command, number};
+use crate::{command, number, progress};
 
 /// What a command studies.
 pub(crate) struct Studied(nanotap::studied::Studied);
@@ -24,17 +25,59 @@ impl Deref for Studied {
     }
 }
 
+/// The case at its setpoint, if it leaves the distance to one.
+pub(crate) fn at_setpoint(
+    studied: nanotap::studied::Studied,
+    output: &Output,
+) -> Result<nanotap::studied::Studied, Failure> {
+    if !studied.leaves_distance_to_setpoint() {
+        return Ok(studied);
+    }
+    let solved = progress::watched(output, "distances", |control| studied.at_setpoint(control))?;
+    solved.map_err(|error| match error {
+        SetpointError::Approach(error) => error.into(),
+        SetpointError::None => Failure::request(error.to_string(), "give drive.setpoint"),
+        other => Failure::Failed(other.to_string()),
+    })
+}
+
 impl Studied {
     /// The case of the arguments. What puts a physical case in doubt is said; its notes
     /// are `nanotap case`'s.
     pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
-        let studied = command::studied(arguments)?;
+        let studied = at_setpoint(command::studied(arguments)?, output)?;
+        if let Some(setpoint) = &studied.setpoint {
+            output.note(&setpoint.remark().text);
+        }
+        Self::warned(studied, output)
+    }
+
+    /// The same, but a setpoint is not solved for: for experiments that vary the distance.
+    pub(crate) fn with_any_distance(
+        arguments: &CaseArguments,
+        output: &Output,
+    ) -> Result<Self, Failure> {
+        Self::warned(command::studied(arguments)?, output)
+    }
+
+    fn warned(studied: nanotap::studied::Studied, output: &Output) -> Result<Self, Failure> {
         for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
             if remark.severity == Severity::Warning {
                 output.warning(&remark.text);
             }
         }
         Ok(Self(studied))
+    }
+
+    /// The same with these parameters free to vary, quantities of a physical case
+    /// (`drive.frequency`) among them.
+    pub(crate) fn varying(self, names: &[&str]) -> Result<Self, Failure> {
+        self.0.varying(names).map(Self).map_err(|error| {
+            Failure::request(
+                error.to_string(),
+                "name a quantity of the case file as section.key, as in drive.frequency",
+            )
+        })
     }
 
     /// Its model.
@@ -55,6 +98,7 @@ impl Studied {
                     number::chosen(case.omega)
                 }
             ),
+            Subject::Physical(_) => "a lever of which physical quantities vary".to_owned(),
             Subject::Oscillator(oscillator) => {
                 let stop = if self.subject.has_rigid_stop() {
                     "rigid"
@@ -77,6 +121,33 @@ impl Studied {
                 "name a parameter of the dimensionless model",
             )
         })
+    }
+
+    /// The parameter that is called `name`, and values of it given after their options.
+    pub(crate) fn key_and_values<const N: usize>(
+        &self,
+        name: &str,
+        given: [(&str, &str); N],
+    ) -> Result<(Key, [f64; N]), Failure> {
+        let plain = self.key(name)?;
+        let mut key = None;
+        let mut values = [0.0; N];
+        for (value, (option, text)) in values.iter_mut().zip(given) {
+            let (read, number) = self.0.key_and_value(plain, text).map_err(|error| {
+                Failure::request(
+                    format!("{option} {error}"),
+                    "give a number or a quantity with its unit",
+                )
+            })?;
+            *value = number;
+            if *key.get_or_insert(read) != read {
+                return Err(Failure::request(
+                    format!("{option} {text}: the ends of the range measure different things"),
+                    "give both in units of the same quantity",
+                ));
+            }
+        }
+        Ok((key.unwrap_or(plain), values))
     }
 
     /// A value of a parameter, given after `option`: a number of the dimensionless model,

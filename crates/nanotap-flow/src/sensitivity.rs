@@ -56,6 +56,38 @@ impl SystemTangent {
             log_period: 0.0,
         }
     }
+
+    /// Adds `factor · other`, the derivative of the same system with respect to another
+    /// parameter: what a parameter does through several others.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        for (regime, more) in self.regimes.iter_mut().zip(&other.regimes) {
+            regime.matrix += factor * &more.matrix;
+            regime.forcing = regime.forcing.plus(factor, &more.forcing);
+        }
+        for (guard, more) in self
+            .guards
+            .iter_mut()
+            .flatten()
+            .zip(other.guards.iter().flatten())
+        {
+            *guard = guard.plus(factor, more);
+        }
+        for (reset, more) in self
+            .resets
+            .iter_mut()
+            .flatten()
+            .zip(other.resets.iter().flatten())
+        {
+            let Some(more) = more else { continue };
+            let sum = reset.get_or_insert_with(|| Reset {
+                matrix: 0.0 * &more.matrix,
+                offset: more.offset.plus(-1.0, &more.offset),
+            });
+            sum.matrix += factor * &more.matrix;
+            sum.offset = sum.offset.plus(factor, &more.offset);
+        }
+        self.log_period += factor * other.log_period;
+    }
 }
 
 /// Carries `∂x/∂θ` of several parameters along a flow.

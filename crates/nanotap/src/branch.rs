@@ -10,8 +10,9 @@ use nanotap_dynamics::{
 use nanotap_flow::{FlowError, Trajectory};
 use serde::Serialize;
 
+use crate::experiment::PhysicalSight;
 use crate::model::{Model, ModelError};
-use crate::observables::{EnergyBalance, begins_contact, lag, virial};
+use crate::observables::{begins_contact, contact_work, lag, virial};
 use crate::orbit::{OrbitError, OrbitOptions, orbit};
 use crate::start_box::default_box;
 use crate::strobe::Strobe;
@@ -236,6 +237,9 @@ pub struct PointReport {
     /// What it looks like.
     #[serde(flatten)]
     pub sight: Sight,
+    /// The same in SI, where the parameter is a quantity of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalSight>,
 }
 
 /// What an orbit of a branch looks like.
@@ -321,7 +325,7 @@ impl Sight {
             mean_force: force.mean(),
             indentation: (-gap_min).max(0.0),
             contact_time: contact / periods,
-            dissipation: EnergyBalance::sample_work(model, trajectory) / periods,
+            dissipation: contact_work(model, trajectory, &force) / periods,
             virial: virial(model, &force, &tip),
         }
     }
@@ -353,6 +357,9 @@ pub struct BifurcationReport {
     /// What it looks like.
     #[serde(flatten)]
     pub sight: Sight,
+    /// The same in SI, where the parameter is a quantity of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalSight>,
 }
 
 /// Loci of bifurcations in two parameters.
@@ -672,13 +679,33 @@ fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
     multipliers.iter().map(|m| [m.re, m.im]).collect()
 }
 
+/// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.
+fn seen(
+    subject: &Subject,
+    key: Key,
+    parameter: f64,
+    orbit: &PeriodicOrbit,
+) -> Result<(Sight, Option<PhysicalSight>), BranchError> {
+    let here = subject.with(key, parameter);
+    let model = here.model().map_err(|error| BranchError::Model {
+        name: key.name(),
+        value: parameter,
+        error,
+    })?;
+    let sight = Sight::of(&model, orbit)?;
+    let physical = here
+        .resolved()
+        .map(|resolved| PhysicalSight::of(&sight, resolved));
+    Ok((sight, physical))
+}
+
 fn point(
     subject: &Subject,
     key: Key,
     branch: usize,
     p: &BranchPoint,
 ) -> Result<PointReport, BranchError> {
-    let model = model_at(subject, key, p.parameter)?;
+    let (sight, physical) = seen(subject, key, p.parameter, &p.orbit)?;
     Ok(PointReport {
         branch,
         period: p.orbit.period,
@@ -686,7 +713,8 @@ fn point(
         state: p.orbit.states.first().cloned().unwrap_or_default(),
         multipliers: pairs(&p.orbit.multipliers),
         stable: p.orbit.is_stable(),
-        sight: Sight::of(&model, &p.orbit)?,
+        sight,
+        physical,
     })
 }
 
@@ -696,7 +724,7 @@ fn bifurcation(
     branch: usize,
     b: &Bifurcation,
 ) -> Result<BifurcationReport, BranchError> {
-    let model = model_at(subject, key, b.parameter)?;
+    let (sight, physical) = seen(subject, key, b.parameter, &b.orbit)?;
     let (angle, time) = match b.kind {
         BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
         BifurcationKind::Grazing { time } => (None, Some(time)),
@@ -712,7 +740,8 @@ fn bifurcation(
         multipliers: pairs(&b.orbit.multipliers),
         angle,
         time,
-        sight: Sight::of(&model, &b.orbit)?,
+        sight,
+        physical,
     })
 }
 

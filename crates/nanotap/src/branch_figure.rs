@@ -8,9 +8,10 @@ use nanotap_figures::{
 };
 
 use crate::branch::{BranchReport, Loci, PointReport, Sight};
+use crate::experiment::PhysicalSight;
 use crate::physical::Kind;
 use crate::subject::Key;
-use crate::units::Units;
+use crate::units::{Units, prefixed};
 
 /// What of an orbit is drawn against the parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,14 +140,26 @@ fn branches_panel(
     axis: &ParameterAxis,
     units: &Units,
 ) -> Panel {
-    let value = |p: &PointReport| shown.of(&p.sight, &p.multipliers);
+    // Where physical quantities vary, the model's units may vary with them: SI then.
+    let si = report.points.iter().any(|p| p.physical.is_some());
+    let of = |sight: &Sight, physical: Option<&PhysicalSight>, multipliers: &[[f64; 2]]| {
+        physical
+            .and_then(|physical| physical.shown(shown))
+            .unwrap_or_else(|| shown.of(sight, multipliers))
+    };
+    let value = |p: &PointReport| of(&p.sight, p.physical.as_ref(), &p.multipliers);
     let (label, kind) = shown.label(beam);
     let size = report
         .points
         .iter()
         .map(|p| value(p).abs())
         .fold(0.0, f64::max);
-    let (factor, unit) = units.axis(kind, size);
+    let (factor, unit) = if si && kind != Kind::Number {
+        let (factor, unit) = prefixed(kind, 1.0, size);
+        (factor, format!(" ({unit})"))
+    } else {
+        units.axis(kind, size)
+    };
     let periods: BTreeSet<usize> = report.points.iter().map(|p| p.period).collect();
     let mut panel = Panel::new(
         Axis::linear(axis.label.clone()).tight(),
@@ -198,7 +211,7 @@ fn branches_panel(
             .map(|b| {
                 (
                     axis.factor * b.parameter,
-                    factor * shown.of(&b.sight, &b.multipliers),
+                    factor * of(&b.sight, b.physical.as_ref(), &b.multipliers),
                 )
             })
             .collect();

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::experiment::setpoint::SetpointReport;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::physical::{MappingRow, Resolved};
 use crate::studied::Studied;
@@ -34,6 +35,9 @@ pub struct CantileverDocument {
     /// What is known of it in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalSummary>,
+    /// How its setpoint was solved for the distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setpoint_solved: Option<SetpointReport>,
 }
 
 /// The physical quantities behind a case, in SI, frequencies in Hz.
@@ -142,14 +146,26 @@ impl CaseDocument {
     /// The document of what is studied.
     pub fn of(studied: &Studied) -> Self {
         match &studied.subject {
-            Subject::Cantilever(case) => Self::Cantilever(Box::new(CantileverDocument {
-                kind: "cantilever",
-                case: case.clone(),
-                period: case.period(),
-                physical: studied.resolved.as_ref().map(PhysicalSummary::of),
-            })),
             Subject::Oscillator(oscillator) => Self::Oscillator(OscillatorDocument::of(oscillator)),
+            Subject::Cantilever(case) => Self::cantilever(case.clone(), studied),
+            // Where the quantities that vary make no sense, the case as it was read.
+            Subject::Physical(_) => {
+                let read = || studied.resolved.as_ref().map(|r| r.case.clone());
+                let case = studied.subject.case().or_else(read);
+                Self::cantilever(case.unwrap_or_else(Case::paper), studied)
+            }
         }
+    }
+
+    fn cantilever(case: Case, studied: &Studied) -> Self {
+        let resolved = studied.subject.resolved().or(studied.resolved.as_ref());
+        Self::Cantilever(Box::new(CantileverDocument {
+            kind: "cantilever",
+            period: case.period(),
+            case,
+            physical: resolved.map(PhysicalSummary::of),
+            setpoint_solved: studied.setpoint.clone(),
+        }))
     }
 }
 

@@ -11,7 +11,6 @@
 //! and repeated keys are all reported at once, each with its place and a remedy.
 
 mod document;
-mod nearest;
 mod physical_tables;
 mod problem;
 
@@ -25,9 +24,9 @@ pub use problem::{CaseFileError, Place, Problem, Source};
 
 use crate::case::{Case, CosineTerm};
 use crate::contact::ContactLaw;
+use crate::near_name::near_name;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::parameter::Parameter;
-use nearest::nearest;
 
 /// How many modes a case has that does not say.
 pub const DEFAULT_MODES: usize = 3;
@@ -240,7 +239,7 @@ fn resolve(document: &Document, problems: &mut Vec<Problem>) -> Option<CaseFile>
     // A key that was misspelt or stands in the wrong place is not missing.
     let meant: Vec<&str> = model
         .iter()
-        .filter_map(|entry| nearest(&entry.key, kind.keys()))
+        .filter_map(|entry| near_name(&entry.key, kind.keys()))
         .collect();
     let found = |name: &str| {
         known.contains_key(name) || meant.iter().any(|key| kind.canonical(key) == Some(name))
@@ -275,7 +274,7 @@ fn misplaced(document: &Document, problems: &mut Vec<Problem>) {
     let tables = || PHYSICAL_KEYS.iter().map(|(name, _)| *name).chain(["model"]);
     let unknown_table = |name: &str, place: &Place, shown: &str| {
         let problem = Problem::new(place.clone(), format!("`{shown}` is not a table of a case"));
-        match nearest(name, tables()) {
+        match near_name(name, tables()) {
             Some(meant) => problem
                 .label(format!("did you mean [{meant}]?"))
                 .help(format!("did you mean [{meant}]?")),
@@ -357,7 +356,7 @@ fn not_among(
             list.join(", ")
         ),
     );
-    match nearest(text, allowed) {
+    match near_name(text, allowed) {
         Some(meant) => problem.help(format!("did you mean \"{meant}\"?")),
         None => problem.help(format!("write one of {}", list.join(", "))),
     }
@@ -398,7 +397,7 @@ fn unknown_model_key(kind: Kind, entry: &Entry) -> Problem {
         entry.key_place.clone(),
         format!("`{key}` (= {}) is not a key of [model]", entry.written),
     );
-    if let Some(meant) = nearest(key, kind.keys()) {
+    if let Some(meant) = near_name(key, kind.keys()) {
         let hint = format!("did you mean `{meant}`?");
         return problem.label(hint.clone()).help(hint);
     }
@@ -453,7 +452,7 @@ fn unknown_physical_key(table: &str, keys: &[&'static str], entry: &Entry) -> Pr
             entry.key, entry.written
         ),
     );
-    match nearest(&entry.key, keys.iter().copied()) {
+    match near_name(&entry.key, keys.iter().copied()) {
         Some(meant) => {
             let hint = format!("did you mean `{meant}`?");
             problem.label(hint.clone()).help(hint)

@@ -15,6 +15,7 @@ use nanotap_flow::{Drive, Output, System};
 use crate::beam::Modes;
 use crate::beam_equations::Beam;
 use crate::case::{Case, CaseError};
+use crate::case_file::CaseFileError;
 use crate::contact::ContactLaw;
 use crate::galerkin::{Galerkin, Regime};
 use crate::parameter::Parameter;
@@ -28,6 +29,9 @@ pub enum ModelError {
     /// The oscillator makes no sense.
     #[error(transparent)]
     Oscillator(#[from] crate::oscillator::OscillatorError),
+    /// The quantities of a physical case make no sense.
+    #[error(transparent)]
+    Physical(#[from] Box<CaseFileError>),
     /// Its equations cannot be solved in closed form.
     #[error(transparent)]
     Flow(#[from] FlowError),

@@ -6,6 +6,8 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
+use crate::near_name::near_name;
+
 /// A dimensionless parameter of the model, Eqs. (5) and (7) of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Parameter {
@@ -162,21 +164,10 @@ impl Parameter {
 
     /// The valid name that `word` was probably meant to be.
     fn nearest_name(word: &str) -> Option<&'static str> {
-        let names = || {
-            Self::every().flat_map(|parameter| {
-                let alias = Some(parameter.alias()).filter(|alias| *alias != parameter.name());
-                std::iter::once(parameter.name()).chain(alias)
-            })
-        };
-        let slip = names()
-            .map(|name| (strsim::damerau_levenshtein(word, name), name))
-            // A slip of the pen changes a third of a word at the most.
-            .filter(|&(distance, name)| distance <= name.len().div_ceil(3))
-            .min_by_key(|&(distance, _)| distance)
-            .map(|(_, name)| name);
-        let mut longer = names().filter(|name| word.len() > 2 && name.starts_with(word));
-        let abbreviated = longer.next().filter(|_| longer.next().is_none());
-        slip.or(abbreviated)
+        let names: Vec<&str> = Self::every()
+            .flat_map(|parameter| [parameter.name(), parameter.alias()])
+            .collect();
+        near_name(word, names.iter().copied())
     }
 }
 

@@ -1,12 +1,18 @@
 //! What an experiment studies: a case resolved to a cantilever or an oscillator, with the
 //! units in which to show it. The doors share it.
 
+use std::sync::Arc;
+
+use nanotap_dynamics::Control;
 use serde::Serialize;
 
 use crate::case_file::{CaseFile, CaseFileError};
+use crate::experiment::approach::ApproachError;
+use crate::experiment::setpoint::{SetpointError, SetpointReport, solve_setpoint};
 use crate::model::{Model, ModelError};
 use crate::parameter::Parameter;
 use crate::physical::{Catalogue, Kind, QuantityError, Resolved};
+use crate::physical_subject::{PhysicalSource, PhysicalSubject, VaryError};
 use crate::subject::{Key, Subject, UnknownKey};
 use crate::units::Units;
 
@@ -33,6 +39,10 @@ pub struct Studied {
     pub subject: Subject,
     /// What is known of it in SI, if it is a physical case.
     pub resolved: Option<Resolved>,
+    /// The physical case as it was written, whose quantities can vary.
+    pub source: Option<PhysicalSource>,
+    /// How the setpoint was solved for, if it was.
+    pub setpoint: Option<SetpointReport>,
 }
 
 /// A value of a parameter that cannot be read.
@@ -64,18 +74,98 @@ impl Studied {
         file: CaseFile,
         catalogue: &Catalogue,
     ) -> Result<Self, CaseFileError> {
-        let (subject, resolved) = match file {
-            CaseFile::Dimensionless(case) => (Subject::Cantilever(case), None),
-            CaseFile::Oscillator(oscillator) => (Subject::Oscillator(oscillator), None),
+        let (subject, resolved, source) = match file {
+            CaseFile::Dimensionless(case) => (Subject::Cantilever(case), None, None),
+            CaseFile::Oscillator(oscillator) => (Subject::Oscillator(oscillator), None, None),
             CaseFile::Physical(tables) => {
-                let resolved = tables.resolve(catalogue)?;
-                (Subject::Cantilever(resolved.case.clone()), Some(resolved))
+                let source = PhysicalSource {
+                    tables,
+                    catalogue: Arc::new(catalogue.clone()),
+                };
+                let resolved = source.resolve()?;
+                let subject = Subject::Cantilever(resolved.case.clone());
+                (subject, Some(resolved), Some(source))
             }
         };
         Ok(Self {
             title,
             subject,
             resolved,
+            source,
+            setpoint: None,
+        })
+    }
+
+    /// Whether the case leaves the distance to a setpoint: `drive.setpoint` without `gap.tip`.
+    pub fn leaves_distance_to_setpoint(&self) -> bool {
+        let given = self
+            .source
+            .as_ref()
+            .is_some_and(|source| source.tables.get("gap", "tip").is_some());
+        !given && self.resolved.as_ref().is_some_and(|r| r.setpoint.is_some())
+    }
+
+    /// The same at the distance where the approach reaches the setpoint, if the case leaves the
+    /// distance to one; else unchanged.
+    ///
+    /// # Errors
+    /// [`SetpointError`] when no distance can be chosen.
+    pub fn at_setpoint(self, control: &Control<'_>) -> Result<Self, SetpointError> {
+        let (Some(source), true) = (&self.source, self.leaves_distance_to_setpoint()) else {
+            return Ok(self);
+        };
+        let report = solve_setpoint(&self, control)?;
+        let Some(resolved) = &self.resolved else {
+            return Ok(self);
+        };
+        let mut source = source.clone();
+        let set = |source: &mut PhysicalSource, key, value| {
+            let text = Kind::Length.format_exact(value);
+            source.tables.set("gap", key, &text);
+        };
+        set(&mut source, "tip", report.zc());
+        // The beam moves with the tip.
+        let beam = resolved.scales.length + report.zc() - resolved.parameters.tip_gap;
+        if source.tables.get("gap", "beam").is_some() {
+            set(&mut source, "beam", beam);
+        }
+        let mut resolved = source
+            .resolve()
+            .map_err(|error| ApproachError::Model(ModelError::Physical(Box::new(error))))?;
+        resolved.remarks.push(report.remark());
+        Ok(Self {
+            subject: Subject::Cantilever(resolved.case.clone()),
+            resolved: Some(resolved),
+            source: Some(source),
+            setpoint: Some(report),
+            ..self
+        })
+    }
+
+    /// The same with the parameters called `names` free to vary: where one of them is a
+    /// quantity of the physical case (`drive.frequency`), all must be, and are then mapped to
+    /// the model anew at every value.
+    ///
+    /// # Errors
+    /// [`VaryError`] for a quantity that there is not, or that cannot vary.
+    pub fn varying(&self, names: &[&str]) -> Result<Self, VaryError> {
+        let (Some(source), Some(resolved)) = (&self.source, &self.resolved) else {
+            return Ok(self.clone());
+        };
+        let physical = |name: &str| name.contains('.') && !name.starts_with("model.");
+        if !names.iter().any(|name| physical(name)) {
+            return Ok(self.clone());
+        }
+        // The number of modes varies beside any.
+        let quantities: Vec<&str> = names
+            .iter()
+            .copied()
+            .filter(|name| !matches!(*name, "modes" | "model.modes"))
+            .collect();
+        let subject = PhysicalSubject::new(source, resolved, &quantities)?;
+        Ok(Self {
+            subject: Subject::Physical(Box::new(subject)),
+            ..self.clone()
         })
     }
 
@@ -103,8 +193,18 @@ impl Studied {
 
     /// What a parameter is in SI, if the case is physical.
     pub fn parameter_unit(&self, key: Key) -> Option<ParameterUnit> {
-        let Key::Cantilever(parameter) = key else {
-            return None;
+        let parameter = match key {
+            Key::Cantilever(parameter) => parameter,
+            Key::Oscillator(_) => return None,
+            // Its values are in SI already.
+            Key::Physical(key) => {
+                return Some(ParameterUnit {
+                    quantity: key.path(),
+                    unit: key.kind().si_unit(),
+                    si: 1.0,
+                    kind: key.kind(),
+                });
+            }
         };
         let resolved = self.resolved.as_ref()?;
         let row = resolved
@@ -119,12 +219,33 @@ impl Studied {
         })
     }
 
+    /// A parameter and a value of it; of a quantity of a physical case also what the value
+    /// measures.
+    ///
+    /// # Errors
+    /// As [`value`](Self::value).
+    pub fn key_and_value(&self, key: Key, text: &str) -> Result<(Key, f64), ParameterValueError> {
+        let Key::Physical(physical) = key else {
+            return Ok((key, self.value(key, text)?));
+        };
+        physical
+            .read(text)
+            .map(|(key, value)| (Key::Physical(key), value))
+            .map_err(|error| ParameterValueError::Quantity {
+                text: text.to_owned(),
+                error,
+            })
+    }
+
     /// A value of a parameter: a number of the dimensionless model, or of a physical case
     /// a quantity with its unit.
     ///
     /// # Errors
     /// When `text` is neither.
     pub fn value(&self, key: Key, text: &str) -> Result<f64, ParameterValueError> {
+        if let Key::Physical(_) = key {
+            return Ok(self.key_and_value(key, text)?.1);
+        }
         if let Ok(value) = text.trim().parse::<f64>() {
             return Ok(value);
         }
@@ -144,6 +265,10 @@ impl Studied {
         match &self.subject {
             Subject::Cantilever(case) => case.get(Parameter::Omega),
             Subject::Oscillator(oscillator) => oscillator.omega,
+            Subject::Physical(_) => self
+                .resolved
+                .as_ref()
+                .map_or(f64::NAN, |resolved| resolved.case.omega),
         }
     }
 }

@@ -9,8 +9,11 @@ use nanotap_flow::sensitivity::SystemTangent;
 
 use crate::case::Case;
 use crate::model::{Model, ModelError, cantilever_tangent};
+use crate::near_name::near_name;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::parameter::Parameter;
+use crate::physical::Resolved;
+use crate::physical_subject::{PhysicalKey, PhysicalSubject};
 use crate::strobe::Strobe;
 use nalgebra::DMatrix;
 
@@ -22,6 +25,8 @@ pub enum Subject {
     Cantilever(Case),
     /// An oscillator with a stop.
     Oscillator(Oscillator),
+    /// A cantilever of which physical quantities vary.
+    Physical(Box<PhysicalSubject>),
 }
 
 /// A parameter of a [`Subject`] that can be varied continuously.
@@ -31,6 +36,8 @@ pub enum Key {
     Cantilever(Parameter),
     /// Of an oscillator.
     Oscillator(OscillatorParameter),
+    /// Of a physical case: a quantity in SI.
+    Physical(PhysicalKey),
 }
 
 impl Key {
@@ -39,6 +46,15 @@ impl Key {
         match self {
             Self::Cantilever(parameter) => parameter.name(),
             Self::Oscillator(parameter) => parameter.name(),
+            Self::Physical(key) => key.path(),
+        }
+    }
+
+    /// What its values measure: of a physical quantity its kind, else a number.
+    pub const fn kind(self) -> crate::physical::Kind {
+        match self {
+            Self::Physical(key) => key.kind(),
+            _ => crate::physical::Kind::Number,
         }
     }
 
@@ -47,6 +63,7 @@ impl Key {
         use OscillatorParameter as P;
         match self {
             Self::Cantilever(parameter) => parameter.symbol(),
+            Self::Physical(key) => key.path(),
             Self::Oscillator(parameter) => match parameter {
                 P::Mass => "m",
                 P::Stiffness => "k",
@@ -87,6 +104,7 @@ impl Subject {
                 .filter(|p| oscillator.get(*p).is_some())
                 .map(Key::Oscillator)
                 .collect(),
+            Self::Physical(_) => PhysicalKey::all().map(Key::Physical).collect(),
         }
     }
 
@@ -106,12 +124,8 @@ impl Subject {
             return Ok(*key);
         }
         let known: Vec<&str> = keys.iter().map(|k| k.name()).collect();
-        let nearest = known
-            .iter()
-            .map(|k| (strsim::damerau_levenshtein(k, name), *k))
-            .min()
-            .filter(|(distance, _)| *distance <= 3);
-        let hint = nearest.map_or_else(String::new, |(_, k)| format!(" (did you mean `{k}`?)"));
+        let hint = near_name(name, known.iter().copied())
+            .map_or_else(String::new, |k| format!(" (did you mean `{k}`?)"));
         Err(UnknownKey {
             given: name.to_owned(),
             known: known.join(", "),
@@ -126,6 +140,7 @@ impl Subject {
             (Self::Oscillator(oscillator), Key::Oscillator(p)) => {
                 oscillator.get(p).unwrap_or(f64::NAN)
             }
+            (Self::Physical(subject), Key::Physical(key)) => subject.get(key),
             _ => f64::NAN,
         }
     }
@@ -140,6 +155,9 @@ impl Subject {
             (Self::Oscillator(oscillator), Key::Oscillator(p)) => {
                 Self::Oscillator(oscillator.with(p, value))
             }
+            (Self::Physical(subject), Key::Physical(key)) => {
+                Self::Physical(Box::new(subject.with(key, value)))
+            }
             _ => self.clone(),
         }
     }
@@ -152,6 +170,9 @@ impl Subject {
         match self {
             Self::Cantilever(case) => Model::cantilever(case),
             Self::Oscillator(oscillator) => oscillator.model(),
+            Self::Physical(subject) => {
+                Model::cantilever(&subject.resolved().map_err(Box::new)?.case)
+            }
         }
     }
 
@@ -163,7 +184,33 @@ impl Subject {
         match (self, key) {
             (Self::Cantilever(case), Key::Cantilever(p)) => cantilever_tangent(case, model, p),
             (Self::Oscillator(oscillator), Key::Oscillator(p)) => oscillator.tangent(model, p),
+            (Self::Physical(subject), Key::Physical(key)) => {
+                let case = &subject.resolved().map_err(Box::new)?.case;
+                let mut sum = SystemTangent::zeros(&model.system);
+                for (parameter, slope) in subject.derivatives(key).map_err(Box::new)? {
+                    sum.add(slope, &cantilever_tangent(case, model, parameter)?);
+                }
+                Ok(sum)
+            }
             _ => Ok(SystemTangent::zeros(&model.system)),
+        }
+    }
+
+    /// The dimensionless cantilever that it is; `None` of an oscillator, and where physical
+    /// quantities have no meaning.
+    pub fn case(&self) -> Option<Case> {
+        match self {
+            Self::Cantilever(case) => Some(case.clone()),
+            Self::Oscillator(_) => None,
+            Self::Physical(_) => self.resolved().map(|resolved| resolved.case.clone()),
+        }
+    }
+
+    /// What is known of it in SI, if physical quantities vary.
+    pub fn resolved(&self) -> Option<&Resolved> {
+        match self {
+            Self::Physical(subject) => subject.resolved().ok(),
+            _ => None,
         }
     }
 

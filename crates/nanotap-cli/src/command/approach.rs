@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.plot.plot {
         file::ending(path, &["svg", "png", "pdf"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = Studied::with_any_distance(&arguments.case, output)?;
     let key = gap_key(&studied.subject);
     let distance = |option: &str, given: &Option<String>| {
         given

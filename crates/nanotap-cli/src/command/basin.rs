@@ -1,20 +1,18 @@
 //! `nanotap basin`: basins of attraction on a slice of initial states.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 use nanotap::basin::{Basin, BasinError, BasinOptions, Shares, SliceRange, figure, shares};
-use serde::Serialize;
 
 use crate::arguments::{CaseArguments, PlotArgument};
-use crate::dataset::{DatasetArguments, derived_name, write_table};
+use crate::dataset::{DatasetArguments, Finished, derived_name};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::studied::Studied;
 use crate::table::{Align, Table};
-use crate::{file, motion, number, progress, style};
+use crate::{file, motion, number, progress};
 
 /// Basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
@@ -72,21 +70,6 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// The JSON document.
-#[derive(Serialize)]
-struct Document {
-    /// The dataset.
-    path: PathBuf,
-    /// Its chunks, and how many of them are finished.
-    chunks: usize,
-    finished: usize,
-    /// What part of the slice goes where, once all is done.
-    #[serde(flatten)]
-    shares: Option<Shares>,
-    /// What this command took, the census included.
-    seconds: f64,
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
     let options = arguments.options()?;
@@ -112,22 +95,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output,
         |store, work| basin.compute(store, work),
     )?;
-    let missing = store.missing();
-    let shares = (missing == 0).then(|| shares(&store)).transpose()?;
-    if let Some(path) = &destination.table {
-        write_table(&store, path)?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        figure(&store)?.write(path)?;
-    }
-    let document = Document {
-        path: destination.store,
-        chunks: store.chunks(),
-        finished: store.chunks() - missing,
-        shares,
-        seconds: begun.elapsed().as_secs_f64(),
-    };
-    output.result(&document, |document| text(&studied, &options, document))
+    let plot = arguments.plot.plot.as_deref();
+    let done = Finished::of(&store, destination, plot, begun, shares, figure)?;
+    output.result(&done, |done| text(&studied, &options, done))
 }
 
 impl Arguments {
@@ -186,7 +156,7 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(studied: &Studied, options: &BasinOptions, document: &Document) -> String {
+fn text(studied: &Studied, options: &BasinOptions, done: &Finished<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
         studied.title,
@@ -196,45 +166,34 @@ fn text(studied: &Studied, options: &BasinOptions, document: &Document) -> Strin
         options.x.name,
         options.y.name
     );
-    let mut text = format!("{}\n\n", style::bold(&heading));
-    if let Some(shares) = &document.shares {
-        let mut table = Table::new([
-            ("", Align::Right),
-            ("attractor", Align::Left),
-            ("starts (%)", Align::Point),
-        ]);
-        let percent = |part: f64| number::significant(100.0 * part, 4);
-        for (k, attractor) in shares.attractors.iter().enumerate() {
-            let name = attractor.period.map_or_else(
-                || attractor.classification.clone(),
-                |period| format!("period {period}"),
-            );
-            table.row([(k + 1).to_string(), name, percent(attractor.fraction)]);
-        }
-        for (name, part) in [
-            ("none within the periods", shares.unsettled),
-            ("left every bound", shares.unbounded),
-            ("could not be followed", shares.failed),
-        ] {
-            if part > 0.0 {
-                table.row([String::new(), name.to_owned(), percent(part)]);
-            }
-        }
-        text.push_str(&table.render());
-    } else {
-        let _ = writeln!(
-            text,
-            "  {} of {} chunks are finished",
-            document.finished, document.chunks
+    done.text(&heading, parts)
+}
+
+/// What part of the slice goes where.
+fn parts(shares: &Shares) -> String {
+    let mut table = Table::new([
+        ("", Align::Right),
+        ("attractor", Align::Left),
+        ("starts (%)", Align::Point),
+    ]);
+    let percent = |part: f64| number::significant(100.0 * part, 4);
+    for (k, attractor) in shares.attractors.iter().enumerate() {
+        let name = attractor.period.map_or_else(
+            || attractor.classification.clone(),
+            |period| format!("period {period}"),
         );
+        table.row([(k + 1).to_string(), name, percent(attractor.fraction)]);
     }
-    let _ = writeln!(
-        text,
-        "\n  {} in {} s",
-        document.path.display(),
-        number::significant(document.seconds, 3)
-    );
-    text
+    for (name, part) in [
+        ("none within the periods", shares.unsettled),
+        ("left every bound", shares.unbounded),
+        ("could not be followed", shares.failed),
+    ] {
+        if part > 0.0 {
+            table.row([String::new(), name.to_owned(), percent(part)]);
+        }
+    }
+    table.render()
 }
 
 impl From<BasinError> for Failure {

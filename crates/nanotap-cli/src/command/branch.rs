@@ -23,7 +23,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// The parameter, as the case file calls it (omega, alpha4, gap …)
+    /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
+    /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
     #[arg(long, value_name = "KEY")]
     parameter: String,
 
@@ -140,7 +141,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let second = arguments
+        .second
+        .iter()
+        .filter_map(|text| text.split_once('='));
+    let names: Vec<&str> = std::iter::once(arguments.parameter.as_str())
+        .chain(second.map(|(name, _)| name.trim()))
+        .collect();
+    let studied = Studied::of(&arguments.case, output)?.varying(&names)?;
     let options = options(arguments, &studied)?;
     let report = progress::watched(output, "points", |control| {
         arguments
@@ -189,9 +197,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Failure> {
-    let key = studied.key(&arguments.parameter)?;
-    let from = studied.value(key, "--from", &arguments.from)?;
-    let to = studied.value(key, "--to", &arguments.to)?;
+    let (key, [from, to]) = studied.key_and_values(
+        &arguments.parameter,
+        [("--from", &arguments.from), ("--to", &arguments.to)],
+    )?;
     let census = arguments.diagram.then(|| SeedOptions {
         values: arguments.values,
         starts: arguments.starts,
@@ -234,12 +243,9 @@ fn second(studied: &Studied, text: &str) -> Result<(Key, f64, f64), Failure> {
     };
     let (name, range) = text.split_once('=').ok_or_else(wrong)?;
     let (low, high) = range.split_once(':').ok_or_else(wrong)?;
-    let key = studied.key(name.trim())?;
-    Ok((
-        key,
-        studied.value(key, "--second", low)?,
-        studied.value(key, "--second", high)?,
-    ))
+    let ends = [("--second", low), ("--second", high)];
+    let (key, [low, high]) = studied.key_and_values(name.trim(), ends)?;
+    Ok((key, low, high))
 }
 
 /// The axis of a parameter that goes up to `size`, in SI where the case has it.
@@ -248,8 +254,10 @@ fn axis(studied: &Studied, key: Key, size: f64) -> ParameterAxis {
         || ParameterAxis::of(key),
         |unit| {
             let (factor, name) = units::prefixed(unit.kind, unit.si, size);
+            // A quantity of a physical case is called by its path.
+            let quantity = unit.quantity.replace(['.', '_'], " ");
             ParameterAxis {
-                label: format!("{} ({name})", unit.quantity),
+                label: format!("{quantity} ({name})"),
                 factor,
             }
         },
@@ -309,6 +317,7 @@ fn csv(report: &BranchReport, names: &[String]) -> String {
                 multipliers: b.multipliers.clone(),
                 stable: false,
                 sight: b.sight,
+                physical: b.physical,
             };
             row(branch, b.kind, &point);
         }

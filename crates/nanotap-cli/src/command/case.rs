@@ -4,13 +4,16 @@ use clap::Args;
 use nanotap::case::{Case, CosineTerm};
 use nanotap::case_document::CaseDocument;
 use nanotap::case_file;
+use nanotap::experiment::setpoint::SetpointReport;
 use nanotap::oscillator::{Oscillator, OscillatorParameter, Stop};
+use nanotap::physical::quantity::format_electronvolts;
 use nanotap::physical::{Kind, Resolved, Severity};
 use nanotap::subject::Subject;
 
 use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;
 use crate::output::Output;
+use crate::studied::at_setpoint;
 use crate::table::{Align, Table};
 use crate::{file, number, style};
 
@@ -24,35 +27,44 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let studied = super::studied(&arguments.case)?;
-    let document = CaseDocument::of(&studied);
-    match &studied.subject {
-        Subject::Cantilever(case) => {
-            write_out(&arguments.out, case)?;
-            for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
-                match remark.severity {
-                    Severity::Note => output.note(&remark.text),
-                    Severity::Warning => output.warning(&remark.text),
-                }
-            }
-            remark(case, output);
-            output.result(&document, |_| {
-                studied.resolved.as_ref().map_or_else(
-                    || cantilever(&studied.title, case),
-                    |resolved| physical(&studied.title, resolved),
-                )
-            })
+    let read = super::studied(&arguments.case)?;
+    // The case is shown also where no distance has the setpoint.
+    let studied = match at_setpoint(read.clone(), output) {
+        Ok(studied) => studied,
+        Err(Failure::Failed(why)) => {
+            output.warning(&why);
+            read
         }
-        Subject::Oscillator(given) => {
-            if let Some(path) = &arguments.out.out {
-                return Err(Failure::request(
-                    format!("--out {}: an oscillator is not written out", path.display()),
-                    "leave --out away, or take --json",
-                ));
-            }
-            output.result(&document, |_| oscillator(&studied.title, given))
+        Err(other) => return Err(other),
+    };
+    let document = CaseDocument::of(&studied);
+    if let Subject::Oscillator(given) = &studied.subject {
+        if let Some(path) = &arguments.out.out {
+            return Err(Failure::request(
+                format!("--out {}: an oscillator is not written out", path.display()),
+                "leave --out away, or take --json",
+            ));
+        }
+        return output.result(&document, |_| oscillator(&studied.title, given));
+    }
+    let case = super::cantilever_of(&studied, "nanotap case")?;
+    write_out(&arguments.out, &case)?;
+    for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
+        match remark.severity {
+            Severity::Note => output.note(&remark.text),
+            Severity::Warning => output.warning(&remark.text),
         }
     }
+    remark(&case, output);
+    output.result(&document, |_| {
+        studied.resolved.as_ref().map_or_else(
+            || cantilever(&studied.title, &case),
+            |resolved| {
+                let solved = studied.setpoint.as_ref().map_or_else(String::new, setpoint);
+                format!("{}{solved}", physical(&studied.title, resolved))
+            },
+        )
+    })
 }
 
 /// Writes the dimensionless case where `--out` says.
@@ -184,6 +196,43 @@ fn physical(title: &str, resolved: &Resolved) -> String {
         style::bold(&heading),
         given.render(),
         mapping.render()
+    )
+}
+
+/// Every distance at which an orbit has the setpoint amplitude.
+fn setpoint(report: &SetpointReport) -> String {
+    let mut table = Table::new([
+        ("gap.tip", Align::Right),
+        ("period", Align::Right),
+        ("phase (°)", Align::Point),
+        ("E_dis", Align::Right),
+        ("F_max", Align::Right),
+        ("", Align::Left),
+    ]);
+    for s in &report.solutions {
+        let stability = if s.stable { "stable" } else { "unstable" };
+        let reached = if s.reached {
+            ", reached on approach"
+        } else {
+            ""
+        };
+        table.row([
+            Kind::Length.format_digits(s.zc, 5),
+            s.period.to_string(),
+            number::significant(s.sight.phase, 4),
+            format_electronvolts(s.physical.dissipation),
+            Kind::Force.format(s.physical.peak_force),
+            format!("{stability}{reached}"),
+        ]);
+    }
+    format!(
+        "\n  {}\n{}",
+        style::bold(&format!(
+            "where the amplitude is {}, {} of A0",
+            Kind::Length.format(report.amplitude),
+            number::significant(report.ratio, 4)
+        )),
+        table.render()
     )
 }
 

@@ -7,7 +7,6 @@ use nanotap::beam::MAX_MODES;
 use nanotap::convergence::{Convergence, convergence};
 use nanotap::motion_figure::convergence_figure;
 use nanotap::orbit::OrbitOptions;
-use nanotap::subject::Subject;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -65,20 +64,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         file::ending(path, &["csv"])?;
     }
     let studied = Studied::of(&arguments.case, output)?;
-    let Subject::Cantilever(case) = &studied.subject else {
-        return Err(Failure::request(
-            format!(
-                "{}: `nanotap convergence` needs a cantilever; this is an oscillator",
-                studied.title
-            ),
-            "an oscillator has one degree of freedom and no beam modes",
-        ));
-    };
+    let case = super::cantilever_of(&studied, "nanotap convergence")?;
     let options = OrbitOptions {
         period: arguments.period,
         ..OrbitOptions::default()
     };
-    let result = convergence(case, arguments.largest, arguments.tolerance, &options)?;
+    let result = convergence(&case, arguments.largest, arguments.tolerance, &options)?;
     if let Some(path) = &arguments.out.out {
         file::write(path, csv(&result).as_bytes())?;
     }

@@ -13,13 +13,13 @@ mod orbit;
 mod paper;
 mod simulate;
 mod sweep;
+mod window;
 
 use clap::Subcommand;
 use nanotap::case::Case;
 use nanotap::case_file::CaseFile;
 use nanotap::physical::Catalogue;
 use nanotap::studied::Studied;
-use nanotap::subject::Subject;
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -44,6 +44,8 @@ pub(crate) enum Command {
     Approach(approach::Arguments),
     /// How the motion changes with one or two parameters, from any number of starts
     Sweep(sweep::Arguments),
+    /// The operating window over two parameters: where only one motion exists
+    Window(window::Arguments),
     /// Basins of attraction on a slice of initial states
     Basin(basin::Arguments),
     /// Put together what several machines computed of one sweep or basin
@@ -67,6 +69,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Branch(arguments) => branch::run(arguments, output),
         Command::Approach(arguments) => approach::run(arguments, output),
         Command::Sweep(arguments) => sweep::run(arguments, output),
+        Command::Window(arguments) => window::run(arguments, output),
         Command::Basin(arguments) => basin::run(arguments, output),
         Command::Merge(arguments) => merge::run(arguments, output),
         Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
@@ -97,14 +100,18 @@ pub(crate) fn studied(arguments: &CaseArguments) -> Result<Studied, Failure> {
 /// physical case in doubt is said; its notes are `nanotap case`'s.
 fn cantilever(arguments: &CaseArguments, command: &str, output: &Output) -> Result<Case, Failure> {
     let studied = crate::studied::Studied::of(arguments, output)?;
-    match &studied.subject {
-        Subject::Cantilever(case) => Ok(case.clone()),
-        Subject::Oscillator(_) => Err(Failure::request(
+    cantilever_of(&studied, command)
+}
+
+/// The dimensionless cantilever that is studied, for `command`.
+fn cantilever_of(studied: &Studied, command: &str) -> Result<Case, Failure> {
+    studied.subject.case().ok_or_else(|| {
+        Failure::request(
             format!(
                 "{}: `{command}` needs a cantilever; this is an oscillator",
                 studied.title
             ),
             "an oscillator has one degree of freedom and no beam modes",
-        )),
-    }
+        )
+    })
 }

@@ -1,23 +1,22 @@
 //! `nanotap sweep`: how the motion changes with one or two parameters.
 
-use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use nanotap::physical::Kind;
 use nanotap::sweep::{
-    Follow, Over, OverError, Starts, Summary, Sweep, SweepError, SweepOptions, figure, summary,
+    Follow, Over, OverError, Starts, Summary, Sweep, SweepError, SweepOptions, figure,
+    response_figure, summary,
 };
-use serde::Serialize;
 
 use super::attractors::parse_side;
 use crate::arguments::{CaseArguments, PlotArgument};
-use crate::dataset::{DatasetArguments, derived_name, write_table};
+use crate::dataset::{DatasetArguments, Finished, derived_name};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::studied::Studied;
 use crate::table::{Align, Table};
-use crate::{motion, number, style};
+use crate::{motion, number};
 
 /// How the motion changes with one or two parameters, from any number of starts.
 #[derive(Args, Debug)]
@@ -26,7 +25,8 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-    /// alpha4=1:1000:50:log in equal ratios; modes too; once or twice
+    /// alpha4=1:1000:50:log in equal ratios; modes too; of a physical case also
+    /// drive.frequency=60kHz:80kHz:200; once or twice
     #[arg(
         long,
         value_name = "KEY=FROM:TO:COUNT",
@@ -74,30 +74,34 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 64)]
     max_period: usize,
 
+    /// What --plot shows of one parameter; without it the response over drive.frequency, else
+    /// the diagram
+    #[arg(long, value_enum)]
+    show: Option<Show>,
+
     #[command(flatten)]
     dataset: DatasetArguments,
     #[command(flatten)]
     plot: PlotArgument,
 }
 
-/// The JSON document.
-#[derive(Serialize)]
-struct Document {
-    /// The dataset.
-    path: PathBuf,
-    /// Its chunks, and how many of them are finished.
-    chunks: usize,
-    finished: usize,
-    /// What the runs came to, once all are done.
-    #[serde(flatten)]
-    summary: Option<Summary>,
-    /// What this command took.
-    seconds: f64,
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Show {
+    /// Greatest deflection in each drive period: a bifurcation diagram
+    Diagram,
+    /// Amplitude and phase at the drive's frequency: a resonance curve
+    Response,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
-    let studied = Studied::of(&arguments.case, output)?;
+    let names: Vec<&str> = arguments
+        .over
+        .iter()
+        .map(|over| over.split('=').next().unwrap_or_default().trim())
+        .collect();
+    let studied = Studied::of(&arguments.case, output)?.varying(&names)?;
     let sweep = Sweep::new(studied.subject.clone(), arguments.options(&studied)?)?;
     let names: Vec<&str> = sweep.options().over.iter().map(|o| o.key.name()).collect();
     let name = derived_name(
@@ -121,22 +125,22 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output,
         |store, work| sweep.compute(store, work),
     )?;
-    let missing = store.missing();
-    let summary = (missing == 0).then(|| summary(&store)).transpose()?;
-    if let Some(path) = &destination.table {
-        write_table(&store, path)?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        figure(&store)?.write(path)?;
-    }
-    let document = Document {
-        path: destination.store,
-        chunks: store.chunks(),
-        finished: store.chunks() - missing,
-        summary,
-        seconds: begun.elapsed().as_secs_f64(),
+    let shown = arguments.show.unwrap_or_else(|| {
+        // A resonance curve is what one sees of the drive's frequency.
+        let key = sweep.options().over[0].key.name();
+        if key.starts_with("drive.frequency") {
+            Show::Response
+        } else {
+            Show::Diagram
+        }
+    });
+    let drawn = match shown {
+        Show::Diagram => figure,
+        Show::Response => response_figure,
     };
-    output.result(&document, |document| text(&studied, &sweep, document))
+    let plot = arguments.plot.plot.as_deref();
+    let done = Finished::of(&store, destination, plot, begun, summary, drawn)?;
+    output.result(&done, |done| text(&studied, &sweep, done))
 }
 
 impl Arguments {
@@ -167,7 +171,7 @@ impl Arguments {
     }
 }
 
-fn text(studied: &Studied, sweep: &Sweep, document: &Document) -> String {
+fn text(studied: &Studied, sweep: &Sweep, done: &Finished<Summary>) -> String {
     let options = sweep.options();
     let ranges: Vec<String> = options
         .over
@@ -176,8 +180,8 @@ fn text(studied: &Studied, sweep: &Sweep, document: &Document) -> String {
             format!(
                 "{} from {} to {} in {} values",
                 over.key.name(),
-                number::chosen(over.from),
-                number::chosen(over.to),
+                value(over, over.from),
+                value(over, over.to),
                 over.count
             )
         })
@@ -188,23 +192,15 @@ fn text(studied: &Studied, sweep: &Sweep, document: &Document) -> String {
         ranges.join(", "),
         number::counted(sweep.runs(), "run", "runs")
     );
-    let mut text = format!("{}\n\n", style::bold(&heading));
-    if let Some(summary) = &document.summary {
-        text.push_str(&counts(summary));
-    } else {
-        let _ = writeln!(
-            text,
-            "  {} of {} chunks are finished",
-            document.finished, document.chunks
-        );
+    done.text(&heading, counts)
+}
+
+/// A value of a parameter in words.
+fn value(over: &Over, value: f64) -> String {
+    match over.key.kind() {
+        Kind::Number => number::chosen(value),
+        kind => kind.format(value),
     }
-    let _ = writeln!(
-        text,
-        "\n  {} in {} s",
-        document.path.display(),
-        number::significant(document.seconds, 3)
-    );
-    text
 }
 
 /// How many runs came to what.

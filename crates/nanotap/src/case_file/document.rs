@@ -38,6 +38,16 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// The value as text; `None` where it is neither text nor a number.
+    pub fn text(&self) -> Option<String> {
+        match &self.value {
+            Value::Text(text) => Some(text.clone()),
+            Value::Integer(integer) => Some(integer.to_string()),
+            Value::Number(number) => Some(number.to_string()),
+            Value::Other(_) => None,
+        }
+    }
+
     /// Was it set beside the file?
     pub fn is_override(&self) -> bool {
         matches!(self.key_place, Place::Override(_))

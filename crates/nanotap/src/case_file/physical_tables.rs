@@ -35,6 +35,32 @@ impl PhysicalTables {
             .and_then(|found| self.entries.get(found))
     }
 
+    /// Sets a key to a text, as if it had been set beside the file; a key that there is not
+    /// is left out.
+    pub fn set(&mut self, table: &str, key: &str, text: &str) {
+        let Some((table, keys)) = PHYSICAL_KEYS.iter().find(|(name, _)| *name == table) else {
+            return;
+        };
+        let Some(key) = keys.iter().find(|name| **name == key) else {
+            return;
+        };
+        let place = Place::Override(format!("{table}.{key}={text}"));
+        let entry = Entry {
+            table: (*table).to_owned(),
+            key: (*key).to_owned(),
+            value: Value::Text(text.to_owned()),
+            written: text.to_owned(),
+            key_place: place.clone(),
+            value_place: place,
+        };
+        self.entries.insert((*table, *key), entry);
+    }
+
+    /// Takes a key out, if it is there.
+    pub fn remove(&mut self, table: &str, key: &str) {
+        self.entries.retain(|(t, k), _| *t != table || *k != key);
+    }
+
     /// Reads the quantities and resolves the case.
     ///
     /// # Errors
@@ -48,13 +74,8 @@ impl PhysicalTables {
     fn sections(&self) -> Sections {
         let mut sections = Sections::new();
         for ((table, key), entry) in &self.entries {
-            let text = match &entry.value {
-                Value::Text(text) => text.clone(),
-                Value::Integer(integer) => integer.to_string(),
-                Value::Number(number) => number.to_string(),
-                // Refused before.
-                Value::Other(_) => continue,
-            };
+            // What is no text was refused before.
+            let Some(text) = entry.text() else { continue };
             sections
                 .entry((*table).to_owned())
                 .or_default()

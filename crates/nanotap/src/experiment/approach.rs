@@ -200,7 +200,7 @@ pub struct ApproachReport {
 /// The key of the distance between tip and sample.
 pub const fn gap_key(subject: &Subject) -> Key {
     match subject {
-        Subject::Cantilever(_) => Key::Cantilever(Parameter::Alpha5),
+        Subject::Cantilever(_) | Subject::Physical(_) => Key::Cantilever(Parameter::Alpha5),
         Subject::Oscillator(_) => Key::Oscillator(OscillatorParameter::Gap),
     }
 }

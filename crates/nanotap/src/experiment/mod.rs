@@ -5,6 +5,8 @@ pub mod approach;
 mod approach_figure;
 mod free_motion;
 mod physical_sight;
+pub mod setpoint;
+pub mod window;
 
 pub use approach_figure::approach_figure;
 pub use free_motion::FreeMotion;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::branch::Sight;
+use crate::branch_figure::Shown;
 use crate::physical::Resolved;
 use crate::physical::quantity::JOULES_PER_ELECTRONVOLT;
 
@@ -17,6 +18,10 @@ pub struct PhysicalSight {
     pub amplitude_ratio: f64,
     /// Phase behind the drive, degrees.
     pub phase: f64,
+    /// Greatest tip deflection, m.
+    pub tip_max: f64,
+    /// Least tip deflection, m.
+    pub tip_min: f64,
     /// Half of peak to peak of the tip deflection, m.
     pub amplitude: f64,
     /// Mean deflection, m.
@@ -46,6 +51,21 @@ pub struct PhysicalSight {
 }
 
 impl PhysicalSight {
+    /// What a picture shows of it; `None` where SI says no more than the model.
+    pub(crate) const fn shown(&self, shown: Shown) -> Option<f64> {
+        Some(match shown {
+            Shown::TipMax => self.tip_max,
+            Shown::TipMin => self.tip_min,
+            Shown::Amplitude => self.amplitude,
+            Shown::FirstHarmonic => self.first_harmonic,
+            Shown::PeakForce => self.peak_force,
+            Shown::Dissipation => self.dissipation,
+            Shown::Indentation => self.indentation,
+            Shown::ImpactSpeed => self.impact_speed,
+            Shown::Phase | Shown::ContactFraction | Shown::SpectralRadius => return None,
+        })
+    }
+
     /// `sight`, of a motion of the case `resolved`, in SI.
     pub fn of(sight: &Sight, resolved: &Resolved) -> Self {
         let scales = &resolved.scales;
@@ -56,6 +76,8 @@ impl PhysicalSight {
             first_harmonic,
             amplitude_ratio: first_harmonic / resolved.free_amplitude,
             phase: sight.phase,
+            tip_max: sight.tip_max * scales.length,
+            tip_min: sight.tip_min * scales.length,
             amplitude: sight.amplitude * scales.length,
             mean_deflection: sight.mean_deflection * scales.length,
             peak_force: sight.peak_force * scales.force,

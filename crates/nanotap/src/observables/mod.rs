@@ -255,6 +255,25 @@ pub(crate) fn virial(model: &Model, force: &PiecewiseSignal, tip: &PiecewiseSign
     away * force.product_integral(tip) / tip.duration()
 }
 
+/// Work of the tip on the sample, −∫ F V̇_T dt, and what impacts take: over a period of an
+/// orbit what the sample dissipates, whatever it is made of.
+pub(crate) fn contact_work(model: &Model, trajectory: &Trajectory, force: &PiecewiseSignal) -> f64 {
+    let drive = model.system.drive();
+    let rates: Vec<_> = model
+        .system
+        .regimes()
+        .iter()
+        .map(|r| model.gap.rate(r.matrix(), r.forcing(), drive))
+        .collect();
+    let impacts: f64 = trajectory
+        .events()
+        .iter()
+        .filter(|e| begins_contact(model, e.from, e.to))
+        .map(|e| e.rate * e.rate)
+        .sum();
+    model.impact_loss * impacts - force.product_integral(&trajectory.signal_by_regime(&rates))
+}
+
 /// Whether a switch begins a contact: from flight into contact, or an impact.
 pub fn begins_contact(model: &Model, from: usize, to: usize) -> bool {
     !model.contact[from] && (model.contact[to] || from == to)

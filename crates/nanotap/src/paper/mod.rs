@@ -31,6 +31,7 @@ mod write;
 use nanotap_dynamics::Control;
 
 use crate::model::ModelError;
+use crate::near_name::near_name;
 use crate::orbit::OrbitError;
 
 pub use check::{Check, Verdict};
@@ -341,11 +342,9 @@ fn chosen(only: &[String]) -> Result<Vec<&'static Topic>, PaperError> {
         if TOPICS.iter().any(|topic| names(given, topic)) {
             continue;
         }
-        let hint = section_names()
-            .map(|id| (strsim::damerau_levenshtein(id, &given.to_lowercase()), id))
-            .min()
-            .filter(|(distance, _)| *distance <= 2)
-            .map_or_else(String::new, |(_, id)| format!(" (did you mean `{id}`?)"));
+        let known: Vec<&str> = section_names().collect();
+        let hint = near_name(given, known.iter().copied())
+            .map_or_else(String::new, |id| format!(" (did you mean `{id}`?)"));
         return Err(PaperError::UnknownSection {
             given: given.clone(),
             hint,

@@ -21,9 +21,9 @@ use serde::Deserialize;
 
 use super::error::PhysicalError;
 use super::lever::BeamGeometry;
-use super::nearest::nearest;
 use super::quantity::{Kind, QuantityError};
 use super::sample::Elastic;
+use crate::near_name::near_names;
 
 /// A lever as its box describes it. No quality factor: that depends on what surrounds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -267,7 +267,7 @@ fn unknown<'a>(
         .iter()
         .copied()
         .chain(aliases.into_iter().flatten().map(String::as_str));
-    let suggestion = match nearest(name, candidates).first() {
+    let suggestion = match near_names(name, candidates).first() {
         Some(near) => format!("did you mean \"{near}\"?"),
         None => format!("known are {}", names.join(", ")),
     };

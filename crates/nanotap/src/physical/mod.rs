@@ -47,7 +47,6 @@ mod error;
 pub mod free_response;
 pub mod lever;
 pub mod mapping;
-mod nearest;
 mod physical_case;
 pub mod quantity;
 mod remark;

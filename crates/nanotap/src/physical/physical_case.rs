@@ -8,7 +8,6 @@ use super::error::PhysicalError;
 use super::free_response::free_response;
 use super::lever::{self, Lever, LeverData};
 use super::mapping::{MappingRow, PhysicalParameters, Scales, mapping_table};
-use super::nearest::suggestion;
 use super::quantity::Kind;
 use super::remark::Remark;
 use super::sample::{self, Sample};
@@ -16,6 +15,7 @@ use super::section::{Reader, Sections};
 use super::tip::{self, Tip};
 use crate::case::{Case, CosineTerm};
 use crate::exact_beam;
+use crate::near_name::suggestion;
 
 /// The sections of a physical case with the keys that each may have.
 pub const SECTIONS: [(&str, &[&str]); 5] = [

@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use super::nearest::nearest;
+use crate::near_name::near_names;
 
 /// Elementary charge in coulomb, hence joules in one electronvolt; exact in the SI of 2019.
 pub const JOULES_PER_ELECTRONVOLT: f64 = 1.602_176_634e-19;
@@ -830,12 +830,12 @@ fn nearest_units(symbol: &str, expected: Option<Kind>) -> Vec<String> {
             find_unit(name).is_some_and(|scale| scale.dimension == kind.dimension())
         })
     };
-    let mut found = nearest(symbol, names.iter().filter(fitting).map(String::as_str));
+    let mut found = near_names(symbol, names.iter().filter(fitting).map(String::as_str));
     if found.is_empty() {
-        found = nearest(symbol, names.iter().map(String::as_str));
+        found = near_names(symbol, names.iter().map(String::as_str));
     }
     found.truncate(2);
-    found
+    found.into_iter().map(str::to_owned).collect()
 }
 
 /// `value` (SI) in `unit`, which is 10^`shift` of SI, with digits moved as text so that no

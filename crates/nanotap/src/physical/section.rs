@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::error::PhysicalError;
-use super::nearest::suggestion;
 use super::quantity::Kind;
+use crate::near_name::suggestion;
 
 /// The keys of one section with their values as text.
 pub type Section = BTreeMap<String, String>;

@@ -2,10 +2,10 @@
 
 use super::catalogue::{Catalogue, Lever as CatalogueLever};
 use super::error::PhysicalError;
-use super::nearest::suggestion;
 use super::quantity::Kind;
 use super::sample::Elastic;
 use super::section::{Reader, Sections};
+use crate::near_name::suggestion;
 
 /// A solid tip under the end of the lever.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,6 +9,7 @@ use super::over::Over;
 use super::run::{Outcome, Starts};
 use crate::dataset::schema::Kind;
 use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
+use crate::physical::Kind as QuantityKind;
 use crate::simulate::Classification;
 use crate::subject::Subject;
 
@@ -48,7 +49,8 @@ pub(super) const START: &str = "start";
 pub(super) fn schema(subject: &Subject, options: &SweepOptions) -> Result<Schema, SweepError> {
     let lanes = options.starts.count() * options.follow.directions().len().max(1);
     let states = state_names(subject, options)?;
-    let variables = variables(options, states.len());
+    let si = subject.resolved().is_some();
+    let variables = variables(options, states.len(), si);
     let bytes: usize = variables.iter().map(|v| v.stride() * v.kind.size()).sum();
     let x = &options.over[0];
     let (along_x, along_starts) = cut(options, lanes, bytes);
@@ -100,7 +102,13 @@ fn state_names(subject: &Subject, options: &SweepOptions) -> Result<Vec<String>,
     Ok(crate::time_series::state_names(&model))
 }
 
-fn variables(options: &SweepOptions, states: usize) -> Vec<Variable> {
+/// The variables; in SI where physical quantities vary, else in the model's units.
+fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
+    let [length, force, speed, energy] = if si {
+        ["m", "N", "m/s", "J"]
+    } else {
+        ["g0", "EI g0/L^3", "g0 sqrt(EI/(m L^4))", "EI g0^2/L^3"]
+    };
     let real = |name, long_name, units| Variable::new(name, Kind::Real, long_name, units);
     let names: Vec<&str> = CLASSES.iter().map(|c| c.name()).collect();
     let flags: Vec<usize> = (0..=CLASSES.len()).collect();
@@ -121,25 +129,43 @@ fn variables(options: &SweepOptions, states: usize) -> Vec<Variable> {
             "periods before the recording",
             "drive periods",
         ),
-        real("tip_max", "greatest tip deflection W", "g0"),
-        real("tip_min", "least tip deflection W", "g0"),
+        real("tip_max", "greatest tip deflection W", length),
+        real("tip_min", "least tip deflection W", length),
         real(
             "amplitude",
             "half of peak to peak of the tip deflection",
-            "g0",
+            length,
         ),
-        real("mean_deflection", "mean tip deflection", "g0"),
+        real("mean_deflection", "mean tip deflection", length),
+        real(
+            "first_harmonic",
+            "amplitude of the tip deflection at the drive frequency",
+            length,
+        ),
+        real("phase", "its lag behind the drive", "degree"),
+        real(
+            "indentation",
+            "greatest depth below the resting surface",
+            length,
+        ),
+        real("mean_force", "mean force of the sample on the tip", force),
+        real(
+            "dissipation",
+            "energy that the sample takes in a drive period",
+            energy,
+        ),
+        real("virial", "mean of force times tip deflection", energy),
         real("contact_fraction", "part of the time in contact", "1"),
         real("contacts_per_period", "contacts begun a drive period", "1"),
         real(
             "peak_force",
             "greatest force of the sample on the tip",
-            "EI g0/L^3",
+            force,
         ),
         real(
             "impact_speed",
             "greatest speed at which a contact begins",
-            "g0 sqrt(EI/(m L^4))",
+            speed,
         ),
         real(
             "multiplier",
@@ -155,13 +181,13 @@ fn variables(options: &SweepOptions, states: usize) -> Vec<Variable> {
         real(
             "period_max",
             "greatest tip deflection of each recorded drive period",
-            "g0",
+            length,
         )
         .along(PERIODS, options.periods),
         real(
             "period_min",
             "least tip deflection of each recorded drive period",
-            "g0",
+            length,
         )
         .along(PERIODS, options.periods),
     ];
@@ -227,7 +253,11 @@ fn coordinates(options: &SweepOptions, lanes: usize, states: Vec<String>) -> Vec
 
 fn parameter(over: &Over) -> Coordinate {
     let values = Values::Real(over.values());
-    let mut coordinate = Coordinate::of(over.key.name(), values, over.key.meaning(), "1");
+    let unit = match over.key.kind() {
+        QuantityKind::Number => "1",
+        kind => kind.si_unit(),
+    };
+    let mut coordinate = Coordinate::of(over.key.name(), values, over.key.meaning(), unit);
     coordinate
         .attributes
         .insert("symbol".into(), over.key.symbol().into());
@@ -300,6 +330,12 @@ pub(super) fn columns(schema: &Schema, outcomes: &[Outcome]) -> Vec<Values> {
             "tip_min" => real(|o| o.observables.tip_min),
             "amplitude" => real(|o| o.observables.amplitude),
             "mean_deflection" => real(|o| o.observables.mean_deflection),
+            "first_harmonic" => real(|o| o.observables.first_harmonic),
+            "phase" => real(|o| o.observables.phase),
+            "indentation" => real(|o| o.observables.indentation),
+            "mean_force" => real(|o| o.observables.mean_force),
+            "dissipation" => real(|o| o.observables.dissipation),
+            "virial" => real(|o| o.observables.virial),
             "contact_fraction" => real(|o| o.observables.contact_fraction),
             "contacts_per_period" => real(|o| o.observables.contacts_per_period),
             "peak_force" => real(|o| o.observables.peak_force),

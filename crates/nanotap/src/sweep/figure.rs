@@ -9,7 +9,9 @@ use nanotap_figures::{
 
 use super::summary::{Motions, class_of};
 use crate::dataset::{Coordinate, Store, StoreError, Values};
+use crate::physical::Kind;
 use crate::simulate::Classification;
+use crate::units::prefixed;
 
 /// Categories of a map that get a colour of their own.
 const MOST_CATEGORIES: usize = 12;
@@ -31,7 +33,7 @@ pub(super) fn of(store: &Store) -> Result<Figure, StoreError> {
 /// classification, a panel a direction of following.
 fn diagram(store: &Store) -> Result<Figure, StoreError> {
     let schema = store.schema();
-    let x = Scale::of(store, 0);
+    let x = GridScale::of(store, 0);
     let directions: Vec<String> = match schema.coordinate("direction").map(|c| &c.values) {
         Some(Values::Text(words)) => words.clone(),
         _ => vec![String::new(); schema.grid.axes[1].length],
@@ -65,6 +67,7 @@ fn diagram(store: &Store) -> Result<Figure, StoreError> {
             );
         }
     }
+    let deflection = Deflection::of(store, "period_max", clouds.values().flatten().map(|p| p.1));
     let shown: BTreeSet<String> = directions.into_iter().collect();
     let mut figure = Figure::new(shown.len(), 1).width(DOUBLE_COLUMN).share_x();
     // "up" before "down".
@@ -74,7 +77,8 @@ fn diagram(store: &Store) -> Result<Figure, StoreError> {
         } else {
             format!("following {direction}")
         };
-        let mut panel = Panel::new(x.axis(), Axis::linear("max $W$ in a drive period"))
+        let label = format!("max $W$ in a drive period{}", deflection.unit);
+        let mut panel = Panel::new(x.axis(), Axis::linear(label))
             .title(title)
             .legend(Legend::Above);
         // What is chaotic lies under what is periodic.
@@ -89,6 +93,9 @@ fn diagram(store: &Store) -> Result<Figure, StoreError> {
                 2_000..20_000 => 0.3,
                 _ => 0.13,
             };
+            let points = points
+                .into_iter()
+                .map(|(at, y)| (at, deflection.factor * y));
             panel = panel.with(
                 Points::new(points)
                     .diameter(diameter)
@@ -104,7 +111,7 @@ fn diagram(store: &Store) -> Result<Figure, StoreError> {
 /// What motions there are over two parameters.
 fn map(store: &Store) -> Result<Figure, StoreError> {
     let schema = store.schema();
-    let (y, x) = (Scale::of(store, 0), Scale::of(store, 1));
+    let (y, x) = (GridScale::of(store, 0), GridScale::of(store, 1));
     let columns = x.values.len();
     let mut found: Vec<BTreeSet<(u8, i32)>> = vec![BTreeSet::new(); columns * y.values.len()];
     for chunk in 0..store.chunks() {
@@ -194,16 +201,119 @@ fn colour(class: Classification) -> Colour {
     }
 }
 
+/// Amplitude and phase at the drive's frequency over one parameter, a colour a direction of
+/// following: resonance curves.
+pub(super) fn response(store: &Store) -> Result<Figure, StoreError> {
+    store.require_all()?;
+    let schema = store.schema();
+    if schema.grid.axes.len() > 2 {
+        return map(store);
+    }
+    let x = GridScale::of(store, 0);
+    let directions: Vec<String> = match schema.coordinate("direction").map(|c| &c.values) {
+        Some(Values::Text(words)) => words.clone(),
+        _ => vec![String::new(); schema.grid.axes[1].length],
+    };
+    let mut figure = Figure::new(2, 1)
+        .width(ONE_AND_A_HALF_COLUMNS)
+        .height(120.0)
+        .share_x();
+    for (name, label) in [
+        ("first_harmonic", "amplitude $A$"),
+        ("phase", "phase behind the drive (°)"),
+    ] {
+        let index = schema.index_of(name).unwrap_or(0);
+        let mut curves: BTreeMap<(String, usize), Vec<(f64, f64)>> = BTreeMap::new();
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            let Values::Real(values) = store.read_chunk(&block, index)? else {
+                continue;
+            };
+            for (value, entry) in values.iter().zip(block.entries()) {
+                curves
+                    .entry((directions[entry[1]].clone(), entry[1]))
+                    .or_default()
+                    .push((x.values[entry[0]], *value));
+            }
+        }
+        let unit = Deflection::of(store, name, curves.values().flatten().map(|p| p.1));
+        let mut panel = Panel::new(x.axis(), Axis::linear(format!("{label}{}", unit.unit))).legend(
+            if name == "phase" {
+                Legend::Hidden
+            } else {
+                Legend::Above
+            },
+        );
+        let mut named = BTreeSet::new();
+        // "up" before "down", whose smaller marks lie upon it.
+        for ((direction, _), mut curve) in curves.into_iter().rev() {
+            curve.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let colour = if direction == "down" {
+                Colour::VERMILLION
+            } else {
+                Colour::BLUE
+            };
+            // What was met is a list of motions: marks, so that a jump is not a line.
+            let marks = curve.into_iter().map(|(at, y)| (at, unit.factor * y));
+            let mut layer = Points::new(marks)
+                .diameter(if direction == "down" { 0.6 } else { 0.9 })
+                .colour(colour);
+            if !direction.is_empty() && named.insert(direction.clone()) {
+                layer = layer.label(format!("following {direction}"));
+            }
+            panel = panel.with(layer);
+        }
+        figure = figure.with(panel);
+    }
+    Ok(figure)
+}
+
+/// How a variable is shown: what its numbers are multiplied with, and the unit in brackets
+/// (empty in the model's own units).
+struct Deflection {
+    factor: f64,
+    unit: String,
+}
+
+impl Deflection {
+    fn of(store: &Store, name: &str, values: impl Iterator<Item = f64>) -> Self {
+        let size = values
+            .filter(|v| v.is_finite())
+            .fold(0.0, |size: f64, v| size.max(v.abs()));
+        let schema = store.schema();
+        let unit = schema
+            .index_of(name)
+            .and_then(|k| schema.variables[k].attributes.get("units")?.as_str());
+        let kind = unit.filter(|unit| *unit == "m").map(|_| Kind::Length);
+        kind.map_or_else(
+            || Self {
+                factor: 1.0,
+                unit: String::new(),
+            },
+            |kind| {
+                let (factor, unit) = prefixed(kind, 1.0, size);
+                Self {
+                    factor,
+                    unit: format!(" ({unit})"),
+                }
+            },
+        )
+    }
+}
+
 /// The values of a parameter and how they are spaced.
-struct Scale {
-    values: Vec<f64>,
+pub(crate) struct GridScale {
+    /// As they are shown.
+    pub(crate) values: Vec<f64>,
+    /// As they are in the dataset.
+    pub(crate) raw: Vec<f64>,
     label: String,
     log: bool,
 }
 
-impl Scale {
+impl GridScale {
     /// Of an axis of the grid.
-    fn of(store: &Store, axis: usize) -> Self {
+    pub(crate) fn of(store: &Store, axis: usize) -> Self {
         let schema = store.schema();
         let axis = &schema.grid.axes[axis];
         let coordinate = schema.coordinate(&axis.name);
@@ -212,15 +322,47 @@ impl Scale {
             _ => (0..axis.length).map(|k| k as f64).collect(),
         };
         let text = |c: &Coordinate, key: &str| Some(c.attributes.get(key)?.as_str()?.to_owned());
-        let label = coordinate
+        let symbol = coordinate
             .and_then(|c| text(c, "symbol"))
             .unwrap_or_else(|| axis.name.clone());
         let log = coordinate.and_then(|c| text(c, "spacing")).as_deref() == Some("log");
-        Self { values, label, log }
+        let unit = coordinate
+            .and_then(|c| text(c, "units"))
+            .unwrap_or_default();
+        let kind = Kind::ALL
+            .into_iter()
+            .find(|kind| *kind != Kind::Number && kind.si_unit() == unit);
+        // A quantity of a physical case is called by its path: drive.frequency.
+        let words = symbol.replace(['.', '_'], " ");
+        match kind {
+            Some(kind) => {
+                let size = values.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
+                let (factor, unit) = prefixed(kind, 1.0, size);
+                Self {
+                    values: values.iter().map(|v| factor * v).collect(),
+                    raw: values,
+                    label: format!("{words} ({unit})"),
+                    log,
+                }
+            }
+            None if symbol.contains('.') => Self {
+                raw: values.clone(),
+                values,
+                label: words,
+                log,
+            },
+            None => Self {
+                raw: values.clone(),
+                values,
+                label: format!("${symbol}$"),
+                log,
+            },
+        }
     }
 
-    fn axis(&self) -> Axis {
-        let label = format!("${}$", self.label);
+    /// The axis.
+    pub(crate) fn axis(&self) -> Axis {
+        let label = self.label.clone();
         if self.log {
             Axis::log(label).tight()
         } else {
@@ -229,7 +371,7 @@ impl Scale {
     }
 
     /// The outer edges of cells around the values.
-    fn edges(&self) -> (f64, f64) {
+    pub(crate) fn edges(&self) -> (f64, f64) {
         let (from, to) = (self.values[0], self.values[self.values.len() - 1]);
         let steps = (self.values.len() - 1) as f64;
         if steps == 0.0 {

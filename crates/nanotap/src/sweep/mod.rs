@@ -34,11 +34,13 @@ mod run;
 mod summary;
 
 pub use error::SweepError;
+pub(crate) use figure::GridScale;
 pub use follow::Follow;
 pub use over::{Over, OverError, Spacing, SweepKey};
 pub use run::Starts;
 pub(crate) use run::nearest;
 pub use summary::Summary;
+pub(crate) use summary::class_of;
 
 use nanotap_dynamics::{Control, LyapunovOptions, SettleOptions};
 use nanotap_figures::Figure;
@@ -230,4 +232,13 @@ pub fn summary(store: &Store) -> Result<Summary, StoreError> {
 /// When a chunk is missing or damaged.
 pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     figure::of(store)
+}
+
+/// Amplitude and phase at the drive's frequency over one parameter, up and down in two
+/// colours; over two parameters as [`figure()`].
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+pub fn response_figure(store: &Store) -> Result<Figure, StoreError> {
+    figure::response(store)
 }

@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use crate::beam::MAX_MODES;
+use crate::physical::{Kind, QuantityError};
 use crate::subject::{Key, Subject, UnknownKey};
 
 /// Most values of one parameter.
@@ -39,7 +40,16 @@ impl SweepKey {
         match self {
             Self::Parameter(Key::Cantilever(parameter)) => parameter.meaning(),
             Self::Parameter(Key::Oscillator(parameter)) => parameter.name(),
+            Self::Parameter(Key::Physical(key)) => key.path(),
             Self::Modes => "number of beam modes",
+        }
+    }
+
+    /// What its values measure.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Parameter(key) => key.kind(),
+            Self::Modes => Kind::Number,
         }
     }
 }
@@ -107,6 +117,16 @@ pub enum OverError {
         /// What it should be.
         wanted: &'static str,
     },
+    /// Something that is no quantity.
+    #[error("`{given}`: {which}: {source}")]
+    Quantity {
+        /// What was given.
+        given: String,
+        /// Which of the values.
+        which: &'static str,
+        /// Why not.
+        source: Box<QuantityError>,
+    },
     /// Numbers that make no range.
     #[error("`{given}`: {what}")]
     Range {
@@ -158,10 +178,29 @@ impl Over {
                     wanted: "finite number",
                 })
         };
+        let quantity = |which, value: &str| match key {
+            SweepKey::Parameter(Key::Physical(physical)) => physical
+                .read(value)
+                .map(|(key, value)| (SweepKey::Parameter(Key::Physical(key)), value))
+                .map_err(|source| OverError::Quantity {
+                    given: given.into(),
+                    which,
+                    source: Box::new(source),
+                }),
+            _ => number(which, value).map(|value| (key, value)),
+        };
+        let (key, from) = quantity("the first value", from)?;
+        let (other, to) = quantity("the last value", to)?;
+        if key != other {
+            return Err(OverError::Range {
+                given: given.into(),
+                what: "the first and the last value measure different things".into(),
+            });
+        }
         let over = Self {
             key,
-            from: number("the first value", from)?,
-            to: number("the last value", to)?,
+            from,
+            to,
             count: count.parse().map_err(|_| OverError::Number {
                 given: given.into(),
                 which: "the count",
@@ -238,13 +277,16 @@ impl Over {
                 Subject::Cantilever(case.clone().with_modes(self.value(index) as usize))
             }
             (SweepKey::Modes, Subject::Oscillator(_)) => subject.clone(),
+            (SweepKey::Modes, Subject::Physical(physical)) => {
+                Subject::Physical(Box::new(physical.with_modes(self.value(index) as usize)))
+            }
         }
     }
 }
 
 fn key(given: &str, name: &str, subject: &Subject) -> Result<SweepKey, OverError> {
     let name = name.strip_prefix("model.").unwrap_or(name);
-    if name == "modes" && matches!(subject, Subject::Cantilever(_)) {
+    if name == "modes" && matches!(subject, Subject::Cantilever(_) | Subject::Physical(_)) {
         return Ok(SweepKey::Modes);
     }
     subject

@@ -7,9 +7,11 @@ use super::record::{Observables, Record};
 use super::{Sweep, SweepOptions};
 use crate::dataset::Block;
 use crate::model::Model;
+use crate::physical::Scales;
 use crate::simulate::{Classification, Named};
 use crate::start_box::box_with;
 use crate::strobe::Strobe;
+use crate::subject::Subject;
 use crate::time_series::with_modes;
 
 /// Where motions start.
@@ -126,7 +128,7 @@ pub(super) fn at_value(
             starts.len()
         ]);
     };
-    let mut runner = Runner::new(&model, &sweep.options);
+    let mut runner = Runner::new(&subject, &model, &sweep.options);
     let mut outcomes = Vec::with_capacity(starts.len());
     for start in starts {
         if cancelled() {
@@ -174,7 +176,7 @@ pub(super) fn along_line(
                 with_modes(&state, model.memory, modes)
             },
         );
-        let (outcome, end) = Runner::new(&model, &sweep.options).run(&state);
+        let (outcome, end) = Runner::new(&subject, &model, &sweep.options).run(&state);
         outcomes[index] = Some(outcome);
         // A motion that ran off is not followed; the next value starts anew.
         last = end;
@@ -200,11 +202,14 @@ struct Runner<'a> {
     options: &'a SweepOptions,
     settle: SettleOptions,
     map: Strobe,
+    /// Units to tell observables in, where physical quantities vary.
+    scales: Option<Scales>,
 }
 
 impl<'a> Runner<'a> {
-    fn new(model: &'a Model, options: &'a SweepOptions) -> Self {
+    fn new(subject: &Subject, model: &'a Model, options: &'a SweepOptions) -> Self {
         Self {
+            scales: subject.resolved().map(|resolved| resolved.scales),
             model,
             options,
             settle: options.settle(),
@@ -263,6 +268,12 @@ impl<'a> Runner<'a> {
             Err(error) => return (Outcome::unknown(class_of(&error), outcome.transient), None),
         };
         outcome.observables = record.observables();
+        if let Some(scales) = &self.scales {
+            outcome.observables = outcome.observables.in_si(scales);
+            for extremum in record.highs.iter_mut().chain(&mut record.lows) {
+                *extremum *= scales.length;
+            }
+        }
         outcome.highs = (0..periods).map(|k| record.highs[k % turn]).collect();
         outcome.lows = (0..periods).map(|k| record.lows[k % turn]).collect();
         let first = periods - self.options.strobe.min(periods);

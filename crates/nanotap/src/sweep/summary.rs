@@ -41,7 +41,7 @@ impl Summary {
 }
 
 /// The classification that a code means.
-pub(super) fn class_of(code: u8) -> Option<crate::simulate::Classification> {
+pub(crate) fn class_of(code: u8) -> Option<crate::simulate::Classification> {
     usize::from(code)
         .checked_sub(1)
         .and_then(|k| CLASSES.get(k))

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::mode_share::ReadingsReport;
 use crate::model::{Model, ModelError};
 use crate::orbit::{OrbitOptions, OrbitReport, orbit};
 use crate::simulate::Classification;
@@ -25,6 +26,10 @@ pub struct Convergence {
     pub tolerance: f64,
     /// The verdict in words.
     pub verdict: String,
+    /// What an experimenter reads, how much each number of modes misses of it, and which modes
+    /// take part.
+    #[serde(flatten)]
+    pub readings: ReadingsReport,
     /// The orbits, for figures.
     #[serde(skip)]
     pub orbits: Vec<Option<OrbitReport>>,
@@ -94,6 +99,7 @@ pub fn convergence(
     let difference = differences(&orbits, &models);
     let enough = enough(&difference, tolerance);
     let verdict = verdict(enough, &difference, largest, tolerance);
+    let readings = ReadingsReport::of(&orbits, &models, tolerance);
     Ok(Convergence {
         modes: (1..=largest).collect(),
         difference,
@@ -101,6 +107,7 @@ pub fn convergence(
         enough,
         tolerance,
         verdict,
+        readings,
         orbits,
         models,
     })

@@ -19,6 +19,7 @@ pub mod experiment;
 pub mod fixed_step_run;
 pub mod galerkin;
 pub mod lyapunov;
+pub mod mode_share;
 pub mod mode_table;
 pub mod model;
 pub mod motion_figure;

@@ -7,6 +7,8 @@ use nanotap::beam::MAX_MODES;
 use nanotap::convergence::{Convergence, convergence};
 use nanotap::motion_figure::convergence_figure;
 use nanotap::orbit::OrbitOptions;
+use nanotap::physical::Kind;
+use nanotap::physical::quantity::format_electronvolts;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -145,6 +147,59 @@ fn text(studied: &Studied, result: &Convergence) -> String {
             missing.modes
         )));
     }
-    let _ = write!(text, "\n  {}\n", style::bold(&result.verdict));
+    let _ = write!(text, "\n  {}\n\n", style::bold(&result.verdict));
+    text.push_str(&readings(studied, result));
     text
+}
+
+/// What an experimenter reads with each number of modes, and the part of each mode.
+fn readings(studied: &Studied, result: &Convergence) -> String {
+    let units = studied.units();
+    let shown = |kind: Kind, value: f64| {
+        units.si(kind).map_or_else(
+            || number::significant(value, 5),
+            |unit| kind.format(unit * value),
+        )
+    };
+    let energy = |value: f64| {
+        units.si(Kind::Energy).map_or_else(
+            || number::significant(value, 5),
+            |unit| format_electronvolts(unit * value),
+        )
+    };
+    let report = &result.readings;
+    let mut table = Table::new([
+        ("modes", Align::Right),
+        ("A", Align::Right),
+        ("phase (°)", Align::Point),
+        ("E_dis", Align::Right),
+        ("F_max", Align::Right),
+        ("share of the mode: energy (%)", Align::Point),
+        ("tip (%)", Align::Point),
+        ("force (%)", Align::Point),
+    ]);
+    let percent = |part: f64| number::significant(100.0 * part, 3);
+    for (k, reading) in report.readings.iter().enumerate() {
+        let mut row = vec![(k + 1).to_string()];
+        match reading {
+            Some(r) => row.extend([
+                shown(Kind::Length, r.first_harmonic),
+                number::significant(r.phase, 5),
+                energy(r.dissipation),
+                shown(Kind::Force, r.peak_force),
+            ]),
+            None => row.extend(std::iter::repeat_n(String::new(), 4)),
+        }
+        if let Some(share) = report.mode_shares.get(k) {
+            row.extend([percent(share.energy), percent(share.tip)]);
+            row.extend(share.force.map(percent));
+        }
+        table.row(row);
+    }
+    format!(
+        "  {}\n{}\n  {}\n",
+        style::bold("what one reads, and the part of each mode with the most modes"),
+        table.render(),
+        style::bold(&report.reading_verdict)
+    )
 }

@@ -11,3 +11,4 @@ mod physical;
 mod sweeps;
 mod terminal;
 mod util;
+mod worked_cases;

@@ -196,7 +196,13 @@ impl Window {
         let mut layer = CategoryMap::new(self.x.len(), self.y.len(), cells, x.edges(), y.edges());
         for condition in present {
             let share = self.shares.get(condition.name()).copied().unwrap_or(0.0);
-            let name = format!("{} ({:.0} %)", condition.words(), 100.0 * share);
+            let percent = 100.0 * share;
+            let part = if percent < 0.5 {
+                "below 1".to_owned()
+            } else {
+                format!("{percent:.0}")
+            };
+            let name = format!("{} ({part} %)", condition.words());
             layer = layer.category_in(name, condition.colour());
         }
         let panel = Panel::new(x.axis(), y.axis())

@@ -1,3 +1,6 @@
 //! Experiments against closed forms, invariants and independent methods.
 
 mod approach;
+mod modes_that_matter;
+mod physical_quantities;
+mod setpoint;

@@ -1,0 +1,147 @@
+//! The worked cases of the documentation: every command of `docs/cases/*.md` is run as it
+//! stands there, and every number is compared, so that they cannot rot.
+//!
+//! A `console` block has the commands, each a line that begins with `$ nanotap`; the table that
+//! follows has what the last of them says in its JSON document: a JSON pointer, the value, and
+//! within what part (`1 %`) or distance (`0.5`) it holds; `exactly` compares texts and whole
+//! numbers.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::util::Folder;
+
+fn documents() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/cases")
+}
+
+/// A folder with the case files of the documentation.
+fn with_cases() -> Folder {
+    let folder = Folder::new();
+    for entry in std::fs::read_dir(documents()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            folder.write(&name, std::fs::read(&path).unwrap());
+        }
+    }
+    folder
+}
+
+/// The words of a command line; quotes hold words together.
+fn words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quoted = false;
+    for c in line.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            ' ' if !quoted => words.push(String::new()),
+            _ => words.last_mut().unwrap().push(c),
+        }
+    }
+    words.retain(|w| !w.is_empty());
+    words
+}
+
+/// Whether `found` is what the document says.
+fn holds(found: &Value, value: &str, within: &str) -> bool {
+    if within == "exactly" {
+        return match found {
+            Value::String(text) => text == value,
+            other => other.to_string() == value,
+        };
+    }
+    let (Some(found), Ok(value)) = (found.as_f64(), value.parse::<f64>()) else {
+        return false;
+    };
+    let limit = match within.strip_suffix('%') {
+        Some(percent) => 0.01 * percent.trim().parse::<f64>().unwrap() * value.abs(),
+        None => within.parse().unwrap(),
+    };
+    (found - value).abs() <= limit
+}
+
+/// Runs one document; how many commands and numbers it has.
+fn follow(name: &str) -> (usize, usize) {
+    let text = std::fs::read_to_string(documents().join(name)).unwrap();
+    let folder = with_cases();
+    let (mut commands, mut numbers) = (0, 0);
+    let mut said = Value::Null;
+    let mut last = String::new();
+    for line in text.lines() {
+        if let Some(command) = line.strip_prefix("$ nanotap ") {
+            let mut arguments = words(command);
+            if !arguments.iter().any(|a| a == "--json") {
+                arguments.push("--json".into());
+            }
+            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            said = folder.run(&arguments).json();
+            command.clone_into(&mut last);
+            commands += 1;
+            // Pictures that are spoken of are drawn.
+            if let Some(k) = arguments.iter().position(|a| *a == "--plot") {
+                assert!(folder.path().join(arguments[k + 1]).exists(), "{last}");
+            }
+        }
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        if cells.len() == 6
+            && let Some(pointer) = cells[2]
+                .strip_prefix("`/")
+                .and_then(|p| p.strip_suffix('`'))
+        {
+            let found = said.pointer(&format!("/{pointer}"));
+            let found = found.unwrap_or_else(|| panic!("{name}: {last}: no /{pointer}"));
+            assert!(
+                holds(found, cells[3], cells[4]),
+                "{name}: {last}: /{pointer} is {found}, not {} within {}",
+                cells[3],
+                cells[4]
+            );
+            numbers += 1;
+        }
+    }
+    (commands, numbers)
+}
+
+/// Every document is followed here: a new one needs its own line.
+#[test]
+fn no_document_is_left_out() {
+    let mut names: Vec<String> = std::fs::read_dir(documents())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .filter(|name| name.ends_with(".md"))
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        [
+            "README.md",
+            "approach-curve.md",
+            "fm-lever-on-polystyrene.md",
+            "frequency-sweep.md",
+            "period-doubling.md",
+            "stiff-lever.md",
+            "tip-mass.md",
+        ]
+    );
+}
+
+/// One test a document, so that they run side by side.
+macro_rules! follows {
+    ($($test:ident: $name:literal, $commands:literal commands, $numbers:literal numbers;)*) => {
+        $(#[test]
+        fn $test() {
+            assert_eq!(follow($name), ($commands, $numbers));
+        })*
+    };
+}
+
+follows! {
+    the_approach_curve: "approach-curve.md", 2 commands, 9 numbers;
+    the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
+    the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
+    the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
+    the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
+    the_tip_mass: "tip-mass.md", 2 commands, 5 numbers;
+}

@@ -1,0 +1,170 @@
+//! Quantities of a physical case that vary.
+
+use nanotap::branch::{BranchOptions, branch};
+use nanotap::control::Control;
+use nanotap::experiment::approach::gap_key;
+use nanotap::parameter::Parameter;
+use nanotap::studied::Studied;
+use nanotap::subject::{Family, Key, Subject};
+use nanotap_dynamics::{DMatrix, MapFamily as _, StroboscopicMap as _};
+
+use crate::approach::{STIFF, studied};
+
+fn varying(lever: &Studied, key: &str, text: &str) -> (Studied, Key, f64) {
+    let varying = lever.varying(&[key]).unwrap();
+    let plain = varying.key(key).unwrap();
+    let (key, value) = varying.key_and_value(plain, text).unwrap();
+    (varying, key, value)
+}
+
+/// A value set is the value that a case file would set; and what the drive was said by its
+/// free amplitude stays what it was at the case's own frequency.
+#[test]
+fn a_quantity_set_is_the_case_with_that_quantity() {
+    let lever = studied(STIFF, &[]);
+    let base = lever.resolved.as_ref().unwrap();
+    for (key, text, set) in [
+        ("cantilever.Q", "300", "cantilever.Q=300"),
+        ("sample.loss_tangent", "0.3", "sample.loss_tangent=0.3"),
+        ("tip.radius", "20 nm", "tip.radius=20 nm"),
+        ("gap.tip", "18 nm", "gap.tip=18 nm"),
+        (
+            "drive.free_amplitude",
+            "30 nm",
+            "drive.free_amplitude=30 nm",
+        ),
+    ] {
+        let (varying, key, value) = varying(&lever, key, text);
+        let found = varying.subject.with(key, value);
+        let expected = studied(STIFF, &[set]);
+        let (found, expected) = (found.case().unwrap(), expected.resolved.unwrap().case);
+        for parameter in [
+            Parameter::Alpha1,
+            Parameter::Alpha4,
+            Parameter::Alpha6,
+            Parameter::Omega,
+        ] {
+            let (a, b) = (found.get(parameter), expected.get(parameter));
+            assert!(
+                (a - b).abs() <= 1e-12 * b.abs(),
+                "{set}: {parameter} {a} {b}"
+            );
+        }
+        // In units of g0, which stays; the free amplitude is what the case file says unless
+        // the lever itself changes.
+        if !set.starts_with("cantilever") {
+            let ratio = found.alpha2 / expected.alpha2;
+            let gaps = found.alpha5 / expected.alpha5;
+            assert!((ratio / gaps - 1.0).abs() < 1e-9, "{set}: {ratio} {gaps}");
+        } else {
+            assert_eq!(found.alpha2.to_bits(), base.case.alpha2.to_bits());
+        }
+    }
+    let (varying, key, value) = varying(&lever, "drive.frequency", "340 kHz");
+    let found = varying.subject.with(key, value).case().unwrap();
+    assert!((found.alpha2 / base.case.alpha2 - 1.0).abs() < 1e-12);
+    assert!((found.omega / base.case.omega - 340.0 / (330.0 * 1.001)).abs() < 1e-9);
+    // The damper of a loss tangent changes with the frequency.
+    assert!((found.alpha6 * found.omega / (base.case.alpha6 * base.case.omega) - 1.0).abs() < 1e-9);
+}
+
+/// The derivative of the map with respect to a quantity, through all that it changes, against
+/// central differences of the map itself.
+#[test]
+fn derivatives_go_through_everything_that_a_quantity_changes() {
+    let lever = studied(STIFF, &[]);
+    for (name, text) in [
+        ("drive.frequency", "330.5 kHz"),
+        ("cantilever.k", "40 N/m"),
+        ("cantilever.f0", "329 kHz"),
+        ("gap.tip", "15 nm"),
+        ("sample.damping", "1e-6 N s/m"),
+        ("drive.free_amplitude", "25 nm"),
+    ] {
+        let (varying, key, value) = varying(&lever, name, text);
+        let family = Family {
+            subject: varying.subject.clone(),
+            key,
+        };
+        let start = vec![-1.2e-3, 1e-5, 1e-4, 0.0];
+        let mut state = start.clone();
+        let (mut jacobian, mut found) = (DMatrix::zeros(4, 4), vec![0.0; 4]);
+        let mut map = family.at(value).unwrap();
+        family
+            .advance_with_derivatives(value, &mut map, &mut state, &mut jacobian, &mut found)
+            .unwrap();
+        let step = 1e-6 * value;
+        let at = |value: f64| {
+            let mut state = start.clone();
+            family.at(value).unwrap().advance(&mut state).unwrap();
+            state
+        };
+        let (low, high) = (at(value - step), at(value + step));
+        // What changes nothing (f0, where the drive is said in units of it) is known to the
+        // rounding of the states.
+        let floor = 1e-5 * 1.2e-3 / value;
+        let size = found.iter().fold(floor, |s: f64, v| s.max(v.abs()));
+        for k in 0..4 {
+            let expected = (high[k] - low[k]) / (2.0 * step);
+            assert!(
+                (found[k] - expected).abs() < 2e-5 * size,
+                "{name}: {found:?} {expected}"
+            );
+        }
+    }
+}
+
+/// A fold met along `gap.tip` in metres is the one met along α5, times g0.
+#[test]
+fn a_branch_in_metres_is_the_branch_in_the_models_units() {
+    let lever = studied(STIFF, &[]);
+    let g0 = lever.resolved.as_ref().unwrap().scales.length;
+    let folds = |subject: &Subject, key: Key, unit: f64| -> Vec<f64> {
+        let options = BranchOptions {
+            period: Some(1),
+            ..BranchOptions::over(key, 24e-9 / unit, 10e-9 / unit)
+        };
+        let report = branch(subject, &options, &Control::default()).unwrap();
+        report
+            .bifurcations
+            .iter()
+            .filter(|b| b.kind == "fold")
+            .map(|b| b.parameter * unit)
+            .collect()
+    };
+    let (metres, key, _) = varying(&lever, "gap.tip", "24 nm");
+    let found = folds(&metres.subject, key, 1.0);
+    let expected = folds(&lever.subject, gap_key(&lever.subject), g0);
+    assert_eq!(found.len(), 2);
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a / b - 1.0).abs() < 1e-7, "{found:?} {expected:?}");
+    }
+}
+
+#[test]
+fn what_cannot_vary_is_refused_by_name() {
+    let lever = studied(STIFF, &[]);
+    for (name, words) in [
+        ("drive.frequenzy", "did you mean `drive.frequency`"),
+        ("sample.material", "a name, not a quantity"),
+        ("drive.setpoint", "vary gap.tip"),
+        ("lever.k", "there are cantilever.k"),
+    ] {
+        let error = lever.varying(&[name]).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains(name), "{error}");
+    }
+    let (varying, key, value) = varying(&lever, "drive.frequency", "325 nm");
+    let error = varying
+        .subject
+        .with(key, value)
+        .model()
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("expected a frequency") && error.contains("a length"),
+        "{error}"
+    );
+    // Beside a quantity there are only quantities.
+    let error = varying.key("omega").unwrap_err().to_string();
+    assert!(error.contains("drive.frequency"), "{error}");
+}

@@ -116,7 +116,7 @@ impl DatasetArguments {
 
 /// Work on a dataset that was done: the JSON of every command that leaves one.
 #[derive(Serialize)]
-pub(crate) struct Finished<S> {
+pub(crate) struct DatasetReport<S> {
     /// The dataset.
     pub(crate) path: PathBuf,
     /// Its chunks, and how many of them are finished.
@@ -129,7 +129,7 @@ pub(crate) struct Finished<S> {
     pub(crate) seconds: f64,
 }
 
-impl<S> Finished<S> {
+impl<S> DatasetReport<S> {
     /// Sums up a dataset, writes its table and draws it, as far as these were asked for.
     pub(crate) fn of(
         store: &Store,

@@ -49,7 +49,7 @@ impl Studied {
         if let Some(setpoint) = &studied.setpoint {
             output.note(&setpoint.remark().text);
         }
-        Self::warned(studied, output)
+        Ok(Self::warned(studied, output))
     }
 
     /// The same, but a setpoint is not solved for: for experiments that vary the distance.
@@ -57,16 +57,16 @@ impl Studied {
         arguments: &CaseArguments,
         output: &Output,
     ) -> Result<Self, Failure> {
-        Self::warned(command::studied(arguments)?, output)
+        Ok(Self::warned(command::studied(arguments)?, output))
     }
 
-    fn warned(studied: nanotap::studied::Studied, output: &Output) -> Result<Self, Failure> {
+    fn warned(studied: nanotap::studied::Studied, output: &Output) -> Self {
         for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
             if remark.severity == Severity::Warning {
                 output.warning(&remark.text);
             }
         }
-        Ok(Self(studied))
+        Self(studied)
     }
 
     /// The same with these parameters free to vary, quantities of a physical case

@@ -7,7 +7,7 @@ use clap::Args;
 use nanotap::basin::{Basin, BasinError, BasinOptions, Shares, SliceRange, figure, shares};
 
 use crate::arguments::{CaseArguments, PlotArgument};
-use crate::dataset::{DatasetArguments, Finished, derived_name};
+use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::studied::Studied;
@@ -96,7 +96,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         |store, work| basin.compute(store, work),
     )?;
     let plot = arguments.plot.plot.as_deref();
-    let done = Finished::of(&store, destination, plot, begun, shares, figure)?;
+    let done = DatasetReport::of(&store, destination, plot, begun, shares, figure)?;
     output.result(&done, |done| text(&studied, &options, done))
 }
 
@@ -156,7 +156,7 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(studied: &Studied, options: &BasinOptions, done: &Finished<Shares>) -> String {
+fn text(studied: &Studied, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
         studied.title,

@@ -11,7 +11,7 @@ use nanotap::sweep::{
 
 use super::attractors::parse_side;
 use crate::arguments::{CaseArguments, PlotArgument};
-use crate::dataset::{DatasetArguments, Finished, derived_name};
+use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::studied::Studied;
@@ -139,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Show::Response => response_figure,
     };
     let plot = arguments.plot.plot.as_deref();
-    let done = Finished::of(&store, destination, plot, begun, summary, drawn)?;
+    let done = DatasetReport::of(&store, destination, plot, begun, summary, drawn)?;
     output.result(&done, |done| text(&studied, &sweep, done))
 }
 
@@ -171,7 +171,7 @@ impl Arguments {
     }
 }
 
-fn text(studied: &Studied, sweep: &Sweep, done: &Finished<Summary>) -> String {
+fn text(studied: &Studied, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
     let options = sweep.options();
     let ranges: Vec<String> = options
         .over

@@ -11,7 +11,7 @@ use nanotap::experiment::window::{Condition, Window};
 use nanotap::sweep::{Over, Starts, Sweep, SweepOptions};
 
 use crate::arguments::{CaseArguments, PlotArgument};
-use crate::dataset::{DatasetArguments, Finished, derived_name};
+use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::number;
 use crate::output::Output;
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         |store, work| sweep.compute(store, work),
     )?;
     let drawn = |store: &_| -> Result<_, StoreError> { Window::of(store)?.figure(store) };
-    let done = Finished::of(&store, destination, plot, begun, Window::of, drawn)?;
+    let done = DatasetReport::of(&store, destination, plot, begun, Window::of, drawn)?;
     output.result(&done, |done| {
         let heading = format!(
             "{}: operating window over {} and {}, {} at each of {} points",

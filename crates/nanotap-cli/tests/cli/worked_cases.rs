@@ -49,7 +49,7 @@ fn holds(found: &Value, value: &str, within: &str) -> bool {
     if within == "exactly" {
         return match found {
             Value::String(text) => text == value,
-            other => other.to_string() == value,
+            number => number.as_i64().is_some() && number.as_i64() == value.parse().ok(),
         };
     }
     let (Some(found), Ok(value)) = (found.as_f64(), value.parse::<f64>()) else {
@@ -109,8 +109,9 @@ fn follow(name: &str) -> (usize, usize) {
 fn no_document_is_left_out() {
     let mut names: Vec<String> = std::fs::read_dir(documents())
         .unwrap()
-        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .filter(|name| name.ends_with(".md"))
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "md"))
+        .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
         .collect();
     names.sort();
     assert_eq!(

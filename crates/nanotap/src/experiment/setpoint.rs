@@ -216,11 +216,11 @@ fn told(point: &ApproachPoint) -> String {
 }
 
 /// The points of the approach between which the amplitude first falls to the target.
-fn bracket<'a>(
-    curve: &'a ApproachReport,
+fn bracket(
+    curve: &ApproachReport,
     ratio: f64,
     target: f64,
-) -> Result<(&'a ApproachPoint, &'a ApproachPoint), SetpointError> {
+) -> Result<(&ApproachPoint, &ApproachPoint), SetpointError> {
     let there: Vec<&ApproachPoint> = curve
         .table
         .iter()

@@ -8,7 +8,6 @@ use nanotap::case_file::{self, CaseFile, PHYSICAL_KEYS, Source};
 use nanotap::parameter::Parameter;
 use nanotap::physical::{Catalogue, Severity};
 use nanotap::studied::Studied;
-use nanotap::subject::Subject;
 use nanotap::time_series::state_names;
 use pyo3::prelude::*;
 
@@ -133,10 +132,10 @@ impl CaseCore {
     /// The dimensionless case file; `None` of an oscillator.
     #[getter]
     fn toml(&self) -> Option<String> {
-        match &self.studied.subject {
-            Subject::Cantilever(case) => Some(case_file::to_toml(case)),
-            Subject::Oscillator(_) => None,
-        }
+        self.studied
+            .subject
+            .case()
+            .map(|case| case_file::to_toml(&case))
     }
 
     /// Whether its parameters were given in physical units.

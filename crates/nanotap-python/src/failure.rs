@@ -96,6 +96,7 @@ impl From<ModelError> for Failure {
             ModelError::Flow(FlowError::Resonance { .. })
             | ModelError::Case(_)
             | ModelError::Oscillator(_) => Self::Input(error.to_string()),
+            ModelError::Physical(error) => (*error).into(),
             ModelError::Flow(_) => Self::Failed(error.to_string()),
         }
     }

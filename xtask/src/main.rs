@@ -4,6 +4,7 @@
 //! comes, and counts what passed. A failed step does not stop the next one: one
 //! run tells everything that is wrong.
 
+mod benches;
 mod peers;
 mod process;
 mod steps;
@@ -26,13 +27,8 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Ok(Selection::Run(steps)) => run(&steps),
-        Ok(Selection::Peers(options)) => match peers::run(&Workspace::find(), &options) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(reason) => {
-                eprintln!("error: {reason}");
-                ExitCode::FAILURE
-            }
-        },
+        Ok(Selection::Bench) => finished(benches::run(&Workspace::find())),
+        Ok(Selection::Peers(options)) => finished(peers::run(&Workspace::find(), &options)),
         Err(message) => {
             eprintln!("error: {message}\n");
             eprint!("{}", usage());
@@ -41,10 +37,23 @@ fn main() -> ExitCode {
     }
 }
 
+/// How a chore ended that is no check.
+fn finished(outcome: Result<(), String>) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(reason) => {
+            eprintln!("error: {reason}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
 /// What the words on the command line ask for.
 enum Selection {
     Help,
     Run(Vec<&'static Step>),
+    /// The benches.
+    Bench,
     /// The comparison with other solvers, with its own options.
     Peers(Vec<String>),
 }
@@ -53,8 +62,10 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
     if arguments.is_empty() {
         return Err("name at least one chore".into());
     }
-    if arguments[0] == "peers" {
-        return Ok(Selection::Peers(arguments[1..].to_vec()));
+    match (arguments[0].as_str(), &arguments[1..]) {
+        ("bench", []) => return Ok(Selection::Bench),
+        ("peers", options) => return Ok(Selection::Peers(options.to_vec())),
+        _ => {}
     }
     let mut selected = Vec::new();
     for argument in arguments {

@@ -14,12 +14,24 @@ use nanotap_flow::{Flow, FlowError, Output, System};
 use crate::model::Model;
 
 /// The map from the state at drive phase 0 to the state one drive period later.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Strobe {
     flow: Flow,
     gap: Arc<Output>,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
+}
+
+impl Clone for Strobe {
+    /// A map with a system of its own, for another thread: threads that count references to
+    /// one system, as every period does, cost each other a third of their time.
+    fn clone(&self) -> Self {
+        Self {
+            flow: Flow::new(Arc::new(System::clone(self.flow.system()))),
+            gap: Arc::clone(&self.gap),
+            tangents: Arc::clone(&self.tangents),
+        }
+    }
 }
 
 impl Strobe {

@@ -24,6 +24,7 @@
 //! building and has no rename-when-complete.
 
 pub mod attributes;
+mod deflate;
 pub mod error;
 pub mod grid;
 pub mod merge;

@@ -1,7 +1,7 @@
 //! One dataset on disk.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -630,15 +630,21 @@ fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
 
 /// Writes a file under a temporary name and renames it: it is there whole or not at all.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    if let Some(folder) = path.parent() {
-        make_folder(folder)?;
-    }
     let name = path
         .file_name()
         .map(|n| n.to_string_lossy().into_owned())
         .unwrap_or_default();
     let temporary = path.with_file_name(format!(".{name}.{}.{TEMPORARY}", std::process::id()));
-    let written = fs::File::create(&temporary)
+    let mut created = fs::File::create(&temporary);
+    if created
+        .as_ref()
+        .is_err_and(|e| e.kind() == ErrorKind::NotFound)
+        && let Some(folder) = path.parent()
+    {
+        make_folder(folder)?;
+        created = fs::File::create(&temporary);
+    }
+    let written = created
         .and_then(|mut file| file.write_all(bytes))
         .and_then(|()| fs::rename(&temporary, path));
     written.map_err(|error| {

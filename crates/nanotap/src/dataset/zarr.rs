@@ -4,15 +4,11 @@
 //! `_ARRAY_DIMENSIONS` for the names of dimensions and `.zmetadata` for all metadata in
 //! one document. Chunks are zlib streams of little-endian numbers in C order.
 
-use miniz_oxide::deflate::compress_to_vec_zlib;
 use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 use serde_json::{Value, json};
 
+use super::deflate::{LEVEL, deflate};
 use super::schema::{Attributes, Kind, Values};
-
-/// How hard zlib tries: repeating motions shrink to almost nothing already here, and
-/// the digits of chaotic ones shrink nowhere.
-const LEVEL: u8 = 3;
 
 /// The names that Zarr gives its documents.
 pub(super) const GROUP: &str = ".zgroup";
@@ -102,7 +98,7 @@ pub(super) fn encode(values: &Values) -> Vec<u8> {
             words.iter().flat_map(padded).collect()
         }
     };
-    compress_to_vec_zlib(&bytes, LEVEL)
+    deflate(&bytes)
 }
 
 /// What a chunk's file of `count` entries holds; the reason if it does not.

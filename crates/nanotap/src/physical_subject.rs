@@ -48,12 +48,13 @@ fn table() -> &'static [PhysicalKey] {
 }
 
 /// Names that are no quantities.
-const WORDS: [&str; 6] = [
+const WORDS: [&str; 7] = [
     "cantilever.lever",
     "tip.material",
     "tip.shape",
     "sample.material",
     "sample.law",
+    "drive.actuation",
     "drive.setpoint",
 ];
 
@@ -93,12 +94,36 @@ impl PhysicalKey {
     }
 }
 
+/// Free amplitudes of the drive's tones, what moves the lever instead (a motion of its base or
+/// a force on it), and the parameter that this becomes.
+const DRIVES: [(&str, [&str; 2], &str); 2] = [
+    (
+        "drive.free_amplitude",
+        ["drive.amplitude", "drive.force"],
+        "alpha2",
+    ),
+    (
+        "drive.second_free_amplitude",
+        ["drive.second_amplitude", "drive.second_force"],
+        "tone2_amplitude",
+    ),
+];
+
 /// Keys that say the same thing as another, which steps back when that one varies.
-const ALTERNATIVES: [(&str, &[&str]); 7] = [
+const ALTERNATIVES: [(&str, &[&str]); 13] = [
     ("drive.frequency", &["drive.frequency_ratio"]),
     ("drive.frequency_ratio", &["drive.frequency"]),
     ("drive.amplitude", &["drive.free_amplitude"]),
-    ("drive.free_amplitude", &["drive.amplitude"]),
+    ("drive.force", &["drive.free_amplitude"]),
+    ("drive.free_amplitude", &["drive.amplitude", "drive.force"]),
+    ("drive.second_frequency", &["drive.second_ratio"]),
+    ("drive.second_ratio", &["drive.second_frequency"]),
+    ("drive.second_amplitude", &["drive.second_free_amplitude"]),
+    ("drive.second_force", &["drive.second_free_amplitude"]),
+    (
+        "drive.second_free_amplitude",
+        &["drive.second_amplitude", "drive.second_force"],
+    ),
     ("sample.damping", &["sample.loss_tangent"]),
     ("sample.loss_tangent", &["sample.damping"]),
     (
@@ -240,7 +265,7 @@ impl PhysicalSubject {
         let varies = |path: &str| keys.iter().any(|key| key.path == path);
         let lever_varies = keys.iter().any(|key| {
             matches!(key.section, "cantilever" | "tip") || key.path.starts_with("drive.f")
-        }) && !varies("drive.free_amplitude");
+        });
         let mut held = source.clone();
         let mut hold = |path: &str, kind: Kind, value: f64| {
             if let Some(key) = PhysicalKey::find(path)
@@ -251,12 +276,15 @@ impl PhysicalSubject {
         };
         hold("gap.beam", Kind::Length, base.scales.length);
         hold("gap.tip", Kind::Length, base.parameters.tip_gap);
-        if lever_varies && source.has("drive.free_amplitude") {
-            hold(
-                "drive.amplitude",
-                Kind::Length,
-                base.parameters.drive_amplitude,
-            );
+        for (free, own, parameter) in DRIVES {
+            let rows = base.mapping();
+            let row = rows.iter().find(|row| row.parameter.name() == parameter);
+            let Some(row) = row.filter(|_| lever_varies && source.has(free) && !varies(free))
+            else {
+                continue;
+            };
+            let path = own[usize::from(row.kind == Kind::Force)];
+            hold(path, row.kind, row.si);
         }
         // The distance stands for it.
         held.tables.remove("drive", "setpoint");

@@ -80,3 +80,237 @@ fn senseless_approaches_are_refused() {
     run(&["--out", "curve.xlsx"]).refused(&["curve.xlsx", ".csv"]);
     case(STIFF, &["--set", "gap.tip=15 kHz"]).refused(&["gap.tip", "length"]);
 }
+
+/// The same lever without a distance: the setpoint decides.
+fn at_setpoint(setpoint: &str) -> String {
+    STIFF.replace(
+        "[gap]\ntip = \"15 nm\"\n",
+        &format!("setpoint = \"{setpoint}\"\n"),
+    )
+}
+
+#[test]
+fn a_setpoint_serves_every_command() {
+    let folder = Folder::new();
+    folder.write("lever.toml", at_setpoint("16 nm"));
+    let case = folder.run(&["case", "lever.toml", "--json"]);
+    assert!(
+        case.stderr
+            .contains("reached on approach at gap.tip = 15.2 nm"),
+        "{}",
+        case.stderr
+    );
+    let json = case.json();
+    let zc = json["setpoint_solved"]["solutions"][0]["zc"]
+        .as_f64()
+        .unwrap();
+    assert_eq!(json["physical"]["tip_gap"].as_f64(), Some(zc));
+    let orbit = folder.run(&["orbit", "lever.toml", "--json"]).json();
+    let amplitude = orbit["physical"]["A"].as_f64().unwrap();
+    assert!((amplitude / 16e-9 - 1.0).abs() < 1e-9, "{amplitude}");
+    let text = folder.run(&["case", "lever.toml"]).stdout;
+    assert!(text.contains("stable, reached on approach"), "{text}");
+    // Too low to be reached: a command fails with the reason, the case is shown all the same.
+    folder.write("low.toml", at_setpoint("1 pm"));
+    let failed = folder.run(&["orbit", "low.toml"]);
+    assert_eq!(failed.code, 1);
+    assert!(
+        failed.stderr.contains("is not reached"),
+        "{}",
+        failed.stderr
+    );
+    let shown = folder.run(&["case", "low.toml"]);
+    assert_eq!(shown.code, 0);
+    assert!(shown.stderr.contains("is not reached"), "{}", shown.stderr);
+}
+
+#[test]
+fn quantities_of_the_case_are_swept_in_their_units() {
+    let folder = Folder::new();
+    folder.write("lever.toml", STIFF);
+    let sweep = |over: &str, more: &[&str]| {
+        folder.run(
+            &[
+                &[
+                    "sweep",
+                    "lever.toml",
+                    "--over",
+                    over,
+                    "--periods",
+                    "1",
+                    "--json",
+                ],
+                more,
+            ]
+            .concat(),
+        )
+    };
+    let json = sweep(
+        "drive.frequency=328kHz:334kHz:7",
+        &["--follow", "both", "--out", "f.csv", "--plot", "f.svg"],
+    )
+    .json();
+    assert_eq!(json["runs"], 14);
+    let csv = folder.read("f.csv");
+    let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let (at, amplitude) = (column("drive.frequency"), column("first_harmonic"));
+    let rows: Vec<Vec<f64>> = csv
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            vec![
+                cells[at].parse().unwrap(),
+                cells[amplitude].parse().unwrap(),
+            ]
+        })
+        .collect();
+    assert!(rows.iter().any(|r| r[0] == 328e3) && rows.iter().any(|r| r[0] == 334e3));
+    // In metres: nanometres of a 20 nm drive.
+    assert!(rows.iter().all(|r| r[1] > 0.5e-9 && r[1] < 40e-9));
+    assert!(folder.read("f.svg").contains("drive frequency (kHz)"));
+    // Twice the drive far away is twice the amplitude.
+    let json = sweep(
+        "drive.amplitude=10pm:20pm:2",
+        &["--set", "gap.tip=100 nm", "--out", "a.csv"],
+    )
+    .json();
+    assert_eq!(json["counts"]["periodic"], 2);
+    let csv = folder.read("a.csv");
+    let column = csv
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|h| h == "first_harmonic");
+    let values: Vec<f64> = csv
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').nth(column.unwrap()).unwrap().parse().unwrap())
+        .collect();
+    assert!((values[1] / values[0] - 2.0).abs() < 1e-6, "{values:?}");
+    sweep("drive.frequency=328nm:334nm:7", &[]).refused(&["expected a frequency", "a length"]);
+    sweep("drive.frequenzy=328kHz:334kHz:7", &[]).refused(&["did you mean `drive.frequency`?"]);
+    sweep("drive.frequency=328kHz:334nm:7", &[]).refused(&["measure different things"]);
+    sweep("drive.frequency=328kilohertz:334kHz:7", &[]).refused(&["kilohertz"]);
+    sweep("drive.setpoint=0.5:0.9:5", &[]).refused(&["vary gap.tip"]);
+}
+
+#[test]
+fn branches_run_over_quantities_of_the_case() {
+    let folder = Folder::new();
+    folder.write("lever.toml", STIFF);
+    let branch = |from: &str, to: &str, more: &[&str]| {
+        let plain = [
+            "branch",
+            "lever.toml",
+            "--parameter",
+            "gap.tip",
+            "--from",
+            from,
+            "--to",
+            to,
+        ];
+        folder.run(&[&plain, more].concat())
+    };
+    let json = branch("24 nm", "10 nm", &["--json", "--plot", "b.svg"]).json();
+    let folds: Vec<f64> = json["bifurcations"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|b| b["kind"] == "fold")
+        .map(|b| b["parameter"].as_f64().unwrap())
+        .collect();
+    // The folds of docs/cases/approach-curve.md.
+    assert!(
+        (folds[0] - 19.974e-9).abs() < 1e-12 && (folds[1] - 23.170e-9).abs() < 1e-12,
+        "{folds:?}"
+    );
+    let point = &json["points"][0];
+    assert!(point["physical"]["A"].as_f64().unwrap() > 19e-9);
+    assert!(folder.read("b.svg").contains("gap tip (nm)"));
+    branch("24 nm", "10 kHz", &[]).refused(&["measure different things"]);
+    branch("24", "10 nm", &[]).refused(&["measure different things"]);
+    branch("24 Hz", "10 Hz", &[]).refused(&["gap.tip", "expected a length"]);
+}
+
+#[test]
+fn the_window_says_where_one_motion_exists() {
+    let folder = Folder::new();
+    folder.write("lever.toml", STIFF);
+    let plain = [
+        "window",
+        "lever.toml",
+        "--over",
+        "gap.tip=15nm:30nm:2",
+        "--over",
+        "drive.frequency=329.9kHz:331kHz:2",
+        "--starts",
+        "12",
+        "--json",
+    ];
+    let json = folder
+        .run(&[&plain, &["--plot", "w.svg"][..]].concat())
+        .json();
+    // Near the sample: one tapping motion at the resonance, beside the free one above it.
+    // Far away nothing touches.
+    assert_eq!(
+        json["conditions"],
+        serde_json::json!([
+            ["one-period-1", "no-contact"],
+            ["second-state", "no-contact"]
+        ])
+    );
+    assert_eq!(json["shares"]["no-contact"].as_f64(), Some(0.5));
+    assert!(folder.read("w.svg").contains("a second state"));
+    // It goes on where it stopped: everything is there already.
+    let again = folder.run(&plain);
+    assert!(
+        again.stderr.contains("chunks are there already"),
+        "{}",
+        again.stderr
+    );
+    assert_eq!(again.json()["conditions"], json["conditions"]);
+    folder
+        .run(&["window", "lever.toml", "--over", "gap.tip=15nm:30nm:2"])
+        .refused(&["1 parameters make no window", "twice"]);
+}
+
+/// What cannot be, and what the model would not hold for, is said with what would be right.
+#[test]
+fn impossible_levers_are_refused_and_touching_beams_warned_of() {
+    let refused = |set: &str, words: &[&str]| {
+        case(STIFF, &["--set", set]).refused(&[&[set], words].concat());
+    };
+    refused(
+        "cantilever.k=42 kHz",
+        &["a force per length", "a frequency"],
+    );
+    refused("cantilever.k=-1 N/m", &["above zero"]);
+    refused("cantilever.Q=0", &["above zero"]);
+    refused("cantilever.f2=1.9 MHz", &["at least 6.2669", "negative"]);
+    refused(
+        "tip.mass=1 ug",
+        &["must be below", "which a beam without mass would carry"],
+    );
+    refused("drive.frequency_ratio=nan", &["drive.frequency_ratio"]);
+    refused("drive.setpoint=30 nm", &["below the free amplitude"]);
+    refused("sample.poisson=0.7", &["not above 0.5"]);
+    case(STIFF, &["--set", "sample.material=polystirene"])
+        .refused(&["did you mean \"polystyrene\"?"]);
+    // A tip 5 nm high on a very soft sample sinks until the beam itself touches.
+    let soft = STIFF.replace(
+        "material = \"polystyrene\"\nloss_tangent = 0.1",
+        "stiffness = \"0.01 N/m\"",
+    );
+    let shown = case(soft, &["--set", "tip.height=5 nm"]);
+    assert_eq!(shown.code, 0);
+    assert!(
+        shown
+            .stderr
+            .contains("another part of the beam would touch"),
+        "{}",
+        shown.stderr
+    );
+}

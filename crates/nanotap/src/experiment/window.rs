@@ -15,8 +15,7 @@ use crate::simulate::Classification;
 use crate::sweep::{GridScale, class_of};
 
 /// What there is at one point, from the safest to the least.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Condition {
     /// Only one motion, that repeats each drive period and does not touch.
     NoContact,
@@ -76,6 +75,12 @@ impl Condition {
             Self::Irregular => Colour::VERMILLION,
             Self::Undecided => Colour::GREY,
         }
+    }
+}
+
+impl Serialize for Condition {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 

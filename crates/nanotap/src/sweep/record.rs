@@ -183,7 +183,7 @@ impl Observer for Record<'_> {
         self.low = self.low.min(low);
         self.high = self.high.max(high);
         self.tip_integral += integral(&tip, length);
-        let omega = std::f64::consts::TAU / drive.period();
+        let omega = drive.frequencies().first().copied().unwrap_or(0.0);
         self.fundamental += fourier_integral(&tip, segment.phase, length, omega);
         self.time += length;
         if self.model.contact[segment.regime] {

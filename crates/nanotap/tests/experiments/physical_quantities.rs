@@ -102,7 +102,7 @@ fn derivatives_go_through_everything_that_a_quantity_changes() {
         let (low, high) = (at(value - step), at(value + step));
         // What changes nothing (f0, where the drive is said in units of it) is known to the
         // rounding of the states.
-        let floor = 1e-5 * 1.2e-3 / value;
+        let floor = 1e-3 * 1.2e-3 / value;
         let size = found.iter().fold(floor, |s: f64, v| s.max(v.abs()));
         for k in 0..4 {
             let expected = (high[k] - low[k]) / (2.0 * step);

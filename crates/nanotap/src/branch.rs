@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::experiment::PhysicalSight;
 use crate::model::{Model, ModelError};
-use crate::observables::{begins_contact, contact_work, lag, virial};
+use crate::observables::{above_rounding, begins_contact, contact_work, lag, virial};
 use crate::orbit::{OrbitError, OrbitOptions, orbit};
 use crate::start_box::default_box;
 use crate::strobe::Strobe;
@@ -325,7 +325,11 @@ impl Sight {
             mean_force: force.mean(),
             indentation: (-gap_min).max(0.0),
             contact_time: contact / periods,
-            dissipation: contact_work(model, trajectory, &force) / periods,
+            dissipation: above_rounding(
+                contact_work(model, trajectory, &force) / periods,
+                peak,
+                -gap_min,
+            ),
             virial: virial(model, &force, &tip),
         }
     }

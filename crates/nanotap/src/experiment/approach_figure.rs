@@ -128,6 +128,12 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
         );
     }
     let bifurcations = report.branches.iter().flat_map(|b| &b.bifurcations);
+    // Where there are many, each is to hide little.
+    let size = if bifurcations.clone().count() > 12 {
+        1.0
+    } else {
+        1.8
+    };
     for (kind, shape, colour) in MARKS {
         let marks: Vec<(f64, f64)> = bifurcations
             .clone()
@@ -140,7 +146,7 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
                     .shape(shape)
                     .colour(colour)
                     .open()
-                    .size(1.8)
+                    .size(size)
                     .label(word(kind)),
             );
         }

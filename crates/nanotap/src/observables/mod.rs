@@ -274,6 +274,17 @@ pub(crate) fn contact_work(model: &Model, trajectory: &Trajectory, force: &Piece
     model.impact_loss * impacts - force.product_integral(&trajectory.signal_by_regime(&rates))
 }
 
+/// `work` on a sample, or 0 where it is the rounding of what the contact stores and gives back,
+/// force times indentation.
+pub(crate) fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
+    const ROUNDING: f64 = 1e-12;
+    if work.abs() <= ROUNDING * peak_force * indentation {
+        0.0
+    } else {
+        work
+    }
+}
+
 /// Whether a switch begins a contact: from flight into contact, or an impact.
 pub fn begins_contact(model: &Model, from: usize, to: usize) -> bool {
     !model.contact[from] && (model.contact[to] || from == to)

@@ -8,7 +8,7 @@ use nanotap_flow::regime::ModalOutput;
 use nanotap_flow::signal::Signal;
 
 use crate::model::Model;
-use crate::observables::{begins_contact, lag};
+use crate::observables::{above_rounding, begins_contact, lag};
 use crate::physical::Scales;
 
 /// Watches a flow: exact extrema from roots of rates, contact, force.
@@ -97,7 +97,7 @@ impl<'a> Record<'a> {
             phase: known(lag(first)),
             mean_force: self.force_integral / self.time,
             indentation: known((-self.lowest_gap).max(0.0)),
-            dissipation: self.work / periods,
+            dissipation: above_rounding(self.work / periods, self.peak_force, -self.lowest_gap),
             virial: self.virial / self.time,
             peak_force: known(self.peak_force),
             impact_speed: known(self.impact_speed),

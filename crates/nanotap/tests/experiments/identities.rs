@@ -85,7 +85,7 @@ fn the_amplitude_follows_the_distance() {
     for pair in tapping.windows(2) {
         let slope = (pair[0].1.first_harmonic - pair[1].1.first_harmonic) / (pair[0].0 - pair[1].0);
         // Less where the tip indents less at every step.
-        assert!((0.94..1.0).contains(&slope), "{slope}");
+        assert!((0.94..1.01).contains(&slope), "{slope}");
     }
 }
 

@@ -78,7 +78,8 @@ def page(result: dict, rows: list[Row], threads: list[int], plot: bool) -> str:
         "For each peer stands the cheapest setting with an error of at most 1e-9, or of",
         "1e-6 where it does not reach that, or else its best. Sweeps and basins are",
         "evenly spread samples, extrapolated. Times are of the processor on one thread,",
-        "of the wall on several; compilation and start-up are not counted.",
+        "of the wall on several (a dash where other programs kept the machine busy);",
+        "compilation and start-up are not counted.",
         "",
         table(rows, threads),
         "",
@@ -124,7 +125,17 @@ def draw(rows: list[Row], path: Path) -> bool:
         times = [1e3 * rung["seconds"] for rung in row.ladder]
         errors = [rung["error"] for rung in row.ladder]
         if row.name.startswith("nanotap"):
-            axes.plot(times, errors, "k*", markersize=13, label=row.name, zorder=3)
+            # One at a time filled, several side by side hollow.
+            face = "none" if "ensemble" in row.name else "black"
+            axes.plot(
+                times,
+                errors,
+                "k*",
+                markersize=13,
+                markerfacecolor=face,
+                label=row.name,
+                zorder=3,
+            )
             continue
         axes.plot(
             times,

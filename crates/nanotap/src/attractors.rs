@@ -8,8 +8,9 @@ use nanotap_dynamics::{
 use serde::Serialize;
 
 use crate::model::Model;
-use crate::observables::Observables;
+use crate::observables::{Observables, PhysicalMotion};
 use crate::orbit::{OrbitError, OrbitReport, report};
+use crate::physical::Resolved;
 use crate::simulate::{Classification, SimulateError, largest_exponent, observe};
 use crate::start_box::default_box;
 use crate::strobe::Strobe;
@@ -154,6 +155,28 @@ pub struct AttractorReport {
     /// What was seen of it, if it is not.
     #[serde(flatten)]
     pub wandering: Option<Wandering>,
+    /// The same in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalMotion>,
+}
+
+impl Attractors {
+    /// The same with every attractor told in SI too, of the case `resolved`.
+    #[must_use]
+    pub fn in_si(mut self, resolved: &Resolved) -> Self {
+        for attractor in &mut self.attractors {
+            attractor.physical = match (&attractor.orbit, &attractor.wandering) {
+                (Some(orbit), _) => Some(PhysicalMotion::of(
+                    &orbit.observables,
+                    Some(&orbit.spectrum),
+                    resolved,
+                )),
+                (None, Some(seen)) => Some(PhysicalMotion::of(&seen.observables, None, resolved)),
+                (None, None) => None,
+            };
+        }
+        self
+    }
 }
 
 /// A motion that does not repeat.
@@ -385,6 +408,7 @@ fn one(
         evidence,
         orbit: orbit.map(|o| report(model, o, harmonics)).transpose()?,
         wandering,
+        physical: None,
     })
 }
 

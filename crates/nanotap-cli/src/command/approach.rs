@@ -106,6 +106,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if report.cancelled {
         output.warning("stopped before it was done");
     }
+    if report.beam_clearance.is_some_and(|height| height <= 0.0) {
+        output.warning(
+            "at the nearest distance another part of the beam than the tip would pass through the \
+             sample: the model does not hold there",
+        );
+    }
     if let Some(path) = &arguments.out.out {
         file::write(path, csv(&report).as_bytes())?;
     }

@@ -102,6 +102,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             .threads
             .install(|| attractors(&model, &options, control))
     })???;
+    let found = match &studied.resolved {
+        Some(resolved) => found.in_si(resolved),
+        None => found,
+    };
     if let Some(path) = &arguments.out.out {
         file::write(path, csv(&model, &found).as_bytes())?;
     }

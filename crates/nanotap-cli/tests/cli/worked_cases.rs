@@ -139,7 +139,7 @@ macro_rules! follows {
 }
 
 follows! {
-    the_approach_curve: "approach-curve.md", 2 commands, 9 numbers;
+    the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;

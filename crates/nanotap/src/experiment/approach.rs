@@ -22,6 +22,7 @@ use serde::Serialize;
 use super::{FreeMotion, PhysicalSight};
 use crate::branch::{BranchError, BranchOptions, BranchReport, Sight, branches_through};
 use crate::model::{FlowError, Model, ModelError};
+use crate::observables::Clearance;
 use crate::oscillator::OscillatorParameter;
 use crate::parameter::Parameter;
 use crate::simulate::{Classification, Named};
@@ -185,6 +186,9 @@ pub struct ApproachReport {
     pub free_reach: f64,
     /// The motions in the order in which they were met: there, then back.
     pub table: Vec<ApproachPoint>,
+    /// Least height of the beam above the sample in the motion at the nearest distance, in the
+    /// model's unit of length: where it is not above zero, another part than the tip touches.
+    pub beam_clearance: Option<f64>,
     /// Where the two ways differ.
     pub hysteresis: Vec<Hysteresis>,
     /// Whether the way back ends in the motion with which the way there began; if not, it
@@ -254,6 +258,7 @@ pub fn approach(
         free_amplitude: free.amplitude,
         free_phase: free.phase,
         free_reach: free.reach,
+        beam_clearance: beam_clearance(studied, &table),
         hysteresis: hysteresis(&table, free.amplitude),
         returned: returned(&table, free.amplitude),
         table,
@@ -417,6 +422,23 @@ fn hysteresis(table: &[ApproachPoint], free_amplitude: f64) -> Vec<Hysteresis> {
         open = difference.is_some();
     }
     intervals
+}
+
+/// The beam's clearance at the nearest distance on the way there.
+fn beam_clearance(studied: &Studied, table: &[ApproachPoint]) -> Option<f64> {
+    let nearest = table.iter().rfind(|p| p.way == Way::Approach)?;
+    let orbit = nearest.orbit.as_ref()?;
+    let subject = &studied.subject;
+    let model = subject.with(gap_key(subject), nearest.gap).model().ok()?;
+    let start = orbit.states.first()?;
+    let trajectory = Trajectory::record(&model.system, start, orbit.period).ok()?;
+    let clearance = Clearance::of(&model, &trajectory)?;
+    // The sample moves towards the whole lever; the model's beam stands where the case has it.
+    let moved = studied
+        .resolved
+        .as_ref()
+        .map_or(0.0, |resolved| nearest.gap - resolved.case.alpha5);
+    Some(clearance.height + moved)
 }
 
 fn returned(table: &[ApproachPoint], free_amplitude: f64) -> bool {

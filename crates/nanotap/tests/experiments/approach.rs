@@ -190,3 +190,36 @@ fn senseless_curves_are_refused() {
     let error = approach(&still, &plain(), &Control::default()).unwrap_err();
     assert!(error.to_string().contains("does not move"), "{error}");
 }
+
+/// A tip 12 nm high on a sample so soft that it sinks in: the beam itself would touch.
+#[test]
+fn a_beam_that_would_touch_is_seen() {
+    let high = curve(
+        &studied(STIFF, &[]),
+        &ApproachOptions {
+            points: 5,
+            branches: false,
+            ..ApproachOptions::default()
+        },
+    );
+    // A tip of 12.5 um, the catalogue's for this lever.
+    assert!(high.beam_clearance.unwrap() > 0.9);
+    let soft = STIFF.replace(
+        "material = \"polystyrene\"\nloss_tangent = 0.1",
+        "stiffness = \"0.01 N/m\"",
+    );
+    let low = studied(&soft, &["tip.height=12 nm"]);
+    let report = curve(
+        &low,
+        &ApproachOptions {
+            points: 5,
+            branches: false,
+            ..ApproachOptions::default()
+        },
+    );
+    assert!(
+        report.beam_clearance.unwrap() < 0.0,
+        "{:?}",
+        report.beam_clearance
+    );
+}

@@ -124,11 +124,9 @@ impl Studied {
             source.tables.set("gap", key, &text);
         };
         set(&mut source, "tip", report.zc());
-        // The beam moves with the tip.
-        let beam = resolved.scales.length + report.zc() - resolved.parameters.tip_gap;
-        if source.tables.get("gap", "beam").is_some() {
-            set(&mut source, "beam", beam);
-        }
+        // The unit of length stays that of the solutions; the beam, which moves with the tip,
+        // is out of place by less than the free amplitude.
+        set(&mut source, "beam", resolved.scales.length);
         let mut resolved = source
             .resolve()
             .map_err(|error| ApproachError::Model(ModelError::Physical(Box::new(error))))?;

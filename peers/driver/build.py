@@ -37,7 +37,8 @@ def last_words(text: str) -> str:
     """The line of a compiler's output that says what is wrong."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     wrong = [line for line in lines if "error" in line.lower()]
-    return (wrong or lines or ["no output"])[0][:160]
+    # Where things lie on this machine is nobody else's concern.
+    return re.sub(r"(/[\w.+-]+)+/", "", (wrong or lines or ["no output"])[0])[:160]
 
 
 def run(command: list[str], **more) -> str:

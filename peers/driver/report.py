@@ -109,7 +109,9 @@ def page(result: dict, rows: list[Row], threads: list[int], plot: bool) -> str:
 
 
 def draw(rows: list[Row], path: Path) -> bool:
-    """The plot of error against time; False where there is no Matplotlib."""
+    """The plot of error against time; False where nothing was measured, or can draw."""
+    if not rows:
+        return False
     try:
         import matplotlib
     except ImportError:
@@ -169,6 +171,4 @@ def write(result: dict, rows: list[Row], threads: list[int], to: Path) -> None:
     (to / "peers.json").write_text(json.dumps(result, indent=1) + "\n")
     (to / "peers.md").write_text(page(result, rows, threads, plot))
     print(table(rows, threads))
-    print(
-        f"\nwritten: {to / 'peers.md'}" + ("" if plot else " (no plot: no Matplotlib)")
-    )
+    print(f"\nwritten: {to / 'peers.md'}" + ("" if plot else " (no plot)"))

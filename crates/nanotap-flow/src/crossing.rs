@@ -25,6 +25,7 @@
 //! precision at the points it visits and reports the crossing as grazing.
 
 use crate::double_double;
+use crate::lattice::{Cell, Lattice};
 use crate::pack::{LARGEST_ANGLE, Library, Math, Plain};
 use crate::signal::{Enclosure, Jet, Signal};
 use std::marker::PhantomData;
@@ -66,6 +67,8 @@ pub struct Statistics {
     pub steps: u64,
     /// Tangencies decided in twice double precision.
     pub tangencies: u64,
+    /// Points of lattices at which exponentials were looked up, not computed.
+    pub points: u64,
 }
 
 /// The first `s` in `(0, length]` where the signal falls to zero, or `None` when it
@@ -83,6 +86,69 @@ pub fn first_crossing(
     }
 }
 
+/// The same for a signal whose exponentials are tabulated on a lattice, which certifies
+/// most of the way. Exponentials of the last evaluation are kept in the signal.
+#[inline(always)]
+pub(crate) fn first_crossing_on_lattice<M: Math>(
+    lattice: &Lattice,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Crossing> {
+    let surface = match start {
+        Start::Inside => None,
+        Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
+        Start::Release => return first_crossing_with::<M>(signal, length, start, statistics),
+    };
+    let mut scan = lattice.scan::<M>(signal, length, surface);
+    let mut found = None;
+    while found.is_none()
+        && let Some(cell) = scan.next_open()
+    {
+        found = crossing_in::<M>(&cell, signal, length, start, statistics);
+    }
+    statistics.points += scan.points();
+    found.flatten()
+}
+
+/// Looks for the crossing in a cell that may hold one. `Some(None)`: it comes too late.
+#[inline(always)]
+fn crossing_in<M: Math>(
+    cell: &Cell,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Option<Crossing>> {
+    if let Some(zero) = cell.falling_zero() {
+        statistics.evaluations += 1;
+        let jet = signal.jet_keeping_factors::<M>(zero.at);
+        // Every zero in the cell is as near as this, and the rate keeps its sign up to there.
+        let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
+        let unique = near * signal.fastest() < 0.1
+            && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
+        if unique && let Some(crossing) = last_step(&jet, zero.at, length, signal.noise()) {
+            return Some((crossing.at <= length).then_some(crossing));
+        }
+    }
+    let mut search = Search {
+        signal,
+        length,
+        limit: cell.end.min(length),
+        noise: signal.noise(),
+        statistics,
+        arithmetic: PhantomData::<M>,
+    };
+    let found = if cell.start > 0.0 {
+        let jet = search.jet(cell.start);
+        search.run(cell.start, jet)
+    } else {
+        search.from(start)
+    };
+    found.map(Some)
+}
+
 /// The same in the arithmetic `M`.
 #[inline(always)]
 pub(crate) fn first_crossing_with<M: Math>(
@@ -94,25 +160,12 @@ pub(crate) fn first_crossing_with<M: Math>(
     let mut search = Search {
         signal,
         length,
+        limit: length,
         noise: signal.noise(),
         statistics,
         arithmetic: PhantomData::<M>,
     };
-    let (s, jet) = match start {
-        Start::Inside => {
-            search.statistics.evaluations += 1;
-            (0.0, signal.first_jet())
-        }
-        Start::Surface { rate } => match search.leave_surface(1, rate) {
-            Departure::Crossing(crossing) => return Some(crossing),
-            Departure::Inside(s, jet) => (s, jet),
-        },
-        Start::Release => match search.leave_surface(3, None) {
-            Departure::Crossing(crossing) => return Some(crossing),
-            Departure::Inside(s, jet) => (s, jet),
-        },
-    };
-    search.run(s, jet)
+    search.from(start)
 }
 
 enum Departure {
@@ -122,7 +175,10 @@ enum Departure {
 
 struct Search<'a, M> {
     signal: &'a Signal,
+    /// How long the segment can be: what times are measured against.
     length: f64,
+    /// Up to where it is searched.
+    limit: f64,
     noise: f64,
     statistics: &'a mut Statistics,
     arithmetic: PhantomData<M>,
@@ -150,10 +206,26 @@ impl<M: Math> Search<'_, M> {
     }
 
     #[inline(always)]
+    fn from(&mut self, start: Start) -> Option<Crossing> {
+        let departure = match start {
+            Start::Inside => {
+                self.statistics.evaluations += 1;
+                Departure::Inside(0.0, self.signal.first_jet())
+            }
+            Start::Surface { rate } => self.leave_surface(1, rate),
+            Start::Release => self.leave_surface(3, None),
+        };
+        match departure {
+            Departure::Crossing(crossing) => Some(crossing),
+            Departure::Inside(s, jet) => self.run(s, jet),
+        }
+    }
+
+    #[inline(always)]
     fn run(&mut self, mut s: f64, mut jet: Jet) -> Option<Crossing> {
         let mut relaxed = [Jet::default(); 2];
         loop {
-            let left = self.length - s;
+            let left = self.limit - s;
             if left < 0.0 {
                 return None;
             }
@@ -169,7 +241,7 @@ impl<M: Math> Search<'_, M> {
             if let Some(distance) = self.unresolved_tangency(&jet) {
                 match self.tangency(s + distance) {
                     Departure::Crossing(crossing) => {
-                        return (crossing.at <= self.length).then_some(crossing);
+                        return (crossing.at <= self.limit).then_some(crossing);
                     }
                     Departure::Inside(at, after) => {
                         s = at;
@@ -186,7 +258,7 @@ impl<M: Math> Search<'_, M> {
                 }
             }
             self.statistics.steps += 1;
-            if step >= self.length - s {
+            if step >= self.limit - s {
                 return None;
             }
             // A step below rounding would never end; the value there is decided
@@ -264,36 +336,32 @@ impl<M: Math> Search<'_, M> {
     /// The unique zero in `(s, high]`, by Newton–Halley steps kept inside the bracket.
     #[inline(always)]
     fn polish(&mut self, s: f64, jet: Jet, high: f64) -> Option<Crossing> {
-        let tolerance = 0.25 * f64::EPSILON * self.length;
+        let tolerance = RESOLUTION * self.length;
         let (mut low, mut high) = (s, high);
         let (mut at, mut jet) = (s, jet);
         for _ in 0..200 {
             let mut step = quadratic_root(&jet);
             if !(at + step >= low && at + step <= high) {
                 step = 0.5 * (low + high) - at;
+            } else if let Some(crossing) = last_step(&jet, at, self.length, self.noise) {
+                return (crossing.at <= self.limit).then_some(crossing);
             }
-            let rate = jet.rate + jet.curvature * step;
-            // |g(at + step)| ≤ ⅙ B |step|³ when the step solves the parabola.
-            let error = jet.third * step.abs().powi(3) / 6.0;
-            let solved =
-                (jet.value + step * (jet.rate + 0.5 * jet.curvature * step)).abs() <= self.noise;
-            if solved && error <= tolerance * rate.abs() || high - low <= tolerance {
-                let at = at + step;
-                return (at <= self.length).then_some(Crossing {
+            at += step;
+            if high - low <= tolerance {
+                return (at <= self.limit).then_some(Crossing {
                     at,
-                    rate: rate.min(0.0),
+                    rate: (jet.rate + jet.curvature * step).min(0.0),
                     grazing: false,
                     refined: false,
                 });
             }
-            at += step;
-            if low > self.length {
+            if low > self.limit {
                 return None;
             }
             jet = self.jet(at);
             if jet.value > 0.0 { low = at } else { high = at }
         }
-        (at <= self.length).then_some(Crossing {
+        (at <= self.limit).then_some(Crossing {
             at,
             rate: jet.rate.min(0.0),
             grazing: false,
@@ -315,7 +383,7 @@ impl<M: Math> Search<'_, M> {
             let step = step_from_surface(&first);
             if step * self.signal.fastest() >= TAYLOR_REACH {
                 self.statistics.steps += 1;
-                let step = step.min(self.length);
+                let step = step.min(self.limit);
                 return Departure::Inside(step, self.jet(step));
             }
         }
@@ -470,6 +538,25 @@ fn certain_crossing(jet: &Jet, root: f64, noise: f64) -> Option<f64> {
     let upper = g + reach * (v + reach * (0.5 * c + b * reach / 6.0));
     let steepest = v + reach * (c + 0.5 * b * reach);
     (upper < -4.0 * noise && steepest < 0.0).then_some(reach)
+}
+
+/// Times are known to this part of the segment's length.
+const RESOLUTION: f64 = 0.25 * f64::EPSILON;
+
+/// The crossing one Halley step from `at`, if that step is certain to be the last one.
+#[inline(always)]
+fn last_step(jet: &Jet, at: f64, length: f64, noise: f64) -> Option<Crossing> {
+    let step = quadratic_root(jet);
+    let rate = jet.rate + jet.curvature * step;
+    // |g(at + step)| ≤ ⅙ B |step|³ when the step solves the parabola.
+    let error = jet.third * step.abs().powi(3) / 6.0;
+    let solved = (jet.value + step * (jet.rate + 0.5 * jet.curvature * step)).abs() <= noise;
+    (solved && error <= RESOLUTION * length * rate.abs()).then_some(Crossing {
+        at: at + step,
+        rate: rate.min(0.0),
+        grazing: false,
+        refined: false,
+    })
 }
 
 /// The zero of `g + vh + ½ch²` nearest to `h = 0` (a Newton step where there is none).

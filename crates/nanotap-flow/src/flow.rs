@@ -1,7 +1,9 @@
 //! Running a system: from switch to switch in modal coordinates, one drive period
 //! at a time.
 
-use crate::crossing::{Crossing, Start, Statistics, first_crossing_with};
+use crate::crossing::{
+    Crossing, Start, Statistics, first_crossing_on_lattice, first_crossing_with,
+};
 #[cfg(target_arch = "x86_64")]
 use crate::pack::Fused;
 use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
@@ -287,10 +289,18 @@ impl Flow {
         let mut stalled = 0;
         while self.phase < end {
             let left = end - self.phase;
-            let found = self.next_crossing::<M>(&system, left)?;
-            let length = found.map_or(left, |(_, crossing)| crossing.at);
+            let reach = if M::LIBRARY {
+                left
+            } else {
+                left.min(system.lattice_reach(self.regime))
+            };
+            let found = self.next_crossing::<M>(&system, reach)?;
+            let length = found.map_or(reach, |(_, crossing)| crossing.at);
             self.pass::<M, O>(&system, length, observer);
             let Some((exit, crossing)) = found else {
+                if reach < left {
+                    continue;
+                }
                 self.phase = end;
                 break;
             };
@@ -341,9 +351,22 @@ impl Flow {
                 Some((surface, start)) if surface == e => start,
                 _ => Start::Inside,
             };
-            if let Some(crossing) =
-                first_crossing_with::<M>(&self.signal, horizon, start, &mut self.statistics)
-            {
+            let found = match &exit.lattice {
+                Some(lattice) if !M::LIBRARY => first_crossing_on_lattice::<M>(
+                    lattice,
+                    &mut self.signal,
+                    horizon,
+                    start,
+                    &mut self.statistics,
+                ),
+                _ => first_crossing_with::<M>(
+                    &self.signal,
+                    horizon,
+                    start,
+                    &mut self.statistics,
+                ),
+            };
+            if let Some(crossing) = found {
                 earliest = Some((e, crossing));
             }
         }
@@ -356,12 +379,23 @@ impl Flow {
         let basis = system.regimes()[self.regime].basis();
         if O::IDLE && basis.clusters.is_empty() {
             let rates = &system.packed_rates()[self.regime];
-            for ([re, im], [decay, frequency]) in self.packed.iter_mut().zip(rates) {
-                let factor =
-                    pack::exp_complex::<M>(M::load(decay), M::load(frequency), M::splat(length));
-                let q = pack::complex_mul::<M>([M::load(re), M::load(im)], factor);
-                *re = M::store(q[0]);
-                *im = M::store(q[1]);
+            let kept = self.signal.kept_factors();
+            let kept = kept.filter(|(at, _)| {
+                (length - at).abs() * self.signal.fastest() < pack::SMALL_ANGLE
+            });
+            if let Some((at, factors)) = kept {
+                let rest = M::splat(length - at);
+                for (i, q) in self.packed.iter_mut().enumerate() {
+                    let [decay, frequency] = &rates[i];
+                    let z = [M::mul(M::load(decay), rest), M::mul(M::load(frequency), rest)];
+                    let factor = [M::load(&factors[i][0]), M::load(&factors[i][1])];
+                    multiply::<M>(q, pack::complex_mul::<M>(factor, pack::exp_small::<M>(z)));
+                }
+            } else {
+                for (q, [decay, frequency]) in self.packed.iter_mut().zip(rates) {
+                    let (decay, frequency) = (M::load(decay), M::load(frequency));
+                    multiply::<M>(q, pack::exp_complex::<M>(decay, frequency, M::splat(length)));
+                }
             }
         } else {
             self.pass_watched(system, length, observer);
@@ -527,6 +561,13 @@ impl Flow {
         }
         std::mem::swap(&mut self.packed, &mut self.next);
     }
+}
+
+/// `q ← q · factor` of packed complex numbers.
+#[inline(always)]
+fn multiply<M: Math>(q: &mut [Pack; 2], factor: [M::Lanes; 2]) {
+    let product = pack::complex_mul::<M>([M::load(&q[0]), M::load(&q[1])], factor);
+    *q = product.map(M::store);
 }
 
 /// Whether this machine has fused multiply-add in vectors of four.

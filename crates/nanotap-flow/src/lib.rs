@@ -33,6 +33,7 @@ pub mod flow;
 pub mod harmonic;
 pub mod integral;
 pub mod jacobian;
+mod lattice;
 mod pack;
 pub mod regime;
 pub mod sensitivity;

@@ -28,6 +28,13 @@ pub(crate) trait Math: Copy {
     /// `c − a b`.
     fn fnma(a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
     fn sqrt(a: Self::Lanes) -> Self::Lanes;
+    fn min(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// A bit a lane, set where not `a ≥ b` (so where one is not a number as well).
+    fn below(a: Self::Lanes, b: Self::Lanes) -> u32;
+    /// `a` with the first lane of `b`.
+    fn with_first(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// The lanes of `a` moved up by one, `before`'s last one first.
+    fn shifted_in(before: Self::Lanes, a: Self::Lanes) -> Self::Lanes;
     /// The lanes, none below `low` or above `high`.
     fn clamp(a: Self::Lanes, low: f64, high: f64) -> Self::Lanes;
     /// `2^n` from the sum of [`ROUND`] and an integer `n`.
@@ -167,6 +174,23 @@ pub(crate) fn exp_complex<M: Math>(a: M::Lanes, b: M::Lanes, s: M::Lanes) -> [M:
     [M::mul(grown, cos), M::mul(grown, sin)]
 }
 
+/// Sizes below which [`exp_small`] is accurate.
+pub(crate) const SMALL_ANGLE: f64 = 1e-4;
+
+/// `e^z` for `|z| ≤` [`SMALL_ANGLE`]: `1 + z + z²/2 + z³/6` leaves out 4e-18.
+#[inline(always)]
+pub(crate) fn exp_small<M: Math>(z: [M::Lanes; 2]) -> [M::Lanes; 2] {
+    let one = M::splat(1.0);
+    let inner = [
+        M::fma(z[0], M::splat(1.0 / 3.0), one),
+        M::mul(z[1], M::splat(1.0 / 3.0)),
+    ];
+    let half = z.map(|z| M::mul(z, M::splat(0.5)));
+    let middle = complex_mul::<M>(half, inner);
+    let [re, im] = complex_mul::<M>(z, [M::add(one, middle[0]), middle[1]]);
+    [M::add(one, re), im]
+}
+
 /// On any machine.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain;
@@ -219,6 +243,22 @@ macro_rules! arrays {
         #[inline(always)]
         fn sqrt(a: Pack) -> Pack {
             a.map(f64::sqrt)
+        }
+        #[inline(always)]
+        fn min(a: Pack, b: Pack) -> Pack {
+            std::array::from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
+        }
+        #[inline(always)]
+        fn below(a: Pack, b: Pack) -> u32 {
+            (0..WIDTH).fold(0, |bits, i| bits | u32::from(!(a[i] >= b[i])) << i)
+        }
+        #[inline(always)]
+        fn with_first(a: Pack, b: Pack) -> Pack {
+            [b[0], a[1], a[2], a[3]]
+        }
+        #[inline(always)]
+        fn shifted_in(before: Pack, a: Pack) -> Pack {
+            [before[3], a[0], a[1], a[2]]
         }
         #[inline(always)]
         fn clamp(a: Pack, low: f64, high: f64) -> Pack {
@@ -315,6 +355,25 @@ mod fused {
             unsafe { x::_mm256_sqrt_pd(a) }
         }
         #[inline(always)]
+        fn min(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { x::_mm256_min_pd(a, b) }
+        }
+        #[inline(always)]
+        fn below(a: Self::Lanes, b: Self::Lanes) -> u32 {
+            unsafe { x::_mm256_movemask_pd(x::_mm256_cmp_pd::<{ x::_CMP_NGE_UQ }>(a, b)) as u32 }
+        }
+        #[inline(always)]
+        fn with_first(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { x::_mm256_blend_pd::<0b0001>(a, b) }
+        }
+        #[inline(always)]
+        fn shifted_in(before: Self::Lanes, a: Self::Lanes) -> Self::Lanes {
+            unsafe {
+                let crossed = x::_mm256_permute2f128_pd::<0x21>(before, a);
+                x::_mm256_shuffle_pd::<0b0101>(crossed, a)
+            }
+        }
+        #[inline(always)]
         fn clamp(a: Self::Lanes, low: f64, high: f64) -> Self::Lanes {
             unsafe {
                 x::_mm256_min_pd(
@@ -394,6 +453,31 @@ mod tests {
         let a: [Pack; 4] =
             std::array::from_fn(|i| std::array::from_fn(|j| (10 * i + j * j) as f64));
         sums::<M>(a.map(|a| M::load(&a)))
+    }
+
+    fn moved<M: Math>() -> (Pack, Pack, Pack, u32) {
+        let (a, b) = (M::load(&[1.0, 2.0, 3.0, 4.0]), M::load(&[5.0, 1.0, f64::NAN, 4.0]));
+        (
+            M::store(M::min(a, M::splat(2.5))),
+            M::store(M::with_first(a, b)),
+            M::store(M::shifted_in(b, a)),
+            M::below(a, b),
+        )
+    }
+
+    #[test]
+    fn lanes_are_moved_and_compared() {
+        let expected = (
+            [1.0, 2.0, 2.5, 2.5],
+            [5.0, 2.0, 3.0, 4.0],
+            [4.0, 1.0, 2.0, 3.0],
+            0b0101,
+        );
+        assert_eq!(moved::<Plain>(), expected);
+        #[cfg(target_arch = "x86_64")]
+        if crate::flow::fused_available() {
+            assert_eq!(moved::<Fused>(), expected);
+        }
     }
 
     #[test]

@@ -27,6 +27,9 @@ pub struct Signal {
     fastest: f64,
     /// Whether terms only decay, so that their amplitudes bound what is to come.
     relaxes: bool,
+    /// `e^{λ_k s}` of the last evaluation that kept them, and its `s`.
+    factors: Vec<[Pack; 2]>,
+    factors_at: Option<f64>,
 }
 
 /// `Re(amplitude · s^power · e^{rate s})` with `power ≥ 1`.
@@ -205,7 +208,10 @@ impl Signal {
         self.count = kernel.count;
         self.fastest = kernel.fastest;
         self.powers.clear();
+        self.factors_at = None;
         self.packs.resize(kernel.packs.len(), TermPack::default());
+        self.factors
+            .resize(kernel.packs.len(), [[0.0; WIDTH]; 2]);
         let mut size = M::splat(0.0);
         for (pack, (kernel, [qr, qi])) in self.packs.iter_mut().zip(kernel.packs.iter().zip(q)) {
             let both = |z: &[Pack; 2]| [M::load(&z[0]), M::load(&z[1])];
@@ -261,6 +267,63 @@ impl Signal {
     #[inline(always)]
     pub(crate) fn jet_with<M: Math>(&self, s: f64) -> Jet {
         self.enclosure::<M>(s).jet
+    }
+
+    /// The jet at `s`; the exponentials are kept for [`Signal::kept_factors`].
+    #[inline(always)]
+    pub(crate) fn jet_keeping_factors<M: Math>(&mut self, s: f64) -> Jet {
+        let mut sums = [M::splat(0.0); 4];
+        let at = M::splat(s);
+        for (p, factor) in self.packs.iter().zip(&mut self.factors) {
+            let grown = pack::exp::<M>(M::mul(M::load(&p.decay), at));
+            let (sin, cos) = pack::sin_cos::<M>(M::mul(M::load(&p.frequency), at));
+            let (re, im) = (M::mul(grown, cos), M::mul(grown, sin));
+            *factor = [M::store(re), M::store(im)];
+            for (sum, z) in sums.iter_mut().zip([&p.value, &p.rate, &p.curvature]) {
+                *sum = M::fnma(M::load(&z[1]), im, M::fma(M::load(&z[0]), re, *sum));
+            }
+            sums[3] = M::fma(M::load(&p.third), grown, sums[3]);
+        }
+        self.factors_at = Some(s);
+        let sums = pack::sums::<M>(sums);
+        Jet {
+            value: self.constant + sums[0],
+            rate: sums[1],
+            curvature: sums[2],
+            third: self.third_constant + sums[3],
+        }
+    }
+
+    /// The exponentials `e^{λ_k s}` that were kept last, and `s`.
+    #[inline(always)]
+    pub(crate) fn kept_factors(&self) -> Option<(f64, &[[Pack; 2]])> {
+        self.factors_at.map(|s| (s, &self.factors[..]))
+    }
+
+    /// `[Re, Im]` of term `k`'s amplitude in value, rate and curvature.
+    #[inline(always)]
+    pub(crate) fn amplitudes(&self, k: usize) -> [[f64; 2]; 3] {
+        let (pack, i) = (&self.packs[k / WIDTH], k % WIDTH);
+        [&pack.value, &pack.rate, &pack.curvature].map(|z| [z[0][i], z[1][i]])
+    }
+
+    /// Sums of the terms' amplitudes, weighted in two ways.
+    #[inline(always)]
+    pub(crate) fn weighted_amplitudes<M: Math>(&self, weights: &[[Pack; 2]]) -> [f64; 2] {
+        let mut sums = [M::splat(0.0); 4];
+        for (p, weights) in self.packs.iter().zip(weights) {
+            for (sum, weight) in sums.iter_mut().zip(weights) {
+                *sum = M::fma(M::load(&p.amplitude), M::load(weight), *sum);
+            }
+        }
+        let sums = pack::sums::<M>(sums);
+        [sums[0], sums[1]]
+    }
+
+    /// The sum of all terms' sizes.
+    #[inline(always)]
+    pub(crate) fn size(&self) -> f64 {
+        self.size
     }
 
     /// The jet at `s` with the jets of the lower bounds.

@@ -1,6 +1,7 @@
 //! A piecewise-linear system: its regimes and the exits between them.
 
 use crate::harmonic::{HarmonicVector, Output};
+use crate::lattice::Lattice;
 use crate::pack::{Pack, WIDTH};
 use crate::regime::{Kernel, ModalOutput, Regime};
 use crate::{Complex, Drive, FlowError};
@@ -137,6 +138,8 @@ pub(crate) struct PreparedExit {
     pub(crate) guard: ModalOutput,
     /// The same, packed.
     pub(crate) kernel: Kernel,
+    /// The points at which it is tabulated, where that can be.
+    pub(crate) lattice: Option<Lattice>,
     /// The change of basis of the plain switch.
     pub(crate) switch: Switch,
     /// The change of basis into the sticking regime.
@@ -361,6 +364,15 @@ impl System {
         &self.rates
     }
 
+    /// How far the lattices of a regime's guards reach.
+    pub(crate) fn lattice_reach(&self, regime: usize) -> f64 {
+        self.switches[regime]
+            .iter()
+            .filter_map(|exit| exit.lattice.as_ref())
+            .map(Lattice::reach)
+            .fold(f64::INFINITY, f64::min)
+    }
+
     pub(crate) fn prepared(&self, regime: usize) -> &[PreparedExit] {
         &self.switches[regime]
     }
@@ -514,8 +526,13 @@ impl System {
                 .rate(target.matrix(), target.forcing(), &self.drive)
         });
         let guard = self.regimes[from].project(&exit.guard);
+        let kernel = Kernel::new(&self.regimes[from], &self.drive, &guard);
+        let clustered = !self.regimes[from].basis().clusters.is_empty();
         PreparedExit {
-            kernel: Kernel::new(&self.regimes[from], &self.drive, &guard),
+            lattice: (!clustered)
+                .then(|| Lattice::new(&kernel, self.drive.period()))
+                .flatten(),
+            kernel,
             guard,
             switch: self.switch(from, exit.target, exit.reset.as_ref(), &exit.guard),
             sticking: exit

@@ -25,7 +25,9 @@
 //! precision at the points it visits and reports the crossing as grazing.
 
 use crate::double_double;
-use crate::lattice::{Cell, Lattice};
+use crate::lattice::{Amplitudes, Cell, Lattice, Stretch};
+#[cfg(target_arch = "x86_64")]
+use crate::pack::Fused;
 use crate::pack::{LARGEST_ANGLE, Library, Math, Plain};
 use crate::signal::{Enclosure, Jet, Signal};
 use std::marker::PhantomData;
@@ -101,52 +103,126 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
         Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
         Start::Release => return first_crossing_with::<M>(signal, length, start, statistics),
     };
-    let mut scan = lattice.scan::<M>(signal, length, surface);
+    let whole = Stretch {
+        start: 0.0,
+        end: length,
+        surface,
+    };
+    let amplitudes = lattice.amplitudes(signal);
+    let search = CellSearch {
+        lattice,
+        length,
+        start,
+    };
+    let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {
+        return search
+            .stretch::<M>(&amplitudes, whole, signal, statistics)
+            .flatten();
+    };
     let mut found = None;
     while found.is_none()
-        && let Some(cell) = scan.next_open()
+        && let Some(cell) = coarse.next_open(&amplitudes)
     {
-        found = crossing_in::<M>(&cell, signal, length, start, statistics);
+        let (stretch, local) = lattice.within(&cell, &amplitudes, whole);
+        found = search.stretch::<M>(&local, stretch, signal, statistics);
     }
-    statistics.points += scan.points();
+    statistics.points += coarse.points;
     found.flatten()
 }
 
-/// Looks for the crossing in a cell that may hold one. `Some(None)`: it comes too late.
-#[inline(always)]
-fn crossing_in<M: Math>(
-    cell: &Cell,
-    signal: &mut Signal,
+/// A search through the cells of a lattice's fine level. Where it finds `Some(None)` there
+/// is a crossing, which comes too late.
+struct CellSearch<'a> {
+    lattice: &'a Lattice,
     length: f64,
     start: Start,
-    statistics: &mut Statistics,
-) -> Option<Option<Crossing>> {
-    if let Some(zero) = cell.falling_zero() {
-        statistics.evaluations += 1;
-        let jet = signal.jet_keeping_factors::<M>(zero.at);
-        // Every zero in the cell is as near as this, and the rate keeps its sign up to there.
-        let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
-        let unique = near * signal.fastest() < 0.1
-            && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
-        if unique && let Some(crossing) = last_step(&jet, zero.at, length, signal.noise()) {
-            return Some((crossing.at <= length).then_some(crossing));
+}
+
+impl CellSearch<'_> {
+    /// The crossing in a stretch.
+    #[inline(always)]
+    fn stretch<M: Math>(
+        &self,
+        amplitudes: &Amplitudes,
+        stretch: Stretch,
+        signal: &mut Signal,
+        statistics: &mut Statistics,
+    ) -> Option<Option<Crossing>> {
+        let mut fine = self.lattice.fine::<M>(signal, stretch);
+        let mut found = None;
+        while found.is_none()
+            && let Some(cell) = fine.next_open(amplitudes)
+        {
+            found = self.cell::<M>(&cell, signal, statistics);
+        }
+        statistics.points += fine.points;
+        found
+    }
+
+    /// The crossing in a cell that may hold one.
+    #[inline(always)]
+    fn cell<M: Math>(
+        &self,
+        cell: &Cell,
+        signal: &mut Signal,
+        statistics: &mut Statistics,
+    ) -> Option<Option<Crossing>> {
+        if let Some(zero) = cell.falling_zero() {
+            statistics.evaluations += 1;
+            let jet = signal.jet_keeping_factors::<M>(zero.at);
+            // Every zero in the cell is as near as this, and the rate keeps its sign up
+            // to there.
+            let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
+            let unique = near * signal.fastest() < 0.1
+                && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
+            if unique && let Some(crossing) = last_step(&jet, zero.at, self.length, signal.noise())
+            {
+                return Some((crossing.at <= self.length).then_some(crossing));
+            }
+        }
+        #[cfg(target_arch = "x86_64")]
+        if M::FUSED {
+            // SAFETY: this arithmetic is in use only where the machine has it.
+            return unsafe { self.cell_in_steps_fused(cell, signal, statistics) }.map(Some);
+        }
+        self.cell_in_steps::<M>(cell, signal, statistics).map(Some)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[inline(never)]
+    fn cell_in_steps_fused(
+        &self,
+        cell: &Cell,
+        signal: &Signal,
+        statistics: &mut Statistics,
+    ) -> Option<Crossing> {
+        self.cell_in_steps::<Fused>(cell, signal, statistics)
+    }
+
+    /// The same by certified steps.
+    #[inline(always)]
+    fn cell_in_steps<M: Math>(
+        &self,
+        cell: &Cell,
+        signal: &Signal,
+        statistics: &mut Statistics,
+    ) -> Option<Crossing> {
+        let mut search = Search {
+            signal,
+            length: self.length,
+            limit: cell.end.min(self.length),
+            noise: signal.noise(),
+            statistics,
+            arithmetic: PhantomData::<M>,
+        };
+        if cell.start > 0.0 {
+            let jet = search.jet(cell.start);
+            search.run(cell.start, jet)
+        } else {
+            search.from(self.start)
         }
     }
-    let mut search = Search {
-        signal,
-        length,
-        limit: cell.end.min(length),
-        noise: signal.noise(),
-        statistics,
-        arithmetic: PhantomData::<M>,
-    };
-    let found = if cell.start > 0.0 {
-        let jet = search.jet(cell.start);
-        search.run(cell.start, jet)
-    } else {
-        search.from(start)
-    };
-    found.map(Some)
 }
 
 /// The same in the arithmetic `M`.

@@ -16,17 +16,27 @@
 //! coefficients are and `½(b₂ + b₃) ≥ M₆h⁶/14400`. This holds up to a zero at either end,
 //! for instance right after a switch.
 //!
-//! Terms too fast for the lattice are replaced by minus their amplitude. What a cell
-//! cannot certify is left to the search of [`crossing`](crate::crossing).
+//! Terms too fast for the lattice are replaced by minus their amplitude. A coarse level
+//! that follows only the slowest terms certifies most of a flight; where it cannot, the
+//! cell is looked at on a finer level, and what that leaves open is for the search of
+//! [`crossing`](crate::crossing).
 
 use crate::pack::{Math, Pack, WIDTH};
 use crate::regime::Kernel;
 use crate::signal::Signal;
 
-/// Angle through which the fastest followed term turns from point to point.
-const ANGLE: f64 = 3.0;
-/// The most terms that are followed.
-const FOLLOWED: usize = 8;
+/// Angle through which the fastest followed term turns from point to point: a larger one
+/// needs fewer points, a smaller one leaves fewer cells open.
+const ANGLE: f64 = 2.2;
+/// The least number of cells in a period, on the fine level and on the coarse one.
+const CELLS: [f64; 2] = [24.0, 8.0];
+/// The most terms that are followed, on the fine level and on the coarse one.
+const FOLLOWED: [usize; 2] = [8, 4];
+/// How much faster the fine level's fastest term must be than the coarse level's.
+const COARSER: f64 = 2.0;
+/// What a period may cost on the fine level alone, in multiplications of packs, before a
+/// coarse one is worth while.
+const CHEAP: f64 = 1500.0;
 /// The most packs of points: longer stretches are searched in pieces.
 const LARGEST: usize = 64;
 /// What rounding, in table and sums, could take from a value, in units of the terms' size.
@@ -35,20 +45,44 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// The tabulated exponentials of one guard.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lattice {
-    /// Distance of the points, `h`.
-    step: f64,
-    /// `[Re, Im]` of each followed term's exponential at four points, pack after pack.
-    table: Vec<[Pack; 2]>,
-    /// Which terms are followed.
+    /// Which terms are followed, slowest first.
     followed: Vec<usize>,
-    /// For packs of terms: the weight of their amplitudes in `M₆h⁶/7200`, and 1 where a
-    /// term is not followed.
-    weights: Vec<[Pack; 2]>,
-    /// Whether all terms are followed.
-    complete: bool,
+    /// Over the whole reach, or from one coarse point to the next.
+    fine: Level,
+    coarse: Option<Coarse>,
     /// How far it reaches.
     reach: f64,
 }
+
+/// The coarse level.
+#[derive(Clone, Debug, PartialEq)]
+struct Coarse {
+    level: Level,
+    /// `[Re, Im]` of every followed term's exponential at a point, point after point.
+    powers: Vec<[f64; 2]>,
+}
+
+/// Equidistant points with the exponentials of the slowest terms.
+#[derive(Clone, Debug, PartialEq)]
+struct Level {
+    /// Distance of the points, `h`.
+    step: f64,
+    /// How many terms it follows.
+    terms: usize,
+    /// Whether these are all.
+    complete: bool,
+    /// `[Re, Im]` of each followed term's exponential at four points, pack after pack.
+    table: Vec<[Pack; 2]>,
+    /// For packs of terms: the weight of their amplitudes in `M₆h⁶/7200`, and 1 where a
+    /// term is not followed.
+    weights: Vec<[Pack; 2]>,
+}
+
+/// A complex number as `[Re, Im]`.
+type Pair = [f64; 2];
+
+/// `[Re, Im]` of each followed term's amplitude in value, rate and curvature.
+pub(crate) type Amplitudes = [[Pair; 3]; FOLLOWED[0]];
 
 /// Value, rate and curvature.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,14 +99,14 @@ pub(crate) struct Cell {
     pub(crate) start: f64,
     /// Where it ends.
     pub(crate) end: f64,
+    /// The number of the point where it begins.
+    point: usize,
     /// Its width.
     width: f64,
     /// Its ends.
     ends: [Point; 2],
-    /// Bound on the quintic's error within.
+    /// Bound on the distance from the quintic to the signal within.
     error: f64,
-    /// Whether the quintic is the signal's own, no term left out.
-    complete: bool,
 }
 
 /// A zero of a cell's quintic.
@@ -92,46 +126,59 @@ impl Lattice {
         if kernel.grows || kernel.fastest <= 0.0 {
             return None;
         }
-        let rates: Vec<[f64; 2]> = (0..kernel.count)
-            .map(|k| {
-                let pack = &kernel.packs[k / WIDTH];
-                [pack.decay[k % WIDTH], pack.frequency[k % WIDTH]]
-            })
-            .collect();
-        let norm = |k: usize| rates[k][0].hypot(rates[k][1]);
-        let mut followed: Vec<usize> = (0..kernel.count).collect();
-        followed.sort_by(|&a, &b| norm(a).total_cmp(&norm(b)));
-        followed.truncate(FOLLOWED);
-        let fastest = norm(*followed.last()?);
-        let step = (ANGLE / fastest).min(period / 4.0);
-        let packs = ((period / step / WIDTH as f64) as usize + 1).min(LARGEST);
-        let mut table = vec![[[0.0; WIDTH]; 2]; packs * followed.len()];
+        let mut order: Vec<usize> = (0..kernel.count).collect();
+        order.sort_by(|&a, &b| norm(kernel, a).total_cmp(&norm(kernel, b)));
+        let fine_terms = order.len().min(FOLLOWED[0]);
+        let fastest = norm(kernel, order[fine_terms - 1]);
+        let slow = order
+            .iter()
+            .filter(|&&k| norm(kernel, k) * COARSER < fastest);
+        let terms = [fine_terms, slow.count().clamp(1, FOLLOWED[1])];
+        let step = |level: usize| {
+            let fastest = norm(kernel, order[terms[level] - 1]);
+            (ANGLE / fastest).min(period / CELLS[level])
+        };
+        let [fine_step, coarse_step] = [step(0), step(1)];
+        let packs =
+            |length: f64, step: f64| ((length / step / WIDTH as f64) as usize + 1).min(LARGEST);
+        let followed = &order[..terms[0]];
+        let cost = period / fine_step / WIDTH as f64 * (6 * terms[0] + 20) as f64;
+        if cost < CHEAP || coarse_step < COARSER * fine_step {
+            let packs = packs(period, fine_step);
+            return Some(Self {
+                fine: Level::new(kernel, followed, terms[0], fine_step, packs),
+                coarse: None,
+                reach: (packs * WIDTH - 1) as f64 * fine_step,
+                followed: order[..terms[0]].to_vec(),
+            });
+        }
+        let divided = (coarse_step / fine_step).ceil();
+        let coarse_packs = packs(period, coarse_step);
+        let points = coarse_packs * WIDTH;
+        let mut powers = vec![[0.0; 2]; points * terms[0]];
         for (j, &k) in followed.iter().enumerate() {
-            for (p, [re, im]) in powers(rates[k], step, packs * WIDTH)
+            for (p, power) in exponentials(kernel, k, coarse_step, points)
                 .into_iter()
                 .enumerate()
             {
-                let entry = &mut table[p / WIDTH * followed.len() + j];
-                entry[0][p % WIDTH] = re;
-                entry[1][p % WIDTH] = im;
+                powers[p * terms[0] + j] = power;
             }
         }
-        let mut weights = vec![[[0.0; WIDTH]; 2]; kernel.packs.len()];
-        for k in 0..kernel.count {
-            let entry = &mut weights[k / WIDTH];
-            if followed.contains(&k) {
-                entry[0][k % WIDTH] = (norm(k) * step).powi(6) / 7200.0;
-            } else {
-                entry[1][k % WIDTH] = 1.0;
-            }
-        }
+        let fine_packs = divided as usize / WIDTH + 1;
         Some(Self {
-            step,
-            table,
-            complete: followed.len() == kernel.count,
-            followed,
-            weights,
-            reach: (packs * WIDTH - 1) as f64 * step,
+            fine: Level::new(
+                kernel,
+                followed,
+                terms[0],
+                coarse_step / divided,
+                fine_packs,
+            ),
+            coarse: Some(Coarse {
+                level: Level::new(kernel, followed, terms[1], coarse_step, coarse_packs),
+                powers,
+            }),
+            reach: (points - 1) as f64 * coarse_step,
+            followed: order[..terms[0]].to_vec(),
         })
     }
 
@@ -140,52 +187,145 @@ impl Lattice {
         self.reach
     }
 
-    /// Looks at the cells of `signal` up to `length` in turn. `surface` is the rate at the
-    /// first point where the signal is zero there by definition.
+    /// The amplitudes of the followed terms.
     #[inline(always)]
-    pub(crate) fn scan<M: Math>(
-        &self,
-        signal: &Signal,
-        length: f64,
-        surface: Option<f64>,
-    ) -> Scan<'_, M> {
-        let mut amplitudes = [[[0.0; 2]; 3]; FOLLOWED];
+    pub(crate) fn amplitudes(&self, signal: &Signal) -> Amplitudes {
+        let mut amplitudes = [[[0.0; 2]; 3]; FOLLOWED[0]];
         for (amplitude, &k) in amplitudes.iter_mut().zip(&self.followed) {
             *amplitude = signal.amplitudes(k);
         }
-        let [sixth, outside] = signal.weighted_amplitudes::<M>(&self.weights);
-        let noise = ROUNDING * signal.size();
-        Scan {
-            lattice: self,
-            amplitudes,
-            constant: signal.constant,
-            floor: outside + noise,
-            tension: sixth + 2.0 * (outside + noise),
-            error: sixth / 6.4 + noise,
-            length,
-            surface,
-            pack: 0,
-            open: 0,
-            ends: [[M::splat(0.0); 3]; 2],
-            lefts: [M::splat(f64::MAX); 2],
+        amplitudes
+    }
+
+    /// A walk along the cells of the coarse level, if there is one; what it leaves open is
+    /// to be looked at in [`Lattice::fine`].
+    #[inline(always)]
+    pub(crate) fn coarse<M: Math>(&self, signal: &Signal, stretch: Stretch) -> Option<Scan<'_, M>> {
+        let coarse = self.coarse.as_ref()?;
+        Some(Scan::new(&coarse.level, signal, stretch))
+    }
+
+    /// A walk along the cells of the fine level.
+    #[inline(always)]
+    pub(crate) fn fine<M: Math>(&self, signal: &Signal, stretch: Stretch) -> Scan<'_, M> {
+        Scan::new(&self.fine, signal, stretch)
+    }
+
+    /// The stretch within a coarse cell, and the amplitudes at its start.
+    #[inline(always)]
+    pub(crate) fn within(
+        &self,
+        cell: &Cell,
+        amplitudes: &Amplitudes,
+        stretch: Stretch,
+    ) -> (Stretch, Amplitudes) {
+        let inner = Stretch {
+            start: cell.start,
+            end: cell.end.min(stretch.end),
+            surface: if cell.point == 0 {
+                stretch.surface
+            } else {
+                None
+            },
+        };
+        let mut local = *amplitudes;
+        if let (Some(coarse), 1..) = (&self.coarse, cell.point) {
+            let terms = self.fine.terms;
+            let powers = &coarse.powers[cell.point * terms..][..terms];
+            for (local, &power) in local.iter_mut().zip(powers) {
+                for z in local {
+                    *z = product(*z, power);
+                }
+            }
+        }
+        (inner, local)
+    }
+}
+
+/// A part of a regime that is to be searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stretch {
+    /// Where the first point lies.
+    pub(crate) start: f64,
+    /// How far to look.
+    pub(crate) end: f64,
+    /// The rate at the start, if the signal is zero there by definition.
+    pub(crate) surface: Option<f64>,
+}
+
+impl Level {
+    fn new(kernel: &Kernel, followed: &[usize], terms: usize, step: f64, packs: usize) -> Self {
+        let mut table = vec![[[0.0; WIDTH]; 2]; packs * terms];
+        for (j, &k) in followed[..terms].iter().enumerate() {
+            let powers = exponentials(kernel, k, step, packs * WIDTH);
+            for (p, [re, im]) in powers.into_iter().enumerate() {
+                let entry = &mut table[p / WIDTH * terms + j];
+                entry[0][p % WIDTH] = re;
+                entry[1][p % WIDTH] = im;
+            }
+        }
+        let mut weights = vec![[[0.0; WIDTH]; 2]; kernel.packs.len()];
+        for k in 0..kernel.count {
+            let entry = &mut weights[k / WIDTH];
+            if followed[..terms].contains(&k) {
+                entry[0][k % WIDTH] = (norm(kernel, k) * step).powi(6) / 7200.0;
+            } else {
+                entry[1][k % WIDTH] = 1.0;
+            }
+        }
+        Self {
+            step,
+            terms,
+            complete: terms == kernel.count,
+            table,
+            weights,
         }
     }
 }
 
-/// A walk along the cells.
+/// `|λ|` of a term.
+fn norm(kernel: &Kernel, k: usize) -> f64 {
+    let pack = &kernel.packs[k / WIDTH];
+    pack.decay[k % WIDTH].hypot(pack.frequency[k % WIDTH])
+}
+
+/// `e^{λ h p}` of a term for `p = 0 … count − 1`. Each is a product of at most as many
+/// factors as `p` has binary digits, so that rounding does not pile up along the table.
+fn exponentials(kernel: &Kernel, k: usize, step: f64, count: usize) -> Vec<Pair> {
+    let pack = &kernel.packs[k / WIDTH];
+    let (decay, frequency) = (pack.decay[k % WIDTH], pack.frequency[k % WIDTH]);
+    let mut powers = Vec::with_capacity(count);
+    powers.push([1.0, 0.0]);
+    let mut highest = 1;
+    while powers.len() < count {
+        let s = step * highest as f64;
+        let (sin, cos) = (frequency * s).sin_cos();
+        let grown = (decay * s).exp();
+        for p in 0..highest.min(count - highest) {
+            powers.push(product(powers[p], [grown * cos, grown * sin]));
+        }
+        highest *= 2;
+    }
+    powers
+}
+
+/// `a b` of complex numbers.
+#[inline(always)]
+fn product([ar, ai]: Pair, [br, bi]: Pair) -> Pair {
+    [ar * br - ai * bi, ar * bi + ai * br]
+}
+
+/// A walk along the cells of one level.
 pub(crate) struct Scan<'a, M: Math> {
-    lattice: &'a Lattice,
-    /// Of the followed terms, in value, rate and curvature.
-    amplitudes: [[[f64; 2]; 3]; FOLLOWED],
+    level: &'a Level,
     constant: f64,
     /// What Bernstein coefficients must not fall below.
     floor: f64,
     /// The same for the sum of the middle two.
     tension: f64,
-    /// Bound on the quintic's error within a cell.
+    /// Bound on the distance from the quintic to the signal within a cell.
     error: f64,
-    length: f64,
-    surface: Option<f64>,
+    stretch: Stretch,
     /// The next pack of points.
     pack: usize,
     /// Cells that end at the last pack's points and are not certified, a bit each.
@@ -194,26 +334,54 @@ pub(crate) struct Scan<'a, M: Math> {
     ends: [[M::Lanes; 3]; 2],
     /// Of the last pack's cells, what their left ends give: the smallest coefficient, and b₂.
     lefts: [M::Lanes; 2],
+    /// Points looked at so far.
+    pub(crate) points: u64,
 }
 
-impl<M: Math> Scan<'_, M> {
+impl<'a, M: Math> Scan<'a, M> {
+    #[inline(always)]
+    fn new(level: &'a Level, signal: &Signal, stretch: Stretch) -> Self {
+        let [sixth, outside] = signal.weighted_amplitudes::<M>(&level.weights);
+        let floor = outside + ROUNDING * signal.size();
+        Self {
+            level,
+            constant: signal.constant,
+            floor,
+            tension: sixth + 2.0 * floor,
+            error: sixth / 6.4 + floor,
+            stretch,
+            pack: 0,
+            open: 0,
+            ends: [[M::splat(0.0); 3]; 2],
+            lefts: [M::splat(f64::MAX); 2],
+            points: 0,
+        }
+    }
+
+    /// Where a point lies.
+    #[inline(always)]
+    fn at(&self, point: usize) -> f64 {
+        self.stretch.start + point as f64 * self.level.step
+    }
+
     /// The next cell that is not certified.
     #[inline(always)]
-    pub(crate) fn next_open(&mut self) -> Option<Cell> {
+    pub(crate) fn next_open(&mut self, amplitudes: &Amplitudes) -> Option<Cell> {
         while self.open == 0 {
-            let table = self.pack * self.lattice.followed.len();
-            let before = (self.pack * WIDTH) as f64 - 1.0;
-            if table >= self.lattice.table.len() || before * self.lattice.step >= self.length {
+            let seen = self.pack * WIDTH;
+            let over = seen > 0 && self.at(seen - 1) >= self.stretch.end;
+            if over || self.pack * self.level.terms >= self.level.table.len() {
                 return None;
             }
-            self.look_at_pack();
+            self.look_at_pack(amplitudes);
         }
         let lane = self.open.trailing_zeros() as usize;
         self.open &= self.open - 1;
-        let point = (self.pack - 1) * WIDTH + lane;
-        let h = self.lattice.step;
-        let start = (point - 1) as f64 * h;
-        if start >= self.length {
+        let point = (self.pack - 1) * WIDTH + lane - 1;
+        if self.at(point) >= self.stretch.end {
+            // It lies beyond the end, and so do all that follow.
+            self.pack = self.level.table.len();
+            self.open = 0;
             return None;
         }
         let before = if lane == 0 {
@@ -222,27 +390,27 @@ impl<M: Math> Scan<'_, M> {
             Point::of::<M>(&self.ends[1], lane - 1)
         };
         Some(Cell {
-            start,
-            end: point as f64 * h,
-            width: h,
+            start: self.at(point),
+            end: self.at(point + 1),
+            point,
+            width: self.level.step,
             ends: [before, Point::of::<M>(&self.ends[1], lane)],
             error: self.error,
-            complete: self.lattice.complete,
         })
     }
 
     /// Certifies the cells that end at the next pack's points, or finds which are open.
     #[inline(always)]
-    fn look_at_pack(&mut self) {
-        let h = self.lattice.step;
-        let [g, v, c] = self.sums();
+    fn look_at_pack(&mut self, amplitudes: &Amplitudes) {
+        let h = self.level.step;
+        let [g, v, c] = self.sums(amplitudes);
         let bent = M::fma(c, M::splat(h * h / 20.0), g);
         let (fifth, two_fifths) = (M::splat(0.2 * h), M::splat(0.4 * h));
         let (b1, b2) = (M::fma(v, fifth, g), M::fma(v, two_fifths, bent));
         let (b4, b3) = (M::fnma(v, fifth, g), M::fnma(v, two_fifths, bent));
         let inner = M::min(b1, b2);
         let mut left = M::min(g, inner);
-        if self.pack == 0 && self.surface.is_some() && self.lattice.complete {
+        if self.pack == 0 && self.stretch.surface.is_some() && self.level.complete {
             // Zero there by definition, which is allowed.
             left = M::with_first(left, inner);
         }
@@ -258,33 +426,28 @@ impl<M: Math> Scan<'_, M> {
         self.ends = [self.ends[1], [g, v, c]];
         self.lefts = [left, b2];
         self.pack += 1;
+        self.points += WIDTH as u64;
     }
 
     /// Value, rate and curvature at the next pack's points.
     #[inline(always)]
-    fn sums(&self) -> [M::Lanes; 3] {
+    fn sums(&self, amplitudes: &Amplitudes) -> [M::Lanes; 3] {
         let zero = M::splat(0.0);
         let (mut g, mut v, mut c) = (M::splat(self.constant), zero, zero);
-        let n = self.lattice.followed.len();
-        let table = &self.lattice.table[self.pack * n..][..n];
-        for (amplitude, [re, im]) in self.amplitudes.iter().zip(table) {
+        let terms = self.level.terms;
+        let table = &self.level.table[self.pack * terms..][..terms];
+        for (amplitude, [re, im]) in amplitudes.iter().zip(table) {
             let (re, im) = (M::load(re), M::load(im));
             let [[gr, gi], [vr, vi], [cr, ci]] = *amplitude;
             g = M::fnma(M::splat(gi), im, M::fma(M::splat(gr), re, g));
             v = M::fnma(M::splat(vi), im, M::fma(M::splat(vr), re, v));
             c = M::fnma(M::splat(ci), im, M::fma(M::splat(cr), re, c));
         }
-        if let (0, Some(rate)) = (self.pack, self.surface) {
+        if let (0, Some(rate)) = (self.pack, self.stretch.surface) {
             g = M::with_first(g, zero);
             v = M::with_first(v, M::splat(rate));
         }
         [g, v, c]
-    }
-
-    /// Points looked at so far.
-    #[inline(always)]
-    pub(crate) fn points(&self) -> u64 {
-        (self.pack * WIDTH) as u64
     }
 }
 
@@ -306,69 +469,44 @@ impl Cell {
     pub(crate) fn falling_zero(&self) -> Option<FallingZero> {
         let [p, q] = self.ends;
         let h = self.width;
-        if !self.complete || p.value <= self.error || q.value >= -self.error {
+        if p.value <= self.error || q.value >= -self.error {
             return None;
         }
-        let b = [
-            p.value,
-            p.value + 0.2 * h * p.rate,
-            p.value + 0.4 * h * p.rate + 0.05 * h * h * p.curvature,
-            q.value - 0.4 * h * q.rate + 0.05 * h * h * q.curvature,
-            q.value - 0.2 * h * q.rate,
-            q.value,
-        ];
-        let d: [f64; 5] = std::array::from_fn(|i| b[i + 1] - b[i]);
-        let gentlest = d[0].max(d[1]).max(d[2].max(d[3])).max(d[4]);
+        let (u, v) = (h * p.rate, h * q.rate);
+        let (a, b) = (h * h * p.curvature, h * h * q.curvature);
+        // The differences of the Bernstein coefficients: the rate's, a fifth of them.
+        let first = 0.2 * u;
+        let second = 0.2 * u + 0.05 * a;
+        let last = 0.2 * v;
+        let last_but_one = 0.2 * v - 0.05 * b;
+        let rest = (q.value - p.value) - (first + second) - (last + last_but_one);
+        let gentlest = first.max(second).max(rest).max(last.max(last_but_one));
         if gentlest >= 0.0 {
             return None;
         }
-        // The inverse function's cubic through both ends, then two Newton steps.
-        let (rise, run) = (1.0 / (p.value - q.value), p.value);
-        let u = run * rise;
-        let (m0, m1) = (-1.0 / (rise * h * p.rate), -1.0 / (rise * h * q.rate));
-        let w = 1.0 - u;
-        let guess = u * u * (3.0 - 2.0 * u) + u * w * (w * m0 - u * m1);
-        let mut t = guess.clamp(0.0, 1.0);
-        let c2 = 0.5 * h * h * p.curvature;
-        let c1 = h * p.rate;
-        let (r0, r1, r2) = (
-            q.value - p.value - c1 - c2,
-            h * q.rate - c1 - 2.0 * c2,
-            h * h * q.curvature - 2.0 * c2,
-        );
+        // A first guess from the inverse function's cubic through both ends.
+        let fall = p.value - q.value;
+        let part = p.value / fall;
+        let (left, right) = (-fall / u, -fall / v);
+        let other = 1.0 - part;
+        let guess = part * part * (3.0 - 2.0 * part) + part * other * (other * left - part * right);
+        let t = guess.clamp(0.0, 1.0);
+        // One Newton step on the quintic in powers of t.
+        let (c1, c2) = (u, 0.5 * a);
+        let r0 = q.value - p.value - c1 - c2;
+        let r1 = v - c1 - 2.0 * c2;
+        let r2 = b - 2.0 * c2;
         let c3 = 10.0 * r0 - 4.0 * r1 + 0.5 * r2;
         let c4 = -15.0 * r0 + 7.0 * r1 - r2;
         let c5 = 6.0 * r0 - 3.0 * r1 + 0.5 * r2;
-        for _ in 0..2 {
-            let t2 = t * t;
-            let value = (p.value + c1 * t) + t2 * ((c2 + c3 * t) + t2 * (c4 + c5 * t));
-            let slope = (c1 + 2.0 * c2 * t) + t2 * ((3.0 * c3 + 4.0 * c4 * t) + 5.0 * c5 * t2);
-            t = (t - value / slope).clamp(0.0, 1.0);
-        }
+        let t2 = t * t;
+        let value = (p.value + c1 * t) + t2 * ((c2 + c3 * t) + t2 * (c4 + c5 * t));
+        let slope = (c1 + 2.0 * c2 * t) + t2 * ((3.0 * c3 + 4.0 * c4 * t) + 5.0 * c5 * t2);
+        let t = (t - value / slope).clamp(0.0, 1.0);
         Some(FallingZero {
             at: self.start + t * h,
             gentlest: -5.0 * gentlest / h,
             error: self.error,
         })
     }
-}
-
-/// `e^{λ h p}` for `p = 0 … count − 1`. Each is a product of at most as many factors as
-/// `p` has binary digits, so that rounding does not pile up along the table.
-fn powers([decay, frequency]: [f64; 2], step: f64, count: usize) -> Vec<[f64; 2]> {
-    let mut powers = Vec::with_capacity(count);
-    powers.push([1.0, 0.0]);
-    let mut highest = 1;
-    while powers.len() < count {
-        let s = step * highest as f64;
-        let (sin, cos) = (frequency * s).sin_cos();
-        let grown = (decay * s).exp();
-        let [fr, fi] = [grown * cos, grown * sin];
-        for p in 0..highest.min(count - highest) {
-            let [re, im]: [f64; 2] = powers[p];
-            powers.push([re * fr - im * fi, re * fi + im * fr]);
-        }
-        highest *= 2;
-    }
-    powers
 }

@@ -14,6 +14,8 @@ pub(crate) type Pack = [f64; WIDTH];
 pub(crate) trait Math: Copy {
     /// Whether functions come from the standard library, one lane at a time.
     const LIBRARY: bool = false;
+    /// Whether it needs AVX2 and FMA.
+    const FUSED: bool = false;
     /// Four lanes.
     type Lanes: Copy;
 
@@ -306,6 +308,7 @@ mod fused {
     // SAFETY of every block here: these instructions need AVX2 and FMA and nothing else;
     // `Fused` is used only where the machine was found to have them.
     impl Math for Fused {
+        const FUSED: bool = true;
         type Lanes = x::__m256d;
 
         #[inline(always)]

@@ -25,7 +25,7 @@
 //! precision at the points it visits and reports the crossing as grazing.
 
 use crate::double_double;
-use crate::lattice::{Amplitudes, Cell, Lattice, Stretch};
+use crate::lattice::{Cell, Lattice, Stretch};
 #[cfg(target_arch = "x86_64")]
 use crate::pack::Fused;
 use crate::pack::{LARGEST_ANGLE, Library, Math, Plain};
@@ -108,23 +108,23 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
         end: length,
         surface,
     };
-    let amplitudes = lattice.amplitudes(signal);
+    signal.follow::<M>(lattice.followed());
     let search = CellSearch {
         lattice,
         length,
         start,
     };
     let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {
-        return search
-            .stretch::<M>(&amplitudes, whole, signal, statistics)
-            .flatten();
+        return search.stretch::<M>(whole, signal, statistics).flatten();
     };
     let mut found = None;
     while found.is_none()
-        && let Some(cell) = coarse.next_open(&amplitudes)
+        && let Some(cell) = coarse.next_open(signal.followed())
     {
-        let (stretch, local) = lattice.within(&cell, &amplitudes, whole);
-        found = search.stretch::<M>(&local, stretch, signal, statistics);
+        signal.follow_from::<M>(lattice, &cell);
+        let stretch = Lattice::within(&cell, whole);
+        found = search.stretch::<M>(stretch, signal, statistics);
+        signal.follow_from_start();
     }
     statistics.points += coarse.points;
     found.flatten()
@@ -143,7 +143,6 @@ impl CellSearch<'_> {
     #[inline(always)]
     fn stretch<M: Math>(
         &self,
-        amplitudes: &Amplitudes,
         stretch: Stretch,
         signal: &mut Signal,
         statistics: &mut Statistics,
@@ -151,7 +150,7 @@ impl CellSearch<'_> {
         let mut fine = self.lattice.fine::<M>(signal, stretch);
         let mut found = None;
         while found.is_none()
-            && let Some(cell) = fine.next_open(amplitudes)
+            && let Some(cell) = fine.next_open(signal.followed())
         {
             found = self.cell::<M>(&cell, signal, statistics);
         }

@@ -359,12 +359,7 @@ impl Flow {
                     start,
                     &mut self.statistics,
                 ),
-                _ => first_crossing_with::<M>(
-                    &self.signal,
-                    horizon,
-                    start,
-                    &mut self.statistics,
-                ),
+                _ => first_crossing_with::<M>(&self.signal, horizon, start, &mut self.statistics),
             };
             if let Some(crossing) = found {
                 earliest = Some((e, crossing));
@@ -380,21 +375,26 @@ impl Flow {
         if O::IDLE && basis.clusters.is_empty() {
             let rates = &system.packed_rates()[self.regime];
             let kept = self.signal.kept_factors();
-            let kept = kept.filter(|(at, _)| {
-                (length - at).abs() * self.signal.fastest() < pack::SMALL_ANGLE
-            });
+            let kept = kept
+                .filter(|(at, _)| (length - at).abs() * self.signal.fastest() < pack::SMALL_ANGLE);
             if let Some((at, factors)) = kept {
                 let rest = M::splat(length - at);
                 for (i, q) in self.packed.iter_mut().enumerate() {
                     let [decay, frequency] = &rates[i];
-                    let z = [M::mul(M::load(decay), rest), M::mul(M::load(frequency), rest)];
+                    let z = [
+                        M::mul(M::load(decay), rest),
+                        M::mul(M::load(frequency), rest),
+                    ];
                     let factor = [M::load(&factors[i][0]), M::load(&factors[i][1])];
                     multiply::<M>(q, pack::complex_mul::<M>(factor, pack::exp_small::<M>(z)));
                 }
             } else {
                 for (q, [decay, frequency]) in self.packed.iter_mut().zip(rates) {
                     let (decay, frequency) = (M::load(decay), M::load(frequency));
-                    multiply::<M>(q, pack::exp_complex::<M>(decay, frequency, M::splat(length)));
+                    multiply::<M>(
+                        q,
+                        pack::exp_complex::<M>(decay, frequency, M::splat(length)),
+                    );
                 }
             }
         } else {
@@ -448,7 +448,7 @@ impl Flow {
         self.switches += 1;
         let description = &system.exits()[self.regime][exit];
         let prepared = &system.prepared(self.regime)[exit];
-        let stuck = self.chatter_ends(system, exit, crossing);
+        let stuck = prepared.acceleration.is_some() && self.chatter_ends(system, exit, crossing);
         let (switch, twin) = match (&prepared.sticking, stuck) {
             (Some(sticking), true) => (sticking, prepared.sticking_twin),
             _ => (&prepared.switch, prepared.twin),
@@ -539,26 +539,7 @@ impl Flow {
 
     #[inline(always)]
     fn change_basis<M: Math>(&mut self, switch: &Switch) {
-        let packed = &switch.packed;
-        let packs = packed.packs;
-        let count = packed.columns.len() / packs;
-        let inputs = (count - 1) / 2;
-        self.next.resize(packs, [[0.0; WIDTH]; 2]);
-        for (i, out) in self.next.iter_mut().enumerate() {
-            let constant = &packed.columns[(count - 1) * packs + i];
-            let mut sum = [M::load(&constant[0]), M::load(&constant[1])];
-            for part in 0..2 {
-                for k in 0..inputs {
-                    let x = M::splat(self.packed[k / WIDTH][part][k % WIDTH]);
-                    let [re, im] = &packed.columns[(part * inputs + k) * packs + i];
-                    sum = [
-                        M::fma(M::load(re), x, sum[0]),
-                        M::fma(M::load(im), x, sum[1]),
-                    ];
-                }
-            }
-            *out = sum.map(M::store);
-        }
+        switch.packed.apply::<M>(&self.packed, &mut self.next);
         std::mem::swap(&mut self.packed, &mut self.next);
     }
 }

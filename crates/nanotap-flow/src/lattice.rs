@@ -21,7 +21,7 @@
 //! cell is looked at on a finer level, and what that leaves open is for the search of
 //! [`crossing`](crate::crossing).
 
-use crate::pack::{Math, Pack, WIDTH};
+use crate::pack::{self, Math, Pack, WIDTH};
 use crate::regime::Kernel;
 use crate::signal::Signal;
 
@@ -65,8 +65,9 @@ struct Coarse {
 /// Equidistant points with the exponentials of the slowest terms.
 #[derive(Clone, Debug, PartialEq)]
 struct Level {
-    /// Distance of the points, `h`.
+    /// Distance of the points, `h`, and its inverse.
     step: f64,
+    density: f64,
     /// How many terms it follows.
     terms: usize,
     /// Whether these are all.
@@ -81,8 +82,9 @@ struct Level {
 /// A complex number as `[Re, Im]`.
 type Pair = [f64; 2];
 
-/// `[Re, Im]` of each followed term's amplitude in value, rate and curvature.
-pub(crate) type Amplitudes = [[Pair; 3]; FOLLOWED[0]];
+/// A followed term's amplitude in value, rate and curvature, `[Re, Im]` each, the same in
+/// every lane.
+pub(crate) type Amplitude = [[Pack; 2]; 3];
 
 /// Value, rate and curvature.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -187,14 +189,10 @@ impl Lattice {
         self.reach
     }
 
-    /// The amplitudes of the followed terms.
+    /// The terms that are followed.
     #[inline(always)]
-    pub(crate) fn amplitudes(&self, signal: &Signal) -> Amplitudes {
-        let mut amplitudes = [[[0.0; 2]; 3]; FOLLOWED[0]];
-        for (amplitude, &k) in amplitudes.iter_mut().zip(&self.followed) {
-            *amplitude = signal.amplitudes(k);
-        }
-        amplitudes
+    pub(crate) fn followed(&self) -> &[usize] {
+        &self.followed
     }
 
     /// A walk along the cells of the coarse level, if there is one; what it leaves open is
@@ -211,15 +209,10 @@ impl Lattice {
         Scan::new(&self.fine, signal, stretch)
     }
 
-    /// The stretch within a coarse cell, and the amplitudes at its start.
+    /// The stretch within a coarse cell.
     #[inline(always)]
-    pub(crate) fn within(
-        &self,
-        cell: &Cell,
-        amplitudes: &Amplitudes,
-        stretch: Stretch,
-    ) -> (Stretch, Amplitudes) {
-        let inner = Stretch {
+    pub(crate) fn within(cell: &Cell, stretch: Stretch) -> Stretch {
+        Stretch {
             start: cell.start,
             end: cell.end.min(stretch.end),
             surface: if cell.point == 0 {
@@ -227,18 +220,31 @@ impl Lattice {
             } else {
                 None
             },
-        };
-        let mut local = *amplitudes;
-        if let (Some(coarse), 1..) = (&self.coarse, cell.point) {
-            let terms = self.fine.terms;
-            let powers = &coarse.powers[cell.point * terms..][..terms];
-            for (local, &power) in local.iter_mut().zip(powers) {
-                for z in local {
-                    *z = product(*z, power);
-                }
-            }
         }
-        (inner, local)
+    }
+
+    /// The amplitudes at the start of a coarse cell, written to `local`.
+    #[inline(always)]
+    pub(crate) fn move_to<M: Math>(
+        &self,
+        cell: &Cell,
+        amplitudes: &[Amplitude],
+        local: &mut Vec<Amplitude>,
+    ) {
+        local.clear();
+        let Some(coarse) = &self.coarse else {
+            return;
+        };
+        let powers = &coarse.powers[cell.point * self.fine.terms..];
+        for (amplitude, power) in amplitudes.iter().zip(powers) {
+            let power = power.map(M::splat);
+            let mut moved = *amplitude;
+            for z in &mut moved {
+                let product = pack::complex_mul::<M>([M::load(&z[0]), M::load(&z[1])], power);
+                *z = product.map(M::store);
+            }
+            local.push(moved);
+        }
     }
 }
 
@@ -275,6 +281,7 @@ impl Level {
         }
         Self {
             step,
+            density: 1.0 / step,
             terms,
             complete: terms == kernel.count,
             table,
@@ -326,8 +333,9 @@ pub(crate) struct Scan<'a, M: Math> {
     /// Bound on the distance from the quintic to the signal within a cell.
     error: f64,
     stretch: Stretch,
-    /// The next pack of points.
+    /// The next pack of points, and how many there are to look at.
     pack: usize,
+    packs: usize,
     /// Cells that end at the last pack's points and are not certified, a bit each.
     open: u32,
     /// Value, rate and curvature at the last two packs of points.
@@ -343,6 +351,8 @@ impl<'a, M: Math> Scan<'a, M> {
     fn new(level: &'a Level, signal: &Signal, stretch: Stretch) -> Self {
         let [sixth, outside] = signal.weighted_amplitudes::<M>(&level.weights);
         let floor = outside + ROUNDING * signal.size();
+        let cells = (stretch.end - stretch.start) * level.density;
+        let most = level.table.len() / level.terms;
         Self {
             level,
             constant: signal.constant,
@@ -351,6 +361,7 @@ impl<'a, M: Math> Scan<'a, M> {
             error: sixth / 6.4 + floor,
             stretch,
             pack: 0,
+            packs: most.min((cells * (1.0 / WIDTH as f64)) as usize + 2),
             open: 0,
             ends: [[M::splat(0.0); 3]; 2],
             lefts: [M::splat(f64::MAX); 2],
@@ -366,11 +377,9 @@ impl<'a, M: Math> Scan<'a, M> {
 
     /// The next cell that is not certified.
     #[inline(always)]
-    pub(crate) fn next_open(&mut self, amplitudes: &Amplitudes) -> Option<Cell> {
+    pub(crate) fn next_open(&mut self, amplitudes: &[Amplitude]) -> Option<Cell> {
         while self.open == 0 {
-            let seen = self.pack * WIDTH;
-            let over = seen > 0 && self.at(seen - 1) >= self.stretch.end;
-            if over || self.pack * self.level.terms >= self.level.table.len() {
+            if self.pack >= self.packs {
                 return None;
             }
             self.look_at_pack(amplitudes);
@@ -380,7 +389,7 @@ impl<'a, M: Math> Scan<'a, M> {
         let point = (self.pack - 1) * WIDTH + lane - 1;
         if self.at(point) >= self.stretch.end {
             // It lies beyond the end, and so do all that follow.
-            self.pack = self.level.table.len();
+            self.pack = self.packs;
             self.open = 0;
             return None;
         }
@@ -401,7 +410,7 @@ impl<'a, M: Math> Scan<'a, M> {
 
     /// Certifies the cells that end at the next pack's points, or finds which are open.
     #[inline(always)]
-    fn look_at_pack(&mut self, amplitudes: &Amplitudes) {
+    fn look_at_pack(&mut self, amplitudes: &[Amplitude]) {
         let h = self.level.step;
         let [g, v, c] = self.sums(amplitudes);
         let bent = M::fma(c, M::splat(h * h / 20.0), g);
@@ -431,17 +440,17 @@ impl<'a, M: Math> Scan<'a, M> {
 
     /// Value, rate and curvature at the next pack's points.
     #[inline(always)]
-    fn sums(&self, amplitudes: &Amplitudes) -> [M::Lanes; 3] {
+    fn sums(&self, amplitudes: &[Amplitude]) -> [M::Lanes; 3] {
         let zero = M::splat(0.0);
         let (mut g, mut v, mut c) = (M::splat(self.constant), zero, zero);
         let terms = self.level.terms;
         let table = &self.level.table[self.pack * terms..][..terms];
         for (amplitude, [re, im]) in amplitudes.iter().zip(table) {
             let (re, im) = (M::load(re), M::load(im));
-            let [[gr, gi], [vr, vi], [cr, ci]] = *amplitude;
-            g = M::fnma(M::splat(gi), im, M::fma(M::splat(gr), re, g));
-            v = M::fnma(M::splat(vi), im, M::fma(M::splat(vr), re, v));
-            c = M::fnma(M::splat(ci), im, M::fma(M::splat(cr), re, c));
+            let [[gr, gi], [vr, vi], [cr, ci]] = amplitude;
+            g = M::fnma(M::load(gi), im, M::fma(M::load(gr), re, g));
+            v = M::fnma(M::load(vi), im, M::fma(M::load(vr), re, v));
+            c = M::fnma(M::load(ci), im, M::fma(M::load(cr), re, c));
         }
         if let (0, Some(rate)) = (self.pack, self.stretch.surface) {
             g = M::with_first(g, zero);

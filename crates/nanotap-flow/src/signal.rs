@@ -1,6 +1,7 @@
 //! What any linear output is inside a regime: a constant plus a finite sum of
 //! decaying complex exponentials, with bounds on its derivatives.
 
+use crate::lattice::{Amplitude, Cell, Lattice};
 use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
 use crate::regime::{Kernel, ModalOutput};
 use crate::{Complex, Drive, Regime};
@@ -30,6 +31,9 @@ pub struct Signal {
     /// `e^{λ_k s}` of the last evaluation that kept them, and its `s`.
     factors: Vec<[Pack; 2]>,
     factors_at: Option<f64>,
+    /// Amplitudes of the terms that a lattice follows, and those at another point.
+    followed: Vec<Amplitude>,
+    other: Vec<Amplitude>,
 }
 
 /// `Re(amplitude · s^power · e^{rate s})` with `power ≥ 1`.
@@ -210,8 +214,7 @@ impl Signal {
         self.powers.clear();
         self.factors_at = None;
         self.packs.resize(kernel.packs.len(), TermPack::default());
-        self.factors
-            .resize(kernel.packs.len(), [[0.0; WIDTH]; 2]);
+        self.factors.resize(kernel.packs.len(), [[0.0; WIDTH]; 2]);
         let mut size = M::splat(0.0);
         for (pack, (kernel, [qr, qi])) in self.packs.iter_mut().zip(kernel.packs.iter().zip(q)) {
             let both = |z: &[Pack; 2]| [M::load(&z[0]), M::load(&z[1])];
@@ -300,11 +303,39 @@ impl Signal {
         self.factors_at.map(|s| (s, &self.factors[..]))
     }
 
-    /// `[Re, Im]` of term `k`'s amplitude in value, rate and curvature.
+    /// Lays out the amplitudes of some terms for a lattice.
     #[inline(always)]
-    pub(crate) fn amplitudes(&self, k: usize) -> [[f64; 2]; 3] {
-        let (pack, i) = (&self.packs[k / WIDTH], k % WIDTH);
-        [&pack.value, &pack.rate, &pack.curvature].map(|z| [z[0][i], z[1][i]])
+    pub(crate) fn follow<M: Math>(&mut self, terms: &[usize]) {
+        self.followed.resize(terms.len(), Amplitude::default());
+        for (amplitude, &k) in self.followed.iter_mut().zip(terms) {
+            let (pack, i) = (&self.packs[k / WIDTH], k % WIDTH);
+            for (out, z) in amplitude
+                .iter_mut()
+                .zip([&pack.value, &pack.rate, &pack.curvature])
+            {
+                *out = [M::store(M::splat(z[0][i])), M::store(M::splat(z[1][i]))];
+            }
+        }
+    }
+
+    /// The amplitudes that were laid out last.
+    #[inline(always)]
+    pub(crate) fn followed(&self) -> &[Amplitude] {
+        &self.followed
+    }
+
+    /// Lays them out as they are at the start of a coarse cell, until
+    /// [`Signal::follow_from_start`].
+    #[inline(always)]
+    pub(crate) fn follow_from<M: Math>(&mut self, lattice: &Lattice, cell: &Cell) {
+        lattice.move_to::<M>(cell, &self.followed, &mut self.other);
+        std::mem::swap(&mut self.followed, &mut self.other);
+    }
+
+    /// Goes back to the amplitudes at the signal's own start.
+    #[inline(always)]
+    pub(crate) fn follow_from_start(&mut self) {
+        std::mem::swap(&mut self.followed, &mut self.other);
     }
 
     /// Sums of the terms' amplitudes, weighted in two ways.

@@ -2,7 +2,7 @@
 
 use crate::harmonic::{HarmonicVector, Output};
 use crate::lattice::Lattice;
-use crate::pack::{Pack, WIDTH};
+use crate::pack::{Math, Pack, WIDTH};
 use crate::regime::{Kernel, ModalOutput, Regime};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
@@ -125,6 +125,8 @@ pub struct System {
     regimes: Vec<Regime>,
     exits: Vec<Vec<Exit>>,
     switches: Vec<Vec<PreparedExit>>,
+    /// How far the lattices of each regime's guards reach.
+    reaches: Vec<f64>,
     /// `[Re λ, Im λ]` of each regime's modal coordinates and tones, packed.
     rates: Vec<Vec<[Pack; 2]>>,
     /// The largest `|λ|` of any regime or tone.
@@ -212,6 +214,33 @@ impl PackedSwitch {
         change.gemv(1.0, to_modal, &shift.constant, 0.0);
         switch.push(change.as_slice(), None);
         switch
+    }
+
+    /// Writes the coordinates and phasors after the switch to `out`.
+    #[inline(always)]
+    pub(crate) fn apply<M: Math>(&self, packed: &[[Pack; 2]], out: &mut Vec<[Pack; 2]>) {
+        let packs = self.packs;
+        let (linear, constant) = self.columns.split_at(self.columns.len() - packs);
+        let (real, imaginary) = linear.split_at(linear.len() / 2);
+        out.resize(packs, [[0.0; WIDTH]; 2]);
+        for (i, out) in out.iter_mut().enumerate() {
+            // A sum for each part of the inputs: two short chains instead of a long one.
+            let mut sums = [
+                [M::load(&constant[i][0]), M::load(&constant[i][1])],
+                [M::splat(0.0); 2],
+            ];
+            for (part, (columns, sum)) in [real, imaginary].into_iter().zip(&mut sums).enumerate() {
+                for (columns, inputs) in columns.chunks(WIDTH * packs).zip(packed) {
+                    for (column, &x) in columns.chunks_exact(packs).zip(&inputs[part]) {
+                        let x = M::splat(x);
+                        sum[0] = M::fma(M::load(&column[i][0]), x, sum[0]);
+                        sum[1] = M::fma(M::load(&column[i][1]), x, sum[1]);
+                    }
+                }
+            }
+            let [a, b] = sums;
+            *out = [M::store(M::add(a[0], b[0])), M::store(M::add(a[1], b[1]))];
+        }
     }
 
     /// Adds a column, real parts first, with a one in coordinate and part `one`.
@@ -312,6 +341,7 @@ impl System {
             regimes,
             exits,
             switches: Vec::new(),
+            reaches: Vec::new(),
             rates: Vec::new(),
             fastest: 0.0,
         };
@@ -321,6 +351,17 @@ impl System {
                     .iter()
                     .map(|exit| system.prepare(r, exit))
                     .collect()
+            })
+            .collect();
+        system.reaches = system
+            .switches
+            .iter()
+            .map(|exits| {
+                exits
+                    .iter()
+                    .filter_map(|exit| exit.lattice.as_ref())
+                    .map(Lattice::reach)
+                    .fold(f64::INFINITY, f64::min)
             })
             .collect();
         system.rates = system
@@ -366,11 +407,7 @@ impl System {
 
     /// How far the lattices of a regime's guards reach.
     pub(crate) fn lattice_reach(&self, regime: usize) -> f64 {
-        self.switches[regime]
-            .iter()
-            .filter_map(|exit| exit.lattice.as_ref())
-            .map(Lattice::reach)
-            .fold(f64::INFINITY, f64::min)
+        self.reaches[regime]
     }
 
     pub(crate) fn prepared(&self, regime: usize) -> &[PreparedExit] {

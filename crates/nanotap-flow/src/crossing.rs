@@ -25,7 +25,7 @@
 //! precision at the points it visits and reports the crossing as grazing.
 
 use crate::double_double;
-use crate::lattice::{Cell, Lattice, Stretch};
+use crate::lattice::{Cell, FallingZero, Lattice, Stretch};
 #[cfg(target_arch = "x86_64")]
 use crate::pack::Fused;
 use crate::pack::{LARGEST_ANGLE, Library, Math, Plain};
@@ -130,6 +130,153 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
     found.flatten()
 }
 
+/// What a lattice says of a stretch before anything is evaluated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Prospect {
+    /// The crossing, or that there is none.
+    Settled(Option<Crossing>),
+    /// Where the first crossing is, all but certainly.
+    Zero(FallingZero),
+}
+
+/// The first half of [`first_crossing_on_lattice`]: all that comes before an exponential is
+/// computed. [`evaluate_zero`] and [`confirm_zero`] go on from there; if that does not settle
+/// it, the whole search does.
+#[inline(always)]
+pub(crate) fn prospect_on_lattice<M: Math>(
+    lattice: &Lattice,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Prospect {
+    let surface = match start {
+        Start::Inside => None,
+        Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
+        Start::Release => {
+            let found = first_crossing_with::<M>(signal, length, start, statistics);
+            return Prospect::Settled(found);
+        }
+    };
+    let whole = Stretch {
+        start: 0.0,
+        end: length,
+        surface,
+    };
+    signal.follow::<M>(lattice.followed());
+    let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {
+        let mut fine = lattice.fine::<M>(signal, whole);
+        let open = fine.next_open(signal.followed());
+        statistics.points += fine.points;
+        let Some(cell) = open else {
+            return Prospect::Settled(None);
+        };
+        return prospect_in::<M>(&cell, lattice, signal, length, start, statistics);
+    };
+    while let Some(cell) = coarse.next_open(signal.followed()) {
+        signal.follow_from::<M>(lattice, &cell);
+        let mut fine = lattice.fine::<M>(signal, Lattice::within(&cell, whole));
+        let open = fine.next_open(signal.followed());
+        signal.follow_from_start();
+        statistics.points += fine.points;
+        if let Some(cell) = open {
+            statistics.points += coarse.points;
+            return prospect_in::<M>(&cell, lattice, signal, length, start, statistics);
+        }
+    }
+    statistics.points += coarse.points;
+    Prospect::Settled(None)
+}
+
+#[inline(always)]
+fn prospect_in<M: Math>(
+    cell: &Cell,
+    lattice: &Lattice,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Prospect {
+    match cell.falling_zero() {
+        Some(zero) => Prospect::Zero(zero),
+        None => Prospect::Settled(whole_search::<M>(
+            lattice, signal, length, start, statistics,
+        )),
+    }
+}
+
+/// [`first_crossing_on_lattice`], outlined. There are no lattices for [`Library`].
+#[inline(always)]
+pub(crate) fn whole_search<M: Math>(
+    lattice: &Lattice,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Crossing> {
+    #[cfg(target_arch = "x86_64")]
+    if M::FUSED {
+        // SAFETY: this arithmetic is in use only where the machine has it.
+        return unsafe { whole_search_fused(lattice, signal, length, start, statistics) };
+    }
+    whole_search_plain(lattice, signal, length, start, statistics)
+}
+
+#[inline(never)]
+fn whole_search_plain(
+    lattice: &Lattice,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Crossing> {
+    first_crossing_on_lattice::<Plain>(lattice, signal, length, start, statistics)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+#[inline(never)]
+fn whole_search_fused(
+    lattice: &Lattice,
+    signal: &mut Signal,
+    length: f64,
+    start: Start,
+    statistics: &mut Statistics,
+) -> Option<Crossing> {
+    first_crossing_on_lattice::<Fused>(lattice, signal, length, start, statistics)
+}
+
+/// The signal itself where a cell's quintic falls through zero; the exponentials are kept.
+#[inline(always)]
+pub(crate) fn evaluate_zero<M: Math>(
+    zero: &FallingZero,
+    signal: &mut Signal,
+    statistics: &mut Statistics,
+) -> Jet {
+    statistics.evaluations += 1;
+    signal.jet_keeping_factors::<M>(zero.at)
+}
+
+/// The crossing at a quintic's zero, if it is certain to be the only one in its cell and one
+/// step away. `Some(None)`: it comes after `length`.
+#[inline(always)]
+pub(crate) fn confirm_zero(
+    zero: &FallingZero,
+    jet: &Jet,
+    signal: &Signal,
+    length: f64,
+) -> Option<Option<Crossing>> {
+    // Every zero in the cell is as near as this, and the rate keeps its sign up to there.
+    let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
+    let unique = near * signal.fastest() < 0.1
+        && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
+    if !unique {
+        return None;
+    }
+    let crossing = last_step(jet, zero.at, length, signal.noise())?;
+    Some((crossing.at <= length).then_some(crossing))
+}
+
 /// A search through the cells of a lattice's fine level. Where it finds `Some(None)` there
 /// is a crossing, which comes too late.
 struct CellSearch<'a> {
@@ -167,16 +314,10 @@ impl CellSearch<'_> {
         statistics: &mut Statistics,
     ) -> Option<Option<Crossing>> {
         if let Some(zero) = cell.falling_zero() {
-            statistics.evaluations += 1;
-            let jet = signal.jet_keeping_factors::<M>(zero.at);
-            // Every zero in the cell is as near as this, and the rate keeps its sign up
-            // to there.
-            let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
-            let unique = near * signal.fastest() < 0.1
-                && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
-            if unique && let Some(crossing) = last_step(&jet, zero.at, self.length, signal.noise())
-            {
-                return Some((crossing.at <= self.length).then_some(crossing));
+            let jet = evaluate_zero::<M>(&zero, signal, statistics);
+            let confirmed = confirm_zero(&zero, &jet, signal, self.length);
+            if confirmed.is_some() {
+                return confirmed;
             }
         }
         #[cfg(target_arch = "x86_64")]
@@ -184,7 +325,7 @@ impl CellSearch<'_> {
             // SAFETY: this arithmetic is in use only where the machine has it.
             return unsafe { self.cell_in_steps_fused(cell, signal, statistics) }.map(Some);
         }
-        self.cell_in_steps::<M>(cell, signal, statistics).map(Some)
+        self.cell_in_steps_plain(cell, signal, statistics).map(Some)
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -197,6 +338,16 @@ impl CellSearch<'_> {
         statistics: &mut Statistics,
     ) -> Option<Crossing> {
         self.cell_in_steps::<Fused>(cell, signal, statistics)
+    }
+
+    #[inline(never)]
+    fn cell_in_steps_plain(
+        &self,
+        cell: &Cell,
+        signal: &Signal,
+        statistics: &mut Statistics,
+    ) -> Option<Crossing> {
+        self.cell_in_steps::<Plain>(cell, signal, statistics)
     }
 
     /// The same by certified steps.

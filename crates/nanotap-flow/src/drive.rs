@@ -74,6 +74,9 @@ impl Drive {
 
     /// `e^{iω_k t}` of tone `k`.
     pub fn phasor(&self, k: usize, t: f64) -> Complex {
+        if t == 0.0 {
+            return Complex::new(1.0, 0.0);
+        }
         let (sin, cos) = (self.frequencies[k] * t).sin_cos();
         Complex::new(cos, sin)
     }

@@ -2,13 +2,15 @@
 //! at a time.
 
 use crate::crossing::{
-    Crossing, Start, Statistics, first_crossing_on_lattice, first_crossing_with,
+    Crossing, Prospect, Start, Statistics, confirm_zero, evaluate_zero, first_crossing_on_lattice,
+    first_crossing_with, prospect_on_lattice, whole_search,
 };
+use crate::lattice::FallingZero;
 #[cfg(target_arch = "x86_64")]
 use crate::pack::Fused;
 use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
 use crate::regime::Regime;
-use crate::signal::Signal;
+use crate::signal::{Jet, Signal};
 use crate::system::{Exit, ON_SURFACE, Onset, Switch, System, rounding};
 use crate::{Complex, FlowError};
 use std::sync::Arc;
@@ -103,6 +105,8 @@ pub struct Flow {
     packed: Vec<[Pack; 2]>,
     /// The work space of a switch.
     next: Vec<[Pack; 2]>,
+    /// `e^{λ_k s}` of the stretch that is passed.
+    turns: Vec<[Pack; 2]>,
     /// The exit whose guard starts at zero, and how.
     surface: Option<(usize, Start)>,
     signal: Signal,
@@ -113,6 +117,15 @@ pub struct Flow {
     statistics: Statistics,
     switches: u64,
     fused: bool,
+}
+
+/// A search for the next switch under way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Pending {
+    /// It is over.
+    Settled(Option<(usize, Crossing)>),
+    /// Where the switch is, all but certainly, and the guard there once it is evaluated.
+    Zero(FallingZero, Jet),
 }
 
 /// Switches without time passing before chatter without a sticking regime is refused.
@@ -135,6 +148,7 @@ impl Flow {
             phase: 0.0,
             packed: Vec::new(),
             next: Vec::new(),
+            turns: Vec::new(),
             surface: None,
             signal: Signal::default(),
             modal: Vec::with_capacity(largest),
@@ -196,7 +210,7 @@ impl Flow {
         let regime = &system.regimes()[regime];
         self.modal
             .resize(regime.basis().len(), Complex::new(0.0, 0.0));
-        regime.to_modal(system.drive(), x, phase, &mut self.modal);
+        regime.to_modal(system.drive(), x, phase, &mut self.state, &mut self.modal);
         self.pack_modal(&system);
         self.set_phasors(&system);
         Ok(())
@@ -251,14 +265,19 @@ impl Flow {
     pub fn run_period<O: Observer>(&mut self, observer: &mut O) -> Result<(), FlowError> {
         let period = self.system.drive().period();
         self.run_until(period, observer)?;
+        self.begin_period();
+        observer.period_end();
+        Ok(())
+    }
+
+    /// Sets phase and phasors, which are carried from switch to switch, right.
+    #[inline(always)]
+    pub(crate) fn begin_period(&mut self) {
         self.phase = 0.0;
-        // Phasors are carried from switch to switch; a new period sets them right.
         let modes = self.system.regimes()[self.regime].basis().len();
         for k in 0..self.system.drive().frequencies().len() {
             self.set_coordinate(modes + k, Complex::new(1.0, 0.0));
         }
-        observer.period_end();
-        Ok(())
     }
 
     /// Runs to time `end` within the same drive period.
@@ -288,38 +307,107 @@ impl Flow {
         let system = Arc::clone(&self.system);
         let mut stalled = 0;
         while self.phase < end {
-            let left = end - self.phase;
-            let reach = if M::LIBRARY {
-                left
-            } else {
-                left.min(system.lattice_reach(self.regime))
-            };
+            let reach = self.reach::<M>(&system, end);
             let found = self.next_crossing::<M>(&system, reach)?;
-            let length = found.map_or(reach, |(_, crossing)| crossing.at);
-            self.pass::<M, O>(&system, length, observer);
-            let Some((exit, crossing)) = found else {
-                if reach < left {
-                    continue;
-                }
-                self.phase = end;
-                break;
-            };
-            stalled = if length <= f64::EPSILON * end {
-                stalled + 1
-            } else {
-                0
-            };
-            if stalled > STALLED_SWITCHES {
-                return Err(FlowError::Accumulation { time: self.phase });
-            }
-            self.switch::<M, O>(&system, exit, crossing, observer);
+            self.go_on::<M, O>(&system, end, reach, found, &mut stalled, observer)?;
         }
         Ok(())
     }
 
-    /// The earliest exit within `left`.
+    /// How far it may be looked for a switch at once on the way to `end`.
+    #[inline(always)]
+    pub(crate) fn reach<M: Math>(&self, system: &System, end: f64) -> f64 {
+        let left = end - self.phase;
+        if M::LIBRARY {
+            left
+        } else {
+            left.min(system.lattice_reach(self.regime))
+        }
+    }
+
+    /// Moves on to the switch that was found within `reach`, or to where the search ended.
+    #[inline(always)]
+    pub(crate) fn go_on<M: Math, O: Observer>(
+        &mut self,
+        system: &System,
+        end: f64,
+        reach: f64,
+        found: Option<(usize, Crossing)>,
+        stalled: &mut u32,
+        observer: &mut O,
+    ) -> Result<(), FlowError> {
+        let to_the_end = reach >= end - self.phase;
+        let length = found.map_or(reach, |(_, crossing)| crossing.at);
+        self.pass::<M, O>(system, length, observer);
+        let Some((exit, crossing)) = found else {
+            if to_the_end {
+                self.phase = end;
+            }
+            return Ok(());
+        };
+        *stalled = if length <= f64::EPSILON * end {
+            *stalled + 1
+        } else {
+            0
+        };
+        if *stalled > STALLED_SWITCHES {
+            return Err(FlowError::Accumulation { time: self.phase });
+        }
+        self.switch::<M, O>(system, exit, crossing, observer);
+        Ok(())
+    }
+
+    /// The earliest exit within `left`. Compiled once for each arithmetic, not again for
+    /// every observer: it is the largest part of the inner loop.
     #[inline(always)]
     fn next_crossing<M: Math>(
+        &mut self,
+        system: &System,
+        left: f64,
+    ) -> Result<Option<(usize, Crossing)>, FlowError> {
+        #[cfg(target_arch = "x86_64")]
+        if M::FUSED {
+            // SAFETY: this arithmetic is in use only where the machine has it.
+            return unsafe { self.next_crossing_fused(system, left) };
+        }
+        if M::LIBRARY {
+            self.next_crossing_library(system, left)
+        } else {
+            self.next_crossing_plain(system, left)
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[inline(never)]
+    fn next_crossing_fused(
+        &mut self,
+        system: &System,
+        left: f64,
+    ) -> Result<Option<(usize, Crossing)>, FlowError> {
+        self.next_crossing_with::<Fused>(system, left)
+    }
+
+    #[inline(never)]
+    fn next_crossing_plain(
+        &mut self,
+        system: &System,
+        left: f64,
+    ) -> Result<Option<(usize, Crossing)>, FlowError> {
+        self.next_crossing_with::<Plain>(system, left)
+    }
+
+    #[inline(never)]
+    fn next_crossing_library(
+        &mut self,
+        system: &System,
+        left: f64,
+    ) -> Result<Option<(usize, Crossing)>, FlowError> {
+        self.next_crossing_with::<Library>(system, left)
+    }
+
+    #[inline(always)]
+    fn next_crossing_with<M: Math>(
         &mut self,
         system: &System,
         left: f64,
@@ -347,10 +435,7 @@ impl Flow {
             if !self.signal.is_finite() {
                 return Err(FlowError::Diverged { time: self.phase });
             }
-            let start = match self.surface {
-                Some((surface, start)) if surface == e => start,
-                _ => Start::Inside,
-            };
+            let start = self.start_of(e);
             let found = match &exit.lattice {
                 Some(lattice) if !M::LIBRARY => first_crossing_on_lattice::<M>(
                     lattice,
@@ -368,37 +453,111 @@ impl Flow {
         Ok(earliest)
     }
 
+    /// The first half of the search for the next switch: what can be said before an
+    /// exponential is computed. Regimes of one exit with a lattice are searched so; others
+    /// at once.
+    #[inline(always)]
+    pub(crate) fn prospect<M: Math>(
+        &mut self,
+        system: &System,
+        reach: f64,
+    ) -> Result<Pending, FlowError> {
+        let clustered = !system.regimes()[self.regime].basis().clusters.is_empty();
+        let ([exit], false) = (system.prepared(self.regime), clustered || M::LIBRARY) else {
+            return self.next_crossing::<M>(system, reach).map(Pending::Settled);
+        };
+        let Some(lattice) = &exit.lattice else {
+            return self.next_crossing::<M>(system, reach).map(Pending::Settled);
+        };
+        self.signal.refill::<M>(&exit.kernel, &self.packed, reach);
+        if !self.signal.is_finite() {
+            return Err(FlowError::Diverged { time: self.phase });
+        }
+        let start = self.start_of(0);
+        let statistics = &mut self.statistics;
+        let prospect =
+            prospect_on_lattice::<M>(lattice, &mut self.signal, reach, start, statistics);
+        Ok(match prospect {
+            Prospect::Settled(found) => Pending::Settled(found.map(|crossing| (0, crossing))),
+            Prospect::Zero(zero) => Pending::Zero(zero, Jet::default()),
+        })
+    }
+
+    /// Evaluates what [`Flow::prospect`] left for it.
+    #[inline(always)]
+    pub(crate) fn evaluate<M: Math>(&mut self, pending: &mut Pending) {
+        if let Pending::Zero(zero, jet) = pending {
+            *jet = evaluate_zero::<M>(zero, &mut self.signal, &mut self.statistics);
+        }
+    }
+
+    /// The second half of the search.
+    #[inline(always)]
+    pub(crate) fn settle<M: Math>(
+        &mut self,
+        system: &System,
+        reach: f64,
+        pending: &Pending,
+    ) -> Option<(usize, Crossing)> {
+        let (zero, jet) = match pending {
+            Pending::Settled(found) => return *found,
+            Pending::Zero(zero, jet) => (zero, jet),
+        };
+        let confirmed = confirm_zero(zero, jet, &self.signal, reach);
+        let found = match (confirmed, &system.prepared(self.regime)[0].lattice) {
+            (Some(found), _) => found,
+            (None, Some(lattice)) => {
+                let start = self.start_of(0);
+                let statistics = &mut self.statistics;
+                whole_search::<M>(lattice, &mut self.signal, reach, start, statistics)
+            }
+            (None, None) => None,
+        };
+        found.map(|crossing| (0, crossing))
+    }
+
+    /// How the motion stands to the guard of exit `exit`.
+    #[inline(always)]
+    fn start_of(&self, exit: usize) -> Start {
+        match self.surface {
+            Some((surface, start)) if surface == exit => start,
+            _ => Start::Inside,
+        }
+    }
+
     /// Moves on by `length` within the regime.
     #[inline(always)]
     fn pass<M: Math, O: Observer>(&mut self, system: &System, length: f64, observer: &mut O) {
         let basis = system.regimes()[self.regime].basis();
-        if O::IDLE && basis.clusters.is_empty() {
-            let rates = &system.packed_rates()[self.regime];
-            let kept = self.signal.kept_factors();
-            let kept = kept
-                .filter(|(at, _)| (length - at).abs() * self.signal.fastest() < pack::SMALL_ANGLE);
-            if let Some((at, factors)) = kept {
-                let rest = M::splat(length - at);
-                for (i, q) in self.packed.iter_mut().enumerate() {
-                    let [decay, frequency] = &rates[i];
-                    let z = [
-                        M::mul(M::load(decay), rest),
-                        M::mul(M::load(frequency), rest),
-                    ];
-                    let factor = [M::load(&factors[i][0]), M::load(&factors[i][1])];
-                    multiply::<M>(q, pack::complex_mul::<M>(factor, pack::exp_small::<M>(z)));
-                }
-            } else {
-                for (q, [decay, frequency]) in self.packed.iter_mut().zip(rates) {
-                    let (decay, frequency) = (M::load(decay), M::load(frequency));
-                    multiply::<M>(
-                        q,
-                        pack::exp_complex::<M>(decay, frequency, M::splat(length)),
-                    );
-                }
+        self.set_turns::<M>(system, length);
+        if !O::IDLE || !basis.clusters.is_empty() {
+            self.unpack_modal(basis.len());
+            self.factors.clear();
+            for k in 0..basis.len() {
+                let [re, im] = &self.turns[k / WIDTH];
+                self.factors
+                    .push(Complex::new(re[k % WIDTH], im[k % WIDTH]));
             }
-        } else {
-            self.pass_watched(system, length, observer);
+            observer.segment(&SegmentView {
+                system,
+                regime: self.regime,
+                phase: self.phase,
+                length,
+                modal: &self.modal,
+                factors: &self.factors,
+            });
+        }
+        for (q, [re, im]) in self.packed.iter_mut().zip(&self.turns) {
+            let turn = [M::load(re), M::load(im)];
+            let turned = pack::complex_mul::<M>([M::load(&q[0]), M::load(&q[1])], turn);
+            *q = [M::store(turned[0]), M::store(turned[1])];
+        }
+        if !basis.clusters.is_empty() {
+            // Coordinates whose eigenvalues coincide mix.
+            basis.apply(&mut self.modal, length, &self.factors);
+            for k in 0..self.modal.len() {
+                self.set_coordinate(k, self.modal[k]);
+            }
         }
         self.phase += length;
         if length > 0.0 {
@@ -406,33 +565,33 @@ impl Flow {
         }
     }
 
-    /// The same where someone watches or eigenvalues coincide.
-    fn pass_watched<O: Observer>(&mut self, system: &System, length: f64, observer: &mut O) {
-        let basis = system.regimes()[self.regime].basis();
-        self.unpack_modal(basis.len());
-        self.factors.clear();
-        self.factors.extend(
-            basis
-                .eigenvalues
-                .iter()
-                .map(|lambda| (lambda * length).exp()),
-        );
-        observer.segment(&SegmentView {
-            system,
-            regime: self.regime,
-            phase: self.phase,
-            length,
-            modal: &self.modal,
-            factors: &self.factors,
-        });
-        basis.apply(&mut self.modal, length, &self.factors);
-        for k in 0..self.modal.len() {
-            self.set_coordinate(k, self.modal[k]);
-        }
-        for (k, &omega) in system.drive().frequencies().iter().enumerate() {
-            let (sin, cos) = (omega * length).sin_cos();
-            let phasor = self.coordinate(basis.len() + k) * Complex::new(cos, sin);
-            self.set_coordinate(basis.len() + k, phasor);
+    /// Sets `turns` to `e^{λ_k · length}`, from what the search for the switch evaluated last
+    /// if that was near enough.
+    #[inline(always)]
+    fn set_turns<M: Math>(&mut self, system: &System, length: f64) {
+        let rates = &system.packed_rates()[self.regime];
+        self.turns.resize(rates.len(), [[0.0; WIDTH]; 2]);
+        let near = |at: f64| (length - at).abs() * system.fastest() < pack::SMALL_ANGLE;
+        let kept = self.signal.kept_factors().filter(|(at, _)| near(*at));
+        if let Some((at, factors)) = kept {
+            let rest = M::splat(length - at);
+            for ((turn, [re, im]), [decay, frequency]) in
+                self.turns.iter_mut().zip(factors).zip(rates)
+            {
+                let rest = [
+                    M::mul(M::load(decay), rest),
+                    M::mul(M::load(frequency), rest),
+                ];
+                let rest = pack::exp_small::<M>(rest);
+                let full = pack::complex_mul::<M>([M::load(re), M::load(im)], rest);
+                *turn = [M::store(full[0]), M::store(full[1])];
+            }
+        } else {
+            for (turn, [decay, frequency]) in self.turns.iter_mut().zip(rates) {
+                let (decay, frequency) = (M::load(decay), M::load(frequency));
+                let full = pack::exp_complex::<M>(decay, frequency, M::splat(length));
+                *turn = [M::store(full[0]), M::store(full[1])];
+            }
         }
     }
 
@@ -542,13 +701,6 @@ impl Flow {
         switch.packed.apply::<M>(&self.packed, &mut self.next);
         std::mem::swap(&mut self.packed, &mut self.next);
     }
-}
-
-/// `q ← q · factor` of packed complex numbers.
-#[inline(always)]
-fn multiply<M: Math>(q: &mut [Pack; 2], factor: [M::Lanes; 2]) {
-    let product = pack::complex_mul::<M>([M::load(&q[0]), M::load(&q[1])], factor);
-    *q = product.map(M::store);
 }
 
 /// Whether this machine has fused multiply-add in vectors of four.

@@ -39,14 +39,20 @@ impl HarmonicVector {
 
     /// The value at time `t`.
     pub fn at(&self, drive: &Drive, t: f64) -> DVector<f64> {
-        let mut value = self.constant.clone();
+        let mut value = DVector::zeros(self.constant.len());
+        self.write(drive, t, value.as_mut_slice());
+        value
+    }
+
+    /// Writes the value at time `t` to `value` (length `n`).
+    pub(crate) fn write(&self, drive: &Drive, t: f64, value: &mut [f64]) {
+        value.copy_from_slice(self.constant.as_slice());
         for (k, tone) in self.tones.iter().enumerate() {
             let phasor = drive.phasor(k, t);
             for (v, z) in value.iter_mut().zip(tone.iter()) {
-                *v += (z * phasor).re;
+                *v += z.re * phasor.re - z.im * phasor.im;
             }
         }
-        value
     }
 
     /// The time derivative.

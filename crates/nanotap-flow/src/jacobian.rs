@@ -11,6 +11,8 @@ use nalgebra::{DMatrix, DVector};
 pub struct Jacobian {
     /// `[Re; Im]` of `∂q/∂x₀`, `2m × n`.
     columns: DMatrix<f64>,
+    /// The work space of a switch.
+    next: DMatrix<f64>,
     scratch: Vec<Complex>,
 }
 
@@ -27,6 +29,7 @@ impl Jacobian {
             .view_mut((m, 0), (m, n))
             .copy_from(&left.map(|z| z.im));
         Self {
+            next: columns.clone(),
             columns,
             scratch: Vec::new(),
         }
@@ -50,15 +53,18 @@ impl Jacobian {
 }
 
 impl Observer for Jacobian {
+    #[inline(always)]
     fn segment(&mut self, segment: &SegmentView<'_>) {
         let basis = segment.regime().basis();
         let m = basis.len();
         if basis.clusters.is_empty() {
-            for mut column in self.columns.column_iter_mut() {
-                for (k, factor) in segment.factors.iter().enumerate() {
-                    let (re, im) = (column[k], column[m + k]);
-                    column[k] = re * factor.re - im * factor.im;
-                    column[m + k] = re * factor.im + im * factor.re;
+            for column in self.columns.as_mut_slice().chunks_exact_mut(2 * m) {
+                let (real, imaginary) = column.split_at_mut(m);
+                let parts = real.iter_mut().zip(imaginary);
+                for ((re, im), factor) in parts.zip(segment.factors) {
+                    let (a, b) = (*re, *im);
+                    *re = a * factor.re - b * factor.im;
+                    *im = a * factor.im + b * factor.re;
                 }
             }
             return;
@@ -75,11 +81,20 @@ impl Observer for Jacobian {
         }
     }
 
+    #[inline(always)]
     fn switch(&mut self, view: &SwitchView<'_>) {
         if let Some(tangent) = &view.switch.tangent {
-            self.columns = product(tangent, &self.columns);
+            product(tangent, &self.columns, &mut self.next);
+            std::mem::swap(&mut self.columns, &mut self.next);
             return;
         }
+        self.saltate(view);
+    }
+}
+
+impl Jacobian {
+    /// A switch whose saltation depends on the state.
+    fn saltate(&mut self, view: &SwitchView<'_>) {
         let regime = &view.system.regimes()[view.switch.from];
         let mut x = DVector::zeros(view.system.dimension());
         let modal = view.modal.iter().copied();
@@ -92,15 +107,23 @@ impl Observer for Jacobian {
     }
 }
 
-/// `a b`; small matrices, for which a general product would be mostly set-up.
-fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
-    for (mut out, b) in out.column_iter_mut().zip(b.column_iter()) {
-        for (a, &factor) in a.column_iter().zip(b.iter()) {
-            out.axpy(factor, &a, 1.0);
+/// Writes `a b` to `out`; small matrices, for which a general product would be mostly
+/// set-up.
+#[inline(always)]
+fn product(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
+    let (rows, inner) = a.shape();
+    if out.shape() != (rows, b.ncols()) {
+        *out = DMatrix::zeros(rows, b.ncols());
+    }
+    let columns = out.as_mut_slice().chunks_exact_mut(rows);
+    for (out, b) in columns.zip(b.as_slice().chunks_exact(inner)) {
+        out.fill(0.0);
+        for (a, &factor) in a.as_slice().chunks_exact(rows).zip(b) {
+            for (out, a) in out.iter_mut().zip(a) {
+                *out += a * factor;
+            }
         }
     }
-    out
 }
 
 impl Flow {

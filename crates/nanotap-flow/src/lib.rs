@@ -26,6 +26,7 @@
 pub mod crossing;
 mod double_double;
 pub mod drive;
+pub mod ensemble;
 pub mod error;
 pub mod extrema;
 pub mod fixed_step;
@@ -46,6 +47,7 @@ pub mod trajectory;
 pub type Complex = nalgebra::Complex<f64>;
 
 pub use drive::Drive;
+pub use ensemble::Ensemble;
 pub use error::FlowError;
 pub use flow::{Flow, Observer};
 pub use harmonic::{HarmonicVector, Output};

@@ -459,7 +459,10 @@ mod tests {
     }
 
     fn moved<M: Math>() -> (Pack, Pack, Pack, u32) {
-        let (a, b) = (M::load(&[1.0, 2.0, 3.0, 4.0]), M::load(&[5.0, 1.0, f64::NAN, 4.0]));
+        let (a, b) = (
+            M::load(&[1.0, 2.0, 3.0, 4.0]),
+            M::load(&[5.0, 1.0, f64::NAN, 4.0]),
+        );
         (
             M::store(M::min(a, M::splat(2.5))),
             M::store(M::with_first(a, b)),

@@ -79,18 +79,23 @@ impl Regime {
         &self.matrix * x + self.forcing.at(drive, t)
     }
 
-    /// Modal coordinates of state `x` at time `t`, written to `q`.
-    pub(crate) fn to_modal(&self, drive: &Drive, x: &[f64], t: f64, q: &mut [Complex]) {
-        let response = self.response.at(drive, t);
-        for (k, q) in q.iter_mut().enumerate() {
-            *q = self
-                .basis
-                .left
-                .row(k)
-                .iter()
-                .zip(x.iter().zip(response.iter()))
-                .map(|(l, (x, p))| l * (x - p))
-                .sum();
+    /// Modal coordinates of state `x` at time `t`, written to `q`; `rest` is work space, as
+    /// long as the state.
+    pub(crate) fn to_modal(
+        &self,
+        drive: &Drive,
+        x: &[f64],
+        t: f64,
+        rest: &mut [f64],
+        q: &mut [Complex],
+    ) {
+        self.response.write(drive, t, rest);
+        q.fill(Complex::new(0.0, 0.0));
+        for ((x, p), left) in x.iter().zip(rest).zip(self.basis.left.column_iter()) {
+            let own = x - *p;
+            for (q, l) in q.iter_mut().zip(left.iter()) {
+                *q += l * own;
+            }
         }
     }
 
@@ -102,9 +107,9 @@ impl Regime {
         t: f64,
         x: &mut [f64],
     ) {
-        x.copy_from_slice(self.response.at(drive, t).as_slice());
-        for (k, q) in q.into_iter().enumerate() {
-            for (x, r) in x.iter_mut().zip(self.basis.right.column(k).iter()) {
+        self.response.write(drive, t, x);
+        for (q, column) in q.into_iter().zip(self.basis.right.column_iter()) {
+            for (x, r) in x.iter_mut().zip(column.iter()) {
                 *x += r.re * q.re - r.im * q.im;
             }
         }

@@ -401,6 +401,11 @@ impl System {
         self.fastest * self.drive.period()
     }
 
+    /// The largest `|λ|` of any regime or tone.
+    pub(crate) fn fastest(&self) -> f64 {
+        self.fastest
+    }
+
     pub(crate) fn packed_rates(&self) -> &[Vec<[Pack; 2]>] {
         &self.rates
     }
@@ -544,7 +549,7 @@ impl System {
         let regime = &self.regimes[r];
         let modal = regime.project(output);
         let mut q = vec![Complex::new(0.0, 0.0); regime.basis().len()];
-        regime.to_modal(&self.drive, x, t, &mut q);
+        regime.to_modal(&self.drive, x, t, &mut vec![0.0; x.len()], &mut q);
         let own: f64 = modal
             .modal
             .iter()

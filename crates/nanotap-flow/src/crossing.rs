@@ -246,13 +246,14 @@ fn whole_search_fused(
     first_crossing_on_lattice::<Fused>(lattice, signal, length, start, statistics)
 }
 
-/// The signal itself where a cell's quintic falls through zero; the exponentials are kept.
+/// The signal itself where a cell's quintic falls through zero, and its third derivative
+/// there; the exponentials are kept.
 #[inline(always)]
 pub(crate) fn evaluate_zero<M: Math>(
     zero: &FallingZero,
     signal: &mut Signal,
     statistics: &mut Statistics,
-) -> Jet {
+) -> (Jet, f64) {
     statistics.evaluations += 1;
     signal.jet_keeping_factors::<M>(zero.at)
 }
@@ -262,7 +263,7 @@ pub(crate) fn evaluate_zero<M: Math>(
 #[inline(always)]
 pub(crate) fn confirm_zero(
     zero: &FallingZero,
-    jet: &Jet,
+    (jet, jerk): (Jet, f64),
     signal: &Signal,
     length: f64,
 ) -> Option<Option<Crossing>> {
@@ -273,7 +274,7 @@ pub(crate) fn confirm_zero(
     if !unique {
         return None;
     }
-    let crossing = last_step(jet, zero.at, length, signal.noise())?;
+    let crossing = last_cubic_step(&jet, jerk, zero.at, length, signal)?;
     Some((crossing.at <= length).then_some(crossing))
 }
 
@@ -314,8 +315,8 @@ impl CellSearch<'_> {
         statistics: &mut Statistics,
     ) -> Option<Option<Crossing>> {
         if let Some(zero) = cell.falling_zero() {
-            let jet = evaluate_zero::<M>(&zero, signal, statistics);
-            let confirmed = confirm_zero(&zero, &jet, signal, self.length);
+            let evaluated = evaluate_zero::<M>(&zero, signal, statistics);
+            let confirmed = confirm_zero(&zero, evaluated, signal, self.length);
             if confirmed.is_some() {
                 return confirmed;
             }
@@ -777,6 +778,32 @@ fn last_step(jet: &Jet, at: f64, length: f64, noise: f64) -> Option<Crossing> {
     // |g(at + step)| ≤ ⅙ B |step|³ when the step solves the parabola.
     let error = jet.third * step.abs().powi(3) / 6.0;
     let solved = (jet.value + step * (jet.rate + 0.5 * jet.curvature * step)).abs() <= noise;
+    (solved && error <= RESOLUTION * length * rate.abs()).then_some(Crossing {
+        at: at + step,
+        rate: rate.min(0.0),
+        grazing: false,
+        refined: false,
+    })
+}
+
+/// The same with the third derivative, `jerk`, known and not only bounded: the cubic's zero.
+#[inline(always)]
+fn last_cubic_step(
+    jet: &Jet,
+    jerk: f64,
+    at: f64,
+    length: f64,
+    signal: &Signal,
+) -> Option<Crossing> {
+    let slope = |h: f64| jet.rate + h * (jet.curvature + 0.5 * jerk * h);
+    let first = quadratic_root(jet);
+    let step = first - jerk * first.powi(3) / (6.0 * slope(first));
+    let rate = slope(step);
+    let cubic =
+        jet.value + step * (jet.rate + step * (0.5 * jet.curvature + step * jerk * (1.0 / 6.0)));
+    // |g(at + step)| ≤ B₄ step⁴ / 24 where the cubic vanishes, and B₄ ≤ B max|λ|.
+    let error = jet.third * signal.fastest() * step.powi(4) / 24.0;
+    let solved = cubic.abs() <= signal.noise();
     (solved && error <= RESOLUTION * length * rate.abs()).then_some(Crossing {
         at: at + step,
         rate: rate.min(0.0),

@@ -125,7 +125,7 @@ pub(crate) enum Pending {
     /// It is over.
     Settled(Option<(usize, Crossing)>),
     /// Where the switch is, all but certainly, and the guard there once it is evaluated.
-    Zero(FallingZero, Jet),
+    Zero(FallingZero, (Jet, f64)),
 }
 
 /// Switches without time passing before chatter without a sticking regime is refused.
@@ -479,15 +479,15 @@ impl Flow {
             prospect_on_lattice::<M>(lattice, &mut self.signal, reach, start, statistics);
         Ok(match prospect {
             Prospect::Settled(found) => Pending::Settled(found.map(|crossing| (0, crossing))),
-            Prospect::Zero(zero) => Pending::Zero(zero, Jet::default()),
+            Prospect::Zero(zero) => Pending::Zero(zero, (Jet::default(), 0.0)),
         })
     }
 
     /// Evaluates what [`Flow::prospect`] left for it.
     #[inline(always)]
     pub(crate) fn evaluate<M: Math>(&mut self, pending: &mut Pending) {
-        if let Pending::Zero(zero, jet) = pending {
-            *jet = evaluate_zero::<M>(zero, &mut self.signal, &mut self.statistics);
+        if let Pending::Zero(zero, evaluated) = pending {
+            *evaluated = evaluate_zero::<M>(zero, &mut self.signal, &mut self.statistics);
         }
     }
 
@@ -499,11 +499,11 @@ impl Flow {
         reach: f64,
         pending: &Pending,
     ) -> Option<(usize, Crossing)> {
-        let (zero, jet) = match pending {
+        let (zero, evaluated) = match pending {
             Pending::Settled(found) => return *found,
-            Pending::Zero(zero, jet) => (zero, jet),
+            Pending::Zero(zero, evaluated) => (zero, *evaluated),
         };
-        let confirmed = confirm_zero(zero, jet, &self.signal, reach);
+        let confirmed = confirm_zero(zero, evaluated, &self.signal, reach);
         let found = match (confirmed, &system.prepared(self.regime)[0].lattice) {
             (Some(found), _) => found,
             (None, Some(lattice)) => {

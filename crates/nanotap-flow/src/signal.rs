@@ -272,29 +272,36 @@ impl Signal {
         self.enclosure::<M>(s).jet
     }
 
-    /// The jet at `s`; the exponentials are kept for [`Signal::kept_factors`].
+    /// The jet at `s` and the third derivative itself; the exponentials are kept for
+    /// [`Signal::kept_factors`].
     #[inline(always)]
-    pub(crate) fn jet_keeping_factors<M: Math>(&mut self, s: f64) -> Jet {
-        let mut sums = [M::splat(0.0); 4];
+    pub(crate) fn jet_keeping_factors<M: Math>(&mut self, s: f64) -> (Jet, f64) {
+        let zero = M::splat(0.0);
+        let (mut sums, mut jerk) = ([zero; 4], zero);
         let at = M::splat(s);
         for (p, factor) in self.packs.iter().zip(&mut self.factors) {
-            let grown = pack::exp::<M>(M::mul(M::load(&p.decay), at));
-            let (sin, cos) = pack::sin_cos::<M>(M::mul(M::load(&p.frequency), at));
-            let (re, im) = (M::mul(grown, cos), M::mul(grown, sin));
+            let (decay, frequency) = (M::load(&p.decay), M::load(&p.frequency));
+            let [re, im] = pack::exp_complex::<M>(decay, frequency, at);
             *factor = [M::store(re), M::store(im)];
-            for (sum, z) in sums.iter_mut().zip([&p.value, &p.rate, &p.curvature]) {
+            for (sum, z) in sums.iter_mut().zip([&p.value, &p.rate]) {
                 *sum = M::fnma(M::load(&z[1]), im, M::fma(M::load(&z[0]), re, *sum));
             }
-            sums[3] = M::fma(M::load(&p.third), grown, sums[3]);
+            let c = [M::load(&p.curvature[0]), M::load(&p.curvature[1])];
+            let [cr, ci] = pack::complex_mul::<M>(c, [re, im]);
+            sums[2] = M::add(sums[2], cr);
+            jerk = M::fnma(ci, frequency, M::fma(cr, decay, jerk));
+            // Bounds need no decay: it is slow.
+            sums[3] = M::add(sums[3], M::load(&p.third));
         }
         self.factors_at = Some(s);
         let sums = pack::sums::<M>(sums);
-        Jet {
+        let jet = Jet {
             value: self.constant + sums[0],
             rate: sums[1],
             curvature: sums[2],
             third: self.third_constant + sums[3],
-        }
+        };
+        (jet, pack::sum::<M>(jerk))
     }
 
     /// The exponentials `e^{λ_k s}` that were kept last, and `s`.

@@ -107,13 +107,19 @@ impl Jacobian {
     }
 }
 
-/// Writes `a b` to `out`; small matrices, for which a general product would be mostly
-/// set-up.
+/// From this size on the general matrix product is worth its set-up.
+const LARGE: usize = 16;
+
+/// Writes `a b` to `out`.
 #[inline(always)]
 fn product(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     let (rows, inner) = a.shape();
     if out.shape() != (rows, b.ncols()) {
         *out = DMatrix::zeros(rows, b.ncols());
+    }
+    if rows >= LARGE {
+        out.gemm(1.0, a, b, 0.0);
+        return;
     }
     let columns = out.as_mut_slice().chunks_exact_mut(rows);
     for (out, b) in columns.zip(b.as_slice().chunks_exact(inner)) {

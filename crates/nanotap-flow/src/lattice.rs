@@ -27,11 +27,11 @@ use crate::signal::Signal;
 
 /// Angle through which the fastest followed term turns from point to point: a larger one
 /// needs fewer points, a smaller one leaves fewer cells open.
-const ANGLE: f64 = 2.2;
+const ANGLE: f64 = 2.4;
 /// The least number of cells in a period, on the fine level and on the coarse one.
 const CELLS: [f64; 2] = [24.0, 8.0];
 /// The most terms that are followed, on the fine level and on the coarse one.
-const FOLLOWED: [usize; 2] = [8, 4];
+const FOLLOWED: [usize; 2] = [8, 3];
 /// How much faster the fine level's fastest term must be than the coarse level's.
 const COARSER: f64 = 2.0;
 /// What a period may cost on the fine level alone, in multiplications of packs, before a

@@ -17,6 +17,8 @@ use crate::model::Model;
 #[derive(Debug)]
 pub struct Strobe {
     flow: Flow,
+    /// The state that the flow was last left in: whoever goes on from it need not start anew.
+    last: Vec<f64>,
     gap: Arc<Output>,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
@@ -45,6 +47,7 @@ impl Strobe {
     pub fn with_tangents(model: &Model, tangents: Vec<SystemTangent>) -> Self {
         Self {
             flow: Flow::new(Arc::clone(&model.system)),
+            last: Vec::new(),
             gap: Arc::new(model.gap.clone()),
             tangents: tangents.into(),
         }
@@ -61,11 +64,29 @@ impl Strobe {
         jacobian: &mut DMatrix<f64>,
         derivatives: &mut DMatrix<f64>,
     ) -> Result<(), FlowError> {
-        self.flow.start(state, 0.0)?;
+        self.begin(state)?;
         self.flow
             .run_period_with_sensitivities(&self.tangents, jacobian, derivatives)?;
-        self.flow.state(state);
+        self.end(state);
         Ok(())
+    }
+
+    /// Puts the flow at `state`, unless that is where it is.
+    fn begin(&mut self, state: &[f64]) -> Result<(), FlowError> {
+        let goes_on = !self.last.is_empty() && self.last == state;
+        // Whatever happens on the way, the flow is no longer there.
+        self.last.clear();
+        if goes_on {
+            Ok(())
+        } else {
+            self.flow.start(state, 0.0)
+        }
+    }
+
+    /// Reads where the flow has come to.
+    fn end(&mut self, state: &mut [f64]) {
+        self.flow.state(state);
+        self.last.extend_from_slice(state);
     }
 
     /// The flow it runs.
@@ -86,9 +107,9 @@ impl StroboscopicMap for Strobe {
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), FlowError> {
-        self.flow.start(state, 0.0)?;
+        self.begin(state)?;
         self.flow.run_period(&mut ())?;
-        self.flow.state(state);
+        self.end(state);
         Ok(())
     }
 
@@ -97,9 +118,9 @@ impl StroboscopicMap for Strobe {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), FlowError> {
-        self.flow.start(state, 0.0)?;
+        self.begin(state)?;
         self.flow.run_period_with_jacobian(jacobian)?;
-        self.flow.state(state);
+        self.end(state);
         Ok(())
     }
 
@@ -108,13 +129,13 @@ impl StroboscopicMap for Strobe {
         state: &mut [f64],
         tangencies: &mut Vec<Tangency>,
     ) -> Result<(), FlowError> {
-        self.flow.start(state, 0.0)?;
+        self.begin(state)?;
         let mut collector = GapExtrema {
             gap: &self.gap,
             tangencies,
         };
         self.flow.run_period(&mut collector)?;
-        self.flow.state(state);
+        self.end(state);
         Ok(())
     }
 }

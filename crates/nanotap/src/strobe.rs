@@ -30,6 +30,7 @@ impl Clone for Strobe {
     fn clone(&self) -> Self {
         Self {
             flow: Flow::new(Arc::new(System::clone(self.flow.system()))),
+            last: Vec::new(),
             gap: Arc::clone(&self.gap),
             tangents: Arc::clone(&self.tangents),
         }

@@ -1,7 +1,7 @@
 //! Several motions of one system at once.
 //!
 //! The motions do not touch each other, and each is computed by the very same operations as
-//! a [`Flow`] alone, to the last bit. But the work is dealt out in turns: all motions look
+//! a [`Flow`] alone ([`Flow::run_periods`]), to the last bit. But the work is dealt out in turns: all motions look
 //! for their next switch on the lattice, then all evaluate it, then all move on. A single
 //! motion waits for one operation after the other; here the processor always has another
 //! motion's operations to go on with.
@@ -84,7 +84,7 @@ impl Ensemble {
     /// failed; the others go on.
     ///
     /// # Errors
-    /// Motion and reason of the first that failed, as in [`Flow::run_period`].
+    /// Motion and reason of the first that failed, as in [`Flow::run_periods`].
     pub fn run_periods(&mut self, periods: usize) -> Result<(), (usize, FlowError)> {
         for lane in &mut self.lanes {
             lane.left = if lane.failure.is_none() { periods } else { 0 };
@@ -120,11 +120,10 @@ impl Ensemble {
     #[inline(always)]
     fn run<M: Math>(&mut self) {
         let system = &*self.system;
-        let end = system.drive().period();
         let mut running = true;
         while running {
             for lane in &mut self.lanes {
-                lane.look::<M>(system, end);
+                lane.look::<M>(system);
             }
             for lane in &mut self.lanes {
                 if lane.left > 0 {
@@ -133,7 +132,7 @@ impl Ensemble {
             }
             running = false;
             for lane in &mut self.lanes {
-                lane.move_on::<M>(system, end);
+                lane.move_on::<M>(system);
                 running |= lane.left > 0;
             }
         }
@@ -143,35 +142,30 @@ impl Ensemble {
 impl Lane {
     /// Looks for the next switch as far as the lattice tells.
     #[inline(always)]
-    fn look<M: Math>(&mut self, system: &System, end: f64) {
+    fn look<M: Math>(&mut self, system: &System) {
         if self.left == 0 {
             return;
         }
-        self.reach = self.flow.reach::<M>(system, end);
+        self.reach = self.flow.reach_over::<M>(system, self.left);
         match self.flow.prospect::<M>(system, self.reach) {
             Ok(pending) => self.pending = pending,
             Err(reason) => self.fail(reason),
         }
     }
 
-    /// Goes to the switch, or to the end of the period.
+    /// Goes to the switch, or to where the search ended.
     #[inline(always)]
-    fn move_on<M: Math>(&mut self, system: &System, end: f64) {
+    fn move_on<M: Math>(&mut self, system: &System) {
         if self.left == 0 {
             return;
         }
-        let found = self.flow.settle::<M>(system, self.reach, &self.pending);
         let (reach, stalled) = (self.reach, &mut self.stalled);
-        if let Err(reason) = self
+        let found = self.flow.settle::<M>(system, reach, &self.pending);
+        let gone = self
             .flow
-            .go_on::<M, ()>(system, end, reach, found, stalled, &mut ())
-        {
-            return self.fail(reason);
-        }
-        if self.flow.phase() >= end {
-            self.flow.begin_period();
-            self.stalled = 0;
-            self.left -= 1;
+            .go_over::<M>(system, reach, found, &mut self.left, stalled);
+        if let Err(reason) = gone {
+            self.fail(reason);
         }
     }
 

@@ -280,6 +280,80 @@ impl Flow {
         }
     }
 
+    /// Runs from phase 0 over `periods` drive periods without stopping at the ends of those
+    /// in between: a flight that lasts from one period into the next is one flight, so that
+    /// this is faster than [`Flow::run_period`] and agrees with it to rounding.
+    ///
+    /// # Errors
+    /// As [`Flow::run_period`].
+    pub fn run_periods(&mut self, periods: usize) -> Result<(), FlowError> {
+        if self.system.largest_angle() > pack::LARGEST_ANGLE {
+            return self.run_over::<Library>(periods);
+        }
+        #[cfg(target_arch = "x86_64")]
+        if self.fused {
+            // SAFETY: `fused` is set only where the machine has these instructions.
+            return unsafe { self.run_over_fused(periods) };
+        }
+        self.run_over::<Plain>(periods)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn run_over_fused(&mut self, periods: usize) -> Result<(), FlowError> {
+        self.run_over::<Fused>(periods)
+    }
+
+    #[inline(always)]
+    fn run_over<M: Math>(&mut self, periods: usize) -> Result<(), FlowError> {
+        let system = Arc::clone(&self.system);
+        let (mut left, mut stalled) = (periods, 0);
+        while left > 0 {
+            let reach = self.reach_over::<M>(&system, left);
+            let found = self.next_crossing::<M>(&system, reach)?;
+            self.go_over::<M>(&system, reach, found, &mut left, &mut stalled)?;
+        }
+        Ok(())
+    }
+
+    /// How far it may be looked for a switch at once with `left` periods, this one included,
+    /// still to run: never over more than one period's end.
+    #[inline(always)]
+    pub(crate) fn reach_over<M: Math>(&self, system: &System, left: usize) -> f64 {
+        let period = system.drive().period();
+        if left > 1 {
+            self.reach::<M>(system, self.phase + period)
+        } else {
+            self.reach::<M>(system, period)
+        }
+    }
+
+    /// Moves on to the switch that was found within `reach`, or to where the search ended,
+    /// and counts the period that ends on the way.
+    #[inline(always)]
+    pub(crate) fn go_over<M: Math>(
+        &mut self,
+        system: &System,
+        reach: f64,
+        found: Option<(usize, Crossing)>,
+        left: &mut usize,
+        stalled: &mut u32,
+    ) -> Result<(), FlowError> {
+        let period = system.drive().period();
+        let end = if *left > 1 { f64::INFINITY } else { period };
+        self.go_on::<M, ()>(system, end, reach, found, stalled, &mut ())?;
+        if self.phase >= period {
+            if *left > 1 {
+                self.phase -= period;
+                self.set_phasors(system);
+            } else {
+                self.begin_period();
+            }
+            *left -= 1;
+        }
+        Ok(())
+    }
+
     /// Runs to time `end` within the same drive period.
     ///
     /// # Errors
@@ -345,7 +419,7 @@ impl Flow {
             }
             return Ok(());
         };
-        *stalled = if length <= f64::EPSILON * end {
+        *stalled = if length <= f64::EPSILON * system.drive().period() {
             *stalled + 1
         } else {
             0
@@ -454,8 +528,8 @@ impl Flow {
     }
 
     /// The first half of the search for the next switch: what can be said before an
-    /// exponential is computed. Regimes of one exit with a lattice are searched so; others
-    /// at once.
+    /// exponential is computed. Regimes of one exit are searched so whose lattice follows all
+    /// terms; others at once.
     #[inline(always)]
     pub(crate) fn prospect<M: Math>(
         &mut self,
@@ -466,7 +540,7 @@ impl Flow {
         let ([exit], false) = (system.prepared(self.regime), clustered || M::LIBRARY) else {
             return self.next_crossing::<M>(system, reach).map(Pending::Settled);
         };
-        let Some(lattice) = &exit.lattice else {
+        let Some(lattice) = exit.lattice.as_ref().filter(|l| l.is_complete()) else {
             return self.next_crossing::<M>(system, reach).map(Pending::Settled);
         };
         self.signal.refill::<M>(&exit.kernel, &self.packed, reach);

@@ -189,6 +189,11 @@ impl Lattice {
         self.reach
     }
 
+    /// Whether every term is followed, on the fine level at least.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.fine.complete
+    }
+
     /// The terms that are followed.
     #[inline(always)]
     pub(crate) fn followed(&self) -> &[usize] {

@@ -79,9 +79,8 @@ fn every_motion_is_the_one_it_is_alone() {
         for i in 0..size {
             let mut alone = Flow::new(Arc::clone(&system));
             alone.start(&start(i), 0.0).unwrap();
-            for _ in 0..37 {
-                alone.run_period(&mut ()).unwrap();
-            }
+            alone.run_periods(30).unwrap();
+            alone.run_periods(7).unwrap();
             let (mut a, mut b) = ([0.0; 4], [0.0; 4]);
             ensemble.flow(i).state(&mut a);
             alone.state(&mut b);
@@ -89,6 +88,29 @@ fn every_motion_is_the_one_it_is_alone() {
             assert_eq!(ensemble.flow(i).switches(), alone.switches());
             assert!(alone.switches() > 37, "the motions must switch");
         }
+    }
+}
+
+/// Running on over the ends of periods is the same motion as stopping at each.
+#[test]
+fn periods_may_be_run_in_one_go() {
+    let system = system();
+    for i in 0..6 {
+        let (mut one_go, mut stopping) = (Flow::new(system.clone()), Flow::new(system.clone()));
+        one_go.start(&start(i), 0.0).unwrap();
+        stopping.start(&start(i), 0.0).unwrap();
+        one_go.run_periods(12).unwrap();
+        for _ in 0..12 {
+            stopping.run_period(&mut ()).unwrap();
+        }
+        let (mut a, mut b) = ([0.0; 4], [0.0; 4]);
+        one_go.state(&mut a);
+        stopping.state(&mut b);
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() < 1e-10, "{i}: {a} {b}");
+        }
+        assert_eq!(one_go.switches(), stopping.switches());
+        assert_eq!(one_go.phase(), 0.0);
     }
 }
 

@@ -37,6 +37,15 @@ pub trait StroboscopicMap: Clone + Send + Sync {
     /// When the period cannot be computed from this state.
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error>;
 
+    /// Replaces `state` by `P^periods(state)`; a flow that need not stop in between may be
+    /// faster than [`advance`](Self::advance) over and over.
+    ///
+    /// # Errors
+    /// When a period cannot be computed.
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), Self::Error> {
+        (0..periods).try_for_each(|_| self.advance(state))
+    }
+
     /// Replaces `state` by `P(state)` and `jacobian` (`dimension × dimension`)
     /// by `DP(state)`.
     ///

@@ -115,7 +115,9 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
         start,
     };
     let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {
-        return search.stretch::<M>(whole, signal, statistics).flatten();
+        return search
+            .stretch::<M>(whole, signal, statistics)
+            .and_then(Decision::crossing);
     };
     let mut found = None;
     while found.is_none()
@@ -127,7 +129,26 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
         signal.follow_from_start();
     }
     statistics.points += coarse.points;
-    found.flatten()
+    found.and_then(Decision::crossing)
+}
+
+/// What ends a search through cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Decision {
+    /// The crossing.
+    Crossing(Crossing),
+    /// There is one, but beyond the end.
+    TooLate,
+}
+
+impl Decision {
+    /// The crossing, unless it comes too late.
+    pub(crate) fn crossing(self) -> Option<Crossing> {
+        match self {
+            Self::Crossing(crossing) => Some(crossing),
+            Self::TooLate => None,
+        }
+    }
 }
 
 /// What a lattice says of a stretch before anything is evaluated.
@@ -259,14 +280,14 @@ pub(crate) fn evaluate_zero<M: Math>(
 }
 
 /// The crossing at a quintic's zero, if it is certain to be the only one in its cell and one
-/// step away. `Some(None)`: it comes after `length`.
+/// step away.
 #[inline(always)]
 pub(crate) fn confirm_zero(
     zero: &FallingZero,
     (jet, jerk): (Jet, f64),
     signal: &Signal,
     length: f64,
-) -> Option<Option<Crossing>> {
+) -> Option<Decision> {
     // Every zero in the cell is as near as this, and the rate keeps its sign up to there.
     let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
     let unique = near * signal.fastest() < 0.1
@@ -275,11 +296,14 @@ pub(crate) fn confirm_zero(
         return None;
     }
     let crossing = last_cubic_step(&jet, jerk, zero.at, length, signal)?;
-    Some((crossing.at <= length).then_some(crossing))
+    Some(if crossing.at <= length {
+        Decision::Crossing(crossing)
+    } else {
+        Decision::TooLate
+    })
 }
 
-/// A search through the cells of a lattice's fine level. Where it finds `Some(None)` there
-/// is a crossing, which comes too late.
+/// A search through the cells of a lattice's fine level.
 struct CellSearch<'a> {
     lattice: &'a Lattice,
     length: f64,
@@ -294,7 +318,7 @@ impl CellSearch<'_> {
         stretch: Stretch,
         signal: &mut Signal,
         statistics: &mut Statistics,
-    ) -> Option<Option<Crossing>> {
+    ) -> Option<Decision> {
         let mut fine = self.lattice.fine::<M>(signal, stretch);
         let mut found = None;
         while found.is_none()
@@ -313,7 +337,7 @@ impl CellSearch<'_> {
         cell: &Cell,
         signal: &mut Signal,
         statistics: &mut Statistics,
-    ) -> Option<Option<Crossing>> {
+    ) -> Option<Decision> {
         if let Some(zero) = cell.falling_zero() {
             let evaluated = evaluate_zero::<M>(&zero, signal, statistics);
             let confirmed = confirm_zero(&zero, evaluated, signal, self.length);
@@ -324,9 +348,11 @@ impl CellSearch<'_> {
         #[cfg(target_arch = "x86_64")]
         if M::FUSED {
             // SAFETY: this arithmetic is in use only where the machine has it.
-            return unsafe { self.cell_in_steps_fused(cell, signal, statistics) }.map(Some);
+            return unsafe { self.cell_in_steps_fused(cell, signal, statistics) }
+                .map(Decision::Crossing);
         }
-        self.cell_in_steps_plain(cell, signal, statistics).map(Some)
+        self.cell_in_steps_plain(cell, signal, statistics)
+            .map(Decision::Crossing)
     }
 
     #[cfg(target_arch = "x86_64")]

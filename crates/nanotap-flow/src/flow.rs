@@ -579,7 +579,7 @@ impl Flow {
         };
         let confirmed = confirm_zero(zero, evaluated, &self.signal, reach);
         let found = match (confirmed, &system.prepared(self.regime)[0].lattice) {
-            (Some(found), _) => found,
+            (Some(decision), _) => decision.crossing(),
             (None, Some(lattice)) => {
                 let start = self.start_of(0);
                 let statistics = &mut self.statistics;

@@ -252,7 +252,8 @@ macro_rules! arrays {
         }
         #[inline(always)]
         fn below(a: Pack, b: Pack) -> u32 {
-            (0..WIDTH).fold(0, |bits, i| bits | u32::from(!(a[i] >= b[i])) << i)
+            let at_least = |i: usize| a[i] >= b[i];
+            (0..WIDTH).fold(0, |bits, i| bits | (u32::from(!at_least(i)) << i))
         }
         #[inline(always)]
         fn with_first(a: Pack, b: Pack) -> Pack {

@@ -176,9 +176,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     }
     let mut map = Strobe::new(model);
     let transient = if let Some(transient) = options.transient {
-        for _ in 0..transient {
-            map.advance(&mut state)?;
-        }
+        map.advance_by(&mut state, transient)?;
         transient
     } else {
         measured_transient(&mut map, &mut state, &options.settle)?

@@ -114,6 +114,13 @@ impl StroboscopicMap for Strobe {
         Ok(())
     }
 
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), FlowError> {
+        self.begin(state)?;
+        self.flow.run_periods(periods)?;
+        self.end(state);
+        Ok(())
+    }
+
     fn advance_with_jacobian(
         &mut self,
         state: &mut [f64],

@@ -243,10 +243,8 @@ impl<'a> Runner<'a> {
     /// The motion after a number of periods.
     fn after(&mut self, start: &[f64], transient: usize) -> (Outcome, Option<Vec<f64>>) {
         let mut state = start.to_vec();
-        for _ in 0..transient {
-            if let Err(error) = self.map.advance(&mut state) {
-                return (Outcome::unknown(class_of(&error), transient), None);
-            }
+        if let Err(error) = self.map.advance_by(&mut state, transient) {
+            return (Outcome::unknown(class_of(&error), transient), None);
         }
         let named = Named::of(&settle(&mut self.map, &state, &self.settle).verdict);
         self.recorded(Outcome::named(&named, transient), &state, None)

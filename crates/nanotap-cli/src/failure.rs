@@ -116,6 +116,9 @@ impl From<OrbitError> for Failure {
     fn from(error: OrbitError) -> Self {
         match error {
             OrbitError::NoPeriod => Self::request(error.to_string(), "give --period 1 or more"),
+            OrbitError::TooManyHarmonics { .. } => {
+                Self::request(error.to_string(), "give fewer --harmonics")
+            }
             OrbitError::Start(error) => error.into(),
             other => Self::Failed(other.to_string()),
         }
@@ -127,6 +130,9 @@ impl From<AttractorsError> for Failure {
         match error {
             AttractorsError::NoStarts => {
                 Self::request(error.to_string(), "give --starts 1 or more")
+            }
+            AttractorsError::TooManyStarts { .. } => {
+                Self::request(error.to_string(), "give fewer --starts")
             }
             AttractorsError::Box(_) | AttractorsError::Dimension { .. } => {
                 Self::request(error.to_string(), "change it with --box")

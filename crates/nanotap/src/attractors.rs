@@ -56,6 +56,12 @@ pub enum AttractorsError {
     /// Nothing to start from.
     #[error("at least one start is needed, 0 were asked for")]
     NoStarts,
+    /// More than fit in memory.
+    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
+    TooManyStarts {
+        /// How many were asked for.
+        starts: usize,
+    },
     /// The box makes no sense.
     #[error(transparent)]
     Box(#[from] StartBoxError),
@@ -221,6 +227,8 @@ pub struct TransientChaosReport {
     pub destinations: Vec<(usize, usize)>,
 }
 
+/// Most starts of a census: 480 MB of states at N = 3.
+pub const MOST_STARTS: usize = 10_000_000;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -237,6 +245,11 @@ pub fn attractors(
 ) -> Result<Attractors, AttractorsError> {
     if options.starts == 0 {
         return Err(AttractorsError::NoStarts);
+    }
+    if options.starts > MOST_STARTS {
+        return Err(AttractorsError::TooManyStarts {
+            starts: options.starts,
+        });
     }
     let start_box = options
         .start_box

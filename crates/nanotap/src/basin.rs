@@ -19,6 +19,7 @@ use nanotap_figures::{
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::attractors::MOST_STARTS;
 use crate::dataset::schema::Kind;
 use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
@@ -190,6 +191,12 @@ pub enum BasinError {
         /// What there is.
         known: String,
     },
+    /// More than fit in memory.
+    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
+    TooManyStarts {
+        /// How many were asked for.
+        starts: usize,
+    },
     /// A number that must be larger.
     #[error("{what}; at least 1 is needed")]
     Zero {
@@ -258,6 +265,11 @@ impl Basin {
             if number == 0 {
                 return Err(BasinError::Zero { what });
             }
+        }
+        if options.starts > MOST_STARTS {
+            return Err(BasinError::TooManyStarts {
+                starts: options.starts,
+            });
         }
         if options.x.count.saturating_mul(options.y.count) > MOST_POINTS {
             let what = format!(

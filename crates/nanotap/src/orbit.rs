@@ -47,6 +47,12 @@ pub enum OrbitError {
     /// A period of 0.
     #[error("a period of at least 1 is needed, 0 was given")]
     NoPeriod,
+    /// More harmonics than anything has.
+    #[error("{harmonics} harmonics are too many; {MOST_HARMONICS} at most")]
+    TooManyHarmonics {
+        /// How many were asked for.
+        harmonics: usize,
+    },
     /// The start makes no sense.
     #[error(transparent)]
     Start(#[from] SimulateError),
@@ -111,6 +117,9 @@ pub struct OrbitReport {
     pub trajectory: Trajectory,
 }
 
+/// Most harmonics of the drive frequency that are reported.
+pub const MOST_HARMONICS: usize = 100_000;
+
 /// Finds a periodic orbit of `model`.
 ///
 /// # Errors
@@ -118,6 +127,11 @@ pub struct OrbitReport {
 pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, OrbitError> {
     if options.period == Some(0) {
         return Err(OrbitError::NoPeriod);
+    }
+    if options.harmonics > MOST_HARMONICS {
+        return Err(OrbitError::TooManyHarmonics {
+            harmonics: options.harmonics,
+        });
     }
     let start = starting_state(model, options.state.as_deref())?;
     let mut map = Strobe::new(model);

@@ -27,6 +27,7 @@ pub mod attributes;
 mod deflate;
 pub mod error;
 pub mod grid;
+pub mod gsf;
 pub mod merge;
 pub mod schema;
 pub mod share;

@@ -1,0 +1,200 @@
+//! Maps as Gwyddion's simple fields, `.gsf`, which programs for AFM data open.
+//!
+//! A file is a text header, zeros up to the next multiple of four bytes, and the values as
+//! little-endian 32-bit floats, row by row from the top. Since pictures have their origin at
+//! the top, the row of the greatest `y` comes first. What is not known is NaN.
+
+use std::fmt::Write as _;
+
+/// Two axes and a value at each of their crossings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// What it shows; one line.
+    pub title: String,
+    /// Values of the horizontal axis, in equal steps, rising.
+    pub x: Vec<f64>,
+    /// Values of the vertical axis, in equal steps, rising.
+    pub y: Vec<f64>,
+    /// The values, a row a value of `y`.
+    pub values: Vec<f64>,
+    /// Unit of the axes in SI, empty if they have none.
+    pub axis_unit: String,
+    /// Unit of the values in SI, empty if they have none.
+    pub value_unit: String,
+}
+
+/// A field that the format cannot hold.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FieldError {
+    /// The values do not fill the axes.
+    #[error("{found} values where {columns} by {rows} are needed")]
+    Size {
+        /// How many there are.
+        found: usize,
+        /// Values of the horizontal axis.
+        columns: usize,
+        /// Values of the vertical axis.
+        rows: usize,
+    },
+    /// An axis is no row of pixels.
+    #[error("the {axis} axis does not rise in equal steps, as the pixels of a GSF file do")]
+    Steps {
+        /// `horizontal` or `vertical`.
+        axis: &'static str,
+    },
+    /// An axis has no value at all.
+    #[error("the {axis} axis is empty")]
+    Empty {
+        /// `horizontal` or `vertical`.
+        axis: &'static str,
+    },
+}
+
+/// Largest deviation of a value from its place, as a part of a step.
+const TOLERANCE: f64 = 1e-6;
+/// What the header is padded to.
+const ALIGNMENT: usize = 4;
+
+impl Field {
+    /// The file.
+    ///
+    /// # Errors
+    /// [`FieldError`] where the format cannot hold it.
+    pub fn to_gsf(&self) -> Result<Vec<u8>, FieldError> {
+        let (columns, rows) = (self.x.len(), self.y.len());
+        let (width, left) = extent(&self.x, "horizontal")?;
+        let (height, bottom) = extent(&self.y, "vertical")?;
+        if columns.checked_mul(rows) != Some(self.values.len()) {
+            return Err(FieldError::Size {
+                found: self.values.len(),
+                columns,
+                rows,
+            });
+        }
+        let mut header = String::from("Gwyddion Simple Field 1.0\n");
+        // Writing to a string does not fail.
+        let _ = write!(
+            header,
+            "XRes = {columns}\nYRes = {rows}\nXReal = {width:e}\nYReal = {height:e}\n\
+             XOffset = {left:e}\nYOffset = {bottom:e}\n"
+        );
+        for (key, text) in [
+            ("Title", &self.title),
+            ("XYUnits", &self.axis_unit),
+            ("ZUnits", &self.value_unit),
+        ] {
+            let line: String = text.chars().filter(|c| !c.is_control()).collect();
+            if !line.is_empty() {
+                let _ = writeln!(header, "{key} = {line}");
+            }
+        }
+        let mut file = header.into_bytes();
+        // One zero at least ends the header.
+        let zeros = ALIGNMENT - file.len() % ALIGNMENT;
+        file.resize(file.len() + zeros, 0);
+        for row in self.values.chunks_exact(columns).rev() {
+            file.extend(row.iter().flat_map(|value| (*value as f32).to_le_bytes()));
+        }
+        Ok(file)
+    }
+}
+
+/// The length of an axis of pixels and where it begins: half a step before the first value.
+fn extent(values: &[f64], axis: &'static str) -> Result<(f64, f64), FieldError> {
+    let (Some(first), Some(last)) = (values.first(), values.last()) else {
+        return Err(FieldError::Empty { axis });
+    };
+    if values.len() == 1 {
+        return if first.is_finite() {
+            Ok((1.0, first - 0.5))
+        } else {
+            Err(FieldError::Steps { axis })
+        };
+    }
+    let step = (last - first) / (values.len() - 1) as f64;
+    let in_place =
+        |(k, value): (usize, &f64)| (value - (first + step * k as f64)).abs() <= TOLERANCE * step;
+    // A step that is no number is not greater than zero.
+    if step > 0.0 && step.is_finite() && values.iter().enumerate().all(in_place) {
+        Ok((step * values.len() as f64, first - 0.5 * step))
+    } else {
+        Err(FieldError::Steps { axis })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field() -> Field {
+        Field {
+            title: "a map".into(),
+            x: vec![1.0, 2.0, 3.0],
+            y: vec![10.0, 20.0],
+            values: vec![1.0, 2.0, 3.0, 4.0, 5.0, f64::NAN],
+            axis_unit: String::new(),
+            value_unit: "m".into(),
+        }
+    }
+
+    /// The layout is that of Gwyddion's user guide, "Gwyddion Simple Field".
+    #[test]
+    fn a_field_is_header_zeros_and_rows_from_the_top() {
+        let file = field().to_gsf().unwrap();
+        let end = file.iter().position(|byte| *byte == 0).unwrap();
+        let header = std::str::from_utf8(&file[..end]).unwrap();
+        assert_eq!(
+            header,
+            "Gwyddion Simple Field 1.0\nXRes = 3\nYRes = 2\nXReal = 3e0\nYReal = 2e1\n\
+             XOffset = 5e-1\nYOffset = 5e0\nTitle = a map\nZUnits = m\n"
+        );
+        let data = &file[file.len() - 4 * 6..];
+        assert_eq!((file.len() - data.len()) % 4, 0);
+        let zeros = &file[end..file.len() - data.len()];
+        assert!((1..=4).contains(&zeros.len()) && zeros.iter().all(|byte| *byte == 0));
+        let values: Vec<f32> = data
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+            .collect();
+        assert_eq!(values[..2], [4.0, 5.0]);
+        assert!(values[2].is_nan());
+        assert_eq!(values[3..], [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn the_header_is_padded_whatever_its_length() {
+        for length in 0..9 {
+            let field = Field {
+                title: "t".repeat(length),
+                ..field()
+            };
+            let file = field.to_gsf().unwrap();
+            assert_eq!(file.len() % 4, 0);
+            assert_eq!(file[file.len() - 24 - 1], 0);
+        }
+    }
+
+    #[test]
+    fn what_is_no_row_of_pixels_is_refused() {
+        for x in [
+            vec![1.0, 2.0, 4.0],
+            vec![3.0, 2.0, 1.0],
+            vec![1.0, 1.0, 1.0],
+            vec![1.0, f64::NAN, 3.0],
+            vec![f64::INFINITY, 2.0, 3.0],
+        ] {
+            let refused = Field { x, ..field() }.to_gsf();
+            assert_eq!(refused, Err(FieldError::Steps { axis: "horizontal" }));
+        }
+        let empty = Field {
+            y: Vec::new(),
+            ..field()
+        };
+        assert_eq!(empty.to_gsf(), Err(FieldError::Empty { axis: "vertical" }));
+        let short = Field {
+            values: vec![1.0],
+            ..field()
+        };
+        assert!(matches!(short.to_gsf(), Err(FieldError::Size { .. })));
+    }
+}

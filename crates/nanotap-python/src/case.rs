@@ -1,7 +1,7 @@
 //! The case: read, resolved, and shown.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nanotap::case_document::{CaseDocument, MappingDocument};
 use nanotap::case_file::{self, CaseFile, PHYSICAL_KEYS, Source};
@@ -12,6 +12,7 @@ use nanotap::time_series::state_names;
 use pyo3::prelude::*;
 
 use crate::failure::Failure;
+use crate::watch::watched;
 
 /// A checked case. It keeps what it was made of, text for text, so that it can be made
 /// again with changes, and elsewhere.
@@ -21,12 +22,28 @@ pub(crate) struct CaseCore {
     source: Option<Source>,
     overrides: Vec<String>,
     catalogues: Vec<(String, String)>,
+    at_setpoint: OnceLock<Arc<Studied>>,
 }
 
 impl CaseCore {
-    /// What it describes.
-    pub(crate) fn studied(&self) -> Arc<Studied> {
+    /// What it describes, whether or not its distance is left to the setpoint.
+    pub(crate) fn at_any_distance(&self) -> Arc<Studied> {
         Arc::clone(&self.studied)
+    }
+
+    /// What it describes; where its distance is left to the setpoint, that is solved for,
+    /// once.
+    pub(crate) fn studied(&self, py: Python<'_>) -> PyResult<Arc<Studied>> {
+        if !self.studied.leaves_distance_to_setpoint() {
+            return Ok(self.at_any_distance());
+        }
+        if let Some(solved) = self.at_setpoint.get() {
+            return Ok(Arc::clone(solved));
+        }
+        let studied = Studied::clone(&self.studied);
+        let done = watched(py, None, move |control| Ok(studied.at_setpoint(control)?))?;
+        let solved = self.at_setpoint.get_or_init(|| Arc::new(done.result));
+        Ok(Arc::clone(solved))
     }
 
     fn make(
@@ -47,6 +64,7 @@ impl CaseCore {
             source,
             overrides,
             catalogues,
+            at_setpoint: OnceLock::new(),
         })
     }
 }
@@ -99,6 +117,22 @@ impl CaseCore {
     #[getter]
     fn document(&self) -> PyResult<String> {
         Ok(serde_json::to_string(&CaseDocument::of(&self.studied)).map_err(Failure::from)?)
+    }
+
+    /// The document of the case as it is studied, its distance solved for, JSON.
+    #[getter]
+    fn document_at_setpoint(&self, py: Python<'_>) -> PyResult<String> {
+        let studied = self.studied(py)?;
+        Ok(serde_json::to_string(&CaseDocument::of(&studied)).map_err(Failure::from)?)
+    }
+
+    /// Every distance at which an orbit has the setpoint amplitude, JSON; `None` where the
+    /// distance is given.
+    #[getter]
+    fn setpoint(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let studied = self.studied(py)?;
+        let report = studied.setpoint.as_ref().map(serde_json::to_string);
+        Ok(report.transpose().map_err(Failure::from)?)
     }
 
     /// Of a physical case, every parameter beside its physical quantity, JSON.

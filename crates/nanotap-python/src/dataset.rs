@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use nanotap::basin::{self, Basin, BasinOptions, SliceRange};
 use nanotap::control::Control;
+use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Schema, Share, Store, Work, WorkError, table};
+use nanotap::experiment::window::Window;
 use nanotap::sweep::{self, Follow, Over, Starts, Sweep, SweepOptions};
 use nanotap_figures::Figure;
 use numpy::PyReadonlyArray1;
@@ -61,6 +63,7 @@ impl Recipe {
     #[staticmethod]
     #[pyo3(signature = (case, *, over, starts, seed, sides, state, follow, periods, strobe, transient, max_period))]
     fn sweep(
+        py: Python<'_>,
         case: &CaseCore,
         over: Vec<String>,
         starts: Option<usize>,
@@ -73,7 +76,8 @@ impl Recipe {
         transient: Option<usize>,
         max_period: usize,
     ) -> PyResult<Self> {
-        let studied = case.studied();
+        let names: Vec<&str> = over.iter().map(|given| name_of(given)).collect();
+        let studied = case.studied(py)?.varying(&names).map_err(Failure::from)?;
         let over = over
             .iter()
             .map(|given| Over::parse(given, &studied.subject))
@@ -120,7 +124,7 @@ impl Recipe {
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let studied = case.studied();
+        let studied = case.studied(py)?;
         let range = |given: &str| SliceRange::parse(given).map_err(Failure::from);
         let options = BasinOptions {
             state: numbers(state),
@@ -199,6 +203,11 @@ impl Recipe {
     }
 }
 
+/// The parameter of an axis as it is written.
+fn name_of(over: &str) -> &str {
+    over.split('=').next().unwrap_or_default().trim()
+}
+
 impl Recipe {
     fn store(&self, path: &Path) -> Result<Store, Failure> {
         Ok(Store::create_or_resume(path, self.kind.schema().clone())?)
@@ -266,6 +275,16 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
     Ok(summary()?)
 }
 
+/// What there is at each point of a finished sweep over two parameters: JSON.
+#[pyfunction]
+pub(crate) fn window(path: PathBuf) -> PyResult<String> {
+    let window = || -> Result<String, Failure> {
+        let (store, _) = opened(&path)?;
+        Ok(serde_json::to_string(&Window::of(&store)?)?)
+    };
+    Ok(window()?)
+}
+
 /// The terminal's picture of a finished dataset, as `svg`, `png` or `pdf`.
 #[pyfunction]
 pub(crate) fn figure<'py>(
@@ -322,4 +341,30 @@ pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
         written
     };
     Ok(write()?)
+}
+
+/// A map as a file of Gwyddion's.
+#[pyfunction]
+pub(crate) fn gsf<'py>(
+    py: Python<'py>,
+    title: String,
+    x: PyReadonlyArray1<'_, f64>,
+    y: PyReadonlyArray1<'_, f64>,
+    values: PyReadonlyArray1<'_, f64>,
+    axis_unit: String,
+    value_unit: String,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let row = |values: PyReadonlyArray1<'_, f64>| values.as_array().to_vec();
+    let field = Field {
+        title,
+        x: row(x),
+        y: row(y),
+        values: row(values),
+        axis_unit,
+        value_unit,
+    };
+    let file = field
+        .to_gsf()
+        .map_err(|error| Failure::Input(error.to_string()))?;
+    Ok(PyBytes::new(py, &file))
 }

@@ -8,12 +8,15 @@ use nanotap::branch::BranchError;
 use nanotap::case::CaseError;
 use nanotap::case_file::{CaseFileError, Place};
 use nanotap::dataset::{StoreError, WorkError};
+use nanotap::experiment::approach::ApproachError;
+use nanotap::experiment::setpoint::SetpointError;
 use nanotap::fixed_step_run::FixedStepError;
 use nanotap::mode_table::ModeTableError;
 use nanotap::model::{FlowError, ModelError};
 use nanotap::orbit::OrbitError;
 use nanotap::paper::PaperError;
 use nanotap::physical::CatalogueError;
+use nanotap::physical_subject::VaryError;
 use nanotap::simulate::SimulateError;
 use nanotap::start_box::SideError;
 use nanotap::studied::ParameterValueError;
@@ -63,6 +66,7 @@ input!(
     SideError,
     SweepError,
     UnknownKey,
+    VaryError,
 );
 
 impl From<CaseFileError> for Failure {
@@ -140,7 +144,9 @@ impl From<FixedStepError> for Failure {
 impl From<OrbitError> for Failure {
     fn from(error: OrbitError) -> Self {
         match error {
-            OrbitError::NoPeriod => Self::Input(error.to_string()),
+            OrbitError::NoPeriod | OrbitError::TooManyHarmonics { .. } => {
+                Self::Input(error.to_string())
+            }
             OrbitError::Start(error) => error.into(),
             other => Self::Failed(other.to_string()),
         }
@@ -168,6 +174,26 @@ impl From<BranchError> for Failure {
                 error: OrbitError::Start(_) | OrbitError::NoPeriod,
                 ..
             } => Self::Input(error.to_string()),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<ApproachError> for Failure {
+    fn from(error: ApproachError) -> Self {
+        match error {
+            ApproachError::Model(error) => error.into(),
+            ApproachError::Branch(error) => error.into(),
+            other => Self::Input(other.to_string()),
+        }
+    }
+}
+
+impl From<SetpointError> for Failure {
+    fn from(error: SetpointError) -> Self {
+        match error {
+            SetpointError::Approach(error) => error.into(),
+            SetpointError::None => Self::Input(error.to_string()),
             other => Self::Failed(other.to_string()),
         }
     }

@@ -37,13 +37,16 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(motion::observe, module)?,
         wrap_pyfunction!(study::attractors, module)?,
         wrap_pyfunction!(study::branch, module)?,
+        wrap_pyfunction!(study::approach, module)?,
         wrap_pyfunction!(study::lyapunov, module)?,
         wrap_pyfunction!(study::convergence, module)?,
         wrap_pyfunction!(study::paper, module)?,
         wrap_pyfunction!(study::paper_sections, module)?,
         wrap_pyfunction!(dataset::merge, module)?,
         wrap_pyfunction!(dataset::summary, module)?,
+        wrap_pyfunction!(dataset::window, module)?,
         wrap_pyfunction!(dataset::figure, module)?,
+        wrap_pyfunction!(dataset::gsf, module)?,
         wrap_pyfunction!(dataset::write_table, module)?,
     ] {
         module.add_function(function)?;

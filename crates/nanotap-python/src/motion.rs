@@ -76,7 +76,7 @@ pub(crate) fn modes<'py>(
     case: &CaseCore,
     points: usize,
 ) -> PyResult<(String, Row<'py>, Rows<'py>)> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let Subject::Cantilever(case) = &studied.subject else {
         return Err(oscillator(&studied, "modes").into());
     };
@@ -135,7 +135,7 @@ pub(crate) fn simulate<'py>(
     series_periods: usize,
     resolution: usize,
 ) -> PyResult<(String, Table<'py>)> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let options = SimulateOptions {
         periods,
         transient,
@@ -171,7 +171,7 @@ pub(crate) fn fixed_step<'py>(
     steps: [u32; 2],
     every_stage: bool,
 ) -> PyResult<(String, Table<'py>)> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let options = FixedStepOptions {
         periods,
         transient: transient.unwrap_or(FixedStepOptions::default().transient),
@@ -205,7 +205,7 @@ pub(crate) fn orbit<'py>(
     harmonics: usize,
     resolution: usize,
 ) -> PyResult<(String, Table<'py>)> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let options = OrbitOptions {
         period,
         state: numbers(state),
@@ -268,7 +268,10 @@ pub(crate) fn observe(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Vec<Told>, bool)> {
-    let cases: Vec<Arc<Studied>> = cases.iter().map(|case| case.studied()).collect();
+    let cases: Vec<Arc<Studied>> = cases
+        .iter()
+        .map(|case| case.studied(py))
+        .collect::<PyResult<_>>()?;
     let state = numbers(state);
     let how = if orbits {
         Observe::Orbit(OrbitOptions {

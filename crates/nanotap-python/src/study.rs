@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use nanotap::attractors::{AttractorsOptions, attractors as census};
 use nanotap::branch::{BranchOptions, BranchReport, SeedOptions, branch as follow};
 use nanotap::convergence::convergence as compare;
+use nanotap::experiment::approach::{
+    ApproachOptions, ApproachReport, approach as approach_curve, gap_key,
+};
 use nanotap::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov as exponents};
 use nanotap::orbit::OrbitOptions;
 use nanotap::paper::{Check, Options as PaperOptions, Verdict, report, section_names};
@@ -35,7 +38,7 @@ pub(crate) fn attractors(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, bool)> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let done = watched(py, progress, move |control| {
         let model = studied.model()?;
         let options = AttractorsOptions {
@@ -82,14 +85,25 @@ pub(crate) fn branch(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, bool)> {
-    let studied = case.studied();
-    let key = studied.key(parameter).map_err(Failure::from)?;
-    let value = |key, text: &str| studied.value(key, text).map_err(Failure::from);
+    let studied = case.studied(py)?;
+    let names: Vec<&str> = std::iter::once(parameter)
+        .chain(second.iter().map(|(name, ..)| name.as_str()))
+        .collect();
+    let studied = studied.varying(&names).map_err(Failure::from)?;
+    let ends = |name: &str, from: &str, to: &str| -> Result<_, Failure> {
+        let key = studied.key(name)?;
+        let (key, from) = studied.key_and_value(key, from)?;
+        let (other, end) = studied.key_and_value(key, to)?;
+        if other != key {
+            return Err(Failure::Input(format!(
+                "{to}: the ends of the range measure different things"
+            )));
+        }
+        Ok((key, from, end))
+    };
+    let (key, from, to) = ends(parameter, from_, to)?;
     let second = second
-        .map(|(name, low, high)| {
-            let key = studied.key(&name)?;
-            Ok::<_, Failure>((key, value(key, &low)?, value(key, &high)?))
-        })
+        .map(|(name, low, high)| ends(&name, &low, &high))
         .transpose()?;
     let options = BranchOptions {
         period,
@@ -103,11 +117,60 @@ pub(crate) fn branch(
         }),
         second,
         max_step,
-        ..BranchOptions::over(key, value(key, from_)?, value(key, to)?)
+        ..BranchOptions::over(key, from, to)
     };
     let done = watched(py, progress, move |control| {
         let report = on_threads(threads, || follow(&studied.subject, &options, control))??;
         Ok(serde_json::to_string(&Branches {
+            report: &report,
+            parameter_unit: studied.parameter_unit(key),
+        })?)
+    })?;
+    Ok((done.result, done.interrupted))
+}
+
+/// The document of an approach curve.
+#[derive(Serialize)]
+struct Approach<'a> {
+    #[serde(flatten)]
+    report: &'a ApproachReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameter_unit: Option<ParameterUnit>,
+}
+
+/// A motion followed to the sample and back: JSON, and whether Ctrl-C stopped it.
+#[pyfunction]
+#[pyo3(signature = (case, *, from_, to, points, branches, doublings, max_period, threads, progress))]
+pub(crate) fn approach(
+    py: Python<'_>,
+    case: &CaseCore,
+    from_: Option<&str>,
+    to: Option<&str>,
+    points: usize,
+    branches: bool,
+    doublings: usize,
+    max_period: usize,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, bool)> {
+    let studied = case.at_any_distance();
+    let key = gap_key(&studied.subject);
+    let distance = |text: Option<&str>| {
+        text.map(|text| studied.value(key, text).map_err(Failure::from))
+            .transpose()
+    };
+    let options = ApproachOptions {
+        from: distance(from_)?,
+        to: distance(to)?,
+        points,
+        branches,
+        doublings,
+        max_period,
+        ..ApproachOptions::default()
+    };
+    let done = watched(py, progress, move |control| {
+        let report = on_threads(threads, || approach_curve(&studied, &options, control))??;
+        Ok(serde_json::to_string(&Approach {
             report: &report,
             parameter_unit: studied.parameter_unit(key),
         })?)
@@ -129,7 +192,7 @@ pub(crate) fn lyapunov<'py>(
     phase: Option<f64>,
     points: usize,
 ) -> PyResult<(String, Bound<'py, PyArray2<f64>>)> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let options = LyapunovOptions {
         transient,
         state: numbers(state),
@@ -169,7 +232,7 @@ pub(crate) fn convergence(
     tolerance: f64,
     period: Option<usize>,
 ) -> PyResult<String> {
-    let studied = case.studied();
+    let studied = case.studied(py)?;
     let done = watched(py, None, move |_| {
         let Subject::Cantilever(case) = &studied.subject else {
             return Err(oscillator(&studied, "convergence"));

@@ -2,7 +2,7 @@
 
 A `Case` says which cantilever, sample and drive; a function for every command of the
 terminal says what it does: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`,
-`branch`, `lyapunov`, `convergence`, `paper`, `merge`. Results carry the names that the
+`branch`, `approach`, `window`, `lyapunov`, `convergence`, `paper`, `merge`. Results carry the names that the
 terminal's JSON has, as xarray Datasets, objects and lists of objects.
 
 >>> import nanotap
@@ -11,8 +11,11 @@ terminal's JSON has, as xarray Datasets, objects and lists of objects.
 1
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from ._case import Case, catalogue
-from ._datasets import basin, merge, open, sweep
+from ._datasets import basin, merge, open, sweep, window
 from ._interrupt import Interrupted
 from ._motions import modes, orbit, simulate
 from ._nanotap import __version__
@@ -26,7 +29,10 @@ from ._results import (
     Paper,
     Record,
 )
-from ._studies import attractors, branch, convergence, lyapunov, paper
+from ._studies import approach, attractors, branch, convergence, lyapunov, paper
+
+if TYPE_CHECKING:
+    from . import export, plot
 
 __all__ = [
     "Attractor",
@@ -40,17 +46,33 @@ __all__ = [
     "Paper",
     "Record",
     "__version__",
+    "approach",
     "attractors",
     "basin",
     "branch",
     "catalogue",
     "convergence",
+    "export",
     "lyapunov",
     "merge",
     "modes",
     "open",
     "orbit",
     "paper",
+    "plot",
     "simulate",
     "sweep",
+    "window",
 ]
+
+
+def __getattr__(name: str) -> object:
+    # matplotlib and pyarrow take longer to import than everything else together.
+    if name in {"plot", "export"}:
+        return import_module(f".{name}", __name__)
+    message = f"module 'nanotap' has no attribute {name!r}"
+    raise AttributeError(message)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

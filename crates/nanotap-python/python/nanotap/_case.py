@@ -146,6 +146,15 @@ class Case:
         return self._core.remarks
 
     @property
+    def setpoint_distances(self) -> Record | None:
+        """Every distance at which an orbit has the setpoint amplitude, and which of them the
+        feedback finds (`chosen`); of a physical case with a setpoint and without `gap.tip`,
+        whose distance is solved for when it is first studied. Else `None`.
+        """
+        text = self._core.setpoint
+        return None if text is None else Record(json.loads(text))
+
+    @property
     def state_names(self) -> list[str]:
         """The names of the entries of a state: a1 … aN, v1 … vN; or x, v."""
         return self._core.state_names

@@ -7,6 +7,8 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from . import _arguments, _nanotap
 from ._arguments import Box, Progress
 from ._case import Case, Path
@@ -237,6 +239,76 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
 def summary(ds: "xr.Dataset | Path") -> Record:
     """What the runs of a sweep, or the points of a basin, in a store came to."""
     return Record(json.loads(_nanotap.summary(_path_of(ds))))
+
+
+def window(
+    case: Case,
+    *,
+    over: Sequence[str] | Mapping[str, Any],
+    starts: int = 16,
+    seed: int = 1,
+    max_period: int = 32,
+    out: Path | None = None,
+    threads: int | None = None,
+    client: "Client | None" = None,
+    progress: Progress = None,
+) -> "xr.Dataset":
+    """The operating window over two parameters: where the lever taps with one motion only,
+    and where a second state, subharmonics or chaos threaten.
+
+    Args:
+        case: Whose window.
+        over: Two parameters with their values, as in `sweep`; of a physical case also its
+            quantities, as in `{"gap.tip": ("5 nm", "25 nm", 41)}`.
+        starts: Quasi-random starts of the census at each point.
+        seed: Their seed.
+        max_period: Longest period looked for.
+        out: The dataset of the census, as in `sweep`.
+        threads: As in `sweep`.
+        client: As in `sweep`.
+        progress: As in `sweep`.
+
+    Returns:
+        The sweep with `condition` over both parameters: no-contact, one-period-1,
+        second-state, subharmonic, irregular or undecided; `share` says how much of each
+        there is.
+
+    Raises:
+        ValueError: something that was asked for is not right.
+    """
+    import xarray as xr
+
+    words = _arguments.axes(over)
+    if len(words) != 2:
+        message = f"{len(words)} parameters make no window; two are needed"
+        raise ValueError(message)
+    with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
+        store = (
+            os.path.join(folder, "window.zarr") if out is None else _ending(out, "out")
+        )
+        ds = sweep(
+            case,
+            over=words,
+            starts=starts,
+            seed=seed,
+            periods=1,
+            strobe=1,
+            max_period=max_period,
+            out=store,
+            threads=threads,
+            client=client,
+            progress=progress,
+        )
+        found = json.loads(_nanotap.window(store))
+        if out is None:
+            ds = ds.load()
+            del ds.attrs["path"]
+    dims = ds.classification.dims[:2]
+    shares = found["shares"]
+    return ds.assign(
+        condition=xr.DataArray(np.array(found["conditions"], dtype=str), dims=dims),
+        share=("kind_of_point", np.array(list(shares.values()))),
+    ).assign_coords(kind_of_point=np.array(list(shares), dtype=str))
 
 
 def _path_of(ds: "xr.Dataset | Path") -> str:

@@ -112,5 +112,5 @@ def case_attributes(case: "Case", title: str) -> dict[str, str]:
     return {
         "title": title,
         "nanotap_version": __version__,
-        "case": case._core.document,
+        "case": case._core.document_at_setpoint,
     }

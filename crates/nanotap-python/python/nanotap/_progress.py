@@ -3,6 +3,9 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
 
 from ._arguments import Progress
 
@@ -23,7 +26,7 @@ def bar(progress: Progress, noun: str) -> Iterator[Callable[[int, int], object] 
         yield None
         return
     try:
-        from tqdm.auto import tqdm
+        tqdm = _tqdm()
     except ImportError:
         if progress:
             message = "progress=True needs tqdm: pip install 'nanotap[progress]'"
@@ -46,3 +49,10 @@ def _somebody_looks() -> bool:
     if "ipykernel" in sys.modules:
         return True
     return sys.stderr is not None and sys.stderr.isatty()
+
+
+def _tqdm() -> Any:
+    """tqdm's bar: of widgets in a notebook that has them, else of letters."""
+    if "ipykernel" in sys.modules and find_spec("ipywidgets"):
+        return import_module("tqdm.notebook").tqdm
+    return import_module("tqdm").tqdm

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from ._case import Case
+    from .plot import Picture
+
 
 class Record(Mapping[str, Any]):
     """A part of a document: its entries by name, as items and as attributes."""
@@ -228,6 +231,12 @@ class Orbit(Result):
             "order"
         )
 
+    def plot(self, **options: Any) -> "Picture":
+        """The orbit as the terminal draws it; see `nanotap.plot.orbit`."""
+        from . import plot
+
+        return plot.orbit(self, **options)
+
     def __repr__(self) -> str:
         return (
             f"Orbit(period={self.period}, {self.stability}, largest multiplier "
@@ -285,7 +294,8 @@ class Attractor(Result):
 class Attractors(Sequence[Attractor]):
     """A census: the attractors as a sequence, the largest first, and what else it found."""
 
-    def __init__(self, document: Mapping[str, Any]) -> None:
+    def __init__(self, case: "Case", document: Mapping[str, Any]) -> None:
+        self.case = case
         self.document = Record(document)
         self._list = [Attractor.of(entry) for entry in self.document["attractors"]]
 
@@ -338,6 +348,12 @@ class Attractors(Sequence[Attractor]):
         ]
         rows = [[getattr(one, name) for name in columns] for one in self]
         return pd.DataFrame(rows, columns=columns)
+
+    def plot(self, **options: Any) -> "Picture":
+        """The attractors as the terminal draws them; see `nanotap.plot.attractors`."""
+        from . import plot
+
+        return plot.attractors(self, **options)
 
     def __repr__(self) -> str:
         lines = [f"  {one!r}" for one in self]

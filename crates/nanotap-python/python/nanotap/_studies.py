@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _MOST_MODES = 50
+# Points of a section: 800 MB at N = 3.
+_MOST_POINTS = 10_000_000
 
 
 def attractors(
@@ -61,7 +63,7 @@ def attractors(
             threads=_threads(threads),
             progress=hears,
         )
-    found = Attractors(json.loads(document))
+    found = Attractors(case, json.loads(document))
     if interrupted:
         message = (
             "stopped before all starts were done: the fractions are of what was done"
@@ -245,6 +247,115 @@ def _columns(
     return columns
 
 
+def approach(
+    case: Case,
+    *,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    points: int = 80,
+    branches: bool = True,
+    switch: int = 1,
+    max_period: int = 32,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> "xr.Dataset":
+    """Amplitude, phase, force and energy against the distance to the sample, both ways.
+
+    Args:
+        case: What approaches.
+        from_: Distance at which to begin, with a unit ("30 nm") or as α5; without it, 1.25
+            times what the free tip swings towards the sample.
+        to: Distance at which to turn back; without it, 0.
+        points: Distances each way.
+        branches: Also continue the branches that coexist, stable and unstable.
+        switch: Doublings of branches to follow.
+        max_period: Longest period looked for.
+        threads: Threads; without it, one a core.
+        progress: Whether to show a bar, or what hears of progress.
+
+    Returns:
+        What is observed over `way` (approach, retract) and the distance (by the name of its
+        parameter, with `zc` in metres for a physical case): `first_harmonic`, `phase`,
+        `peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`,
+        `physical_E_dis` …; the branches over `branch_point`.
+
+    Raises:
+        ValueError: something that was asked for is not right.
+        Interrupted: Ctrl-C; its `result` is the curve until then.
+    """
+
+    def distance(name: str, value: float | str | None) -> str | None:
+        return None if value is None else _arguments.quantity(name, value)
+
+    with bar(progress, "distances") as hears:
+        text, interrupted = _nanotap.approach(
+            _cased(case)._core,
+            from_=distance("from_", from_),
+            to=distance("to", to),
+            points=_arguments.count("points", points),
+            branches=bool(branches),
+            doublings=_arguments.count("switch", switch),
+            max_period=_arguments.count("max_period", max_period),
+            threads=_threads(threads),
+            progress=hears,
+        )
+    ds = _approach_dataset(case, json.loads(text))
+    if interrupted:
+        message = "stopped before it was done"
+        raise Interrupted(message, ds)
+    return ds
+
+
+def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
+    import xarray as xr
+
+    name = report["parameter"]
+    ways = ["approach", "retract"]
+    rows: dict[tuple[str, float], dict[str, Any]] = {}
+    for entry in report["table"]:
+        physical = entry.pop("physical", None) or {}
+        entry |= {f"physical_{key}": value for key, value in physical.items()}
+        rows[entry["way"], entry["gap"]] = entry
+    gaps = sorted({gap for _, gap in rows})
+    flat = [rows.get((way, gap), {}) for way in ways for gap in gaps]
+    for entry in flat:
+        # A word that is not said is empty, not missing.
+        entry.setdefault("classification", "")
+        entry.setdefault("reason", "")
+    columns = _columns(flat, "row", "", 0)
+    variables = {
+        key: (("way", name), values.reshape(len(ways), len(gaps)))
+        for key, (_, values) in columns.items()
+        if key not in {"way", "gap", "zc"}
+    }
+    coords: dict[str, Any] = {"way": words(ways), name: np.array(gaps)}
+    if "zc" in columns:
+        # Both ways stop at the same distances.
+        zc = columns["zc"][1].reshape(len(ways), len(gaps))
+        coords["zc"] = (name, np.where(np.isnan(zc[0]), zc[1], zc[0]))
+    branches = report.get("branches") or {"points": []}
+    entries = case.state_names
+    further = _columns(branches["points"], "branch_point", "branch_", len(entries))
+    ds = xr.Dataset(variables, coords)
+    if further:
+        coords["state"] = words(entries)
+        ds = ds.assign(further).assign_coords(state=words(entries))
+    for key in ("free_amplitude", "free_phase", "free_reach"):
+        ds[key] = report[key]
+    ds.attrs.update(case_attributes(case, "approach and retract"))
+    ds.attrs.update(
+        parameter=name,
+        hysteresis=json.dumps(report["hysteresis"]),
+        returned=int(report["returned"]),
+    )
+    unit = report.get("parameter_unit")
+    if unit:
+        ds.attrs["parameter_unit"] = json.dumps(unit)
+        ds.zc.attrs.update(long_name="distance to the sample", units="m")
+    ds[name].attrs.update(long_name="distance to the sample", units="g0")
+    return describe(ds)
+
+
 def lyapunov(
     case: Case,
     *,
@@ -278,6 +389,9 @@ def lyapunov(
     degrees = _arguments.number("phase", phase)
     if not np.isfinite(degrees):
         message = f"phase {degrees}: no phase"
+        raise ValueError(message)
+    if _arguments.count("points", points) > _MOST_POINTS:
+        message = f"points: {points} are too many; {_MOST_POINTS} at most"
         raise ValueError(message)
     text, rows = _nanotap.lyapunov(
         _cased(case)._core,

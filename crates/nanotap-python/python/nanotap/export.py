@@ -1,0 +1,201 @@
+"""Files for other programs: CSV, Parquet, HDF5, and Gwyddion's simple fields.
+
+>>> import nanotap
+>>> ds = nanotap.sweep(nanotap.Case.paper(), over={"omega": (2.9, 3.1, 3)}, periods=4)
+>>> nanotap.export.table(ds).columns[0]
+'classification'
+"""
+
+import json
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from . import _arguments, _nanotap
+from ._case import Path
+from ._results import Attractors, Convergence, Modes, Orbit, Paper
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def table(result: Any) -> pd.DataFrame:
+    """A result as a table.
+
+    Of a sweep a row a start, of a basin a row a point, of a branch or approach a row a point
+    of it, of a run or orbit a row an instant; of attractors, modes, convergence and paper
+    their own tables.
+    """
+    if isinstance(result, Attractors | Convergence | Modes | Paper):
+        return result.table()
+    if isinstance(result, Orbit):
+        if result.series is None:
+            message = "only an orbit found by nanotap.orbit has a time series"
+            raise ValueError(message)
+        return _frame(result.series, ("tau",))
+    if not hasattr(result, "data_vars"):
+        message = f"there is no table of a {type(result).__name__}"
+        raise TypeError(message)
+    if "period_max" in result.variables:
+        return _frame(result, tuple(map(str, result.classification.dims)))
+    if "attractor" in result.variables:
+        return _frame(result, tuple(map(str, result.attractor.dims)))
+    for dim in ("point", "tau"):
+        if dim in result.dims:
+            return _frame(result, (dim,))
+    longest = max((v.dims for v in result.data_vars.values()), key=len, default=())
+    return _frame(result, tuple(map(str, longest)))
+
+
+def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
+    """What lies along `dims`, codes as the words that they mean; states a column an entry."""
+    chosen: dict[str, Any] = {}
+    for key, variable in ds.data_vars.items():
+        name = str(key)
+        if variable.dims == dims:
+            meanings = variable.attrs.get("flag_meanings")
+            if meanings is not None:
+                words = np.array(meanings.split(), dtype=object)
+                variable = variable.copy(data=words[variable.values])
+            chosen[name] = variable
+        elif variable.dims == (*dims, "state") and name in {"states", "orbit_state"}:
+            for entry in ds.state.values:
+                chosen[str(entry)] = variable.sel(state=entry, drop=True)
+    part = ds[list(set(dims) & set(map(str, ds.coords)))].assign(chosen)
+    beside = {
+        str(name): coord
+        for name, coord in ds.coords.items()
+        if coord.dims and set(coord.dims) <= set(dims)
+    }
+    return part.assign_coords(beside).to_dataframe(dim_order=list(dims))
+
+
+def csv(result: Any, path: Path) -> None:
+    """The table of a result as CSV."""
+    frame = table(result)
+    _written(path, lambda name: frame.to_csv(name))
+
+
+def parquet(result: Any, path: Path) -> None:
+    """The table of a result as Parquet; needs pyarrow."""
+    frame = table(result).reset_index()
+    _written(path, lambda name: frame.to_parquet(name, engine="pyarrow", index=False))
+
+
+def hdf5(result: Any, path: Path) -> None:
+    """An orbit or a Dataset as HDF5: an array a variable, `long_name` and `units` as
+    attributes, the case as JSON in the attribute `case`; needs h5py."""
+    import h5py
+
+    if isinstance(result, Orbit):
+        arrays = {
+            "state": result.state,
+            "states": result.states,
+            "multipliers": result.multipliers,
+        }
+        harmonics = result.spectrum().reset_index()
+        series = result.series
+        attributes = {
+            key: value for key, value in result.to_dict().items() if np.isscalar(value)
+        }
+    elif hasattr(result, "data_vars"):
+        arrays, harmonics, series, attributes = {}, None, result, {}
+    else:
+        message = f"hdf5 holds orbits and Datasets, not a {type(result).__name__}"
+        raise TypeError(message)
+
+    def write(target: str) -> None:
+        with h5py.File(target, "w") as file:
+            for key, value in attributes.items():
+                file.attrs[key] = value
+            for name, array in arrays.items():
+                file.create_dataset(name, data=array)
+            if harmonics is not None:
+                group = file.create_group("harmonics")
+                for column in harmonics:
+                    group.create_dataset(str(column), data=harmonics[column].to_numpy())
+            if series is not None:
+                group = file.create_group("series") if arrays else file
+                _datasets(group, series)
+                file.attrs["case"] = series.attrs.get("case", "")
+
+    _written(path, write)
+
+
+def _datasets(group: Any, ds: "xr.Dataset") -> None:
+    import h5py
+
+    for key, variable in ds.variables.items():
+        values = variable.values
+        if values.dtype.kind in "UO":
+            values = values.astype(object)
+            dataset = group.create_dataset(
+                str(key), data=values, dtype=h5py.string_dtype()
+            )
+        else:
+            dataset = group.create_dataset(str(key), data=values)
+        dataset.attrs["dimensions"] = json.dumps(list(map(str, variable.dims)))
+        for name in ("long_name", "units", "flag_meanings"):
+            if name in variable.attrs:
+                dataset.attrs[name] = variable.attrs[name]
+
+
+def gsf(
+    ds: "xr.Dataset", path: Path, *, variable: str | None = None, start: int = 0
+) -> None:
+    """A map over two parameters, or a basin, as a field of Gwyddion's.
+
+    Args:
+        ds: The Dataset.
+        path: The file, ending in .gsf.
+        variable: Which variable; without it, `attractor` of a basin, `amplitude` of a sweep.
+        start: Of a sweep: which start.
+
+    Raises:
+        ValueError: there is no such map, or its axes do not rise in equal steps.
+    """
+    name = variable or ("attractor" if "attractor" in ds else "amplitude")
+    if name not in ds:
+        message = f"variable: there is no `{name}`; there are {', '.join(map(str, ds.data_vars))}"
+        raise ValueError(message)
+    field = ds[name]
+    if "start" in field.dims:
+        if not 0 <= start < field.sizes["start"]:
+            message = f"start: {start} is none of the {field.sizes['start']} starts"
+            raise ValueError(message)
+        field = field.isel(start=start)
+    if field.ndim != 2:
+        message = f"variable: `{name}` lies over {', '.join(map(str, field.dims))}; a map has two axes"
+        raise ValueError(message)
+    y, x = field.dims
+    file = _nanotap.gsf(
+        f"{field.attrs.get('long_name', name)} over {x} and {y}",
+        _arguments.real(ds[x].values, str(x)),
+        _arguments.real(ds[y].values, str(y)),
+        _arguments.real(field.values.ravel(), name),
+        "",
+        "",
+    )
+
+    def write(target: str) -> None:
+        with open(target, "wb") as stream:
+            stream.write(file)
+
+    _written(path, write)
+
+
+def _written(path: Path, write: Callable[[str], object]) -> None:
+    """Writes under a temporary name beside it, then renames: nobody meets half a file."""
+    name = os.fspath(path)
+    folder, last = os.path.split(name)
+    temporary = os.path.join(folder, f".{last}.{os.getpid()}.tmp")
+    try:
+        write(temporary)
+        os.replace(temporary, name)
+    except BaseException:
+        if os.path.exists(temporary):
+            os.unlink(temporary)
+        raise

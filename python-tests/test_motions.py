@@ -213,3 +213,53 @@ def test_the_time_steps_of_the_paper(regular):
     assert ds.strobe.shape == (10, 6)
     exact = nanotap.orbit(regular)
     assert ds.tip_max.item() == pytest.approx(exact.tip_max, abs=0.02)
+
+
+def test_a_distance_left_to_the_setpoint_is_solved_for(physical):
+    tables = {
+        "cantilever": {"lever": "PPP-FM", "Q": 200},
+        "tip": {"mass_ratio": 0.1},
+        "sample": {"material": "polystyrene"},
+        "drive": {"frequency": "65.7 kHz", "free_amplitude": "20 nm", "setpoint": 0.9},
+    }
+    case = nanotap.Case(**tables)
+    report = case.setpoint_distances
+    assert report.ratio == 0.9
+    # There the first harmonic is nine tenths of A₀.
+    orbit = nanotap.orbit(case)
+    assert orbit.physical.A == pytest.approx(0.9 * 20e-9, rel=1e-6)
+    ds = nanotap.simulate(case, periods=2)
+    gap = json.loads(ds.attrs["case"])["physical"]["tip_gap"]
+    assert gap == pytest.approx(report.solutions[report.chosen].zc, rel=1e-9)
+    assert physical.setpoint_distances is None
+
+
+def test_physical_quantities_vary(physical):
+    ds = nanotap.branch(
+        physical, parameter="gap.tip", from_="19 nm", to="18 nm", max_step=0.1
+    )
+    low, high = float(ds["gap.tip"].min()), float(ds["gap.tip"].max())
+    assert (low, high) == pytest.approx((18e-9, 19e-9), rel=1e-6)
+    swept = nanotap.sweep(physical, over={"gap.tip": ("17 nm", "19 nm", 3)}, periods=3)
+    middle = nanotap.orbit(physical.with_(**{"gap.tip": "18 nm"}))
+    np.testing.assert_allclose(swept["gap.tip"], [17e-9, 18e-9, 19e-9], rtol=1e-9)
+    # Over physical quantities, what is observed is in SI.
+    assert float(swept.tip_max[1, 0]) == pytest.approx(
+        middle.physical.tip_max, rel=1e-3
+    )
+    window = nanotap.window(
+        physical,
+        over={
+            "gap.tip": ("15 nm", "30 nm", 3),
+            "drive.frequency": ("65 kHz", "66 kHz", 2),
+        },
+        starts=3,
+    )
+    assert window.condition.shape == (2, 3)
+    assert float(window.share.sum()) == pytest.approx(1)
+    # Farther than it swings freely, the tip touches nothing.
+    assert window.condition.values[1, 2] == "no-contact"
+    with pytest.raises(ValueError, match="two are needed"):
+        nanotap.window(physical, over="gap.tip=15nm:30nm:3")
+    with pytest.raises(ValueError, match=r"gap\.tap"):
+        nanotap.sweep(physical, over="gap.tap=15nm:30nm:3")

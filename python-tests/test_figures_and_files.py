@@ -1,0 +1,231 @@
+"""Figures of every result, and the files that other programs read."""
+
+import json
+import struct
+
+import matplotlib as mpl
+import nanotap
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+from nanotap import export, plot
+
+mpl.use("agg")
+
+
+@pytest.fixture(scope="module")
+def swept(regular):
+    return nanotap.sweep(regular, over={"omega": (2.5, 3.1, 31)}, starts=2, periods=12)
+
+
+@pytest.fixture(scope="module")
+def mapped(regular):
+    over = {"omega": (2.5, 3.1, 7), "alpha4": (15, 25, 5)}
+    return nanotap.sweep(regular, over=over, periods=4)
+
+
+def drawn(picture):
+    png = picture._repr_png_()
+    assert png.startswith(b"\x89PNG")
+    return picture
+
+
+def test_runs_and_orbits_are_drawn(regular):
+    for run in (
+        nanotap.simulate(regular),
+        nanotap.simulate(regular, omega=2.6, periods=30),
+        nanotap.simulate(regular, periods=3, transient=0),
+        nanotap.simulate(regular, method="rk4", periods=5),
+    ):
+        drawn(plot.show(run))
+    picture = drawn(nanotap.orbit(regular).plot())
+    time, _, harmonics, multipliers = picture.axes
+    # The drawn tip is the motion: its extrema are the orbit's.
+    tip = next(line for line in time.lines if line.get_label() == "tip")
+    orbit = nanotap.orbit(regular)
+    assert tip.get_ydata().max() == pytest.approx(orbit.tip_max, abs=1e-4)
+    assert harmonics.get_yscale() == "log"
+    assert "drive periods" in time.get_xlabel() and "mu" in multipliers.get_xlabel()
+    with pytest.raises(ValueError, match="no time series"):
+        plot.run(nanotap.simulate(regular, series=0))
+
+
+def test_attractors_are_drawn_in_the_order_of_their_colours(bistable):
+    found = nanotap.attractors(bistable, starts=24, unstable=1)
+    left, right = drawn(found.plot()).axes
+    colours = {
+        line.get_label().split(",")[0]: to_hex(line.get_color()) for line in left.lines
+    }
+    assert colours == {one.name: plot.LINES[k] for k, one in enumerate(found)}
+    # Four strobe points of the period 4, one of the period 1.
+    marks = sorted(len(line.get_xdata()) for line in right.lines[: len(found)])
+    assert marks == [1, 4]
+
+
+def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
+    axes = drawn(plot.show(swept)).axes[0]
+    meanings = swept.classification.attrs["flag_meanings"].split()
+    colours = {
+        cloud.get_label(): to_hex(cloud.get_facecolor()[0])
+        for cloud in axes.collections
+    }
+    kinds = {meanings[code] for code in np.unique(swept.classification)}
+    assert set(colours) == kinds
+    assert colours["periodic"] == plot.BLUE
+    # A dot for each turn of each orbit.
+    periodic = swept.classification.values == meanings.index("periodic")
+    dots = next(c for c in axes.collections if c.get_label() == "periodic")
+    turns = np.minimum(swept.period.values, 12)[periodic].sum()
+    assert len(dots.get_offsets()) == turns
+    assert "Omega" in axes.get_xlabel()
+    picture = drawn(plot.show(mapped))
+    words = {text.get_text() for text in picture.axes[0].get_legend().get_texts()}
+    for code, period in zip(
+        mapped.classification.values.ravel(), mapped.period.values.ravel()
+    ):
+        word = meanings[code]
+        assert (f"period {period}" if word == "periodic" else word) in words
+    follow = nanotap.sweep(
+        regular, over={"omega": (2.9, 3.0, 4)}, follow="both", periods=3
+    )
+    titles = [axes.get_title(loc="left") for axes in drawn(plot.show(follow)).axes]
+    assert titles == ["following up", "following down"]
+
+
+def test_basins_branches_and_the_rest_are_drawn(bistable, regular):
+    basin = nanotap.basin(bistable, x="a1=-1:1:10", y="v1=-20:20:8", starts=24)
+    axes = drawn(plot.show(basin)).axes[0]
+    assert axes.get_xlim()[0] < -1 and "a_{1}" in axes.get_ylabel()
+    branch = nanotap.branch(
+        regular, parameter="omega", from_=3.0, to=2.9, second={"alpha4": (18, 22)}
+    )
+    _, right = drawn(plot.show(branch)).axes
+    assert "alpha" in right.get_ylabel() and len(right.lines) >= 1
+    drawn(plot.branch(branch, show="spectral_radius"))
+    with pytest.raises(ValueError, match="there are tip_max"):
+        plot.branch(branch, show="colour")
+    drawn(plot.show(nanotap.lyapunov(regular, periods=500, points=50)))
+    drawn(plot.show(nanotap.modes(regular)))
+    drawn(plot.show(nanotap.convergence(regular, largest=3)))
+    with pytest.raises(TypeError, match="no figure of a dict"):
+        plot.show({})
+
+
+def test_the_approach_goes_both_ways(physical):
+    ds = nanotap.approach(physical, points=8, branches=False)
+    assert ds.physical_A.dims == ("way", "alpha5")
+    assert ds.way.values.tolist() == ["approach", "retract"]
+    length = physical.physical.length_unit
+    np.testing.assert_allclose(ds.zc, ds.alpha5 * length, rtol=1e-12)
+    np.testing.assert_allclose(ds.physical_A, ds.first_harmonic * length, rtol=1e-12)
+    # Far away it swings freely: A₀ of the case.
+    assert float(ds.physical_A[0, -1]) == pytest.approx(20e-9, rel=1e-6)
+    picture = drawn(plot.show(ds))
+    assert "nm" in picture.axes[0].get_ylabel()
+    with_branches = nanotap.approach(physical, points=4)
+    assert "branch_stable" in with_branches
+    drawn(plot.show(with_branches))
+
+
+def test_the_terminals_own_picture_is_to_be_had(regular, tmp_path):
+    out = tmp_path / "s.zarr"
+    nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=out)
+    assert b"<svg" in nanotap._nanotap.figure(out, "svg")
+    assert nanotap._nanotap.figure(out, "png").startswith(b"\x89PNG")
+    with pytest.raises(ValueError, match="there are svg, png and pdf"):
+        nanotap._nanotap.figure(out, "gif")
+
+
+def test_tables_say_the_same_in_every_format(swept, tmp_path):
+    frame = export.table(swept)
+    assert frame.index.names == ["omega", "start"] and len(frame) == 62
+    assert set(frame.classification) <= {
+        "periodic",
+        "chaotic",
+        "quasi-periodic",
+        "undecided",
+    }
+    assert frame.tip_max.loc[2.5, 0] == float(swept.tip_max[0, 0])
+    export.csv(swept, tmp_path / "t.csv")
+    export.parquet(swept, tmp_path / "t.parquet")
+    from_csv = pd.read_csv(tmp_path / "t.csv", float_precision="round_trip")
+    from_parquet = pd.read_parquet(tmp_path / "t.parquet")
+    pd.testing.assert_frame_equal(from_csv, from_parquet, check_dtype=False)
+    np.testing.assert_array_equal(from_parquet.tip_max, frame.tip_max)
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_tables_of_other_results(regular, bistable, tmp_path):
+    orbit = nanotap.orbit(regular)
+    frame = export.table(orbit)
+    assert frame.index.name == "tau" and {"tip", "force", "a1", "v3"} <= set(
+        frame.columns
+    )
+    export.csv(orbit, tmp_path / "orbit.csv")
+    assert len(pd.read_csv(tmp_path / "orbit.csv")) == 201
+    branch = nanotap.branch(regular, parameter="omega", from_=3.0, to=2.95)
+    assert {"omega", "tip_max", "a1"} <= set(export.table(branch).columns)
+    drawn(plot.show(branch))
+    assert len(export.table(nanotap.attractors(bistable, starts=24))) == 2
+    basin = nanotap.basin(bistable, x="a1=-1:1:5", y="v1=-4:4:4", starts=24)
+    assert export.table(basin).attractor.shape == (20,)
+    with pytest.raises(TypeError, match="no table of a dict"):
+        export.table({})
+
+
+def test_orbits_are_kept_as_hdf5(regular, swept, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    orbit = nanotap.orbit(regular)
+    export.hdf5(orbit, tmp_path / "orbit.h5")
+    with h5py.File(tmp_path / "orbit.h5") as file:
+        np.testing.assert_array_equal(file["states"], orbit.states)
+        np.testing.assert_array_equal(file["multipliers"], orbit.multipliers)
+        np.testing.assert_array_equal(file["series/tip"], orbit.series.tip)
+        assert file["series/tip"].attrs["units"] == "g0"
+        assert file.attrs["period"] == 1 and file.attrs["stable"]
+        assert json.loads(file.attrs["case"])["omega"] == 3
+        np.testing.assert_array_equal(file["harmonics/order"][:2], [1, 2])
+    export.hdf5(swept, tmp_path / "sweep.h5")
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        np.testing.assert_array_equal(file["tip_max"], swept.tip_max)
+        assert json.loads(file["tip_max"].attrs["dimensions"]) == ["omega", "start"]
+    with pytest.raises(TypeError, match="hdf5 holds"):
+        export.hdf5({}, tmp_path / "x.h5")
+
+
+def read_gsf(path):
+    """A reader after Gwyddion's description of the format, independent of the writer."""
+    data = path.read_bytes()
+    head, _, _ = data.partition(b"\0")
+    lines = head.decode().splitlines()
+    assert lines[0] == "Gwyddion Simple Field 1.0"
+    fields = dict(line.split(" = ", 1) for line in lines[1:])
+    start = len(head) + 4 - len(head) % 4
+    columns, rows = int(fields["XRes"]), int(fields["YRes"])
+    values = struct.unpack(f"<{columns * rows}f", data[start:])
+    return fields, np.array(values).reshape(rows, columns)
+
+
+def test_maps_are_fields_of_gwyddion(mapped, bistable, tmp_path):
+    path = tmp_path / "map.gsf"
+    export.gsf(mapped, path, variable="tip_max")
+    fields, values = read_gsf(path)
+    np.testing.assert_allclose(values[::-1], mapped.tip_max.isel(start=0), rtol=1e-6)
+    assert float(fields["XReal"]) == pytest.approx(7 * 0.1)
+    assert float(fields["YOffset"]) == pytest.approx(15 - 1.25)
+    basin = nanotap.basin(bistable, x="a1=-1:1:6", y="v1=-4:4:5", starts=24)
+    export.gsf(basin, path)
+    np.testing.assert_array_equal(read_gsf(path)[1][::-1], basin.attractor)
+    for arguments, words in (
+        ({"variable": "nothing"}, "there is no `nothing`"),
+        ({"variable": "strobe"}, "a map has two axes"),
+        ({"start": 3}, "none of the 1 starts"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            export.gsf(mapped, path, **arguments)
+    log = nanotap.sweep(
+        bistable, over={"omega": (19, 20, 2), "alpha4": (1, 100, 4, "log")}, periods=2
+    )
+    with pytest.raises(ValueError, match="equal steps"):
+        export.gsf(log, path)

@@ -1,0 +1,236 @@
+"""Sweeps and basins from Python: the terminal's bytes, lazily, in shares, on a cluster."""
+
+import filecmp
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import threading
+import time
+
+import nanotap
+import numpy as np
+import pytest
+import xarray as xr
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
+
+
+def assert_same(here, there):
+    """Two stores hold the same files with the same bytes."""
+    names = [
+        sorted(
+            str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()
+        )
+        for root in (pathlib.Path(here), pathlib.Path(there))
+    ]
+    assert names[0] == names[1]
+    _, differing, missing = filecmp.cmpfiles(here, there, names[0], shallow=False)
+    assert not differing and not missing
+
+
+def test_python_writes_the_terminals_bytes(regular, tmp_path):
+    (tmp_path / "case.toml").write_text(regular.to_toml())
+    command = (
+        "sweep case.toml --over omega=2.8:3.2:24 --starts 2 --periods 6 --strobe 3"
+    )
+    subprocess.run(
+        [PROGRAM, *command.split(), "--out", "terminal.zarr", "--quiet"],
+        cwd=tmp_path, check=True, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    for k, over in enumerate(
+        (
+            "omega=2.8:3.2:24",
+            {"omega": (2.8, 3.2, 24)},
+            {"omega": np.linspace(2.8, 3.2, 24)},
+        )
+    ):
+        out = tmp_path / f"python{k}.zarr"
+        ds = nanotap.sweep(regular, over=over, starts=2, periods=6, strobe=3, out=out)
+        assert_same(tmp_path / "terminal.zarr", out)
+    assert ds.tip_max.chunks is not None  # lazily
+    xr.testing.assert_identical(ds.load(), nanotap.open(out).load())
+    memory = nanotap.sweep(regular, over=over, starts=2, periods=6, strobe=3)
+    xr.testing.assert_equal(memory, ds)
+    assert "path" not in memory.attrs
+    said = nanotap._datasets.summary(ds)
+    assert sum(said["counts"].values()) == said.runs == 48
+
+
+def test_a_logarithmic_array_is_a_logarithmic_axis(regular):
+    given = np.geomspace(5, 50, 7)
+    ds = nanotap.sweep(regular, over={"alpha4": given}, periods=3)
+    np.testing.assert_allclose(ds.alpha4, given, rtol=1e-14)
+    assert ds.alpha4.attrs["spacing"] == "log"
+    with pytest.raises(ValueError, match="neither in equal steps nor in equal ratios"):
+        nanotap.sweep(regular, over={"alpha4": [1, 2, 4, 9]})
+
+
+def test_shares_merge_to_the_same_bytes(regular, tmp_path):
+    call = {"over": {"omega": (2.8, 3.2, 9)}, "periods": 4}
+    nanotap.sweep(regular, **call, out=tmp_path / "whole.zarr")
+    shares = [tmp_path / f"{i}.zarr" for i in (1, 2, 3)]
+    for i, share in enumerate(shares):
+        nanotap.sweep(regular, **call, chunk=f"{i + 1}/3", out=share)
+    part = nanotap.merge(shares[:2], tmp_path / "merged.zarr")
+    assert part.copied == 6 and part.missing == [2, 5, 8]
+    assert nanotap.merge(shares, tmp_path / "merged.zarr").missing == []
+    assert_same(tmp_path / "whole.zarr", tmp_path / "merged.zarr")
+    with pytest.raises(ValueError, match="made otherwise: .*omega"):
+        nanotap.sweep(regular, over={"omega": (2, 3, 9)}, periods=4, out=shares[0])
+    with pytest.raises(ValueError, match="is not a dataset of nanotap"):
+        nanotap.merge([tmp_path], tmp_path / "other.zarr")
+    with pytest.raises(ValueError, match="it is not there"):
+        nanotap.open(tmp_path / "nowhere.zarr")
+
+
+def test_basins_from_what_was_found(bistable):
+    found = nanotap.attractors(bistable, starts=32)
+    call = {"x": {"a1": (-1, 1, 12)}, "y": "v1=-20:20:9"}
+    ds = nanotap.basin(bistable, **call, attractors=found)
+    assert ds.attractor.dims == ("v1", "a1")
+    known = json.loads(ds.attrs["attractors"])
+    assert sorted(one["period"] for one in known) == [1, 4]
+    same = nanotap.basin(bistable, **call, attractors=[one.state for one in found])
+    np.testing.assert_array_equal(ds.attractor, same.attractor)
+    # Every start does go where the map says.
+    for i, j in ((0, 0), (4, 6), (8, 11)):
+        state = np.zeros(6)
+        state[0], state[3] = ds.a1[j], ds.v1[i]
+        run = nanotap.simulate(bistable, state=state, periods=4, series=0)
+        assert run.period == known[int(ds.attractor[i, j])]["period"]
+
+
+def test_ctrl_c_keeps_what_is_finished(regular, tmp_path):
+    out = tmp_path / "stopped.zarr"
+    call = {
+        "over": {"omega": (2.5, 3.5, 20_000)},
+        "periods": 20,
+        "threads": 1,
+        "out": out,
+    }
+    heard = []
+
+    def progress(done, total):
+        heard.append((done, total))
+        if done > 100:
+            signal.raise_signal(signal.SIGINT)
+
+    begun = time.monotonic()
+    with pytest.raises(nanotap.Interrupted, match="goes on") as stopped:
+        nanotap.sweep(regular, **call, progress=progress)
+    assert time.monotonic() - begun < 20 and heard[-1][1] == 20_000
+    ds = stopped.value.result
+    finished = int((ds.classification > 0).sum())
+    assert 0 <= finished < 20_000
+    assert isinstance(stopped.value, KeyboardInterrupt)
+
+
+def test_ctrl_c_keeps_the_starts_that_were_done(bistable):
+    def progress(done, _total):
+        if done > 10:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(nanotap.Interrupted) as stopped:
+        nanotap.attractors(bistable, starts=20_000, threads=1, progress=progress)
+    part = stopped.value.result
+    assert 0 < sum(one.count for one in part) < 20_000
+
+
+def test_ctrl_c_stops_what_nobody_can_stop(regular):
+    timer = threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT))
+    begun = time.monotonic()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        nanotap.lyapunov(regular, periods=200_000, points=0)
+    assert time.monotonic() - begun < 3
+
+
+def test_an_error_of_the_listener_is_the_callers(regular):
+    def progress(_done, _total):
+        raise LookupError("enough")
+
+    with pytest.raises(LookupError, match="enough"):
+        nanotap.sweep(
+            regular, over={"omega": (2.5, 3.5, 500)}, periods=5, progress=progress
+        )
+
+
+def test_others_run_meanwhile(regular):
+    counted = 0
+    working = True
+
+    def count():
+        nonlocal counted
+        while working:
+            counted += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    begun = time.monotonic()
+    nanotap.attractors(regular.with_(omega=2.6), starts=24, threads=1)
+    spent = time.monotonic() - begun
+    working = False
+    thread.join()
+    # Held for good, the interpreter would have let it count once or twice.
+    assert counted > 20 * spent
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+def test_a_cluster_makes_the_same_bytes_though_a_worker_is_killed(
+    cluster, regular, tmp_path
+):
+    call = {"over": {"omega": (2.4, 3.4, 128)}, "starts": 2, "periods": 20}
+    nanotap.sweep(regular, **call, out=tmp_path / "here.zarr")
+    killed = []
+
+    def progress(done, total):
+        if done >= total // 3 and not killed:
+            victim = next(iter(cluster.cluster.workers.values()))
+            killed.append(victim.pid)
+            os.kill(victim.pid, signal.SIGKILL)
+
+    ds = nanotap.sweep(
+        regular, **call, out=tmp_path / "there.zarr", client=cluster, progress=progress
+    )
+    assert killed
+    assert_same(tmp_path / "here.zarr", tmp_path / "there.zarr")
+    assert (ds.classification > 0).all()
+
+
+def test_a_cluster_goes_on_where_it_stopped(cluster, regular, tmp_path):
+    call = {"over": {"omega": (2.8, 3.2, 32)}, "periods": 4}
+    out = tmp_path / "parts.zarr"
+    nanotap.sweep(regular, **call, chunk="1/2", out=out)
+    heard = []
+    nanotap.sweep(
+        regular,
+        **call,
+        out=out,
+        client=cluster,
+        progress=lambda *now: heard.append(now),
+    )
+    assert heard[0] == (0, 16) and heard[-1] == (16, 16)
+    nanotap.sweep(regular, **call, out=tmp_path / "whole.zarr")
+    assert_same(out, tmp_path / "whole.zarr")
+
+
+def test_basins_on_a_cluster(cluster, bistable, tmp_path):
+    call = {"x": "a1=-1:1:16", "y": "v1=-20:20:16", "starts": 24}
+    nanotap.basin(bistable, **call, out=tmp_path / "here.zarr")
+    nanotap.basin(bistable, **call, out=tmp_path / "there.zarr", client=cluster)
+    assert_same(tmp_path / "here.zarr", tmp_path / "there.zarr")

@@ -1,0 +1,228 @@
+"""Whatever is asked for, the answer is a result or an exception, never the end of Python."""
+
+import itertools
+import math
+
+import nanotap
+import numpy as np
+import pytest
+
+NAN, INF = math.nan, math.inf
+
+REFUSED = [
+    ("simulate", {"periods": 0}, ValueError, "at least one period"),
+    ("simulate", {"periods": -1}, ValueError, "periods: -1 is out of range"),
+    ("simulate", {"periods": 2**64}, ValueError, "out of range"),
+    ("simulate", {"periods": 2.0}, TypeError, "periods: a whole number is needed"),
+    ("simulate", {"periods": True}, TypeError, "periods"),
+    ("simulate", {"periods": None}, TypeError, "periods"),
+    (
+        "simulate",
+        {"state": [1, 2]},
+        ValueError,
+        "the state has 2 numbers where 6 are needed",
+    ),
+    ("simulate", {"state": [NAN] * 6}, ValueError, "number 1 of the state is NaN"),
+    ("simulate", {"state": [[0] * 6]}, ValueError, "one row of numbers"),
+    ("simulate", {"state": ["a"] * 6}, TypeError, "state: real numbers are needed"),
+    ("simulate", {"state": [1j] * 6}, TypeError, "state"),
+    ("simulate", {"state": [[1], [2, 3]]}, ValueError, "state"),
+    ("simulate", {"max_period": 0}, ValueError, "max_period"),
+    ("simulate", {"resolution": 0}, ValueError, "resolution"),
+    ("simulate", {"resolution": 10**9}, ValueError, "too many"),
+    ("simulate", {"series": 10**12}, ValueError, "too many"),
+    ("simulate", {"method": "euler"}, ValueError, "there are exact and rk4"),
+    ("simulate", {"method": "rk4", "steps": 0}, ValueError, "steps"),
+    ("simulate", {"method": "rk4", "steps": [1, 2, 3]}, ValueError, "steps"),
+    ("simulate", {"method": "rk4", "steps": 2**40}, ValueError, "steps"),
+    ("simulate", {"method": "rk4", "switching": "x"}, ValueError, "switching"),
+    ("simulate", {"omgea": 2}, ValueError, "did you mean `omega`"),
+    ("simulate", {"omega": [2, NAN]}, ValueError, "finite"),
+    ("simulate", {"omega": [[2, 3]]}, ValueError, "a row of values"),
+    ("simulate", {"omega": np.array([])}, ValueError, "a row of values"),
+    ("simulate", {"omega": ["a", "b"]}, TypeError, "real numbers"),
+    ("simulate", {"omega": [2, 3], "threads": 0}, ValueError, "threads"),
+    ("orbit", {"period": 0}, ValueError, "a period of at least 1"),
+    ("orbit", {"omega": 2.6}, RuntimeError, "not periodic"),
+    ("orbit", {"harmonics": 2**50}, ValueError, "harmonics"),
+    ("attractors", {"starts": 0}, ValueError, "at least one start"),
+    ("attractors", {"starts": 2**60}, ValueError, "starts"),
+    ("attractors", {"box": {"b1": (0, 1)}}, ValueError, "no coordinate `b1`"),
+    ("attractors", {"box": {"a1": (1, 0)}}, ValueError, "a1|side"),
+    ("attractors", {"box": {"a1": (NAN, 1)}}, ValueError, "."),
+    ("attractors", {"box": {"a1": (0, 1, 2)}}, ValueError, "a lower and an upper end"),
+    ("attractors", {"box": {"a1": 3}}, TypeError, "a lower and an upper end"),
+    ("attractors", {"box": ["a1"]}, TypeError, "name the sides"),
+    ("attractors", {"seed": -1}, ValueError, "seed"),
+    ("sweep", {"over": "omgea=2:3:4"}, ValueError, "did you mean `omega`"),
+    ("sweep", {"over": "omega"}, ValueError, "omega"),
+    ("sweep", {"over": 3}, TypeError, "over"),
+    ("sweep", {"over": {"omega": (2, 3)}}, ValueError, "first, last and how many"),
+    ("sweep", {"over": {"omega": (2, NAN, 4)}}, ValueError, "."),
+    ("sweep", {"over": {"omega": (2, 3, 0)}}, ValueError, "."),
+    ("sweep", {"over": {"omega": (2, 3, 2**62)}}, ValueError, "."),
+    ("sweep", {"over": {"omega": (-1, 3, 4)}}, ValueError, "."),
+    ("sweep", {"over": {"omega": (2, 3, 4, "cubic")}}, ValueError, "."),
+    (
+        "sweep",
+        {"over": {"omega": (2, 3, 4), "alpha4": (1, 2, 2), "gap": (0, 1, 2)}},
+        ValueError,
+        ".",
+    ),
+    (
+        "sweep",
+        {"over": {"omega": (2, 3, 4)}, "follow": "sideways"},
+        ValueError,
+        "no way to follow",
+    ),
+    ("sweep", {"over": {"omega": (2, 3, 4)}, "periods": 0}, ValueError, "."),
+    ("sweep", {"over": {"omega": (2, 3, 4)}, "periods": 2**62}, ValueError, "."),
+    ("sweep", {"over": {"omega": (2, 3, 4)}, "starts": 0}, ValueError, "."),
+    ("sweep", {"over": {"omega": (2, 3, 4)}, "starts": 2**62}, ValueError, "."),
+    (
+        "sweep",
+        {"over": {"omega": (2, 3, 4)}, "chunk": "3/2"},
+        ValueError,
+        "is not a share",
+    ),
+    (
+        "sweep",
+        {"over": {"omega": (2, 3, 4)}, "out": "x.csv"},
+        ValueError,
+        "end the name in .zarr",
+    ),
+    ("basin", {"x": "a1=-1:1:4", "y": "a1=-1:1:4"}, ValueError, "."),
+    ("basin", {"x": "a9=-1:1:4", "y": "v1=-1:1:4"}, ValueError, "a9"),
+    ("basin", {"x": "a1=-1:1:4", "y": {}}, TypeError, "name one entry"),
+    ("basin", {"x": "a1=-1:1:4000000", "y": "v1=-1:1:4000000"}, ValueError, "."),
+    (
+        "basin",
+        {"x": "a1=-1:1:4", "y": "v1=-1:1:4", "starts": 2**50},
+        ValueError,
+        "starts",
+    ),
+    (
+        "basin",
+        {"x": "a1=-1:1:4", "y": "v1=-1:1:4", "attractors": [[1, 2]]},
+        ValueError,
+        "2 numbers",
+    ),
+    (
+        "branch",
+        {"parameter": "omgea", "from_": 2, "to": 3},
+        ValueError,
+        "no parameter `omgea`",
+    ),
+    ("branch", {"parameter": "omega", "from_": 3, "to": 3}, ValueError, "."),
+    ("branch", {"parameter": "omega", "from_": NAN, "to": 3}, ValueError, "."),
+    (
+        "branch",
+        {"parameter": "omega", "from_": "70 kHz", "to": 3},
+        ValueError,
+        "not a number",
+    ),
+    (
+        "branch",
+        {"parameter": "omega", "from_": 3, "to": 2, "max_step": INF},
+        ValueError,
+        ".",
+    ),
+    (
+        "branch",
+        {"parameter": "omega", "from_": 3, "to": 2, "second": 3},
+        TypeError,
+        "second",
+    ),
+    (
+        "branch",
+        {"parameter": "omega", "from_": 3, "to": 2, "diagram": True, "values": 1},
+        ValueError,
+        "2 values",
+    ),
+    ("lyapunov", {"phase": NAN}, ValueError, "no phase"),
+    ("lyapunov", {"section": "x"}, ValueError, "phase and contact"),
+    ("lyapunov", {"points": 2**60}, ValueError, "points"),
+    ("convergence", {"largest": 1}, ValueError, "from 2 to 50"),
+    ("convergence", {"largest": 51}, ValueError, "from 2 to 50"),
+    ("convergence", {"tolerance": NAN}, ValueError, "tolerance"),
+    ("approach", {"points": 1}, ValueError, "at least 2"),
+    ("approach", {"from_": 0, "to": 1}, ValueError, "from far to near"),
+    ("approach", {"from_": "30 nm"}, ValueError, "not a number"),
+    ("modes", {"points": 1}, ValueError, "points"),
+    ("modes", {"points": 2**60}, ValueError, "points"),
+]
+
+
+@pytest.mark.parametrize(("name", "arguments", "kind", "words"), REFUSED)
+def test_bad_input_is_refused_with_a_reason(regular, name, arguments, kind, words):
+    with pytest.raises(kind, match=words):
+        getattr(nanotap, name)(regular, **arguments)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "simulate",
+        "orbit",
+        "attractors",
+        "sweep",
+        "basin",
+        "branch",
+        "lyapunov",
+        "convergence",
+        "modes",
+    ],
+)
+def test_what_is_no_case_is_a_type_error(name):
+    needed = {
+        "sweep": {"over": "omega=2:3:4"},
+        "basin": {"x": "a1=-1:1:4", "y": "v1=-1:1:4"},
+        "branch": {"parameter": "omega", "from_": 2, "to": 3},
+    }
+    with pytest.raises(TypeError, match="a nanotap.Case is needed"):
+        getattr(nanotap, name)({"omega": 3}, **needed.get(name, {}))
+
+
+def test_no_combination_of_odd_numbers_ends_python():
+    """Cases at the ends of what numbers can be: a result, or one of the documented errors."""
+    odd = [0.0, -0.0, 1e-9, 1e3, 1e308, -1.0, NAN, INF]
+    keys = ["alpha1", "alpha2", "alpha3", "alpha4", "alpha5", "alpha6", "omega"]
+    tried = made = 0
+    for key, value in itertools.product(keys, odd):
+        for modes in (1, 3):
+            tried += 1
+            try:
+                case = nanotap.Case.paper(**{key: value, "modes": modes})
+                made += 1
+                nanotap.simulate(case, periods=2, transient=0, max_period=2, series=1)
+                nanotap.modes(case)
+            except (ValueError, RuntimeError) as error:
+                assert str(error) and "mistake inside" not in str(error), (
+                    key,
+                    value,
+                    error,
+                )
+    assert tried == 112 and made > 30
+
+
+def test_odd_arrays_are_read_as_what_they_are(regular):
+    state = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    plain = nanotap.simulate(
+        regular, state=state, periods=3, transient=0, strobe=3
+    ).strobe
+    twice = np.zeros(12)
+    twice[::2] = state
+    buffer = np.zeros(49, dtype=np.uint8)
+    misaligned = buffer[1:].view(np.float64)
+    misaligned[:] = state
+    for odd in (
+        twice[::2],
+        np.array(state)[::-1][::-1],
+        np.array(state, dtype=">f8"),
+        misaligned,
+        tuple(state),
+    ):
+        run = nanotap.simulate(regular, state=odd, periods=3, transient=0, strobe=3)
+        np.testing.assert_array_equal(run.strobe, plain)
+    whole = nanotap.simulate(regular, state=np.arange(6), periods=3, transient=0)
+    assert np.isfinite(whole.tip_max)

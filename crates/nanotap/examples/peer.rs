@@ -1,10 +1,11 @@
 //! nanotap on the works of `peers/README.md`, from the command line that all peers have:
 //!
 //! ```text
-//! peer first|long|sweep|basin [--threads K] [--seconds S]
+//! peer first|long|sweep|basin [--method one|ensemble] [--threads K] [--seconds S]
 //! ```
 //!
 //! `cargo xtask peers` runs it beside the others. There is no setting: nothing is stepped.
+//! Method `one` follows a motion at a time, `ensemble` eight side by side.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -13,11 +14,13 @@ use std::time::Instant;
 
 use nanotap::case::Case;
 use nanotap::model::Model;
-use nanotap_flow::Flow;
+use nanotap_flow::{Ensemble, Flow, System};
 
 /// Modes, and the dimension of a state.
 const MODES: usize = 3;
 const DIMENSION: usize = 2 * MODES;
+/// Motions that an ensemble has.
+const LANES: usize = 8;
 /// The sweep: 400 values of Ω by 8 starts, 500 periods each, the last 100 kept.
 const SWEEP: (usize, usize) = (400, 8);
 const SWEEP_PERIODS: usize = 500;
@@ -32,6 +35,8 @@ type Failure = Box<dyn std::error::Error>;
 /// What the command line asks for.
 struct Options {
     work: String,
+    /// Motions side by side.
+    lanes: usize,
     threads: usize,
     seconds: f64,
 }
@@ -45,6 +50,11 @@ impl Options {
         };
         Ok(Self {
             work: words.first().cloned().unwrap_or_default(),
+            lanes: match value("--method").map(String::as_str) {
+                None | Some("one") => 1,
+                Some("ensemble") => LANES,
+                Some(other) => return Err(format!("no method `{other}`: one or ensemble").into()),
+            },
             threads: value("--threads").map_or(Ok(1), |text| text.parse())?,
             seconds: value("--seconds").map_or(Ok(1.0), |text| text.parse())?,
         })
@@ -72,55 +82,101 @@ fn model(omega: f64) -> Result<Model, Failure> {
     Ok(Model::cantilever(&case)?)
 }
 
-/// A flow of a model from a start.
-fn flow(model: &Model, start: &State) -> Result<Flow, Failure> {
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(start, 0.0)?;
-    Ok(flow)
+/// Motions of one system, side by side: an ensemble, or a single one by the engine for
+/// single ones.
+enum Motions {
+    One(Box<Flow>),
+    Several(Ensemble),
 }
 
-fn state(flow: &Flow) -> State {
-    let mut state = [0.0; DIMENSION];
-    flow.state(&mut state);
-    state
-}
-
-/// The first 20 periods from rest, best of many.
-fn first(options: &Options) -> Result<(), Failure> {
-    let model = model(Case::paper().omega)?;
-    let (begin, mut best, mut repeats) = (Instant::now(), f64::INFINITY, 0);
-    let mut states = Vec::new();
-    while repeats < 3 || (repeats < 1000 && begin.elapsed().as_secs_f64() < options.seconds) {
-        states.clear();
-        let start = Instant::now();
-        let mut flow = flow(&model, &[0.0; DIMENSION])?;
-        for _ in 0..20 {
-            flow.run_period(&mut ())?;
-            states.push(state(&flow));
+impl Motions {
+    /// So many motions of a system of their own: threads that share one count references
+    /// to it and wait for each other.
+    fn new(model: &Model, lanes: usize) -> Self {
+        let system = Arc::new(System::clone(&model.system));
+        if lanes == 1 {
+            Self::One(Box::new(Flow::new(system)))
+        } else {
+            Self::Several(Ensemble::new(&system, lanes))
         }
+    }
+
+    fn start(&mut self, lane: usize, state: &State) -> Result<(), Failure> {
+        match self {
+            Self::One(flow) => flow.start(state, 0.0)?,
+            Self::Several(ensemble) => ensemble.start(lane, state)?,
+        }
+        Ok(())
+    }
+
+    fn run_periods(&mut self, periods: usize) -> Result<(), Failure> {
+        match self {
+            Self::One(flow) => flow.run_periods(periods)?,
+            Self::Several(ensemble) => ensemble
+                .run_periods(periods)
+                .map_err(|(lane, error)| format!("motion {lane}: {error}"))?,
+        }
+        Ok(())
+    }
+
+    fn state(&self, lane: usize) -> State {
+        let mut state = [0.0; DIMENSION];
+        match self {
+            Self::One(flow) => flow.state(&mut state),
+            Self::Several(ensemble) => ensemble.flow(lane).state(&mut state),
+        }
+        state
+    }
+}
+
+/// The best time of many for what `run` does with motions from rest, a motion.
+fn best_from_rest(
+    options: &Options,
+    mut run: impl FnMut(&mut Motions) -> Result<(), Failure>,
+) -> Result<f64, Failure> {
+    let model = model(Case::paper().omega)?;
+    let mut motions = Motions::new(&model, options.lanes);
+    let (begin, mut best, mut repeats) = (Instant::now(), f64::INFINITY, 0);
+    while repeats < 3 || (repeats < 1000 && begin.elapsed().as_secs_f64() < options.seconds) {
+        let start = Instant::now();
+        for lane in 0..options.lanes {
+            motions.start(lane, &[0.0; DIMENSION])?;
+        }
+        run(&mut motions)?;
         best = best.min(start.elapsed().as_secs_f64());
         repeats += 1;
     }
-    println!("{{\"seconds\": {best:e}, \"states\": {states:?}}}");
+    Ok(best / options.lanes as f64)
+}
+
+/// The first 20 periods from rest.
+fn first(options: &Options) -> Result<(), Failure> {
+    let mut states = Vec::new();
+    let seconds = best_from_rest(options, |motions| {
+        states.clear();
+        for _ in 0..20 {
+            motions.run_periods(1)?;
+            states.push(motions.state(0));
+        }
+        Ok(())
+    })?;
+    println!("{{\"seconds\": {seconds:e}, \"states\": {states:?}}}");
     Ok(())
 }
 
-/// 2000 periods from rest, best of many.
+/// 2000 periods from rest, dealt out to the motions side by side.
 fn long(options: &Options) -> Result<(), Failure> {
     const PERIODS: usize = 2000;
-    let model = model(Case::paper().omega)?;
-    let (begin, mut best, mut repeats) = (Instant::now(), f64::INFINITY, 0);
-    while repeats < 3 || (repeats < 1000 && begin.elapsed().as_secs_f64() < options.seconds) {
-        let start = Instant::now();
-        let mut flow = flow(&model, &[0.0; DIMENSION])?;
-        for _ in 0..PERIODS {
-            flow.run_period(&mut ())?;
-        }
-        black_box(state(&flow));
-        best = best.min(start.elapsed().as_secs_f64());
-        repeats += 1;
-    }
-    println!("{{\"seconds\": {best:e}, \"periods\": {PERIODS}}}");
+    // What is told is the time a motion; all of them together do the 2000 periods.
+    let seconds = best_from_rest(options, |motions| {
+        motions.run_periods(PERIODS / options.lanes)?;
+        black_box(motions.state(0));
+        Ok(())
+    })?;
+    println!(
+        "{{\"seconds\": {:e}, \"periods\": {PERIODS}}}",
+        seconds * options.lanes as f64
+    );
     Ok(())
 }
 
@@ -130,14 +186,16 @@ fn sweep(options: &Options) -> Result<(), Failure> {
     let values = as_many_as_fit(options, SWEEP.0, |k| {
         let value = (k * 247 % SWEEP.0) as f64 / (SWEEP.0 - 1) as f64;
         let model = model(2.0 + 2.0 * value)?;
-        for start in &starts {
-            let mut flow = flow(&model, start)?;
-            let mut kept = [[0.0; DIMENSION]; SWEEP_KEPT];
-            for period in 0..SWEEP_PERIODS {
-                flow.run_period(&mut ())?;
-                if let Some(place) = (period + SWEEP_KEPT).checked_sub(SWEEP_PERIODS) {
-                    kept[place] = state(&flow);
-                }
+        let mut motions = Motions::new(&model, options.lanes);
+        for starts in starts.chunks(options.lanes) {
+            for (lane, start) in starts.iter().enumerate() {
+                motions.start(lane, start)?;
+            }
+            motions.run_periods(SWEEP_PERIODS - SWEEP_KEPT)?;
+            let mut kept = Vec::with_capacity(SWEEP_KEPT * starts.len());
+            for _ in 0..SWEEP_KEPT {
+                motions.run_periods(1)?;
+                kept.extend((0..starts.len()).map(|lane| motions.state(lane)));
             }
             black_box(&kept);
         }
@@ -158,16 +216,19 @@ fn basin(options: &Options) -> Result<(), Failure> {
     let count = BASIN_SIDE * BASIN_SIDE;
     let along = |k: usize| k as f64 / (BASIN_SIDE - 1) as f64;
     let packets = as_many_as_fit(options, count / PACKET, |packet| {
-        for k in packet * PACKET..(packet + 1) * PACKET {
-            let point = k * 24721 % count;
-            let mut start = [0.0; DIMENSION];
-            start[0] = -1.0 + 2.0 * along(point / BASIN_SIDE);
-            start[MODES] = -4.0 + 8.0 * along(point % BASIN_SIDE);
-            let mut flow = flow(&model, &start)?;
-            for _ in 0..BASIN_PERIODS {
-                flow.run_period(&mut ())?;
+        let mut motions = Motions::new(&model, options.lanes);
+        for first in (packet * PACKET..(packet + 1) * PACKET).step_by(options.lanes) {
+            for lane in 0..options.lanes {
+                let point = (first + lane) * 24721 % count;
+                let mut start = [0.0; DIMENSION];
+                start[0] = -1.0 + 2.0 * along(point / BASIN_SIDE);
+                start[MODES] = -4.0 + 8.0 * along(point % BASIN_SIDE);
+                motions.start(lane, &start)?;
             }
-            black_box(state(&flow));
+            motions.run_periods(BASIN_PERIODS)?;
+            for lane in 0..options.lanes {
+                black_box(motions.state(lane));
+            }
         }
         Ok(())
     })?;

@@ -11,6 +11,7 @@ use nanotap::fixed_step_run::FixedStepError;
 use nanotap::model::{FlowError, ModelError};
 use nanotap::orbit::OrbitError;
 use nanotap::physical::CatalogueError;
+use nanotap::sample_comparison::ComparisonError;
 use nanotap::simulate::SimulateError;
 use nanotap_figures::FigureError;
 
@@ -121,6 +122,19 @@ impl From<OrbitError> for Failure {
             }
             OrbitError::Start(error) => error.into(),
             other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<ComparisonError> for Failure {
+    fn from(error: ComparisonError) -> Self {
+        match error {
+            ComparisonError::Arm { .. } => {
+                Self::request(error.to_string(), "give --arm a stiffness above 0")
+            }
+            ComparisonError::Model(error) => error.into(),
+            ComparisonError::Orbit(error) => error.into(),
+            ComparisonError::Branch(error) => error.into(),
         }
     }
 }

@@ -42,7 +42,7 @@ pub enum Shown {
 
 impl Shown {
     /// Axis label and the kind of quantity.
-    const fn label(self, beam: bool) -> (&'static str, Kind) {
+    pub(crate) const fn label(self, beam: bool) -> (&'static str, Kind) {
         match self {
             Self::TipMax if beam => ("greatest tip deflection $W_{max}$", Kind::Length),
             Self::TipMin if beam => ("least tip deflection $W_{min}$", Kind::Length),

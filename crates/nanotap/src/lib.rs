@@ -31,6 +31,8 @@ pub mod paper;
 pub mod parameter;
 pub mod physical;
 pub mod physical_subject;
+pub mod sample_comparison;
+pub mod sample_figure;
 pub mod simulate;
 pub mod spectrum;
 pub mod start_box;

@@ -11,6 +11,7 @@ mod merge;
 mod modes;
 mod orbit;
 mod paper;
+mod samples;
 mod simulate;
 mod sweep;
 mod window;
@@ -54,6 +55,8 @@ pub(crate) enum Command {
     Lyapunov(lyapunov::Arguments),
     /// The same motion with N = 1 … K modes: how many are enough
     Convergence(convergence::Arguments),
+    /// The same lever and drive on every contact law: what difference the sample makes
+    Samples(samples::Arguments),
     /// Every figure and number of the paper, with verdicts and evidence
     Paper(paper::Arguments),
 }
@@ -74,6 +77,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Merge(arguments) => merge::run(arguments, output),
         Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
         Command::Convergence(arguments) => convergence::run(arguments, output),
+        Command::Samples(arguments) => samples::run(arguments, output),
         Command::Paper(arguments) => paper::run(arguments, output),
     }
 }

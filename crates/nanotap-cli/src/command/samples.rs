@@ -1,0 +1,159 @@
+//! `nanotap samples`: the same lever and drive on every contact law.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use nanotap::control::Control;
+use nanotap::parameter::Parameter;
+use nanotap::sample_comparison::{Comparison, ComparisonOptions, SampleMotion, compare};
+use nanotap::sample_figure::sample_figure;
+use nanotap::subject::{Key, Subject};
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::studied::Studied;
+use crate::table::{Align, Table};
+use crate::{file, motion, number, style};
+
+/// The same lever and drive on every contact law: what difference the sample makes.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// Period of the orbits compared
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    period: usize,
+
+    /// Stiffness of the standard linear solid's arm [default: the case's, or twice alpha4]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    arm: Option<f64>,
+
+    /// Lowest drive frequency to which the orbits are followed
+    #[arg(long, value_name = "OMEGA", requires = "to")]
+    from: Option<String>,
+
+    /// Highest drive frequency to which the orbits are followed
+    #[arg(long, value_name = "OMEGA", requires = "from")]
+    to: Option<String>,
+
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if let Some(path) = &arguments.out.out {
+        file::ending(path, &["csv"])?;
+    }
+    let studied = Studied::of(&arguments.case, output)?;
+    let Subject::Cantilever(case) = &studied.subject else {
+        return Err(Failure::request(
+            format!(
+                "{}: `nanotap samples` needs a cantilever; this is an oscillator",
+                studied.title
+            ),
+            "an oscillator's stop is said by its own keys",
+        ));
+    };
+    let key = Key::Cantilever(Parameter::Omega);
+    let value = |option: &str, text: &Option<String>| {
+        text.as_ref()
+            .map(|text| studied.value(key, option, text))
+            .transpose()
+    };
+    let options = ComparisonOptions {
+        period: arguments.period,
+        arm: arguments.arm,
+        frequencies: value("--from", &arguments.from)?.zip(value("--to", &arguments.to)?),
+    };
+    let result = compare(case, &options, &Control::default())?;
+    if let Some(path) = &arguments.out.out {
+        file::write(path, csv(&result).as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        sample_figure(&result, &studied.units()).write(path)?;
+    }
+    output.result(&result, |result| text(&studied, result))
+}
+
+/// The loops, a row a point.
+fn csv(result: &Comparison) -> String {
+    let mut csv = String::from("contact,indentation,force\n");
+    for sample in &result.samples {
+        for [indentation, force] in sample.orbit.iter().flat_map(|o| &o.force_loop) {
+            let _ = writeln!(csv, "{},{indentation},{force}", sample.contact);
+        }
+    }
+    csv
+}
+
+fn text(studied: &Studied, result: &Comparison) -> String {
+    let heading = format!(
+        "{}: the period-{} orbit on each sample at Ω = {}",
+        studied.title,
+        result.period,
+        number::significant(result.omega, 6)
+    );
+    let mut table = Table::new([
+        ("sample", Align::Left),
+        ("from rest", Align::Left),
+        ("largest |μ|", Align::Point),
+        ("amplitude", Align::Point),
+        ("E_dis", Align::Point),
+        ("F max", Align::Point),
+        ("F min", Align::Point),
+        ("indentation", Align::Point),
+        ("contact (%)", Align::Point),
+    ]);
+    for sample in &result.samples {
+        let mut cells = vec![sample.contact.to_string(), from_rest(sample)];
+        if let Some(orbit) = &sample.orbit {
+            let o = &orbit.observables;
+            // What is not above rounding is no force.
+            let least = if o.least_force.abs() < 1e-10 * o.peak_force {
+                0.0
+            } else {
+                o.least_force
+            };
+            let values = [
+                orbit.spectral_radius,
+                o.first_harmonic,
+                o.dissipation,
+                o.peak_force,
+                least,
+                o.indentation,
+                100.0 * o.contact_fraction,
+            ];
+            cells.extend(values.map(|v| number::significant(v, 5)));
+        }
+        cells.resize(9, String::new());
+        table.row(cells);
+    }
+    let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
+    if let Some(solid) = result.samples.last() {
+        text.push_str(&motion::paragraph(&format!(
+            "all have the spring α₄ = {} and the damper of the case; the solid has it in series with an arm of \
+             stiffness {}, so that its force relaxes in {}. E_dis is the energy that the sample takes in one \
+             drive period, F the force on the tip: negative where the sample pulls",
+            number::significant(solid.case.alpha4, 5),
+            number::significant(solid.case.relaxation_stiffness, 5),
+            number::significant(solid.case.relaxation_time, 5),
+        )));
+    }
+    for sample in &result.samples {
+        if let Some(reason) = &sample.reason {
+            text.push_str(&motion::paragraph(&format!("{}: {reason}", sample.contact)));
+        }
+    }
+    text
+}
+
+fn from_rest(sample: &SampleMotion) -> String {
+    match sample.from_rest_period {
+        Some(n) => format!("period {n}"),
+        None => sample.from_rest.name().to_owned(),
+    }
+}

@@ -15,6 +15,7 @@ use nanotap_flow::{
 use crate::case::CosineTerm;
 use crate::contact::dual::Dual;
 use crate::contact::law::{Answer, Combination, Law, Square};
+use crate::drive_form::Actuation;
 use crate::galerkin::{Forcing, Galerkin, Gap, Regime};
 use crate::model::{BeamOutputs, Forgetting, Powers, Product};
 use crate::parameter::Parameter;
@@ -98,19 +99,30 @@ impl Layout {
 
     /// Accelerations as the forcing of the state equation.
     fn accelerations(self, of: &Forcing) -> HarmonicVector {
-        HarmonicVector::zeros(self.dimension(), self.tones)
+        let forcing = HarmonicVector::zeros(self.dimension(), self.tones)
             .with_tone(
                 0,
                 &self.at_velocities(&of.sine),
                 &self.at_velocities(&of.cosine),
             )
-            .with_constant(&self.at_velocities(&of.constant))
+            .with_constant(&self.at_velocities(&of.constant));
+        match &of.second {
+            Some([sine, cosine]) => {
+                forcing.with_tone(1, &self.at_velocities(sine), &self.at_velocities(cosine))
+            }
+            None => forcing,
+        }
     }
 
     fn gap(self, gap: &Gap) -> Output {
-        self.row(&gap.tip, 0)
+        let output = self
+            .row(&gap.tip, 0)
             .with_tone(0, gap.sine, 0.0)
-            .with_constant(gap.constant)
+            .with_constant(gap.constant);
+        match gap.second {
+            Some([sine, cosine]) => output.with_tone(1, sine, cosine),
+            None => output,
+        }
     }
 }
 
@@ -276,13 +288,21 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Displacement of the base, α2 sin Ωτ.
+    /// The drive itself, α2 sin Ωτ and the second tone.
+    fn drive_output(&self) -> Output {
+        let case = &self.galerkin.case;
+        let drive = self.layout.memory(0.0).with_tone(0, case.alpha2, 0.0);
+        if case.tone2_ratio.is_none() {
+            return drive;
+        }
+        let (sin, cos) = case.tone2_phase.to_radians().sin_cos();
+        drive.with_tone(1, case.tone2_amplitude * cos, case.tone2_amplitude * sin)
+    }
+
+    /// Displacement of the base: the drive, if it acts there.
     fn base(&self) -> Output {
-        Output::linear(
-            RowDVector::zeros(self.layout.dimension()),
-            self.layout.tones,
-        )
-        .with_tone(0, self.galerkin.case.alpha2, 0.0)
+        let moves = self.galerkin.case.actuation == Actuation::Base;
+        self.drive_output().scaled(f64::from(u8::from(moves)))
     }
 
     /// Energy flows in each regime.
@@ -296,7 +316,8 @@ impl<'a> Beam<'a> {
 
     /// Energy flows in one regime, in the frame of the resting sample. With y = α2 sin Ωτ,
     /// the clamp pushes with R = d/dτ(I·ȧ + ẏ + α1(p·ȧ + ẏ)) + α3(I·ȧ + ẏ) − f and
-    /// delivers R ẏ; the beam's damping, which acts on the velocity of the beam
+    /// delivers R ẏ (a drive on the lever itself its force times the speed there, and y = 0);
+    /// the beam's damping, which acts on the velocity of the beam
     /// through the medium, takes α3 ∫(Ẇ + ẏ)² dξ; the sample takes and stores what its law
     /// says. The printed Eq. (14) is a further force on the modes, whose work counts as the
     /// drive's.
@@ -317,12 +338,19 @@ impl<'a> Beam<'a> {
             a: a.clone(),
             b: b.clone(),
         };
-        let mut drive = vec![product(1.0, &clamp, &base_rate)];
-        if case.cosine_term == CosineTerm::Printed {
-            // Printed minus corrected: −α2 α3 (1 − Ω) I cos Ωτ, acting on ȧ.
-            let extra =
-                base.scaled(0.0)
-                    .with_tone(0, 0.0, -case.alpha2 * case.alpha3 * (1.0 - case.omega));
+        let tip_rate = self.layout.row(&modes.tip, 1);
+        let mut drive = vec![match case.actuation {
+            Actuation::Base => product(1.0, &clamp, &base_rate),
+            Actuation::Tip => product(1.0, &self.drive_output(), &tip_rate),
+            Actuation::Distributed => product(1.0, &self.drive_output(), &integral),
+        }];
+        if case.cosine_term == CosineTerm::Printed && case.actuation == Actuation::Base {
+            // Printed minus corrected: of each tone −A α3 (1 − w) I cos(wτ + θ), acting on ȧ.
+            let mut extra = base.clone();
+            for (z, w) in extra.tones.iter_mut().zip(self.drive.frequencies()) {
+                // From sine to cosine is a quarter turn.
+                *z *= Complex::new(0.0, -case.alpha3 * (1.0 - w));
+            }
             drive.push(product(1.0, &extra, &integral));
         }
         let unit = |j: usize, block: usize| {
@@ -394,6 +422,11 @@ impl<'a> Beam<'a> {
             sine: of_vector(&df.sine, &f.sine),
             cosine: of_vector(&df.cosine, &f.cosine),
             constant: of_vector(&df.constant, &f.constant),
+            second: df
+                .second
+                .as_ref()
+                .zip(f.second.as_ref())
+                .map(|(df, f)| [0, 1].map(|k| of_vector(&df[k], &f[k]))),
         });
         let height = self.layout.gap(&derivative.gap);
         let mut height_rate = self.layout.row(&derivative.gap.tip, 1);
@@ -479,6 +512,10 @@ impl Solve {
             sine: self.vector(&of.sine),
             cosine: self.vector(&of.cosine),
             constant: self.vector(&of.constant),
+            second: of
+                .second
+                .as_ref()
+                .map(|tone| [0, 1].map(|k| self.vector(&tone[k]))),
         }
     }
 }

@@ -309,7 +309,7 @@ impl Sight {
                 .iter()
                 .filter(|e| begins_contact(model, e.from, e.to))
         };
-        let first = tip.fourier(std::f64::consts::TAU / model.period());
+        let first = tip.fourier(model.frequency());
         let periods = periods as f64;
         Self {
             tip_max,

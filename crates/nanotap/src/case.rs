@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::beam::{MAX_MODES, ModeCountError};
 use crate::contact::ContactLaw;
+use crate::drive_form::{Actuation, FrequencyRatio};
 use crate::parameter::Parameter;
 
 /// Which cosine term the drive has in Eq. (14) of the paper.
@@ -49,6 +50,15 @@ pub struct Case {
     pub relaxation_stiffness: f64,
     /// Time in which that arm's force decays, ≥ 0; 0 with every other law.
     pub relaxation_time: f64,
+    /// Where the drive acts; α2 is an amplitude of motion or of force accordingly, see
+    /// [`drive_form`](crate::drive_form).
+    pub actuation: Actuation,
+    /// Frequency of a second tone over Ω.
+    pub tone2_ratio: Option<FrequencyRatio>,
+    /// Its amplitude, measured as α2, ≥ 0; 0 without a second tone.
+    pub tone2_amplitude: f64,
+    /// Its phase in degrees.
+    pub tone2_phase: f64,
 }
 
 /// Largest size of α1 … α6. Beyond it a number is a slip (a value in SI units, say),
@@ -73,6 +83,10 @@ impl Case {
             contact: ContactLaw::SpringDamper,
             relaxation_stiffness: 0.0,
             relaxation_time: 0.0,
+            actuation: Actuation::Base,
+            tone2_ratio: None,
+            tone2_amplitude: 0.0,
+            tone2_phase: 0.0,
         }
     }
 
@@ -91,6 +105,10 @@ impl Case {
             contact: ContactLaw::SpringDamper,
             relaxation_stiffness: 0.0,
             relaxation_time: 0.0,
+            actuation: Actuation::Base,
+            tone2_ratio: None,
+            tone2_amplitude: 0.0,
+            tone2_phase: 0.0,
         }
     }
 
@@ -106,6 +124,8 @@ impl Case {
             Parameter::Omega => self.omega,
             Parameter::RelaxationStiffness => self.relaxation_stiffness,
             Parameter::RelaxationTime => self.relaxation_time,
+            Parameter::Tone2Amplitude => self.tone2_amplitude,
+            Parameter::Tone2Phase => self.tone2_phase,
         }
     }
 
@@ -122,6 +142,8 @@ impl Case {
             Parameter::Omega => &mut self.omega,
             Parameter::RelaxationStiffness => &mut self.relaxation_stiffness,
             Parameter::RelaxationTime => &mut self.relaxation_time,
+            Parameter::Tone2Amplitude => &mut self.tone2_amplitude,
+            Parameter::Tone2Phase => &mut self.tone2_phase,
         } = value;
         self
     }
@@ -134,21 +156,24 @@ impl Case {
     }
 
     /// The parameters that this case has: the paper's (without α6 where the damper is the
-    /// relaxing arm's) and those of its contact law.
+    /// relaxing arm's) and those of its contact law and its second tone.
     pub fn parameters(&self) -> Vec<Parameter> {
         let of_solid = self.contact == ContactLaw::StandardLinearSolid;
         Parameter::every()
             .filter(|parameter| match parameter {
                 Parameter::Alpha6 => !of_solid,
                 Parameter::RelaxationStiffness | Parameter::RelaxationTime => of_solid,
+                Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
                 _ => true,
             })
             .collect()
     }
 
-    /// The period of the drive, 2π/Ω.
+    /// The period of the drive: 2π/Ω, or with a second tone the time after which both
+    /// repeat.
     pub fn period(&self) -> f64 {
-        std::f64::consts::TAU / self.omega
+        let repetition = self.tone2_ratio.map_or(1, FrequencyRatio::denominator);
+        f64::from(repetition) * std::f64::consts::TAU / self.omega
     }
 
     /// What is wrong with a value of a parameter that this case does not have.
@@ -158,6 +183,7 @@ impl Case {
         }
         Some(match parameter {
             Parameter::Alpha6 => Reason::DamperOfSolid,
+            Parameter::Tone2Amplitude | Parameter::Tone2Phase => Reason::NoSecondTone,
             _ => Reason::NoSolid,
         })
     }
@@ -213,8 +239,8 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
         }
         Parameter::Omega => None,
         _ if value.abs() > LARGEST_ALPHA => Some(Reason::TooLarge),
-        Parameter::Alpha5 => None,
-        Parameter::Alpha2 if value < 0.0 => Some(Reason::NegativeDrive),
+        Parameter::Alpha5 | Parameter::Tone2Phase => None,
+        Parameter::Alpha2 | Parameter::Tone2Amplitude if value < 0.0 => Some(Reason::NegativeDrive),
         _ if value < 0.0 => Some(Reason::Negative),
         _ => None,
     }
@@ -263,6 +289,8 @@ pub enum Reason {
     DamperOfSolid,
     /// A relaxing arm of another law.
     NoSolid,
+    /// A second tone without a frequency.
+    NoSecondTone,
 }
 
 impl fmt::Display for Reason {
@@ -293,6 +321,9 @@ impl fmt::Display for Reason {
             Self::DamperOfSolid => formatter.write_str(
                 "must be 0 with contact = \"standard-linear-solid\", whose damper is its arm's: \
                  relaxation_stiffness times relaxation_time",
+            ),
+            Self::NoSecondTone => formatter.write_str(
+                "there is no second tone: give tone2_ratio, as in \"25/4\", or leave this out",
             ),
             Self::NoSolid => formatter.write_str(
                 "belongs to contact = \"standard-linear-solid\"; leave it out with any other",

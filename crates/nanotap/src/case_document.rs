@@ -54,20 +54,35 @@ pub struct PhysicalSummary {
     pub beam_mass: f64,
     /// Mass of the tip, kg.
     pub tip_mass: f64,
-    /// Amplitude of the base, m.
+    /// Amplitude of the base, m, or of the force on the lever, N.
     pub drive_amplitude: f64,
     /// Drive frequency, Hz.
     pub drive_frequency: f64,
     /// Free amplitude of the tip, m.
     pub free_amplitude: f64,
-    /// Its phase behind the base.
+    /// Its phase behind the drive.
     pub free_phase_degrees: f64,
+    /// What phases are counted from.
+    pub phase_reference: &'static str,
+    /// Free amplitude of the second tone, m, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_free_amplitude: Option<f64>,
+    /// Frequency of the second tone, Hz, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_frequency: Option<f64>,
+    /// Amplitude of the second tone, m or N, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_amplitude: Option<f64>,
     /// Setpoint amplitude over free amplitude, if given.
     pub setpoint: Option<f64>,
     /// Contact stiffness, N/m.
     pub contact_stiffness: f64,
     /// Contact damping, N s/m.
     pub contact_damping: f64,
+    /// Stiffness of a standard linear solid's relaxing arm, N/m; 0 of other samples.
+    pub relaxation_stiffness: f64,
+    /// Its relaxation time, s.
+    pub relaxation_time: f64,
     /// Gap of the tip, m.
     pub tip_gap: f64,
     /// Gap of the beam, m.
@@ -91,6 +106,7 @@ impl PhysicalSummary {
             scales,
             ..
         } = resolved;
+        let second = resolved.case.tone2_ratio;
         Self {
             k: lever.k,
             f0: lever.f0,
@@ -101,9 +117,15 @@ impl PhysicalSummary {
             drive_frequency: parameters.drive_frequency,
             free_amplitude: resolved.free_amplitude,
             free_phase_degrees: resolved.free_phase,
+            phase_reference: resolved.phase_reference(),
+            second_free_amplitude: resolved.second_free_amplitude,
+            second_frequency: second.map(|ratio| ratio.value() * parameters.drive_frequency),
+            second_amplitude: second.map(|_| parameters.tone2_amplitude),
             setpoint: resolved.setpoint,
             contact_stiffness: parameters.contact_stiffness,
             contact_damping: parameters.contact_damping,
+            relaxation_stiffness: parameters.relaxation_stiffness,
+            relaxation_time: parameters.relaxation_time,
             tip_gap: parameters.tip_gap,
             beam_gap: scales.length,
             length_unit: scales.length,

@@ -24,6 +24,7 @@ pub use problem::{CaseFileError, Place, Problem, Source};
 
 use crate::case::{Case, CosineTerm};
 use crate::contact::ContactLaw;
+use crate::drive_form::{Actuation, FrequencyRatio};
 use crate::near_name::near_name;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::parameter::Parameter;
@@ -82,6 +83,16 @@ pub fn to_toml(case: &Case) -> String {
     }
     if case.cosine_term == CosineTerm::Printed {
         text.push_str("cosine_term = \"printed\"\n");
+    }
+    if case.actuation != Actuation::default() {
+        let (name, meaning) = (case.actuation.name(), case.actuation.meaning());
+        let _ = writeln!(text, "actuation = \"{name}\"  # {meaning}");
+    }
+    if let Some(ratio) = case.tone2_ratio {
+        let _ = writeln!(
+            text,
+            "tone2_ratio = \"{ratio}\"  # frequency of the second tone over omega"
+        );
     }
     if case.contact != ContactLaw::default() {
         let _ = writeln!(
@@ -173,7 +184,13 @@ impl Kind {
         let mut keys = self.numbers();
         keys.push("kind");
         if self == Self::Cantilever {
-            keys.extend(["modes", "cosine_term", "contact"]);
+            keys.extend([
+                "modes",
+                "cosine_term",
+                "contact",
+                "actuation",
+                "tone2_ratio",
+            ]);
             let aliases = Parameter::every().map(Parameter::alias);
             keys.extend(aliases.filter(|alias| !Parameter::every().any(|p| p.name() == *alias)));
         }
@@ -198,6 +215,7 @@ fn default_of(kind: Kind, law: ContactLaw, key: &str) -> Option<f64> {
         (Kind::Cantilever, "alpha5") => Some(0.0),
         (Kind::Cantilever, "alpha6") if solid => Some(0.0),
         (Kind::Cantilever, "relaxation_stiffness" | "relaxation_time") if !solid => Some(0.0),
+        (Kind::Cantilever, "tone2_amplitude" | "tone2_phase") => Some(0.0),
         (Kind::VibroImpact | Kind::Impact, "mass") => Some(1.0),
         _ => None,
     }
@@ -657,23 +675,66 @@ fn contact(
     known: &BTreeMap<&'static str, &Entry>,
     problems: &mut Vec<Problem>,
 ) -> Option<ContactLaw> {
-    let Some(entry) = known.get("contact") else {
-        return Some(ContactLaw::default());
+    let names = ContactLaw::ALL.map(ContactLaw::name);
+    word(known, "contact", names.into_iter(), problems)
+}
+
+/// A word of a key, its default if it is not written.
+fn word<T: Default + std::str::FromStr>(
+    known: &BTreeMap<&'static str, &Entry>,
+    key: &str,
+    allowed: impl Iterator<Item = &'static str> + Clone,
+    problems: &mut Vec<Problem>,
+) -> Option<T> {
+    let Some(entry) = known.get(key) else {
+        return Some(T::default());
     };
     let text = if let Value::Text(text) = &entry.value {
         text.as_str()
     } else {
         ""
     };
-    let law = text.parse().ok();
-    if law.is_none() {
-        problems.push(not_among(
-            entry,
-            text,
-            ContactLaw::ALL.map(ContactLaw::name).into_iter(),
-        ));
+    let read = text.parse().ok();
+    if read.is_none() {
+        problems.push(not_among(entry, text, allowed));
     }
-    law
+    read
+}
+
+/// How the case is driven: where, and the ratio of a second tone.
+fn drive_form(
+    known: &BTreeMap<&'static str, &Entry>,
+    problems: &mut Vec<Problem>,
+) -> Option<(Actuation, Option<FrequencyRatio>)> {
+    let names = Actuation::ALL.map(Actuation::name);
+    let actuation: Option<Actuation> = word(known, "actuation", names.into_iter(), problems);
+    let printed = known
+        .get("cosine_term")
+        .filter(|entry| entry.written.contains("printed"));
+    if let (Some(entry), Some(Actuation::Tip | Actuation::Distributed)) = (printed, actuation) {
+        problems.push(
+            Problem::new(
+                entry.value_place.clone(),
+                "the printed cosine term belongs to the drive through the base",
+            )
+            .help("leave cosine_term out, or write actuation = \"base\""),
+        );
+        return None;
+    }
+    let Some(entry) = known.get("tone2_ratio") else {
+        return Some((actuation?, None));
+    };
+    let read = match &entry.value {
+        Value::Text(text) => text.parse::<FrequencyRatio>(),
+        Value::Integer(_) | Value::Number(_) | Value::Other(_) => entry.written.parse(),
+    };
+    match read {
+        Ok(ratio) => Some((actuation?, Some(ratio))),
+        Err(error) => {
+            problems.push(out_of_range(entry, &error.to_string()));
+            None
+        }
+    }
 }
 
 fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem>) -> Option<Case> {
@@ -685,6 +746,8 @@ fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem
     let mut complete = true;
     let law = contact(known, problems);
     case.contact = law.unwrap_or_default();
+    let form = drive_form(known, problems);
+    (case.actuation, case.tone2_ratio) = form.unwrap_or_default();
     for parameter in Parameter::every() {
         let Some(entry) = known.get(parameter.name()) else {
             let default = default_of(Kind::Cantilever, case.contact, parameter.name());
@@ -711,6 +774,7 @@ fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem
         }
     }
     complete.then_some(())?;
+    form?;
     Some(Case {
         modes: modes?,
         cosine_term: cosine_term?,

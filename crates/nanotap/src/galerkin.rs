@@ -2,7 +2,8 @@
 //! respect to every parameter.
 //!
 //! In either regime M Ẍ + C Ẋ + K X = s sin Ωτ + c cos Ωτ + k, and the gap between
-//! tip and sample is V_T = p·X + α2 sin Ωτ + α5, Eq. (8).
+//! tip and sample is V_T = p·X + α2 sin Ωτ + α5, Eq. (8); with a second tone, or a drive
+//! that acts on the lever itself, as [`drive_form`](crate::drive_form) says.
 
 use std::sync::Arc;
 
@@ -10,6 +11,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::beam::Modes;
 use crate::case::{Case, CaseError, CosineTerm};
+use crate::contact::dual::Dual;
+use crate::drive_form::{Actuation, FrequencyRatio};
 use crate::parameter::Parameter;
 
 /// The two linear regimes of the tip.
@@ -43,6 +46,8 @@ pub struct Forcing {
     pub cosine: DVector<f64>,
     /// k, the part constant in time.
     pub constant: DVector<f64>,
+    /// Sine and cosine coefficients at the second tone's frequency, if there is one.
+    pub second: Option<[DVector<f64>; 2]>,
 }
 
 /// The gap V_T = p·X + sine · sin Ωτ + constant, Eq. (8), or a derivative of it.
@@ -54,6 +59,8 @@ pub struct Gap {
     pub sine: f64,
     /// The part constant in time.
     pub constant: f64,
+    /// Sine and cosine coefficients at the second tone's frequency, if there is one.
+    pub second: Option<[f64; 2]>,
 }
 
 /// The equations of motion of one case. Arrays are indexed by [`Regime::index`].
@@ -123,9 +130,85 @@ impl Galerkin {
     }
 }
 
+/// One tone of the drive, its numbers factors of the vectors that they stand at.
+#[derive(Clone, Copy, Debug)]
+struct Tone<N> {
+    /// Force along p: sine, cosine.
+    tip: [N; 2],
+    /// Force along I.
+    spread: [N; 2],
+    /// Part of the gap.
+    gap: [N; 2],
+    /// What contact adds along p.
+    contact: [N; 2],
+}
+
+impl Tone<Dual> {
+    /// A sin(wτ + θ). Through the base its force is A w² (α1 p + I) sin(wτ + θ) −
+    /// A α3 w I cos(wτ + θ), as Eqs. (14) and (6) have it.
+    fn new(case: &Case, dual: &impl Fn(Parameter) -> Dual, which: Which) -> Self {
+        let zero = Dual::constant(0.0);
+        let omega = dual(Parameter::Omega);
+        let (amplitude, rate, phase) = match which {
+            Which::First => (dual(Parameter::Alpha2), omega, zero),
+            Which::Second(ratio) => (
+                dual(Parameter::Tone2Amplitude),
+                omega * Dual::constant(ratio.value()),
+                dual(Parameter::Tone2Phase),
+            ),
+        };
+        let (sin, cos) = phase.sin_cos_degrees();
+        // s sin(wτ + θ) + c cos(wτ + θ)
+        let turned = |s: Dual, c: Dual| [s * cos - c * sin, s * sin + c * cos];
+        let (tip, spread, gap) = match case.actuation {
+            Actuation::Base => {
+                let inertia = amplitude * rate * rate;
+                let drag = amplitude * dual(Parameter::Alpha3);
+                let drag = match case.cosine_term {
+                    CosineTerm::Corrected => drag * rate,
+                    CosineTerm::Printed => drag,
+                };
+                (
+                    turned(dual(Parameter::Alpha1) * inertia, zero),
+                    turned(inertia, -drag),
+                    turned(amplitude, zero),
+                )
+            }
+            Actuation::Tip => (turned(amplitude, zero), [zero; 2], [zero; 2]),
+            Actuation::Distributed => ([zero; 2], turned(amplitude, zero), [zero; 2]),
+        };
+        let (stiffness, damping) = (dual(Parameter::Alpha4), dual(Parameter::Alpha6));
+        Self {
+            tip,
+            spread,
+            gap,
+            contact: [
+                -(stiffness * gap[0]) + damping * rate * gap[1],
+                -(stiffness * gap[1]) - damping * rate * gap[0],
+            ],
+        }
+    }
+
+    fn map(self, number: fn(Dual) -> f64) -> Tone<f64> {
+        Tone {
+            tip: self.tip.map(number),
+            spread: self.spread.map(number),
+            gap: self.gap.map(number),
+            contact: self.contact.map(number),
+        }
+    }
+}
+
+/// Which tone.
+#[derive(Clone, Copy)]
+enum Which {
+    First,
+    Second(FrequencyRatio),
+}
+
 /// Everything that depends on the parameters, as factors of 1, ppᵀ, diag(β⁴), p and I.
 /// Values and derivatives differ in these numbers only.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug)]
 struct Coefficients {
     beam_mass: f64,
     tip_mass: f64,
@@ -133,108 +216,42 @@ struct Coefficients {
     contact_damping: f64,
     beam_stiffness: f64,
     contact_stiffness: f64,
-    /// Free sine force along p and along I.
-    sine: [f64; 2],
-    /// Free cosine force along I.
-    cosine: f64,
-    /// What contact adds along p: sine, cosine, constant.
-    contact: [f64; 3],
+    tones: Vec<Tone<f64>>,
+    /// Constant force that contact adds along p.
+    contact_constant: f64,
     gap_tip: f64,
-    gap_sine: f64,
     gap_constant: f64,
 }
 
 impl Coefficients {
     /// Eqs. (8) and (11)–(18).
     fn of(case: &Case) -> Self {
-        let &Case {
-            alpha1,
-            alpha2,
-            alpha3,
-            alpha4,
-            alpha5,
-            alpha6,
-            omega,
-            ..
-        } = case;
-        Self {
-            beam_mass: 1.0,
-            tip_mass: alpha1,
-            beam_damping: alpha3,
-            contact_damping: alpha6,
-            beam_stiffness: 1.0,
-            contact_stiffness: alpha4,
-            sine: [alpha1 * alpha2 * omega * omega, alpha2 * omega * omega],
-            cosine: match case.cosine_term {
-                CosineTerm::Corrected => -alpha2 * alpha3 * omega,
-                CosineTerm::Printed => -alpha2 * alpha3,
-            },
-            contact: [-alpha2 * alpha4, -alpha2 * alpha6 * omega, -alpha4 * alpha5],
-            gap_tip: 1.0,
-            gap_sine: alpha2,
-            gap_constant: alpha5,
-        }
+        Self::numbers(case, None, |dual| dual.value)
     }
 
     /// The derivatives of [`of`](Self::of).
     fn derivative(case: &Case, parameter: Parameter) -> Self {
-        let &Case {
-            alpha1,
-            alpha2,
-            alpha3,
-            alpha4,
-            alpha5,
-            alpha6,
-            omega,
-            ..
-        } = case;
-        let zero = Self::default();
-        // The cosine force is −α2 α3 times this.
-        let (rate, rate_by_omega) = match case.cosine_term {
-            CosineTerm::Corrected => (omega, 1.0),
-            CosineTerm::Printed => (1.0, 0.0),
-        };
-        match parameter {
-            Parameter::Alpha1 => Self {
-                tip_mass: 1.0,
-                sine: [alpha2 * omega * omega, 0.0],
-                ..zero
-            },
-            Parameter::Alpha2 => Self {
-                sine: [alpha1 * omega * omega, omega * omega],
-                cosine: -alpha3 * rate,
-                contact: [-alpha4, -alpha6 * omega, 0.0],
-                gap_sine: 1.0,
-                ..zero
-            },
-            Parameter::Alpha3 => Self {
-                beam_damping: 1.0,
-                cosine: -alpha2 * rate,
-                ..zero
-            },
-            Parameter::Alpha4 => Self {
-                contact_stiffness: 1.0,
-                contact: [-alpha2, 0.0, -alpha5],
-                ..zero
-            },
-            Parameter::Alpha5 => Self {
-                contact: [0.0, 0.0, -alpha4],
-                gap_constant: 1.0,
-                ..zero
-            },
-            Parameter::Alpha6 => Self {
-                contact_damping: 1.0,
-                contact: [0.0, -alpha2 * omega, 0.0],
-                ..zero
-            },
-            Parameter::Omega => Self {
-                sine: [2.0 * alpha1 * alpha2 * omega, 2.0 * alpha2 * omega],
-                cosine: -alpha2 * alpha3 * rate_by_omega,
-                contact: [0.0, -alpha2 * alpha6, 0.0],
-                ..zero
-            },
-            // Of the sample's own equations only.
-            Parameter::RelaxationStiffness | Parameter::RelaxationTime => zero,
+        Self::numbers(case, Some(parameter), |dual| dual.derivative)
+    }
+
+    fn numbers(case: &Case, parameter: Option<Parameter>, number: fn(Dual) -> f64) -> Self {
+        let dual = |p| Dual::new(case.get(p), f64::from(u8::from(Some(p) == parameter)));
+        let second = case.tone2_ratio.map(Which::Second);
+        let one = Dual::constant(1.0);
+        Self {
+            beam_mass: number(one),
+            tip_mass: number(dual(Parameter::Alpha1)),
+            beam_damping: number(dual(Parameter::Alpha3)),
+            contact_damping: number(dual(Parameter::Alpha6)),
+            beam_stiffness: number(one),
+            contact_stiffness: number(dual(Parameter::Alpha4)),
+            tones: std::iter::once(Which::First)
+                .chain(second)
+                .map(|which| Tone::new(case, &dual, which).map(number))
+                .collect(),
+            contact_constant: number(-(dual(Parameter::Alpha4) * dual(Parameter::Alpha5))),
+            gap_tip: number(one),
+            gap_constant: number(dual(Parameter::Alpha5)),
         }
     }
 
@@ -254,15 +271,17 @@ impl Coefficients {
         };
         let damping = |_: usize| self.beam_damping;
         let stiffness = |j: usize| modes.stiffness[j] * self.beam_stiffness;
-        let free = Forcing {
-            sine: p * self.sine[0] + i * self.sine[1],
-            cosine: i * self.cosine,
-            constant: DVector::zeros(count),
-        };
-        let contact = Forcing {
-            sine: &free.sine + p * self.contact[0],
-            cosine: &free.cosine + p * self.contact[1],
-            constant: p * self.contact[2],
+        let forcing = |touching: f64| {
+            let tone = |tone: &Tone<f64>| {
+                [0, 1].map(|k| p * (tone.tip[k] + touching * tone.contact[k]) + i * tone.spread[k])
+            };
+            let [sine, cosine] = tone(&self.tones[0]);
+            Forcing {
+                sine,
+                cosine,
+                constant: p * (touching * self.contact_constant),
+                second: self.tones.get(1).map(tone),
+            }
         };
         GalerkinDerivative {
             mass: loaded(&|_| self.beam_mass, self.tip_mass),
@@ -274,11 +293,12 @@ impl Coefficients {
                 loaded(&stiffness, 0.0),
                 loaded(&stiffness, self.contact_stiffness),
             ],
-            forcing: [free, contact],
+            forcing: [forcing(0.0), forcing(1.0)],
             gap: Gap {
                 tip: p * self.gap_tip,
-                sine: self.gap_sine,
+                sine: self.tones[0].gap[0],
                 constant: self.gap_constant,
+                second: self.tones.get(1).map(|tone| tone.gap),
             },
         }
     }
@@ -320,6 +340,9 @@ mod tests {
         }
         all.extend(g.gap.tip.iter());
         all.extend([g.gap.sine, g.gap.constant]);
+        all.extend(g.gap.second.iter().flatten());
+        let second = g.forcing.iter().filter_map(|f| f.second.as_ref());
+        all.extend(second.flatten().flat_map(|v| v.iter()));
         all
     }
 

@@ -14,6 +14,7 @@ pub mod case_file;
 pub mod contact;
 pub mod convergence;
 pub mod dataset;
+pub mod drive_form;
 pub mod exact_beam;
 pub mod experiment;
 pub mod fixed_step_run;

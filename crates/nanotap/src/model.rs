@@ -63,6 +63,8 @@ pub struct Model {
     pub beam: Option<BeamOutputs>,
     /// How many numbers at the end of the state are the sample's.
     pub memory: usize,
+    /// Phase of a second tone in rad.
+    pub second_phase: f64,
     /// What a sample's memory that is overwritten at the end of each contact does to
     /// volumes of states.
     pub forgetting: Option<Forgetting>,
@@ -145,7 +147,8 @@ pub struct BeamOutputs {
     pub modes: Arc<Modes>,
     /// Slope ∂W/∂ξ at the tip: what an optical lever reads.
     pub slope: Output,
-    /// Displacement of the base, α2 sin Ωτ.
+    /// Displacement of the base: α2 sin Ωτ and what a second tone adds, 0 if the drive acts
+    /// on the lever itself.
     pub base: Output,
 }
 
@@ -169,7 +172,7 @@ impl Model {
     /// When the case is not valid, or a regime is driven at an undamped resonance.
     pub fn cantilever(case: &Case) -> Result<Self, ModelError> {
         let galerkin = Galerkin::new(case)?;
-        let drive = Drive::single(case.omega)?;
+        let drive = drive_of(case)?;
         let law = ContactLaw::law(case, None);
         let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
         let regimes = vec![
@@ -189,6 +192,7 @@ impl Model {
             beam: Some(outputs.beam),
             memory: usize::from(law.has_memory),
             forgetting: outputs.forgetting,
+            second_phase: case.tone2_phase.to_radians(),
             system,
         })
     }
@@ -227,9 +231,30 @@ impl Model {
         self.tip.plus(towards, &self.gap)
     }
 
-    /// The drive period.
+    /// The drive period: that of the stroboscopic map, after which every tone repeats.
     pub fn period(&self) -> f64 {
         self.system.drive().period()
+    }
+
+    /// Angular frequency of the drive, of several tones the first.
+    pub fn frequency(&self) -> f64 {
+        let drive = self.system.drive();
+        let first = drive.frequencies().first().copied();
+        first.unwrap_or(std::f64::consts::TAU / drive.period())
+    }
+
+    /// How many periods of the first tone the drive period has.
+    pub fn repetition(&self) -> usize {
+        let first = self.system.drive().harmonics().first().copied();
+        first.unwrap_or(1) as usize
+    }
+}
+
+/// The drive's tones: the first, and the second if there is one.
+fn drive_of(case: &Case) -> Result<Drive, FlowError> {
+    match case.tone2_ratio {
+        None => Drive::single(case.omega),
+        Some(ratio) => Drive::new(case.period(), &[ratio.denominator(), ratio.numerator()]),
     }
 }
 

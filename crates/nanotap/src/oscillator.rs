@@ -298,6 +298,7 @@ impl Oscillator {
             beam: None,
             memory: 0,
             forgetting: None,
+            second_phase: 0.0,
             height: gap.clone(),
             gap,
             system,

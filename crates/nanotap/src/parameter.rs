@@ -1,5 +1,5 @@
 //! The numbers of the dimensionless model, under every name they go by: the paper's seven,
-//! and those that only some samples have.
+//! and those that only some samples and drives have.
 
 use std::fmt;
 use std::str::FromStr;
@@ -31,6 +31,10 @@ pub enum Parameter {
     /// Time in which the force of that arm decays at constant indentation, in the model's
     /// unit of time √(mL⁴/(EI)).
     RelaxationTime,
+    /// Amplitude of the second tone, measured as α2.
+    Tone2Amplitude,
+    /// Phase θ of the second tone in degrees: it is sin(ρΩτ + θ), ρ the ratio of frequencies.
+    Tone2Phase,
 }
 
 /// What is known of a parameter besides its value.
@@ -54,8 +58,13 @@ impl Parameter {
         Self::Omega,
     ];
 
-    /// Parameters that only some samples have; 0 where they are not said.
-    pub const FURTHER: [Self; 2] = [Self::RelaxationStiffness, Self::RelaxationTime];
+    /// Parameters that only some samples and drives have; 0 where they are not said.
+    pub const FURTHER: [Self; 4] = [
+        Self::RelaxationStiffness,
+        Self::RelaxationTime,
+        Self::Tone2Amplitude,
+        Self::Tone2Phase,
+    ];
 
     const fn entry(self) -> Entry {
         match self {
@@ -121,6 +130,20 @@ impl Parameter {
                 symbol: "τₘ",
                 ascii_symbol: "τm",
                 meaning: "time in which the arm's force decays, over √(mL⁴/(EI))",
+            },
+            Self::Tone2Amplitude => Entry {
+                name: "tone2_amplitude",
+                alias: "second_tone_amplitude",
+                symbol: "A₂",
+                ascii_symbol: "A2",
+                meaning: "amplitude of the second tone, measured as alpha2",
+            },
+            Self::Tone2Phase => Entry {
+                name: "tone2_phase",
+                alias: "second_tone_phase",
+                symbol: "θ₂",
+                ascii_symbol: "θ2",
+                meaning: "phase of the second tone in degrees",
             },
         }
     }
@@ -247,7 +270,7 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         // The arm's two names are readable as they are.
-        assert_eq!(names.len(), 16);
+        assert_eq!(names.len(), 20);
     }
 
     #[test]

@@ -48,13 +48,14 @@ fn table() -> &'static [PhysicalKey] {
 }
 
 /// Names that are no quantities.
-const WORDS: [&str; 7] = [
+const WORDS: [&str; 8] = [
     "cantilever.lever",
     "tip.material",
     "tip.shape",
     "sample.material",
     "sample.law",
     "drive.actuation",
+    "drive.second_ratio",
     "drive.setpoint",
 ];
 
@@ -264,7 +265,7 @@ impl PhysicalSubject {
             .collect::<Result<Vec<_>, _>>()?;
         let varies = |path: &str| keys.iter().any(|key| key.path == path);
         let lever_varies = keys.iter().any(|key| {
-            matches!(key.section, "cantilever" | "tip") || key.path.starts_with("drive.f")
+            matches!(key.section, "cantilever" | "tip") || key.path.starts_with("drive.frequency")
         });
         let mut held = source.clone();
         let mut hold = |path: &str, kind: Kind, value: f64| {
@@ -285,6 +286,14 @@ impl PhysicalSubject {
             };
             let path = own[usize::from(row.kind == Kind::Force)];
             hold(path, row.kind, row.si);
+        }
+        if let Some(ratio) = base.case.tone2_ratio
+            && source.has("drive.second_frequency")
+            && !varies("drive.second_frequency")
+        {
+            // The second tone keeps its place among the harmonics of the first.
+            held.tables.remove("drive", "second_frequency");
+            held.tables.set("drive", "second_ratio", &ratio.to_string());
         }
         // The distance stands for it.
         held.tables.remove("drive", "setpoint");
@@ -325,7 +334,7 @@ impl PhysicalSubject {
             "sample.damping" => parameters.contact_damping,
             "drive.frequency" => parameters.drive_frequency,
             "drive.frequency_ratio" => parameters.drive_frequency / resolved.lever.f0,
-            "drive.amplitude" => parameters.drive_amplitude,
+            "drive.amplitude" | "drive.force" => parameters.drive_amplitude,
             "drive.free_amplitude" => resolved.free_amplitude,
             _ => return None,
         })

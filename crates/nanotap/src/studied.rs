@@ -212,7 +212,7 @@ impl Studied {
         Some(ParameterUnit {
             quantity: row.quantity,
             unit: row.kind.si_unit(),
-            si: resolved.scales.of(parameter),
+            si: resolved.scales.of(parameter, resolved.case.actuation),
             kind: row.kind,
         })
     }

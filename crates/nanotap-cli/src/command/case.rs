@@ -113,8 +113,17 @@ fn cantilever(title: &str, case: &Case) -> String {
         number::counted(case.modes, "mode", "modes")
     );
     let period = number::significant(case.period(), 7);
+    let formula = case.tone2_ratio.map_or_else(
+        || "2π/Ω".to_owned(),
+        |ratio| {
+            format!(
+                "{}·2π/Ω, after which both tones repeat,",
+                ratio.denominator()
+            )
+        },
+    );
     format!(
-        "{}\n\n{}\n  drive period 2π/Ω = {period}\n",
+        "{}\n\n{}\n  drive period {formula} = {period}\n",
         style::bold(&heading),
         table.render()
     )
@@ -150,8 +159,9 @@ fn physical(title: &str, resolved: &Resolved) -> String {
     ]);
     let free = Kind::Length.format(resolved.free_amplitude);
     let phase = format!(
-        "free amplitude of the tip, {:.1}° behind the base",
-        resolved.free_phase
+        "free amplitude of the tip, {:.1}° behind the {}",
+        resolved.free_phase,
+        resolved.phase_reference()
     );
     given.row(["A0", &free, &phase]);
     if let Some(setpoint) = resolved.setpoint {
@@ -168,6 +178,11 @@ fn physical(title: &str, resolved: &Resolved) -> String {
         &format!("{:.4e} s", scales.time),
         "unit of time, √(mL⁴/(EI))",
     ]);
+    if let (Some(free), Some(ratio)) = (resolved.second_free_amplitude, case.tone2_ratio) {
+        let what = format!("free amplitude at the second tone, {ratio} of the first's frequency");
+        given.row(["A02", &Kind::Length.format(free), &what]);
+    }
+    given.row(["", case.actuation.name(), case.actuation.meaning()]);
     given.row(["", case.contact.name(), case.contact.meaning()]);
     let mut mapping = Table::new([
         ("", Align::Left),

@@ -15,6 +15,13 @@ impl Dual {
         Self { value, derivative }
     }
 
+    /// Sine and cosine of an angle in degrees.
+    pub(crate) fn sin_cos_degrees(self) -> (Self, Self) {
+        let (sin, cos) = self.value.to_radians().sin_cos();
+        let rate = self.derivative.to_radians();
+        (Self::new(sin, cos * rate), Self::new(cos, -sin * rate))
+    }
+
     /// A number that no parameter changes.
     pub(crate) const fn constant(value: f64) -> Self {
         Self::new(value, 0.0)

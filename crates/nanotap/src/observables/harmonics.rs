@@ -51,13 +51,15 @@ impl Spectrum {
             .beam
             .as_ref()
             .map(|beam| trajectory.signal(&beam.slope));
-        let base = std::f64::consts::TAU / (model.period() * period as f64);
-        let harmonics: Vec<Harmonic> = (1..=orders * period)
+        // Both tones are whole multiples of the whole motion's own frequency.
+        let repetition = model.repetition() * period;
+        let base = model.frequency() / repetition as f64;
+        let harmonics: Vec<Harmonic> = (1..=orders * repetition)
             .map(|j| {
                 let omega = base * j as f64;
                 let (t, f) = (tip.fourier(omega), force.fourier(omega));
                 Harmonic {
-                    order: j as f64 / period as f64,
+                    order: j as f64 / repetition as f64,
                     tip: t.norm(),
                     tip_phase: lag(t),
                     force: f.norm(),
@@ -66,7 +68,7 @@ impl Spectrum {
                 }
             })
             .collect();
-        let first = tip.fourier(base * period as f64);
+        let first = tip.fourier(model.frequency());
         let mean = tip.mean();
         let variance = tip.product_integral(&tip) / tip.duration() - mean * mean;
         let thd = if variance > 0.0 {

@@ -40,6 +40,9 @@ pub struct Observables {
     /// The component of W at the drive's frequency: Re(c e^{iΩτ}).
     #[serde(skip)]
     pub fundamental: Complex,
+    /// The same of the second tone, if there is one.
+    #[serde(flatten)]
+    pub second_tone: Option<SecondTone>,
     /// Time mean of W.
     pub mean_deflection: f64,
     /// Root mean square of W about its mean.
@@ -105,6 +108,36 @@ pub struct OpticalLever {
     pub fundamental: Complex,
 }
 
+/// The tip deflection at the frequency of a second tone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SecondTone {
+    /// Its amplitude.
+    #[serde(rename = "tone2_response")]
+    pub amplitude: f64,
+    /// Its lag behind the second tone itself, degrees in (−180, 180].
+    #[serde(rename = "tone2_lag")]
+    pub phase: f64,
+    /// The component Re(c e^{iwτ}), turned back by the tone's own phase.
+    #[serde(skip)]
+    pub component: Complex,
+}
+
+impl SecondTone {
+    fn of(component: Complex) -> Self {
+        Self {
+            amplitude: component.norm(),
+            phase: lag(component),
+            component,
+        }
+    }
+
+    fn read(model: &Model, tip: &PiecewiseSignal) -> Option<Self> {
+        let omega = *model.system.drive().frequencies().get(1)?;
+        let own = Complex::new(0.0, -model.second_phase).exp();
+        Some(Self::of(tip.fourier(omega) * own))
+    }
+}
+
 impl OpticalLever {
     fn of(fundamental: Complex) -> Self {
         Self {
@@ -137,7 +170,7 @@ impl Observables {
             .filter(|&r| model.contact[r])
             .map(|r| trajectory.time_in(r))
             .sum();
-        let omega = std::f64::consts::TAU / model.period();
+        let omega = model.frequency();
         let slope = model
             .beam
             .as_ref()
@@ -160,6 +193,7 @@ impl Observables {
             first_harmonic: fundamental.norm(),
             phase: lag(fundamental),
             fundamental,
+            second_tone: SecondTone::read(model, &tip),
             mean_deflection: mean,
             rms_deflection: (mean_square - mean * mean).max(0.0).sqrt(),
             gap_range: [gap_low.value, gap_high.value],
@@ -193,6 +227,9 @@ impl Observables {
         let mean_deflection = mean(self.mean_deflection, next.mean_deflection);
         let fundamental =
             (self.fundamental * self.periods + next.fundamental * next.periods) / periods;
+        let second_tone = self.second_tone.zip(next.second_tone).map(|(a, b)| {
+            SecondTone::of((a.component * self.periods + b.component * next.periods) / periods)
+        });
         let optical_lever = self.optical_lever.zip(next.optical_lever).map(|(a, b)| {
             OpticalLever::of(
                 (a.fundamental * self.periods + b.fundamental * next.periods) / periods,
@@ -219,6 +256,7 @@ impl Observables {
             first_harmonic: fundamental.norm(),
             phase: lag(fundamental),
             fundamental,
+            second_tone,
             mean_deflection,
             rms_deflection: (mean(square(self), square(next)) - mean_deflection.powi(2))
                 .max(0.0)

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use crate::case::{Case, CosineTerm};
 use crate::contact::ContactLaw;
+use crate::drive_form::Actuation;
 use crate::oscillator::{Oscillator, OscillatorParameter, Stop};
 
 /// `nanotap` with `command` on `case`, with `options` behind it.
@@ -15,6 +16,12 @@ pub(super) fn on_case(command: &str, case: &Case, options: &str) -> String {
     }
     if case.cosine_term == CosineTerm::Printed {
         line.push_str(" --set cosine_term=printed");
+    }
+    if case.actuation != Actuation::default() {
+        let _ = write!(line, " --set actuation={}", case.actuation);
+    }
+    if let Some(ratio) = case.tone2_ratio {
+        let _ = write!(line, " --set tone2_ratio={ratio}");
     }
     if case.contact != ContactLaw::default() {
         let _ = write!(line, " --set contact={}", case.contact);
@@ -78,6 +85,9 @@ mod tests {
     fn a_command_line_says_its_whole_case() {
         let mut case = Case::paper().with_modes(5).with(Parameter::Omega, 20.0);
         case.cosine_term = CosineTerm::Printed;
+        case.contact = ContactLaw::KelvinVoigt;
+        case.tone2_ratio = Some("25/4".parse().unwrap());
+        case.tone2_amplitude = 0.01;
         let line = on_case("simulate", &case, "--periods 4");
         assert!(line.starts_with("nanotap simulate ") && line.ends_with(" --periods 4"));
         let read = CaseFile::parse(None, &overrides(&line)).unwrap();

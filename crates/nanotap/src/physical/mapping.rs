@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::lever::Lever;
 use super::quantity::Kind;
-use crate::case::{Case, CosineTerm};
-use crate::contact::ContactLaw;
+use crate::case::Case;
+use crate::drive_form::Actuation;
 use crate::parameter::Parameter;
 
 /// The SI value of the model's unit of each kind.
@@ -61,12 +61,17 @@ impl Scales {
         }
     }
 
-    /// SI value of 1 of a dimensionless parameter: of α2 and α5 in m, of Ω in Hz, of the
-    /// relaxation time in s.
-    pub fn of(&self, parameter: Parameter) -> f64 {
+    /// SI value of 1 of a dimensionless parameter: of α5 in m, of α2 and a second tone in m
+    /// or N as the drive acts, of Ω in Hz, of the relaxation time in s, of an angle in rad.
+    pub fn of(&self, parameter: Parameter, actuation: Actuation) -> f64 {
         match parameter {
             Parameter::Alpha1 => self.mass,
-            Parameter::Alpha2 | Parameter::Alpha5 => self.length,
+            Parameter::Alpha2 | Parameter::Tone2Amplitude => match actuation {
+                Actuation::Base => self.length,
+                Actuation::Tip | Actuation::Distributed => self.force,
+            },
+            Parameter::Alpha5 => self.length,
+            Parameter::Tone2Phase => 1_f64.to_radians(),
             Parameter::Alpha3 | Parameter::Alpha6 => self.damping,
             Parameter::Alpha4 | Parameter::RelaxationStiffness => self.stiffness,
             Parameter::Omega => self.frequency,
@@ -80,7 +85,7 @@ impl Scales {
 pub struct PhysicalParameters {
     /// Mass of the tip M, in kg: α1.
     pub tip_mass: f64,
-    /// Amplitude of the base f, in m: α2.
+    /// Amplitude of the base f, in m, or of the force on the lever, in N: α2.
     pub drive_amplitude: f64,
     /// Damping of the whole beam CL, in N s/m: α3.
     pub beam_damping: f64,
@@ -96,12 +101,16 @@ pub struct PhysicalParameters {
     pub relaxation_stiffness: f64,
     /// Its relaxation time, in s.
     pub relaxation_time: f64,
+    /// Amplitude of the second tone, in m or N; 0 without one.
+    pub tone2_amplitude: f64,
+    /// Its phase in rad.
+    pub tone2_phase: f64,
 }
 
 impl PhysicalParameters {
     /// What a dimensionless case means under these units.
     pub fn from_case(case: &Case, scales: &Scales) -> Self {
-        let value = |parameter| case.get(parameter) * scales.of(parameter);
+        let value = |parameter| case.get(parameter) * scales.of(parameter, case.actuation);
         Self {
             tip_mass: value(Parameter::Alpha1),
             drive_amplitude: value(Parameter::Alpha2),
@@ -112,32 +121,18 @@ impl PhysicalParameters {
             drive_frequency: value(Parameter::Omega),
             relaxation_stiffness: value(Parameter::RelaxationStiffness),
             relaxation_time: value(Parameter::RelaxationTime),
+            tone2_amplitude: value(Parameter::Tone2Amplitude),
+            tone2_phase: value(Parameter::Tone2Phase),
         }
     }
 
-    /// The dimensionless case; not validated.
-    pub fn to_case(
-        &self,
-        scales: &Scales,
-        modes: usize,
-        cosine_term: CosineTerm,
-        contact: ContactLaw,
-    ) -> Case {
-        let ratio = |parameter| self.get(parameter) / scales.of(parameter);
-        Case {
-            modes,
-            alpha1: ratio(Parameter::Alpha1),
-            alpha2: ratio(Parameter::Alpha2),
-            alpha3: ratio(Parameter::Alpha3),
-            alpha4: ratio(Parameter::Alpha4),
-            alpha5: ratio(Parameter::Alpha5),
-            alpha6: ratio(Parameter::Alpha6),
-            omega: ratio(Parameter::Omega),
-            cosine_term,
-            contact,
-            relaxation_stiffness: ratio(Parameter::RelaxationStiffness),
-            relaxation_time: ratio(Parameter::RelaxationTime),
-        }
+    /// The dimensionless case, not validated: `like` says what is no quantity (modes, contact
+    /// law, way of driving, ratio of the tones).
+    pub fn to_case(&self, scales: &Scales, like: &Case) -> Case {
+        Parameter::every().fold(like.clone(), |case, parameter| {
+            let unit = scales.of(parameter, like.actuation);
+            case.with(parameter, self.get(parameter) / unit)
+        })
     }
 
     /// The quantity that becomes a dimensionless parameter.
@@ -152,6 +147,8 @@ impl PhysicalParameters {
             Parameter::Omega => self.drive_frequency,
             Parameter::RelaxationStiffness => self.relaxation_stiffness,
             Parameter::RelaxationTime => self.relaxation_time,
+            Parameter::Tone2Amplitude => self.tone2_amplitude,
+            Parameter::Tone2Phase => self.tone2_phase,
         }
     }
 }
@@ -179,7 +176,7 @@ pub fn mapping_table(case: &Case, scales: &Scales) -> Vec<MappingRow> {
     case.parameters()
         .into_iter()
         .map(|parameter| {
-            let (formula, quantity, kind) = description(parameter);
+            let (formula, quantity, kind) = description(parameter, case.actuation);
             MappingRow {
                 parameter,
                 value: case.get(parameter),
@@ -192,10 +189,26 @@ pub fn mapping_table(case: &Case, scales: &Scales) -> Vec<MappingRow> {
         .collect()
 }
 
-const fn description(parameter: Parameter) -> (&'static str, &'static str, Kind) {
+const fn description(
+    parameter: Parameter,
+    actuation: Actuation,
+) -> (&'static str, &'static str, Kind) {
+    let by_force = !matches!(actuation, Actuation::Base);
     match parameter {
         Parameter::Alpha1 => ("M/(mL)", "tip mass M", Kind::Mass),
+        Parameter::Alpha2 if by_force => (
+            "F L^3/(EI g0) = 3 F/(k g0)",
+            "amplitude of the drive's force F",
+            Kind::Force,
+        ),
         Parameter::Alpha2 => ("f/g0", "base amplitude f", Kind::Length),
+        Parameter::Tone2Amplitude if by_force => (
+            "F2 L^3/(EI g0) = 3 F2/(k g0)",
+            "force of the second tone F2",
+            Kind::Force,
+        ),
+        Parameter::Tone2Amplitude => ("f2/g0", "base amplitude of the second tone", Kind::Length),
+        Parameter::Tone2Phase => ("degrees", "phase of the second tone", Kind::Angle),
         Parameter::Alpha3 => (
             "C sqrt(L^4/(m EI)) = (C L) T/(m L)",
             "damping of the whole beam C L",

@@ -2,10 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::Complex;
+
 use super::catalogue::{self, Catalogue};
 use super::drive::{self, Drive, DriveFrequency, DriveStrength, Gaps, Setpoint};
 use super::error::PhysicalError;
-use super::free_response::free_response;
+use super::free_response::{free_response, response_at};
 use super::lever::{self, Lever, LeverData};
 use super::mapping::{MappingRow, PhysicalParameters, Scales, mapping_table};
 use super::quantity::Kind;
@@ -14,8 +16,10 @@ use super::sample::{self, Sample};
 use super::section::{Reader, Sections};
 use super::tip::{self, Tip};
 use crate::case::{Case, CosineTerm};
+use crate::drive_form::Actuation;
 use crate::exact_beam;
 use crate::near_name::suggestion;
+use crate::parameter::Parameter;
 
 /// The sections of a physical case with the keys that each may have.
 pub const SECTIONS: [(&str, &[&str]); 5] = [
@@ -65,7 +69,10 @@ pub struct Resolved {
     pub parameters: PhysicalParameters,
     /// Free amplitude A₀ of the tip's deflection at the drive frequency, in m.
     pub free_amplitude: f64,
-    /// Phase of the free deflection behind the base in degrees: 90 at resonance.
+    /// Free amplitude of the second tone, in m, if there is one.
+    pub second_free_amplitude: Option<f64>,
+    /// Phase of the free deflection behind the drive (the base's displacement, or the force
+    /// on the lever) in degrees: 90 at resonance.
     pub free_phase: f64,
     /// Setpoint amplitude over A₀, if one was given: experiments solve for its gap.
     pub setpoint: Option<f64>,
@@ -140,21 +147,32 @@ impl PhysicalCase {
             DriveFrequency::Absolute(frequency) => frequency,
             DriveFrequency::Ratio(ratio) => ratio * lever.f0,
         };
-        // The free response does not depend on g0, so any length serves as unit here.
-        let free = self.free_case(&lever, frequency);
-        let response = free_response(&free)?;
-        let gain = response.norm();
-        let (base, free_amplitude) = match self.drive.strength {
-            DriveStrength::Base(base) => (base, base * gain),
-            DriveStrength::Free(amplitude) => (amplitude / gain, amplitude),
+        let ratio = self.drive.second.map(|s| s.frequency.ratio(frequency));
+        let like = Case {
+            modes: self.modes,
+            cosine_term: self.cosine_term,
+            contact: self.sample.law,
+            actuation: self.drive.actuation,
+            tone2_ratio: ratio.transpose()?,
+            ..Case::paper()
         };
-        if !base.is_finite() {
-            return Err(PhysicalError::impossible(
-                "drive.free_amplitude",
-                Kind::Length.format(free_amplitude),
-                "the lever does not move at this drive frequency",
-            ));
-        }
+        // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
+        // in which a force is measured in k/3.
+        let free = Self::free_case(&lever, frequency, &like);
+        let unit = Scales::new(&lever, 1.0).of(Parameter::Alpha2, like.actuation);
+        let response = free_response(&free)?;
+        let strength =
+            |strength, response: Complex<f64>, key| applied(strength, response.norm() / unit, key);
+        let (base, free_amplitude) =
+            strength(self.drive.strength, response, "drive.free_amplitude")?;
+        let second = match (self.drive.second, like.tone2_ratio) {
+            (Some(second), Some(ratio)) => {
+                let response = response_at(&free, ratio.value() * free.omega)?;
+                let key = "drive.second_free_amplitude";
+                Some((second.phase, strength(second.strength, response, key)?))
+            }
+            _ => None,
+        };
         let setpoint = self.setpoint_ratio(free_amplitude)?;
         let (tip_gap, beam_gap) = self.gaps(setpoint, free_amplitude, &mut remarks)?;
         let scales = Scales::new(&lever, beam_gap);
@@ -168,8 +186,10 @@ impl PhysicalCase {
             drive_frequency: frequency,
             relaxation_stiffness: self.sample.relaxation_stiffness,
             relaxation_time: self.sample.relaxation_time,
+            tone2_amplitude: second.map_or(0.0, |(_, (applied, _))| applied),
+            tone2_phase: second.map_or(0.0, |(phase, _)| phase),
         };
-        let case = parameters.to_case(&scales, self.modes, self.cosine_term, self.sample.law);
+        let case = parameters.to_case(&scales, &like);
         case.validate()?;
         let resolved = Resolved {
             case,
@@ -178,6 +198,7 @@ impl PhysicalCase {
             sample: self.sample.clone(),
             parameters,
             free_amplitude,
+            second_free_amplitude: second.map(|(_, (_, free))| free),
             free_phase: -response.arg().to_degrees(),
             setpoint,
             tip_height: beam_gap - tip_gap,
@@ -192,9 +213,9 @@ impl PhysicalCase {
     }
 
     /// The lever alone, driven with unit amplitude.
-    fn free_case(&self, lever: &Lever, frequency: f64) -> Case {
+    fn free_case(lever: &Lever, frequency: f64, like: &Case) -> Case {
         Case {
-            modes: self.modes,
+            modes: like.modes,
             alpha1: lever.tip_mass_ratio,
             alpha2: 1.0,
             alpha3: lever.damping(),
@@ -202,7 +223,8 @@ impl PhysicalCase {
             alpha5: 0.0,
             alpha6: 0.0,
             omega: TAU * frequency * lever.time_unit(),
-            cosine_term: self.cosine_term,
+            cosine_term: like.cosine_term,
+            actuation: like.actuation,
             ..Case::paper()
         }
     }
@@ -277,6 +299,24 @@ impl PhysicalCase {
     }
 }
 
+/// Amplitude of the drive and of the free tip, one from the other by the `gain` from the
+/// first to the second, both in SI.
+fn applied(
+    strength: DriveStrength,
+    gain: f64,
+    key: &'static str,
+) -> Result<(f64, f64), PhysicalError> {
+    match strength {
+        DriveStrength::Applied(applied) => Ok((applied, applied * gain)),
+        DriveStrength::Free(free) if (free / gain).is_finite() => Ok((free / gain, free)),
+        DriveStrength::Free(free) => Err(PhysicalError::impossible(
+            key,
+            Kind::Length.format(free),
+            "the lever does not move at this drive frequency",
+        )),
+    }
+}
+
 impl Resolved {
     /// The mapping to α1 … α6 and Ω, line by line.
     pub fn mapping(&self) -> Vec<MappingRow> {
@@ -285,7 +325,11 @@ impl Resolved {
 
     /// What phases are counted from.
     pub const fn phase_reference(&self) -> &'static str {
-        "displacement of the clamped end"
+        match self.case.actuation {
+            Actuation::Base => "displacement of the clamped end",
+            Actuation::Tip => "force at the tip",
+            Actuation::Distributed => "force on the lever",
+        }
     }
 
     /// Whether another part of the beam would touch. The trajectory decides in the end; what
@@ -293,7 +337,10 @@ impl Resolved {
     /// ½kA₀² = ½K₁δ², but no deeper than it swings.
     fn clearance_remarks(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
-        let base = self.parameters.drive_amplitude;
+        let base = match self.case.actuation {
+            Actuation::Base => self.parameters.drive_amplitude + self.parameters.tone2_amplitude,
+            Actuation::Tip | Actuation::Distributed => 0.0,
+        };
         if base >= self.scales.length {
             remarks.push(Remark::warning(format!(
                 "the drive moves the clamped end by {}, further than its gap of {}: the beam \

@@ -10,7 +10,6 @@ use super::tip::{TipMass, TipShape};
 use super::*;
 use crate::beam::Modes;
 use crate::case::{Case, CosineTerm};
-use crate::contact::ContactLaw;
 use crate::exact_beam;
 
 fn sections(text: &[(&str, &str, &str)]) -> Sections {
@@ -338,8 +337,10 @@ fn units_are_those_of_the_beam_equation() {
         drive_frequency: 65.7e3,
         relaxation_stiffness: 0.0,
         relaxation_time: 0.0,
+        tone2_amplitude: 0.0,
+        tone2_phase: 0.0,
     };
-    let case = physical.to_case(&scales, 3, CosineTerm::Corrected, ContactLaw::SpringDamper);
+    let case = physical.to_case(&scales, &Case::paper());
     // Eqs. (5) and (7) of the paper, with the mass per length put back under the root.
     let time = (m * length.powi(4) / ei).sqrt();
     let root = (length.powi(4) / (m * ei)).sqrt();
@@ -399,7 +400,7 @@ proptest! {
             ..Case::paper()
         };
         let physical = PhysicalParameters::from_case(&case, &scales);
-        let back = physical.to_case(&scales, 3, CosineTerm::Corrected, ContactLaw::SpringDamper);
+        let back = physical.to_case(&scales, &Case::paper());
         for parameter in crate::parameter::Parameter::ALL {
             prop_assert!((back.get(parameter) / case.get(parameter) - 1.0).abs() < 1e-13);
         }

@@ -3,6 +3,7 @@
 
 mod contact_laws;
 mod derivatives;
+mod drive;
 mod facts;
 mod impact_oscillator;
 mod kelvin_voigt;

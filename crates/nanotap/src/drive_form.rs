@@ -1,0 +1,280 @@
+//! How the lever is driven: where, and with how many tones.
+//!
+//! A tone is A sin(wτ + θ). Driven through the base (the paper's piezo), the clamped end
+//! moves by A in units of g₀. Driven directly, a force of amplitude A in units of EI g₀/L³ (a
+//! third of k g₀) acts on the tip (a magnet) or is spread evenly over the beam (light, heat),
+//! the clamped end is at rest, and the gap has no motion of its own. A static force A at the
+//! tip would bend it by A/3.
+//!
+//! A second tone has p/q of the first one's frequency. Both repeat after q periods of the
+//! first, so that the stroboscopic map is of that period.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize, Serializer};
+
+/// Where the drive acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Actuation {
+    /// The clamped end is moved, as in the paper.
+    #[default]
+    Base,
+    /// A force at the tip (magnetic).
+    Tip,
+    /// A force spread evenly over the beam (photothermal, electrostatic).
+    Distributed,
+}
+
+impl Actuation {
+    /// Every way.
+    pub const ALL: [Self; 3] = [Self::Base, Self::Tip, Self::Distributed];
+
+    /// Its name in case files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Base => "base",
+            Self::Tip => "tip",
+            Self::Distributed => "distributed",
+        }
+    }
+
+    /// What it is, in a few words.
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Base => "the clamped end is moved",
+            Self::Tip => "a force at the tip",
+            Self::Distributed => "a force spread evenly over the beam",
+        }
+    }
+}
+
+impl fmt::Display for Actuation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(self.name())
+    }
+}
+
+/// A word that names no way of driving.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{given}` is no way of driving; there are {}", Actuation::ALL.map(Actuation::name).join(", "))]
+pub struct UnknownActuation {
+    /// The word.
+    pub given: String,
+}
+
+impl FromStr for Actuation {
+    type Err = UnknownActuation;
+
+    fn from_str(given: &str) -> Result<Self, UnknownActuation> {
+        let word = given.trim().to_lowercase();
+        Self::ALL
+            .into_iter()
+            .find(|way| way.name() == word)
+            .ok_or_else(|| UnknownActuation {
+                given: given.to_owned(),
+            })
+    }
+}
+
+/// A ratio of two frequencies, in lowest terms and not 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct FrequencyRatio {
+    numerator: u32,
+    denominator: u32,
+}
+
+/// Most periods of the first tone after which both repeat, and the largest numerator.
+const LARGEST: (u32, u32) = (64, 10_000);
+/// How near a number must be to a ratio to count as one.
+const NEAR: f64 = 1e-9;
+
+/// Why two frequencies make no two-tone drive.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RatioError {
+    /// Not a ratio at all.
+    #[error("\"{given}\" is no ratio of frequencies; write it as in \"25/4\", with whole numbers")]
+    Form {
+        /// What was given.
+        given: String,
+    },
+    /// Zero, or too large.
+    #[error(
+        "{numerator}/{denominator} is out of range: the numerator goes from 1 to {}, the denominator, in \
+         lowest terms, from 1 to {}", LARGEST.1, LARGEST.0
+    )]
+    Range {
+        /// As given.
+        numerator: u64,
+        /// As given.
+        denominator: u64,
+    },
+    /// One and the same frequency.
+    #[error("the two tones have the same frequency: add their amplitudes to one tone")]
+    One,
+    /// Not a ratio of small whole numbers.
+    #[error(
+        "the ratio {ratio} of the two frequencies is no fraction with a denominator up to {}, so the drive \
+         would not repeat; the nearest is {nearest}", LARGEST.0
+    )]
+    Irrational {
+        /// The ratio.
+        ratio: f64,
+        /// The nearest that would do.
+        nearest: FrequencyRatio,
+    },
+}
+
+impl FrequencyRatio {
+    /// `numerator / denominator` in lowest terms.
+    ///
+    /// # Errors
+    /// [`RatioError`] when a term is zero or too large, or the ratio is 1.
+    pub fn new(numerator: u64, denominator: u64) -> Result<Self, RatioError> {
+        let range = RatioError::Range {
+            numerator,
+            denominator,
+        };
+        if numerator == 0 || denominator == 0 {
+            return Err(range);
+        }
+        let (mut a, mut b) = (numerator, denominator);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        let terms = (u32::try_from(numerator / a), u32::try_from(denominator / a));
+        let (Ok(numerator), Ok(denominator)) = terms else {
+            return Err(range);
+        };
+        if numerator > LARGEST.1 || denominator > LARGEST.0 {
+            return Err(range);
+        }
+        if numerator == denominator {
+            return Err(RatioError::One);
+        }
+        Ok(Self {
+            numerator,
+            denominator,
+        })
+    }
+
+    /// The ratio that a number is.
+    ///
+    /// # Errors
+    /// [`RatioError::Irrational`] names the nearest one where it is none.
+    pub fn of(ratio: f64) -> Result<Self, RatioError> {
+        let mut nearest: Option<(f64, Self)> = None;
+        for denominator in 1..=u64::from(LARGEST.0) {
+            let numerator = (ratio * denominator as f64).round().clamp(0.0, 1e9) as u64;
+            let distance = (numerator as f64 / denominator as f64 - ratio).abs();
+            if distance <= NEAR * ratio.abs() {
+                return Self::new(numerator, denominator);
+            }
+            if let Ok(near) = Self::new(numerator, denominator)
+                && nearest.is_none_or(|(d, _)| distance < d)
+            {
+                nearest = Some((distance, near));
+            }
+        }
+        Err(match nearest {
+            Some((_, nearest)) => RatioError::Irrational { ratio, nearest },
+            None => RatioError::Form {
+                given: ratio.to_string(),
+            },
+        })
+    }
+
+    /// p: the second tone's periods in a repetition of both.
+    pub const fn numerator(self) -> u32 {
+        self.numerator
+    }
+
+    /// q: the first tone's periods in a repetition of both.
+    pub const fn denominator(self) -> u32 {
+        self.denominator
+    }
+
+    /// p/q.
+    pub fn value(self) -> f64 {
+        f64::from(self.numerator) / f64::from(self.denominator)
+    }
+}
+
+impl fmt::Display for FrequencyRatio {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}/{}", self.numerator, self.denominator)
+    }
+}
+
+impl Serialize for FrequencyRatio {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl FromStr for FrequencyRatio {
+    type Err = RatioError;
+
+    /// Reads `25/4`, `6` or `6.25`.
+    fn from_str(given: &str) -> Result<Self, RatioError> {
+        let form = || RatioError::Form {
+            given: given.to_owned(),
+        };
+        if let Some((numerator, denominator)) = given.split_once('/') {
+            let whole = |text: &str| text.trim().parse::<u64>().map_err(|_| form());
+            return Self::new(whole(numerator)?, whole(denominator)?);
+        }
+        match given.trim().parse::<f64>() {
+            Ok(ratio) if ratio.is_finite() && ratio > 0.0 => Self::of(ratio),
+            _ => Err(form()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_are_read_and_reduced() {
+        for (given, shown) in [
+            ("25/4", "25/4"),
+            ("50 / 8", "25/4"),
+            ("6.25", "25/4"),
+            ("3", "3/1"),
+        ] {
+            let ratio: FrequencyRatio = given.parse().unwrap();
+            assert_eq!(ratio.to_string(), shown);
+        }
+        assert_eq!("25/4".parse::<FrequencyRatio>().unwrap().value(), 6.25);
+        for way in Actuation::ALL {
+            assert_eq!(way.name().parse(), Ok(way));
+        }
+        assert!("magnet".parse::<Actuation>().is_err());
+    }
+
+    /// π is 22/7 to a denominator of 64 at the most: 201/64 is 3.140625, 22/7 3.142857,
+    /// 179/57 3.140351; the nearest of all is 201/64 … 22/7; found by looking at each.
+    #[test]
+    fn what_is_no_ratio_is_refused_with_the_nearest() {
+        let refused = "3.141592653589793".parse::<FrequencyRatio>().unwrap_err();
+        let best = (1..=64_u32)
+            .map(|q| ((std::f64::consts::PI * f64::from(q)).round(), q))
+            .min_by(|a, b| {
+                let off = |(p, q): &(f64, u32)| (p / f64::from(*q) - std::f64::consts::PI).abs();
+                off(a).total_cmp(&off(b))
+            })
+            .unwrap();
+        assert!(
+            refused
+                .to_string()
+                .ends_with(&format!("{}/{}", best.0, best.1))
+        );
+        for given in [
+            "", "x", "1/0", "0/3", "-2", "2/2", "1", "1/65", "nan", "1e300", "20000/3",
+        ] {
+            assert!(given.parse::<FrequencyRatio>().is_err(), "{given}");
+        }
+    }
+}

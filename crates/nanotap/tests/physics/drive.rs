@@ -1,0 +1,184 @@
+//! Drives through the base and on the lever itself, with one tone and two.
+
+use nanotap::case::Case;
+use nanotap::contact::ContactLaw;
+use nanotap::drive_form::Actuation;
+use nanotap::model::Model;
+use nanotap::observables::{Observables, Spectrum};
+use nanotap::orbit::{OrbitOptions, orbit};
+use nanotap::parameter::Parameter;
+use nanotap::physical::free_response::response_at;
+use nanotap::subject::Subject;
+use nanotap_flow::{Complex, Flow, Trajectory};
+
+use crate::contact_laws::on;
+use crate::derivatives::{advance, worst};
+
+/// Two tones, the second at 25/4 of the first, on the lever as said.
+fn two_tones(actuation: Actuation) -> Case {
+    Case {
+        actuation,
+        alpha2: if actuation == Actuation::Base {
+            0.1
+        } else {
+            0.6
+        },
+        tone2_ratio: Some("25/4".parse().unwrap()),
+        tone2_amplitude: if actuation == Actuation::Base {
+            0.01
+        } else {
+            0.4
+        },
+        tone2_phase: 35.0,
+        omega: 3.1,
+        ..Case::paper()
+    }
+}
+
+/// Far from the sample the motion is the sum of both tones' responses, each with the
+/// amplitude and phase of its closed form.
+#[test]
+fn tones_superpose_in_free_flight() {
+    for actuation in Actuation::ALL {
+        let case = Case {
+            alpha5: 50.0,
+            ..two_tones(actuation)
+        };
+        let model = Model::cantilever(&case).unwrap();
+        let found = orbit(&model, &OrbitOptions::default()).unwrap();
+        assert!(found.events.is_empty() && found.period == 1);
+        let o = &found.observables;
+        let second = o.second_tone.unwrap();
+        let tones = [
+            (case.alpha2, case.omega, o.first_harmonic, o.phase),
+            (
+                case.tone2_amplitude,
+                6.25 * case.omega,
+                second.amplitude,
+                second.phase,
+            ),
+        ];
+        for (drive, frequency, amplitude, phase) in tones {
+            let z = response_at(&case, frequency).unwrap();
+            assert!(
+                (amplitude / (drive * z.norm()) - 1.0).abs() < 1e-10,
+                "{actuation}"
+            );
+            let off = (phase + z.arg().to_degrees()).rem_euclid(360.0);
+            assert!(off.min(360.0 - off) < 1e-8, "{actuation}: {off}");
+        }
+        // All of the motion is in these two.
+        let power = 0.5 * (o.first_harmonic.powi(2) + second.amplitude.powi(2));
+        assert!((o.rms_deflection.powi(2) / power - 1.0).abs() < 1e-10);
+        let spectrum = Spectrum::of(&model, &found.trajectory, 1, 8);
+        let at = |order: f64| {
+            let found = spectrum
+                .harmonics
+                .iter()
+                .find(|h| (h.order - order).abs() < 1e-12);
+            found.unwrap().tip
+        };
+        assert!((at(1.0) - o.first_harmonic).abs() < 1e-12);
+        assert!((at(6.25) - second.amplitude).abs() < 1e-12);
+        assert!(at(2.0) < 1e-12 && at(0.25) < 1e-12);
+    }
+}
+
+/// Slowly pushed, a beam bends by L³/3EI per force at its tip and L³/8EI per force spread
+/// evenly; slowly moved, it follows its base.
+#[test]
+fn slow_drives_are_static() {
+    let slow = |actuation| Case {
+        actuation,
+        ..Case::paper().with_modes(50)
+    };
+    let response = |actuation| response_at(&slow(actuation), 1e-3).unwrap();
+    for (actuation, expected) in [
+        (Actuation::Tip, 1.0 / 3.0),
+        (Actuation::Distributed, 1.0 / 8.0),
+        (Actuation::Base, 0.0),
+    ] {
+        let found = response(actuation);
+        assert!(
+            (found - Complex::new(expected, 0.0)).norm() < 1e-4,
+            "{actuation}: {found}"
+        );
+    }
+}
+
+/// With contacts, every way of driving and both tones: derivatives to all parameters, the
+/// second tone's among them, and a closed energy balance.
+#[test]
+fn every_drive_has_its_derivatives_and_balances_its_energy() {
+    for actuation in Actuation::ALL {
+        for law in ContactLaw::ALL {
+            let sample = on(law, 3.1);
+            let case = Case {
+                modes: 2,
+                contact: law,
+                alpha5: 0.03,
+                alpha6: sample.alpha6,
+                relaxation_stiffness: sample.relaxation_stiffness,
+                relaxation_time: sample.relaxation_time,
+                ..two_tones(actuation)
+            };
+            let subject = Subject::Cantilever(case);
+            let model = subject.model().unwrap();
+            let mut state = vec![0.0; model.dimension()];
+            state[0] = 0.1;
+            let run = Trajectory::record(&model.system, &state, 3).unwrap();
+            let seen = Observables::of(&model, &run).unwrap();
+            assert!(
+                seen.energy_balance.residual.abs() < 1e-11,
+                "{actuation} {law}"
+            );
+            assert!(seen.contacts_per_period > 0.5);
+            if law != ContactLaw::SpringDamper {
+                continue;
+            }
+            state = advance(&subject, &state);
+            // Differences over four drive periods of a stiff spring: their own rounding.
+            let error = worst(&subject, &state);
+            assert!(error < 1e-4, "{actuation}: {error:e}");
+        }
+    }
+}
+
+/// After one period of the first tone a second one at 3/2 of its frequency has gone half a
+/// turn further: the same motion as with its phase half a turn on.
+#[test]
+fn phases_and_times_agree() {
+    let case = Case {
+        tone2_ratio: Some("3/2".parse().unwrap()),
+        ..two_tones(Actuation::Base)
+    };
+    let first = std::f64::consts::TAU / case.omega;
+    let run = |case: &Case, state: &[f64], from: f64| {
+        let model = Model::cantilever(case).unwrap();
+        let mut flow = Flow::new(model.system.clone());
+        flow.start(state, from).unwrap();
+        flow.run_until(from + first, &mut ()).unwrap();
+        let mut end = vec![0.0; state.len()];
+        flow.state(&mut end);
+        (end, flow.switches())
+    };
+    let start = [0.05, 0.01, 0.0, -0.2, 0.1, 0.0];
+    let turned = case
+        .clone()
+        .with(Parameter::Tone2Phase, case.tone2_phase + 180.0);
+    let (later, switches) = run(&case, &start, first);
+    let (now, _) = run(&turned, &start, 0.0);
+    assert!(switches > 0);
+    for (a, b) in later.iter().zip(&now) {
+        assert!((a - b).abs() < 1e-12, "{later:?} {now:?}");
+    }
+    // A second tone of no strength is none, but for the length of the period.
+    let silent = case.clone().with(Parameter::Tone2Amplitude, 0.0);
+    let single = Case {
+        tone2_ratio: None,
+        tone2_phase: 0.0,
+        ..silent.clone()
+    };
+    let (a, b) = (run(&silent, &start, 0.0).0, run(&single, &start, 0.0).0);
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-13));
+}

@@ -8,6 +8,7 @@ mod modes;
 mod motions;
 mod paper;
 mod physical;
+mod samples;
 mod sweeps;
 mod terminal;
 mod util;

@@ -1,6 +1,8 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::contact::ContactLaw;
+use crate::drive_form::Actuation;
 
 const PAPER: &str = "[model]\nmodes = 3\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\n\
                      alpha4 = 20.0\nalpha5 = 0.0\nalpha6 = 0.2\nomega = 2.6\n";
@@ -368,12 +370,86 @@ fn physical_tables_keep_their_quantities_and_places() {
 }
 
 #[test]
+fn laws_and_drives_are_read_and_checked() {
+    let recovers = dimensionless(PAPER, &["contact=kelvin-voigt"]);
+    assert_eq!(recovers.contact, ContactLaw::KelvinVoigt);
+    let solid = [
+        "contact=standard-linear-solid",
+        "alpha6=0",
+        "relaxation_stiffness=40",
+        "relaxation_time=0.005",
+    ];
+    let read = dimensionless(PAPER, &solid);
+    assert_eq!(
+        (read.relaxation_stiffness, read.relaxation_time),
+        (40.0, 0.005)
+    );
+    // The solid's damper is its arm's, so a file without alpha6 lacks nothing.
+    let file = PAPER.replace("alpha6 = 0.2\n", "");
+    assert_eq!(dimensionless(&file, &[solid[0], solid[2], solid[3]]), read);
+    let driven = dimensionless(
+        PAPER,
+        &[
+            "actuation=tip",
+            "tone2_ratio=25/4",
+            "tone2_amplitude=0.01",
+            "tone2_phase=90",
+        ],
+    );
+    assert_eq!(driven.actuation, Actuation::Tip);
+    assert_eq!(driven.tone2_ratio, "6.25".parse().ok());
+    assert_eq!(
+        dimensionless(PAPER, &["tone2_ratio=6.25"]).tone2_ratio,
+        driven.tone2_ratio
+    );
+    for (words, refusal_words) in [
+        (
+            &["contact=kelvin-voight"][..],
+            "did you mean \"kelvin-voigt\"?",
+        ),
+        (&solid[..1], "`alpha6` = 0.2: must be 0 with contact"),
+        (&solid[..2], "lacks relaxation_stiffness, relaxation_time"),
+        (
+            &["relaxation_time=0.1"],
+            "belongs to contact = \"standard-linear-solid\"",
+        ),
+        (
+            &["tone2_amplitude=0.1"],
+            "there is no second tone: give tone2_ratio",
+        ),
+        (&["tone2_ratio=3.14159"], "the nearest is"),
+        (&["tone2_ratio=two"], "is no ratio of frequencies"),
+        (&["tone2_ratio=1"], "the same frequency"),
+        (&["actuation=magnet"], "\"base\", \"tip\", \"distributed\""),
+        (
+            &["actuation=tip", "cosine_term=printed"],
+            "belongs to the drive through the base",
+        ),
+    ] {
+        let refused = refusal(PAPER, words);
+        assert!(refused.contains(refusal_words), "{words:?}: {refused}");
+    }
+}
+
+#[test]
 fn a_case_written_out_is_read_back() {
     let case = Case {
         modes: 7,
         alpha5: -0.125,
         alpha4: 1e-9 / 3.0,
         cosine_term: CosineTerm::Printed,
+        ..Case::paper()
+    };
+    assert_eq!(dimensionless(&to_toml(&case), &[]), case);
+    let case = Case {
+        contact: ContactLaw::StandardLinearSolid,
+        alpha6: 0.0,
+        relaxation_stiffness: 40.0,
+        relaxation_time: 0.1 / 3.0,
+        actuation: Actuation::Distributed,
+        tone2_ratio: "25/4".parse().ok(),
+        tone2_amplitude: 0.01,
+        tone2_phase: -12.5,
         ..Case::paper()
     };
     assert_eq!(dimensionless(&to_toml(&case), &[]), case);

@@ -979,3 +979,137 @@ fn a_users_file_adds_and_replaces() {
     let missing = std::path::Path::new("no such file.toml");
     assert!(catalogue.extend_from_file(missing).is_err());
 }
+
+/// A magnetic drive at the resonance of a bare lever of high Q: A₀ = (3φ₁(1)²/β₁⁴) F Q/k with
+/// φ₁(1)² = 4 and β₁⁴ = 12.3624; the spread force acts by φ₁(1)∫φ₁ = 1.5660 instead of 4.
+#[test]
+fn a_force_on_the_lever_gives_its_free_amplitude() {
+    for (actuation, weight, name) in [("tip", 4.0, "tip"), ("distributed", 1.566, "lever")] {
+        let resolved = resolve(&changed(&[
+            ("cantilever", "Q", "1000"),
+            ("tip", "mass", ""),
+            ("drive", "actuation", actuation),
+            ("drive", "frequency", ""),
+            ("drive", "frequency_ratio", "1"),
+            ("drive", "amplitude", ""),
+            ("drive", "free_amplitude", "20 nm"),
+        ]))
+        .unwrap();
+        let force = resolved.parameters.drive_amplitude;
+        close(3.0 * weight / 12.3624 * force * 1000.0 / 2.8, 20e-9, 1e-3);
+        assert!((resolved.free_phase - 90.0).abs() < 0.5);
+        assert!(resolved.phase_reference().contains(name));
+        let row = &resolved.mapping()[1];
+        assert_eq!((row.kind, row.si), (Kind::Force, force));
+        // The unit of force is k g₀/3.
+        close(row.value, force / (2.8 * 12e-6 / 3.0), 1e-12);
+        // And back from the force.
+        let given = format!("{force:e} N");
+        let mut entries: Vec<(&str, &str, &str)> = changed(&[
+            ("cantilever", "Q", "1000"),
+            ("tip", "mass", ""),
+            ("drive", "actuation", actuation),
+            ("drive", "amplitude", ""),
+        ]);
+        entries.retain(|entry| entry.1 != "frequency");
+        entries.extend([("drive", "frequency", "75 kHz"), ("drive", "force", &given)]);
+        close(resolve(&entries).unwrap().free_amplitude, 20e-9, 1e-9);
+    }
+}
+
+/// Both tones have the free amplitudes that were asked for, by the closed form of each.
+#[test]
+fn a_second_tone_has_its_own_free_amplitude() {
+    let resolved = resolve(&changed(&[
+        ("drive", "amplitude", ""),
+        ("drive", "free_amplitude", "20 nm"),
+        ("drive", "second_frequency", "410.625 kHz"),
+        ("drive", "second_free_amplitude", "0.5 nm"),
+        ("drive", "second_phase", "30 deg"),
+    ]))
+    .unwrap();
+    let case = &resolved.case;
+    let ratio = case.tone2_ratio.unwrap();
+    assert_eq!(ratio.to_string(), "25/4");
+    close(case.tone2_phase, 30.0, 1e-12);
+    for (amplitude, frequency, expected) in [
+        (case.alpha2, case.omega, 20e-9),
+        (case.tone2_amplitude, 6.25 * case.omega, 0.5e-9),
+    ] {
+        let z = super::free_response::response_at(case, frequency).unwrap();
+        close(
+            amplitude * z.norm() * resolved.scales.length,
+            expected,
+            1e-9,
+        );
+    }
+    assert_eq!(resolved.second_free_amplitude, Some(0.5e-9));
+}
+
+/// The laws of a sample with what each needs: 3 km/k and the time over the model's unit.
+#[test]
+fn samples_have_their_laws() {
+    let solid = resolve(&changed(&[
+        ("sample", "law", "standard-linear-solid"),
+        ("sample", "damping", ""),
+        ("sample", "relaxation_stiffness", "50 N/m"),
+        ("sample", "relaxation_time", "0.5 us"),
+    ]))
+    .unwrap();
+    close(solid.case.relaxation_stiffness, 3.0 * 50.0 / 2.8, 1e-13);
+    close(
+        solid.case.relaxation_time,
+        0.5e-6 / solid.scales.time,
+        1e-13,
+    );
+    assert_eq!(solid.case.alpha6, 0.0);
+    assert!(
+        !solid
+            .remarks
+            .iter()
+            .any(|r| r.text.contains("dissipates nothing"))
+    );
+    let recovers = resolve(&changed(&[("sample", "law", "kelvin-voigt")])).unwrap();
+    assert!(recovers.case.alpha6 > 0.0);
+    assert_eq!(recovers.case.contact.name(), "kelvin-voigt");
+}
+
+#[test]
+fn laws_and_drives_are_refused_with_what_would_be_right() {
+    let cases: [(&[Entry], &str); 9] = [
+        (&[("sample", "law", "hertz")], "kelvin-voigt"),
+        (
+            &[("sample", "law", "standard-linear-solid")],
+            "relaxing arm",
+        ),
+        (
+            &[
+                ("sample", "law", "standard-linear-solid"),
+                ("sample", "damping", ""),
+            ],
+            "sample.relaxation_stiffness is missing",
+        ),
+        (
+            &[("sample", "relaxation_time", "1 us")],
+            "standard-linear-solid",
+        ),
+        (&[("drive", "actuation", "magnet")], "distributed"),
+        (&[("drive", "actuation", "tip")], "has a force"),
+        (&[("drive", "force", "1 nN")], "drive.actuation"),
+        (
+            &[
+                ("drive", "second_frequency", "411.5237 kHz"),
+                ("drive", "second_amplitude", "1 nm"),
+            ],
+            "the nearest is",
+        ),
+        (
+            &[("drive", "second_ratio", "25/4")],
+            "second_free_amplitude",
+        ),
+    ];
+    for (changes, words) in cases {
+        let error = resolve(&changed(changes)).unwrap_err().to_string();
+        assert!(error.contains(words), "{changes:?}: {error}");
+    }
+}

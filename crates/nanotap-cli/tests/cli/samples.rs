@@ -1,0 +1,142 @@
+//! Contact laws, ways of driving and second tones at the terminal.
+
+use crate::util::Folder;
+
+const FAST: [&str; 2] = ["--set", "omega=20"];
+
+/// The difference that the law makes, as a table, as JSON, as data and as a picture.
+#[test]
+fn samples_are_compared() {
+    let folder = Folder::with_paper_case();
+    let json = folder
+        .run(
+            &[
+                &[
+                    "samples",
+                    "case.toml",
+                    "--json",
+                    "--out",
+                    "loops.csv",
+                    "--plot",
+                    "s.svg",
+                ],
+                &FAST[..],
+            ]
+            .concat(),
+        )
+        .json();
+    let samples = json["samples"].as_array().unwrap();
+    let number = |k: usize, key: &str| samples[k][key].as_f64().unwrap();
+    assert_eq!(samples.len(), 3);
+    // The paper's damper pulls on the leaving tip; a surface that recovers does not.
+    assert!(number(0, "least_force") < -0.1);
+    assert!(number(1, "least_force") > -1e-10 && number(2, "least_force") > -1e-10);
+    assert!(
+        samples
+            .iter()
+            .all(|s| s["stable"] == true && s["from_rest"] == "periodic")
+    );
+    assert_eq!(samples[2]["case"]["relaxation_stiffness"], 40.0);
+    assert!(
+        folder
+            .read("loops.csv")
+            .starts_with("contact,indentation,force\n")
+    );
+    assert!(folder.read("s.svg").contains("kelvin-voigt"));
+    let text = folder
+        .run(&[&["samples", "case.toml"], &FAST[..]].concat())
+        .stdout;
+    for words in ["standard-linear-solid", "E_dis", "period 1"] {
+        assert!(text.contains(words), "{words}:\n{text}");
+    }
+    folder
+        .run(&["samples", "case.toml", "--arm", "0"])
+        .refused(&["holds no damper", "--arm"]);
+    folder
+        .run(&["samples", "case.toml", "--period", "0"])
+        .refused(&["--period 1 or more"]);
+}
+
+/// Every analysis takes a sample with a memory, and says its state by name.
+#[test]
+fn a_surface_with_a_memory_is_analysed_like_any_other() {
+    let folder = Folder::with_paper_case();
+    let kelvin = ["--set", "contact=kelvin-voigt", "--set", "omega=20"];
+    let on = |words: &[&str]| folder.run(&[words, &kelvin[..]].concat());
+    let run = on(&["simulate", "case.toml", "--periods", "3", "--json"]).json();
+    assert_eq!(run["strobe"][0].as_array().unwrap().len(), 7);
+    let orbit = on(&["orbit", "case.toml", "--json"]).json();
+    assert!(orbit["determinant_defect"].as_f64().unwrap() < 1e-8);
+    assert_eq!(orbit["multipliers"].as_array().unwrap().len(), 7);
+    let census = on(&["attractors", "case.toml", "--starts", "8", "--json"]).json();
+    assert_eq!(census["box"][6]["coordinate"], "s1");
+    let branch = on(&[
+        "branch",
+        "case.toml",
+        "--parameter",
+        "alpha6",
+        "--from",
+        "0.2",
+        "--to",
+        "0.4",
+        "--json",
+    ]);
+    assert!(branch.json()["points"].as_array().unwrap().len() > 3);
+    let basin = on(&[
+        "basin",
+        "case.toml",
+        "--x",
+        "a1=-1:1:6",
+        "--y",
+        "s1=-0.2:0:4",
+        "--out",
+        "b.zarr",
+        "--json",
+    ]);
+    assert_eq!(basin.code, 0, "{}", basin.stderr);
+    let sweep = on(&[
+        "sweep",
+        "case.toml",
+        "--over",
+        "alpha6=0.1:0.4:4",
+        "--out",
+        "s.zarr",
+        "--json",
+    ]);
+    assert_eq!(sweep.code, 0, "{}", sweep.stderr);
+    let convergence = on(&["convergence", "case.toml", "--largest", "4", "--json"]).json();
+    assert_eq!(convergence["modes"].as_array().unwrap().len(), 4);
+    let exponents = on(&["lyapunov", "case.toml", "--json"]);
+    assert_eq!(exponents.code, 0, "{}", exponents.stderr);
+    on(&["simulate", "case.toml", "--state", "1,2"]).refused(&["the sample's memory"]);
+}
+
+/// Two tones at the tip: each with its own response, and a map of four periods.
+#[test]
+fn two_tones_are_driven_and_read() {
+    let folder = Folder::with_paper_case();
+    let words = [
+        "orbit",
+        "case.toml",
+        "--json",
+        "--set",
+        "actuation=tip",
+        "--set",
+        "alpha5=5",
+        "--set",
+        "tone2_ratio=25/4",
+        "--set",
+        "tone2_amplitude=0.2",
+        "--set",
+        "tone2_phase=30",
+    ];
+    let orbit = folder.run(&words).json();
+    assert!(orbit["tone2_response"].as_f64().unwrap() > 0.0);
+    assert!(orbit["tone2_lag"].as_f64().is_some());
+    let case = folder.run(&[&["case"], &words[1..]].concat()).json();
+    assert_eq!(case["tone2_ratio"], "25/4");
+    assert_eq!(case["actuation"], "tip");
+    // Four periods of 2π/2.6.
+    let period = 4.0 * std::f64::consts::TAU / 2.6;
+    assert!((case["period"].as_f64().unwrap() / period - 1.0).abs() < 1e-14);
+}

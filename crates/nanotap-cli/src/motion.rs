@@ -97,6 +97,14 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
         &si(Kind::Length, o.first_harmonic),
         &format!("{}° behind the drive", number::significant(o.phase, 4)),
     ]);
+    if let Some(second) = &o.second_tone {
+        table.row([
+            "at the second tone",
+            &number::significant(second.amplitude, 6),
+            &si(Kind::Length, second.amplitude),
+            &format!("{}° behind that tone", number::significant(second.phase, 4)),
+        ]);
+    }
     table.row([
         "gap",
         &range(o.gap_range[0], o.gap_range[1]),
@@ -137,6 +145,15 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
                 &si(Kind::Force, o.peak_force),
                 &format!("mean {}", number::significant(o.mean_force, 4)),
             ]);
+            // What is not above rounding is no pull.
+            if o.least_force < -1e-10 * o.peak_force {
+                table.row([
+                    "pull of the sample",
+                    &format!("up to {}", number::significant(-o.least_force, 6)),
+                    &si(Kind::Force, -o.least_force),
+                    "of its damper, on a tip that leaves",
+                ]);
+            }
             table.row([
                 "indentation",
                 &number::significant(o.indentation, 5),

@@ -296,7 +296,7 @@ impl Sight {
                 .map_or((0.0, 0.0), |(low, high)| (low.value, high.value))
         };
         let (tip_min, tip_max) = range(&tip);
-        let (gap_min, _) = range(&trajectory.signal(&model.gap));
+        let (gap_min, _) = range(&trajectory.signal(&model.height));
         let force = trajectory.signal_by_regime(&model.force);
         let (_, peak) = range(&force);
         let contact: f64 = (0..model.contact.len())

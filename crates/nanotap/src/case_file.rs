@@ -212,10 +212,9 @@ impl Kind {
 fn default_of(kind: Kind, law: ContactLaw, key: &str) -> Option<f64> {
     let solid = law == ContactLaw::StandardLinearSolid;
     match (kind, key) {
-        (Kind::Cantilever, "alpha5") => Some(0.0),
+        (Kind::Cantilever, "alpha5" | "tone2_amplitude" | "tone2_phase") => Some(0.0),
         (Kind::Cantilever, "alpha6") if solid => Some(0.0),
         (Kind::Cantilever, "relaxation_stiffness" | "relaxation_time") if !solid => Some(0.0),
-        (Kind::Cantilever, "tone2_amplitude" | "tone2_phase") => Some(0.0),
         (Kind::VibroImpact | Kind::Impact, "mass") => Some(1.0),
         _ => None,
     }

@@ -57,8 +57,11 @@ pub enum FixedStepError {
     /// As for the exact flow.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// Impacts are beyond it.
-    #[error("fixed steps know no rigid impacts: only a soft contact can be run this way")]
+    /// Jumps of the state are beyond it.
+    #[error(
+        "fixed steps know no jumps of the state: neither rigid impacts nor a Kelvin–Voigt surface, which is \
+         left without force, can be run this way"
+    )]
     Rigid,
     /// The numbers overflowed.
     #[error(

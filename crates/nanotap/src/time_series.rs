@@ -100,7 +100,7 @@ impl Outputs {
             tau,
             at(&model.tip),
             at(&self.tip_rate),
-            at(&model.gap),
+            at(&model.height),
             at(&model.force[regime]),
             contact,
         ];

@@ -248,7 +248,7 @@ fn an_impact_oscillator_runs_through_the_same_door() {
         .refused(&["impact.toml", "needs a cantilever"]);
     folder
         .run(&["simulate", "impact.toml", "--method", "rk4"])
-        .refused(&["no rigid impacts", "--method"]);
+        .refused(&["neither rigid impacts", "--method"]);
 }
 
 #[test]

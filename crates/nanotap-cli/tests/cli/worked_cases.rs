@@ -122,6 +122,7 @@ fn no_document_is_left_out() {
             "fm-lever-on-polystyrene.md",
             "frequency-sweep.md",
             "period-doubling.md",
+            "samples.md",
             "stiff-lever.md",
             "tip-mass.md",
         ]
@@ -143,6 +144,7 @@ follows! {
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
+    the_samples: "samples.md", 5 commands, 30 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 2 commands, 5 numbers;
 }

@@ -301,7 +301,7 @@ pub(crate) fn contact_work(model: &Model, trajectory: &Trajectory, force: &Piece
         .system
         .regimes()
         .iter()
-        .map(|r| model.gap.rate(r.matrix(), r.forcing(), drive))
+        .map(|r| model.height.rate(r.matrix(), r.forcing(), drive))
         .collect();
     let impacts: f64 = trajectory
         .events()

@@ -78,14 +78,14 @@ impl SecondFrequency {
                 let nearest = match &error {
                     RatioError::Irrational { nearest, .. } => format!(
                         ", or drive.second_frequency = {}",
-                        Kind::Frequency.format(nearest.value() * frequency)
+                        Kind::Frequency.format_digits(nearest.value() * frequency, 12)
                     ),
                     _ => String::new(),
                 };
                 PhysicalError::impossible(
                     "drive.second_frequency",
-                    Kind::Frequency.format(second),
-                    format!("{error}; write it as drive.second_ratio{nearest}"),
+                    Kind::Frequency.format_digits(second, 12),
+                    format!("{error}; say that by drive.second_ratio{nearest}"),
                 )
             }),
         }

@@ -353,8 +353,11 @@ pub(super) fn columns(schema: &Schema, outcomes: &[Outcome]) -> Vec<Values> {
 /// A state in as many columns as the longest state has; what it lacks is missing.
 fn in_columns(state: &[f64], columns: usize) -> Vec<f64> {
     let mut all = vec![f64::NAN; columns];
-    let (n, most) = (state.len() / 2, columns / 2);
-    all[..n].copy_from_slice(&state[..n]);
-    all[most..most + n].copy_from_slice(&state[n..]);
+    // A sample's memory is one number at the end, or none.
+    let (beam, memory) = state.split_at(state.len() - state.len() % 2);
+    let (n, most) = (beam.len() / 2, columns / 2);
+    all[..n].copy_from_slice(&beam[..n]);
+    all[most..most + n].copy_from_slice(&beam[n..]);
+    all[columns - memory.len()..].copy_from_slice(memory);
     all
 }

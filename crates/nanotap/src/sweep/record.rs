@@ -51,12 +51,12 @@ impl<'a> Record<'a> {
                 .zip(&model.force)
                 .map(|(r, f)| r.project(f))
                 .collect(),
-            gap: regimes.iter().map(|r| r.project(&model.gap)).collect(),
+            gap: regimes.iter().map(|r| r.project(&model.height)).collect(),
             gap_rate: regimes
                 .iter()
                 .map(|r| {
                     let rate = model
-                        .gap
+                        .height
                         .rate(r.matrix(), r.forcing(), model.system.drive());
                     r.project(&rate)
                 })

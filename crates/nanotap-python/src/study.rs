@@ -53,6 +53,10 @@ pub(crate) fn attractors(
             ..AttractorsOptions::default()
         };
         let found = on_threads(threads, || census(&model, &options, control))??;
+        let found = match &studied.resolved {
+            Some(resolved) => found.in_si(resolved),
+            None => found,
+        };
         Ok(serde_json::to_string(&found)?)
     })?;
     Ok((done.result, done.interrupted))

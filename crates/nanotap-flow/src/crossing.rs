@@ -440,6 +440,9 @@ struct Search<'a, M> {
 /// Dips shallower than this many rounding errors are measured in twice double precision.
 const SHALLOW: f64 = 1e5;
 
+/// Steps in a row that may be below rounding before they grow.
+const PATIENCE: u32 = 64;
+
 /// Orders of the Taylor series used right after a switch.
 const TAYLOR_ORDER: usize = 10;
 /// Its reach, as an angle of the fastest term.
@@ -477,9 +480,10 @@ impl<M: Math> Search<'_, M> {
     #[inline(always)]
     fn run(&mut self, mut s: f64, mut jet: Jet) -> Option<Crossing> {
         let mut relaxed = [Jet::default(); 2];
+        let mut stuck = 0_u32;
         loop {
             let left = self.limit - s;
-            if left < 0.0 {
+            if left.is_nan() || left < 0.0 {
                 return None;
             }
             if jet.value <= 0.0
@@ -496,11 +500,13 @@ impl<M: Math> Search<'_, M> {
                     Departure::Crossing(crossing) => {
                         return (crossing.at <= self.limit).then_some(crossing);
                     }
-                    Departure::Inside(at, after) => {
+                    Departure::Inside(at, after) if at > s => {
                         s = at;
                         jet = after;
                         relaxed = [Jet::default(); 2];
                     }
+                    // All rounding: the steps go on.
+                    Departure::Inside(..) => {}
                 }
             }
             let mut step = certified_step(&jet, zero);
@@ -514,9 +520,16 @@ impl<M: Math> Search<'_, M> {
             if step >= self.limit - s {
                 return None;
             }
-            // A step below rounding would never end; the value there is decided
-            // in twice double precision.
-            s += step.max(4.0 * f64::EPSILON * self.length);
+            // Steps below rounding would never end. The value there is decided in twice double
+            // precision; where it stays within rounding of zero for long, they grow.
+            let least = 4.0 * f64::EPSILON * self.length;
+            if step >= least {
+                stuck = 0;
+                s += step;
+            } else {
+                stuck += 1;
+                s += least * f64::from(stuck.saturating_sub(PATIENCE).min(40)).exp2();
+            }
             Enclosure { jet, relaxed } = self.enclosure(s);
         }
     }

@@ -14,11 +14,21 @@ pub struct Extremum {
     pub value: f64,
 }
 
-/// Every zero in `(0, length)` at which the signal changes sign, in order.
+/// Zeros nearer to each other than this part of the length …
+const CROWDED: f64 = 1e-13;
+/// … and more than this many in a row are rounding: a signal that is zero but for it.
+const MOST_CROWDED: u32 = 32;
+
+/// Every zero in `(0, length)` at which the signal changes sign, in order. A signal that
+/// drowns in its own rounding has none from there on.
 pub fn sign_changes(signal: &Signal, length: f64) -> Vec<f64> {
     let mut zeros = Vec::new();
+    if signal.noise() < f64::MIN_POSITIVE {
+        // Below the numbers that have all their digits there is nothing but rounding.
+        return zeros;
+    }
     let mut statistics = Statistics::default();
-    let mut offset = 0.0;
+    let (mut offset, mut crowded) = (0.0, 0);
     let value = signal.at(0.0);
     let on_surface = value.abs() <= signal.noise();
     let mut sign = if on_surface {
@@ -39,6 +49,14 @@ pub fn sign_changes(signal: &Signal, length: f64) -> Vec<f64> {
         };
         offset += crossing.at;
         if offset >= length {
+            break;
+        }
+        crowded = if crossing.at <= CROWDED * length {
+            crowded + 1
+        } else {
+            0
+        };
+        if crowded > MOST_CROWDED {
             break;
         }
         if crossing.at > 0.0 {
@@ -104,6 +122,18 @@ mod tests {
     use super::*;
     use crate::Complex;
     use std::f64::consts::PI;
+
+    /// A signal of the smallest numbers there are changes sign wherever rounding has it.
+    #[test]
+    fn a_signal_that_is_all_rounding_has_no_zeros() {
+        let tiny = f64::from_bits(1);
+        let terms = [
+            (Complex::new(-0.05, 3.0), Complex::new(tiny, tiny)),
+            (Complex::new(0.0, 2.6), Complex::new(0.0, -tiny)),
+        ];
+        let signal = Signal::from_terms(0.0, &terms, Vec::new(), 2.4);
+        assert!(sign_changes(&signal, 2.4).is_empty());
+    }
 
     /// sin s has its zeros at multiples of π, sin² s − ½ at odd multiples of π/4.
     #[test]

@@ -19,9 +19,10 @@ pub struct Signal {
     /// How many terms there are without one.
     count: usize,
     packs: Vec<TermPack>,
-    /// Bound on the third derivative of growing terms and power terms, over the whole
-    /// segment.
+    /// Bound on the third derivative of growing terms over the whole segment.
     third_constant: f64,
+    /// How far it will be looked at.
+    length: f64,
     /// `|c| + Σ|a_k| + …`, the size against which rounding is measured.
     size: f64,
     /// The largest `|λ_k|`.
@@ -118,6 +119,7 @@ impl Signal {
             constant,
             powers,
             count: terms.len(),
+            length,
             ..Self::default()
         };
         signal
@@ -154,7 +156,6 @@ impl Signal {
             signal.fastest = signal.fastest.max(norm);
         }
         for term in &signal.powers {
-            signal.third_constant += term.bound(3, length);
             signal.size += term.bound(0, length);
             signal.fastest = signal.fastest.max(term.rate.norm());
         }
@@ -416,6 +417,7 @@ impl Signal {
             jet.value += term.derivative(0, s);
             jet.rate += term.derivative(1, s);
             jet.curvature += term.derivative(2, s);
+            jet.third += term.bound_from(3, s, self.length);
         }
         enclosure
     }
@@ -439,6 +441,7 @@ impl Signal {
             jet.value += term.derivative(0, 0.0);
             jet.rate += term.derivative(1, 0.0);
             jet.curvature += term.derivative(2, 0.0);
+            jet.third += term.bound_from(3, 0.0, self.length);
         }
         jet
     }
@@ -577,15 +580,28 @@ impl PowerTerm {
     }
 
     fn bound(self, order: u32, length: f64) -> f64 {
-        let growth = (self.rate.re.max(0.0) * length).exp();
+        self.bound_from(order, 0.0, length)
+    }
+
+    /// Bound on the size of the `order`-th derivative between `start` and `end`.
+    fn bound_from(self, order: u32, start: f64, end: f64) -> f64 {
+        let decay = -self.rate.re;
         let sum: f64 = (0..=order.min(self.power))
             .map(|i| {
+                // s^k e^{−a s} is largest at k/a.
+                let k = self.power - i;
+                let at = if decay > 0.0 {
+                    (f64::from(k) / decay).min(end).max(start)
+                } else {
+                    end
+                };
                 self.rate.norm().powi((order - i) as i32)
                     * self.weight(order, i)
-                    * length.powi((self.power - i) as i32)
+                    * at.powi(k as i32)
+                    * (-decay * at).exp()
             })
             .sum();
-        self.amplitude.norm() * growth * sum
+        self.amplitude.norm() * sum
     }
 }
 

@@ -411,3 +411,26 @@ fn what_makes_no_sense_is_refused_with_a_remedy() {
         &["undamped mode", "add damping"],
     );
 }
+
+/// Values at the edge of what is allowed end in a verdict, and soon: a drive of the smallest
+/// number there is, whose motion drowns in its rounding, and a beam so damped that its fast
+/// eigenvalues coincide at −10⁹ (a bound that did not decay with them took 10⁹ steps a period).
+#[test]
+fn extreme_cases_come_to_an_end() {
+    let folder = Folder::with_paper_case();
+    for extreme in ["alpha2=5e-324", "alpha3=1e9"] {
+        let outcome = folder.run(&[
+            "simulate",
+            "case.toml",
+            "--set",
+            extreme,
+            "--periods",
+            "2",
+            "--transient",
+            "0",
+            "--json",
+        ]);
+        let json = outcome.json();
+        assert!(json["classification"].is_string(), "{extreme}: {json}");
+    }
+}

@@ -3,14 +3,14 @@
 //! A law says in numbers only what the beam need know: the force in contact, what the free
 //! surface does meanwhile, when contact begins and ends, and where energy goes. All are sums
 //! `h V_T + r V̇_T + m s` of the height V_T of the tip over the undeformed surface, its rate,
-//! and the one number `s` that a surface with a memory carries; see [`law::Law`]. The model
+//! and the one number `s` that a surface with a memory carries; see `law::Law`. The model
 //! joins them with the beam to a piecewise-linear system.
 //!
-//! - [`spring_damper`]: the paper's; contact is where V_T ≤ 0, and its damper pulls on a tip
+//! - `spring_damper`: the paper's; contact is where V_T ≤ 0, and its damper pulls on a tip
 //!   that leaves;
-//! - [`kelvin_voigt`]: the same spring and damper as a surface of its own; contact ends when
+//! - `kelvin_voigt`: the same spring and damper as a surface of its own; contact ends when
 //!   the force is zero, and the surface recovers until the tip meets it again;
-//! - [`standard_linear_solid`]: a spring beside a spring and damper in series.
+//! - `standard_linear_solid`: a spring beside a spring and damper in series.
 //!
 //! A law that is not linear (Hertz, DMT, JKR) has no place here, since its flow has no closed
 //! form. Its place is one floor up: whatever analyses motions asks for a

@@ -13,22 +13,6 @@ use divan::{Bencher, black_box};
 #[path = "../src/pack.rs"]
 mod pack;
 
-/// What the tests in there ask of the engine.
-mod flow {
-    /// Whether this machine has fused multiply-add in vectors of four.
-    pub(crate) fn fused_available() -> bool {
-        #[cfg(target_arch = "x86_64")]
-        {
-            std::arch::is_x86_feature_detected!("avx2")
-                && std::arch::is_x86_feature_detected!("fma")
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        {
-            false
-        }
-    }
-}
-
 use pack::{Math, Pack, Plain, WIDTH};
 
 /// Numbers of modes N.
@@ -94,7 +78,7 @@ fn terms(modes: usize) -> Vec<Terms> {
 /// The sum of [`EVALUATIONS`] values of the signal.
 fn evaluations(terms: &[Terms], chained: bool) -> f64 {
     #[cfg(target_arch = "x86_64")]
-    if flow::fused_available() {
+    if pack::fused_available() {
         // SAFETY: the machine has these instructions.
         return unsafe { evaluations_fused(terms, chained) };
     }

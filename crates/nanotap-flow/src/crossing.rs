@@ -98,15 +98,8 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
     start: Start,
     statistics: &mut Statistics,
 ) -> Option<Crossing> {
-    let surface = match start {
-        Start::Inside => None,
-        Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
-        Start::Release => return first_crossing_with::<M>(signal, length, start, statistics),
-    };
-    let whole = Stretch {
-        start: 0.0,
-        end: length,
-        surface,
+    let Some(whole) = whole_stretch(signal, length, start) else {
+        return first_crossing_with::<M>(signal, length, start, statistics);
     };
     signal.follow::<M>(lattice.followed());
     let search = CellSearch {
@@ -130,6 +123,22 @@ pub(crate) fn first_crossing_on_lattice<M: Math>(
     }
     statistics.points += coarse.points;
     found.and_then(Decision::crossing)
+}
+
+/// All of a signal up to `length`, for a lattice; `None` for a start that only the Taylor
+/// series can leave.
+#[inline(always)]
+fn whole_stretch(signal: &Signal, length: f64, start: Start) -> Option<Stretch> {
+    let surface = match start {
+        Start::Inside => None,
+        Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
+        Start::Release => return None,
+    };
+    Some(Stretch {
+        start: 0.0,
+        end: length,
+        surface,
+    })
 }
 
 /// What ends a search through cells.
@@ -171,18 +180,9 @@ pub(crate) fn prospect_on_lattice<M: Math>(
     start: Start,
     statistics: &mut Statistics,
 ) -> Prospect {
-    let surface = match start {
-        Start::Inside => None,
-        Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
-        Start::Release => {
-            let found = first_crossing_with::<M>(signal, length, start, statistics);
-            return Prospect::Settled(found);
-        }
-    };
-    let whole = Stretch {
-        start: 0.0,
-        end: length,
-        surface,
+    let Some(whole) = whole_stretch(signal, length, start) else {
+        let found = first_crossing_with::<M>(signal, length, start, statistics);
+        return Prospect::Settled(found);
     };
     signal.follow::<M>(lattice.followed());
     let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {

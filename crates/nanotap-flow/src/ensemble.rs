@@ -6,7 +6,7 @@
 //! motion waits for one operation after the other; here the processor always has another
 //! motion's operations to go on with.
 
-use crate::flow::Pending;
+use crate::motion::Pending;
 #[cfg(target_arch = "x86_64")]
 use crate::pack::Fused;
 use crate::pack::{self, Library, Math, Plain};
@@ -104,7 +104,7 @@ impl Ensemble {
 
     fn run_with_vectors(&mut self) {
         #[cfg(target_arch = "x86_64")]
-        if crate::flow::fused_available() {
+        if pack::fused_available() {
             // SAFETY: the machine has these instructions.
             return unsafe { self.run_fused() };
         }
@@ -127,7 +127,7 @@ impl Ensemble {
             }
             for lane in &mut self.lanes {
                 if lane.left > 0 {
-                    lane.flow.evaluate::<M>(&mut lane.pending);
+                    lane.flow.motion.evaluate::<M>(&mut lane.pending);
                 }
             }
             running = false;
@@ -146,8 +146,8 @@ impl Lane {
         if self.left == 0 {
             return;
         }
-        self.reach = self.flow.reach_over::<M>(system, self.left);
-        match self.flow.prospect::<M>(system, self.reach) {
+        self.reach = self.flow.motion.reach_over::<M>(system, self.left);
+        match self.flow.motion.prospect::<M>(system, self.reach) {
             Ok(pending) => self.pending = pending,
             Err(reason) => self.fail(reason),
         }
@@ -160,9 +160,10 @@ impl Lane {
             return;
         }
         let (reach, stalled) = (self.reach, &mut self.stalled);
-        let found = self.flow.settle::<M>(system, reach, &self.pending);
+        let found = self.flow.motion.settle::<M>(system, reach, &self.pending);
         let gone = self
             .flow
+            .motion
             .go_over::<M>(system, reach, found, &mut self.left, stalled);
         if let Err(reason) = gone {
             self.fail(reason);

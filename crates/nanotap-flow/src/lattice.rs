@@ -58,8 +58,8 @@ pub(crate) struct Lattice {
 #[derive(Clone, Debug, PartialEq)]
 struct Coarse {
     level: Level,
-    /// `[Re, Im]` of every followed term's exponential at a point, point after point.
-    powers: Vec<[f64; 2]>,
+    /// Of every followed term, the exponential at each point.
+    powers: Vec<Vec<Pair>>,
 }
 
 /// Equidistant points with the exponentials of the slowest terms.
@@ -143,44 +143,36 @@ impl Lattice {
         let [fine_step, coarse_step] = [step(0), step(1)];
         let packs =
             |length: f64, step: f64| ((length / step / WIDTH as f64) as usize + 1).min(LARGEST);
-        let followed = &order[..terms[0]];
         let cost = period / fine_step / WIDTH as f64 * (6 * terms[0] + 20) as f64;
-        if cost < CHEAP || coarse_step < COARSER * fine_step {
+        let single = cost < CHEAP || coarse_step < COARSER * fine_step;
+        order.truncate(terms[0]);
+        let columns = |step: f64, packs: usize| -> Vec<Vec<Pair>> {
+            let column = |&k: &usize| exponentials(kernel, k, step, packs * WIDTH);
+            order.iter().map(column).collect()
+        };
+        if single {
             let packs = packs(period, fine_step);
             return Some(Self {
-                fine: Level::new(kernel, followed, terms[0], fine_step, packs),
+                fine: Level::new(kernel, &order, fine_step, &columns(fine_step, packs)),
                 coarse: None,
                 reach: (packs * WIDTH - 1) as f64 * fine_step,
-                followed: order[..terms[0]].to_vec(),
+                followed: order,
             });
         }
         let divided = (coarse_step / fine_step).ceil();
-        let coarse_packs = packs(period, coarse_step);
-        let points = coarse_packs * WIDTH;
-        let mut powers = vec![[0.0; 2]; points * terms[0]];
-        for (j, &k) in followed.iter().enumerate() {
-            for (p, power) in exponentials(kernel, k, coarse_step, points)
-                .into_iter()
-                .enumerate()
-            {
-                powers[p * terms[0] + j] = power;
-            }
-        }
-        let fine_packs = divided as usize / WIDTH + 1;
+        let fine_step = coarse_step / divided;
+        let fine_columns = columns(fine_step, divided as usize / WIDTH + 1);
+        let packs = packs(period, coarse_step);
+        let powers = columns(coarse_step, packs);
+        let coarse = &order[..terms[1]];
         Some(Self {
-            fine: Level::new(
-                kernel,
-                followed,
-                terms[0],
-                coarse_step / divided,
-                fine_packs,
-            ),
+            fine: Level::new(kernel, &order, fine_step, &fine_columns),
             coarse: Some(Coarse {
-                level: Level::new(kernel, followed, terms[1], coarse_step, coarse_packs),
+                level: Level::new(kernel, coarse, coarse_step, &powers),
                 powers,
             }),
-            reach: (points - 1) as f64 * coarse_step,
-            followed: order[..terms[0]].to_vec(),
+            reach: (packs * WIDTH - 1) as f64 * coarse_step,
+            followed: order,
         })
     }
 
@@ -240,9 +232,8 @@ impl Lattice {
         let Some(coarse) = &self.coarse else {
             return;
         };
-        let powers = &coarse.powers[cell.point * self.fine.terms..];
-        for (amplitude, power) in amplitudes.iter().zip(powers) {
-            let power = power.map(M::splat);
+        for (amplitude, column) in amplitudes.iter().zip(&coarse.powers) {
+            let power = column[cell.point].map(M::splat);
             let mut moved = *amplitude;
             for z in &mut moved {
                 let product = pack::complex_mul::<M>([M::load(&z[0]), M::load(&z[1])], power);
@@ -265,11 +256,14 @@ pub(crate) struct Stretch {
 }
 
 impl Level {
-    fn new(kernel: &Kernel, followed: &[usize], terms: usize, step: f64, packs: usize) -> Self {
-        let mut table = vec![[[0.0; WIDTH]; 2]; packs * terms];
-        for (j, &k) in followed[..terms].iter().enumerate() {
-            let powers = exponentials(kernel, k, step, packs * WIDTH);
-            for (p, [re, im]) in powers.into_iter().enumerate() {
+    /// The level that follows the terms `followed`, from a column of exponentials for each
+    /// (of at least as many terms).
+    fn new(kernel: &Kernel, followed: &[usize], step: f64, columns: &[Vec<Pair>]) -> Self {
+        let terms = followed.len();
+        let points = columns.first().map_or(0, Vec::len);
+        let mut table = vec![[[0.0; WIDTH]; 2]; points / WIDTH * terms];
+        for (j, column) in columns.iter().take(terms).enumerate() {
+            for (p, &[re, im]) in column.iter().enumerate() {
                 let entry = &mut table[p / WIDTH * terms + j];
                 entry[0][p % WIDTH] = re;
                 entry[1][p % WIDTH] = im;
@@ -278,7 +272,7 @@ impl Level {
         let mut weights = vec![[[0.0; WIDTH]; 2]; kernel.packs.len()];
         for k in 0..kernel.count {
             let entry = &mut weights[k / WIDTH];
-            if followed[..terms].contains(&k) {
+            if followed.contains(&k) {
                 entry[0][k % WIDTH] = (norm(kernel, k) * step).powi(6) / 7200.0;
             } else {
                 entry[1][k % WIDTH] = 1.0;

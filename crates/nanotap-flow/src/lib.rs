@@ -35,6 +35,7 @@ pub mod harmonic;
 pub mod integral;
 pub mod jacobian;
 mod lattice;
+mod motion;
 mod pack;
 pub mod regime;
 pub mod sensitivity;

@@ -197,6 +197,18 @@ pub(crate) fn exp_small<M: Math>(z: [M::Lanes; 2]) -> [M::Lanes; 2] {
 #[derive(Clone, Copy)]
 pub(crate) struct Plain;
 
+/// Whether this machine has fused multiply-add in vectors of four.
+pub(crate) fn fused_available() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        false
+    }
+}
+
 /// With the standard library's functions, for angles beyond [`LARGEST_ANGLE`].
 #[derive(Clone, Copy)]
 pub(crate) struct Library;
@@ -295,7 +307,7 @@ impl Math for Library {
     arrays!();
 }
 
-/// In vector registers with fused multiply-add. Only [`crate::flow`] uses it, inside a
+/// In vector registers with fused multiply-add. Only the inner loop uses it, inside a
 /// function compiled for machines that have AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
@@ -435,7 +447,7 @@ mod tests {
     fn each(x: f64, y: f64) -> Vec<(f64, f64, f64)> {
         let mut results = vec![all::<Plain>(x, y)];
         #[cfg(target_arch = "x86_64")]
-        if crate::flow::fused_available() {
+        if fused_available() {
             results.push(all::<Fused>(x, y));
         }
         results
@@ -482,7 +494,7 @@ mod tests {
         );
         assert_eq!(moved::<Plain>(), expected);
         #[cfg(target_arch = "x86_64")]
-        if crate::flow::fused_available() {
+        if fused_available() {
             assert_eq!(moved::<Fused>(), expected);
         }
     }
@@ -492,7 +504,7 @@ mod tests {
         let expected = [14.0, 54.0, 94.0, 134.0];
         assert_eq!(rows::<Plain>(), expected);
         #[cfg(target_arch = "x86_64")]
-        if crate::flow::fused_available() {
+        if fused_available() {
             assert_eq!(rows::<Fused>(), expected);
         }
     }

@@ -363,12 +363,12 @@ impl Flow {
         jacobian: &mut DMatrix<f64>,
         derivatives: &mut DMatrix<f64>,
     ) -> Result<(), FlowError> {
-        let system = std::sync::Arc::clone(self.system());
-        let start = self.regime();
+        let Self { system, motion } = self;
+        let start = motion.regime;
         let mut carried = crate::jacobian::Jacobian::identity(&system.regimes()[start]);
-        let mut sensitivity = Sensitivity::new(&system, tangents, start);
-        self.run_period(&mut (&mut carried, &mut sensitivity))?;
-        let regime = &system.regimes()[self.regime()];
+        let mut sensitivity = Sensitivity::new(system, tangents, start);
+        motion.run_period(system, &mut (&mut carried, &mut sensitivity))?;
+        let regime = &system.regimes()[motion.regime];
         carried.to_state(regime, jacobian);
         let mut column = vec![0.0; system.dimension()];
         for p in 0..tangents.len() {

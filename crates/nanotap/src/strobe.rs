@@ -14,7 +14,7 @@ use nanotap_flow::{Flow, FlowError, Output, System};
 use crate::model::Model;
 
 /// The map from the state at drive phase 0 to the state one drive period later.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Strobe {
     flow: Flow,
     /// The state that the flow was last left in: whoever goes on from it need not start anew.
@@ -22,19 +22,6 @@ pub struct Strobe {
     gap: Arc<Output>,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
-}
-
-impl Clone for Strobe {
-    /// A map with a system of its own, for another thread: threads that count references to
-    /// one system, as every period does, cost each other a third of their time.
-    fn clone(&self) -> Self {
-        Self {
-            flow: Flow::new(Arc::new(System::clone(self.flow.system()))),
-            last: Vec::new(),
-            gap: Arc::clone(&self.gap),
-            tangents: Arc::clone(&self.tangents),
-        }
-    }
 }
 
 impl Strobe {

@@ -3,16 +3,16 @@
 use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-use nanotap::attractors::AttractorsError;
-use nanotap::branch::BranchError;
-use nanotap::case::CaseError;
-use nanotap::case_file::{CaseFileError, Place, Problem, Source};
-use nanotap::fixed_step_run::FixedStepError;
+use nanotap::case::file::{CaseFileError, Place, Problem, Source};
+use nanotap::case::physical::CatalogueError;
+use nanotap::model::cantilever::CaseError;
 use nanotap::model::{FlowError, ModelError};
-use nanotap::orbit::OrbitError;
-use nanotap::physical::CatalogueError;
-use nanotap::sample_comparison::ComparisonError;
-use nanotap::simulate::SimulateError;
+use nanotap::study::attractors::AttractorsError;
+use nanotap::study::branch::BranchError;
+use nanotap::study::contact_laws::ComparisonError;
+use nanotap::study::fixed_step::FixedStepError;
+use nanotap::study::orbit::OrbitError;
+use nanotap::study::simulate::SimulateError;
 use nanotap_figures::FigureError;
 
 use crate::style;

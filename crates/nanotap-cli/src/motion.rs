@@ -3,11 +3,11 @@
 
 use std::fmt::Write as _;
 
-use nanotap::observables::{Observables, Spectrum};
-use nanotap::physical::Kind;
-use nanotap::physical::quantity::format_electronvolts;
-use nanotap::simulate::Classification;
-use nanotap::units::Units;
+use nanotap::case::physical::Kind;
+use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::case::units::Units;
+use nanotap::observe::{Observables, Spectrum};
+use nanotap::study::simulate::Classification;
 
 use crate::output::Output;
 use crate::table::{Align, Table};

@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::model::Model;
-use nanotap::physical::Kind;
-use nanotap::time_series;
-use nanotap::units::Units;
+use nanotap::observe::time_series;
 
 use crate::failure::Failure;
 use crate::file;

@@ -3,11 +3,11 @@
 
 use std::ops::Deref;
 
-use nanotap::experiment::setpoint::SetpointError;
+use nanotap::case::physical::Severity;
+use nanotap::case::subject::{Key, Subject};
 use nanotap::model::Model;
-use nanotap::physical::Severity;
-pub(crate) use nanotap::studied::ParameterUnit;
-use nanotap::subject::{Key, Subject};
+use nanotap::study::setpoint::SetpointError;
+pub(crate) use nanotap::study::studied::ParameterUnit;
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -15,10 +15,10 @@ use crate::output::Output;
 use crate::{command, number, progress};
 
 /// What a command studies.
-pub(crate) struct Studied(nanotap::studied::Studied);
+pub(crate) struct Studied(nanotap::study::studied::Studied);
 
 impl Deref for Studied {
-    type Target = nanotap::studied::Studied;
+    type Target = nanotap::study::studied::Studied;
 
     fn deref(&self) -> &Self::Target {
         &self.0
@@ -27,9 +27,9 @@ impl Deref for Studied {
 
 /// The case at its setpoint, if it leaves the distance to one.
 pub(crate) fn at_setpoint(
-    studied: nanotap::studied::Studied,
+    studied: nanotap::study::studied::Studied,
     output: &Output,
-) -> Result<nanotap::studied::Studied, Failure> {
+) -> Result<nanotap::study::studied::Studied, Failure> {
     if !studied.leaves_distance_to_setpoint() {
         return Ok(studied);
     }
@@ -60,7 +60,7 @@ impl Studied {
         Ok(Self::warned(command::studied(arguments)?, output))
     }
 
-    fn warned(studied: nanotap::studied::Studied, output: &Output) -> Self {
+    fn warned(studied: nanotap::study::studied::Studied, output: &Output) -> Self {
         for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
             if remark.severity == Severity::Warning {
                 output.warning(&remark.text);

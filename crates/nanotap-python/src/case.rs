@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use nanotap::case_document::{CaseDocument, MappingDocument};
-use nanotap::case_file::{self, CaseFile, PHYSICAL_KEYS, Source};
-use nanotap::parameter::Parameter;
-use nanotap::physical::{Catalogue, Severity};
-use nanotap::studied::Studied;
-use nanotap::time_series::state_names;
+use nanotap::case::document::{CaseDocument, MappingDocument};
+use nanotap::case::file::{self, CaseFile, PHYSICAL_KEYS, Source};
+use nanotap::case::physical::{Catalogue, Severity};
+use nanotap::model::parameter::Parameter;
+use nanotap::observe::time_series::state_names;
+use nanotap::study::studied::Studied;
 use pyo3::prelude::*;
 
 use crate::failure::Failure;
@@ -90,7 +90,7 @@ impl CaseCore {
         overrides: Vec<String>,
         catalogues: Vec<PathBuf>,
     ) -> PyResult<Self> {
-        let source = case_file::read(&path).map_err(Failure::from)?;
+        let source = file::read(&path).map_err(Failure::from)?;
         let catalogues = catalogues
             .iter()
             .map(|path| Ok((path.display().to_string(), text_of(path)?)))
@@ -142,7 +142,7 @@ impl CaseCore {
             .studied
             .resolved
             .iter()
-            .flat_map(nanotap::physical::Resolved::mapping)
+            .flat_map(nanotap::case::physical::Resolved::mapping)
             .map(MappingDocument::from)
             .collect();
         Ok(serde_json::to_string(&rows).map_err(Failure::from)?)
@@ -166,10 +166,7 @@ impl CaseCore {
     /// The dimensionless case file; `None` of an oscillator.
     #[getter]
     fn toml(&self) -> Option<String> {
-        self.studied
-            .subject
-            .case()
-            .map(|case| case_file::to_toml(&case))
+        self.studied.subject.case().map(|case| file::to_toml(&case))
     }
 
     /// Whether its parameters were given in physical units.

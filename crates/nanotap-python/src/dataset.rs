@@ -6,12 +6,12 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nanotap::basin::{self, Basin, BasinOptions, SliceRange};
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Schema, Share, Store, Work, WorkError, table};
-use nanotap::experiment::window::Window;
-use nanotap::sweep::{self, Follow, Over, Starts, Sweep, SweepOptions};
+use nanotap::study::basin::{self, Basin, BasinOptions, SliceRange};
+use nanotap::study::sweep::{self, Follow, Over, Starts, Sweep, SweepOptions};
+use nanotap::study::window::Window;
 use nanotap_figures::Figure;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;

@@ -2,27 +2,27 @@
 //! not work out a `RuntimeError`, what the file system refused an `OSError`; each in the
 //! library's own words, which the terminal shows too.
 
-use nanotap::attractors::AttractorsError;
-use nanotap::basin::BasinError;
-use nanotap::branch::BranchError;
-use nanotap::case::CaseError;
-use nanotap::case_file::{CaseFileError, Place};
+use nanotap::case::file::{CaseFileError, Place};
+use nanotap::case::physical::CatalogueError;
+use nanotap::case::physical_subject::VaryError;
+use nanotap::case::subject::UnknownKey;
 use nanotap::dataset::{StoreError, WorkError};
-use nanotap::experiment::approach::ApproachError;
-use nanotap::experiment::setpoint::SetpointError;
-use nanotap::fixed_step_run::FixedStepError;
-use nanotap::mode_table::ModeTableError;
+use nanotap::model::cantilever::CaseError;
 use nanotap::model::{FlowError, ModelError};
-use nanotap::orbit::OrbitError;
-use nanotap::paper::PaperError;
-use nanotap::physical::CatalogueError;
-use nanotap::physical_subject::VaryError;
-use nanotap::simulate::SimulateError;
-use nanotap::start_box::SideError;
-use nanotap::studied::ParameterValueError;
-use nanotap::subject::UnknownKey;
-use nanotap::sweep::{OverError, SweepError};
+use nanotap::study::approach::ApproachError;
+use nanotap::study::attractors::AttractorsError;
+use nanotap::study::basin::BasinError;
+use nanotap::study::branch::BranchError;
+use nanotap::study::fixed_step::FixedStepError;
+use nanotap::study::modes::ModeTableError;
+use nanotap::study::orbit::OrbitError;
+use nanotap::study::setpoint::SetpointError;
+use nanotap::study::simulate::SimulateError;
+use nanotap::study::start_box::SideError;
+use nanotap::study::studied::ParameterValueError;
+use nanotap::study::sweep::{OverError, SweepError};
 use nanotap_figures::FigureError;
+use nanotap_paper::PaperError;
 use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 

@@ -3,16 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nanotap::beam::Modes;
-use nanotap::fixed_step_run::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
-use nanotap::mode_table::ModeTable;
+use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::observables::PhysicalMotion;
-use nanotap::orbit::{OrbitOptions, OrbitReport, orbit as find_orbit};
-use nanotap::simulate::{SettleOptions, SimulateOptions, Simulation, simulate as run};
-use nanotap::studied::Studied;
-use nanotap::subject::Subject;
-use nanotap::time_series;
+use nanotap::model::beam::Modes;
+use nanotap::observe::PhysicalMotion;
+use nanotap::observe::time_series;
+use nanotap::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
+use nanotap::study::modes::ModeTable;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit as find_orbit};
+use nanotap::study::simulate::{SettleOptions, SimulateOptions, Simulation, simulate as run};
+use nanotap::study::studied::Studied;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;

@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 
-use nanotap::attractors::{AttractorsOptions, attractors as census};
-use nanotap::branch::{BranchOptions, BranchReport, SeedOptions, branch as follow};
-use nanotap::convergence::convergence as compare;
-use nanotap::experiment::approach::{
+use nanotap::case::subject::Subject;
+use nanotap::study::approach::{
     ApproachOptions, ApproachReport, approach as approach_curve, gap_key,
 };
-use nanotap::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov as exponents};
-use nanotap::orbit::OrbitOptions;
-use nanotap::paper::{Check, Options as PaperOptions, Verdict, report, section_names};
-use nanotap::simulate::SettleOptions;
-use nanotap::start_box::box_with;
-use nanotap::studied::ParameterUnit;
-use nanotap::subject::Subject;
+use nanotap::study::attractors::{AttractorsOptions, attractors as census};
+use nanotap::study::branch::{BranchOptions, BranchReport, SeedOptions, branch as follow};
+use nanotap::study::convergence::convergence as compare;
+use nanotap::study::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov as exponents};
+use nanotap::study::orbit::OrbitOptions;
+use nanotap::study::simulate::SettleOptions;
+use nanotap::study::start_box::box_with;
+use nanotap::study::studied::ParameterUnit;
+use nanotap_paper::{Check, Options as PaperOptions, Verdict, report, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde::Serialize;

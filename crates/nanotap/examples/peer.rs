@@ -12,8 +12,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use nanotap::case::Case;
 use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
 use nanotap_flow::{Ensemble, Flow, System};
 
 /// Modes, and the dimension of a state.

@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use nanotap::branch::Sight;
-use nanotap::experiment::approach::{
+use nanotap::case::physical::Kind;
+use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::figure::approach::approach_figure;
+use nanotap::study::approach::{
     ApproachError, ApproachOptions, ApproachPoint, ApproachReport, approach, gap_key,
 };
-use nanotap::experiment::approach_figure;
-use nanotap::physical::Kind;
-use nanotap::physical::quantity::format_electronvolts;
-use nanotap::studied::ParameterUnit;
+use nanotap::study::branch::Sight;
+use nanotap::study::studied::ParameterUnit;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};

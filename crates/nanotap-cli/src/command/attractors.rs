@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::attractor_figure::attractors_figure;
-use nanotap::attractors::{AttractorReport, Attractors, AttractorsOptions, attractors};
+use nanotap::case::units::Units;
+use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
-use nanotap::simulate::SettleOptions;
-use nanotap::start_box::box_with;
-use nanotap::time_series;
-use nanotap::units::Units;
+use nanotap::observe::time_series;
+use nanotap::study::attractors::{AttractorReport, Attractors, AttractorsOptions, attractors};
+use nanotap::study::simulate::SettleOptions;
+use nanotap::study::start_box::box_with;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -307,7 +307,7 @@ fn table(attractors: &[AttractorReport], units: &Units) -> String {
 }
 
 fn tip(low: f64, high: f64, units: &Units) -> String {
-    let kind = nanotap::physical::Kind::Length;
+    let kind = nanotap::case::physical::Kind::Length;
     units.si(kind).map_or_else(
         || {
             format!(

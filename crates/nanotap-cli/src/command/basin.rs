@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::basin::{Basin, BasinError, BasinOptions, Shares, SliceRange, figure, shares};
+use nanotap::study::basin::{Basin, BasinError, BasinOptions, Shares, SliceRange, figure, shares};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};

@@ -3,10 +3,11 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use nanotap::branch::{BranchOptions, BranchReport, PointReport, SeedOptions, branch};
-use nanotap::branch_figure::{ParameterAxis, Shown, branch_figure};
-use nanotap::subject::Key;
-use nanotap::{time_series, units};
+use nanotap::case::subject::Key;
+use nanotap::case::units;
+use nanotap::figure::branch::{ParameterAxis, Shown, branch_figure};
+use nanotap::observe::time_series;
+use nanotap::study::branch::{BranchOptions, BranchReport, PointReport, SeedOptions, branch};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};

@@ -1,14 +1,14 @@
 //! `nanotap case`: the case, checked and resolved.
 
 use clap::Args;
-use nanotap::case::{Case, CosineTerm};
-use nanotap::case_document::CaseDocument;
-use nanotap::case_file;
-use nanotap::experiment::setpoint::SetpointReport;
-use nanotap::oscillator::{Oscillator, OscillatorParameter, Stop};
-use nanotap::physical::quantity::format_electronvolts;
-use nanotap::physical::{Kind, Resolved, Severity};
-use nanotap::subject::Subject;
+use nanotap::case::document::CaseDocument;
+use nanotap::case::file as case_file;
+use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::case::physical::{Kind, Resolved, Severity};
+use nanotap::case::subject::Subject;
+use nanotap::model::cantilever::{Case, CosineTerm};
+use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use nanotap::study::setpoint::SetpointReport;
 
 use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::beam::MAX_MODES;
-use nanotap::convergence::{Convergence, convergence};
-use nanotap::motion_figure::convergence_figure;
-use nanotap::orbit::OrbitOptions;
-use nanotap::physical::Kind;
-use nanotap::physical::quantity::format_electronvolts;
+use nanotap::case::physical::Kind;
+use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::figure::motion::convergence_figure;
+use nanotap::model::beam::MAX_MODES;
+use nanotap::study::convergence::{Convergence, convergence};
+use nanotap::study::orbit::OrbitOptions;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;

@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use nanotap::attractor_figure::section_figure;
-use nanotap::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov};
+use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
-use nanotap::time_series;
+use nanotap::observe::time_series;
+use nanotap::study::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;

@@ -17,10 +17,10 @@ mod sweep;
 mod window;
 
 use clap::Subcommand;
-use nanotap::case::Case;
-use nanotap::case_file::CaseFile;
-use nanotap::physical::Catalogue;
-use nanotap::studied::Studied;
+use nanotap::case::file::CaseFile;
+use nanotap::case::physical::Catalogue;
+use nanotap::model::cantilever::Case;
+use nanotap::study::studied::Studied;
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::beam::Modes;
-use nanotap::case::Case;
-use nanotap::mode_table::{self, ModeTable, ModeTableError, damping_ratio};
+use nanotap::model::beam::Modes;
+use nanotap::model::cantilever::Case;
+use nanotap::study::modes::{ModeTable, ModeTableError, damping_ratio, shapes_figure};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         file::write(path, shapes(&beam).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
-        mode_table::shapes_figure(&beam).write(path)?;
+        shapes_figure(&beam).write(path)?;
     }
     let title = super::title(&arguments.case);
     output.result(&table, |table| text(&title, &case, table))

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::motion_figure::orbit_figure;
-use nanotap::observables::PhysicalMotion;
-use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
-use nanotap::time_series;
+use nanotap::observe::PhysicalMotion;
+use nanotap::observe::time_series;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};

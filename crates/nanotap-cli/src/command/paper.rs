@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::paper::{Check, Options, PaperError, Report, Verdict, Written, report, section_names};
+use nanotap_paper::{Check, Options, PaperError, Report, Verdict, Written, report, section_names};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -118,7 +118,7 @@ fn text(document: &Document<'_>, report: &Report, written: &Written) -> String {
 mod tests {
     use clap::Parser as _;
     use nanotap::control::Control;
-    use nanotap::paper::{Options, report};
+    use nanotap_paper::{Options, report};
 
     /// Every command that the report tells to run again can be typed.
     #[test]

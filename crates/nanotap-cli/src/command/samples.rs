@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::case::subject::{Key, Subject};
 use nanotap::control::Control;
-use nanotap::parameter::Parameter;
-use nanotap::sample_comparison::{Comparison, ComparisonOptions, SampleMotion, compare};
-use nanotap::sample_figure::sample_figure;
-use nanotap::subject::{Key, Subject};
+use nanotap::figure::contact_laws::sample_figure;
+use nanotap::model::parameter::Parameter;
+use nanotap::study::contact_laws::{Comparison, ComparisonOptions, SampleMotion, compare};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;

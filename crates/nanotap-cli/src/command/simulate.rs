@@ -3,12 +3,14 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use nanotap::fixed_step_run::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
+use nanotap::case::units::Units;
+use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
-use nanotap::motion_figure::{fixed_step_figure, simulation_figure};
-use nanotap::observables::PhysicalMotion;
-use nanotap::simulate::{Classification, SettleOptions, SimulateOptions, Simulation, simulate};
-use nanotap::units::Units;
+use nanotap::observe::PhysicalMotion;
+use nanotap::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
+use nanotap::study::simulate::{
+    Classification, SettleOptions, SimulateOptions, Simulation, simulate,
+};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -306,8 +308,8 @@ fn rk4_text(studied: &Studied, run: &FixedStepRun) -> String {
             number::significant(run.tip_max, 6)
         ),
     ]);
-    if let Some(unit) = units.si(nanotap::physical::Kind::Length) {
-        let metres = nanotap::physical::Kind::Length;
+    if let Some(unit) = units.si(nanotap::case::physical::Kind::Length) {
+        let metres = nanotap::case::physical::Kind::Length;
         table.row(["amplitude", &metres.format(unit * run.amplitude)]);
     } else {
         table.row(["amplitude", &number::significant(run.amplitude, 6)]);

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use nanotap::physical::Kind;
-use nanotap::sweep::{
+use nanotap::case::physical::Kind;
+use nanotap::study::sweep::{
     Follow, Over, OverError, Starts, Summary, Sweep, SweepError, SweepOptions, figure,
     response_figure, summary,
 };

@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use clap::Args;
 use nanotap::dataset::StoreError;
-use nanotap::experiment::window::{Condition, Window};
-use nanotap::sweep::{Over, Starts, Sweep, SweepOptions};
+use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
+use nanotap::study::window::{Condition, Window};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};

@@ -2,9 +2,9 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use nanotap::basin::{Basin, BasinOptions, SliceRange};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
+use nanotap::study::basin::{Basin, BasinOptions, SliceRange};
 
 use crate::cases;
 use crate::folder::Folder;

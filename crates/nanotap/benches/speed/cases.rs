@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use nanotap::case::Case;
+use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::subject::Subject;
+use nanotap::model::cantilever::Case;
 use nanotap_flow::Flow;
 
 /// Numbers of modes N.

@@ -1,8 +1,8 @@
 //! A census of coexisting motions.
 
 use divan::Bencher;
-use nanotap::attractors::{AttractorsOptions, attractors};
 use nanotap::control::Control;
+use nanotap::study::attractors::{AttractorsOptions, attractors};
 
 use crate::cases;
 

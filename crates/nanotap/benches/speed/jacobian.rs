@@ -2,9 +2,9 @@
 
 use divan::Bencher;
 use nalgebra::DMatrix;
-use nanotap::parameter::Parameter;
-use nanotap::strobe::Strobe;
-use nanotap::subject::Key;
+use nanotap::case::subject::Key;
+use nanotap::model::parameter::Parameter;
+use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 
 use crate::cases::{self, MODES};

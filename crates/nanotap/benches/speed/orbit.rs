@@ -1,8 +1,8 @@
 //! A periodic orbit by Newton's method.
 
 use divan::Bencher;
-use nanotap::case::Case;
-use nanotap::strobe::Strobe;
+use nanotap::model::cantilever::Case;
+use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::{ShootingOptions, close_orbit};
 
 use crate::cases::{self, MODES};

@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use nanotap::case::Case;
+use nanotap::model::cantilever::Case;
 use nanotap_flow::{Ensemble, Flow};
 
 use crate::cases::{self, DAMPINGS, MODES};

@@ -1,9 +1,9 @@
 //! Setting up a model for one value of the parameters.
 
 use divan::{Bencher, black_box};
+use nanotap::case::subject::Key;
 use nanotap::model::Model;
-use nanotap::parameter::Parameter;
-use nanotap::subject::Key;
+use nanotap::model::parameter::Parameter;
 
 use crate::cases::{self, MODES};
 

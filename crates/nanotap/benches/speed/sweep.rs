@@ -4,7 +4,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
-use nanotap::sweep::{Over, Starts, Sweep, SweepOptions};
+use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
 
 use crate::cases;
 use crate::folder::Folder;

@@ -1,7 +1,7 @@
 //! One switch between free flight and contact.
 
 use divan::Bencher;
-use nanotap::case::Case;
+use nanotap::model::cantilever::Case;
 use nanotap_flow::{Flow, Trajectory};
 
 use crate::cases::{self, MODES};

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::schema::Attributes;
-use crate::subject::Subject;
+use crate::case::subject::Subject;
 
 /// The attributes that every dataset begins with: what it is, the program's version,
 /// and the case as JSON text (an attribute that every file format can hold).

@@ -1,12 +1,12 @@
 //! Approach curves.
 
-use nanotap::case::Case;
-use nanotap::case_file::{CaseFile, Source};
+use nanotap::case::file::{CaseFile, Source};
+use nanotap::case::physical::Catalogue;
 use nanotap::control::Control;
-use nanotap::experiment::approach::{ApproachOptions, ApproachReport, Way, approach};
-use nanotap::physical::Catalogue;
-use nanotap::simulate::Classification;
-use nanotap::studied::Studied;
+use nanotap::model::cantilever::Case;
+use nanotap::study::approach::{ApproachOptions, ApproachReport, Way, approach};
+use nanotap::study::simulate::Classification;
+use nanotap::study::studied::Studied;
 
 /// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
 pub(crate) const STIFF: &str = "\

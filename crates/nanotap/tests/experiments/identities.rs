@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use nanotap::control::Control;
-use nanotap::experiment::approach::{ApproachOptions, Way, approach};
-use nanotap::experiment::setpoint::solve_setpoint;
+use nanotap::study::approach::{ApproachOptions, Way, approach};
+use nanotap::study::setpoint::solve_setpoint;
 
 use crate::approach::{STIFF, studied};
 

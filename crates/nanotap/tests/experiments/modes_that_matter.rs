@@ -1,8 +1,8 @@
 //! Which modes matter.
 
-use nanotap::case::Case;
-use nanotap::convergence::convergence;
-use nanotap::orbit::OrbitOptions;
+use nanotap::model::cantilever::Case;
+use nanotap::study::convergence::convergence;
+use nanotap::study::orbit::OrbitOptions;
 
 /// Far from the sample each mode is a damped oscillator by itself: its energy, and its part in
 /// the tip's motion, follow from a_j = (Ω² − iα3Ω) I_j α2/(β_j⁴ − Ω² + iα3Ω) (no tip mass).
@@ -15,7 +15,7 @@ fn shares_of_a_free_lever_are_the_closed_form() {
         ..Case::paper()
     };
     let found = convergence(&case, 4, 0.01, &OrbitOptions::default()).unwrap();
-    let modes = nanotap::beam::Modes::new(4).unwrap();
+    let modes = nanotap::model::beam::Modes::new(4).unwrap();
     let square = case.omega * case.omega;
     let response: Vec<nalgebra::Complex<f64>> = (0..4)
         .map(|j| {
@@ -59,7 +59,7 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
     let tolerance = 0.05;
     let found = convergence(&case, 6, tolerance, &options).unwrap();
     let report = &found.readings;
-    let sum = |of: fn(&nanotap::mode_share::ModeShare) -> f64| -> f64 {
+    let sum = |of: fn(&nanotap::observe::mode_share::ModeShare) -> f64| -> f64 {
         report.mode_shares.iter().map(of).sum()
     };
     assert!((sum(|s| s.energy) - 1.0).abs() < 1e-12);

@@ -1,11 +1,11 @@
 //! Quantities of a physical case that vary.
 
-use nanotap::branch::{BranchOptions, branch};
+use nanotap::case::subject::{Family, Key, Subject};
 use nanotap::control::Control;
-use nanotap::experiment::approach::gap_key;
-use nanotap::parameter::Parameter;
-use nanotap::studied::Studied;
-use nanotap::subject::{Family, Key, Subject};
+use nanotap::model::parameter::Parameter;
+use nanotap::study::approach::gap_key;
+use nanotap::study::branch::{BranchOptions, branch};
+use nanotap::study::studied::Studied;
 use nanotap_dynamics::{DMatrix, MapFamily as _, StroboscopicMap as _};
 
 use crate::approach::{STIFF, studied};

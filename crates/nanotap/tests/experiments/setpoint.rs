@@ -1,14 +1,14 @@
 //! Setpoints solved for the distance.
 
 use nanotap::control::Control;
-use nanotap::experiment::approach::gap_key;
-use nanotap::experiment::setpoint::{SetpointError, solve_setpoint};
-use nanotap::orbit::{OrbitOptions, orbit};
+use nanotap::study::approach::gap_key;
+use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap::study::setpoint::{SetpointError, solve_setpoint};
 
 use crate::approach::{STIFF, studied};
 
 /// Without `gap.tip`, the setpoint decides.
-fn held(set: &[&str]) -> nanotap::studied::Studied {
+fn held(set: &[&str]) -> nanotap::study::studied::Studied {
     studied(&STIFF.replace("[gap]\ntip = \"15 nm\"\n", ""), set)
 }
 

@@ -1,12 +1,12 @@
 //! What must hold of every contact law.
 
-use nanotap::case::Case;
-use nanotap::contact::ContactLaw;
+use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::observables::Observables;
-use nanotap::orbit::{OrbitOptions, orbit};
-use nanotap::parameter::Parameter;
-use nanotap::subject::Subject;
+use nanotap::model::cantilever::Case;
+use nanotap::model::contact::ContactLaw;
+use nanotap::model::parameter::Parameter;
+use nanotap::observe::Observables;
+use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
 

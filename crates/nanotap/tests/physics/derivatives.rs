@@ -2,11 +2,11 @@
 //! at grazing.
 
 use nalgebra::DMatrix;
-use nanotap::case::Case;
+use nanotap::case::subject::{Key, Subject};
 use nanotap::model::Model;
-use nanotap::oscillator::{Oscillator, Stop};
-use nanotap::strobe::Strobe;
-use nanotap::subject::{Key, Subject};
+use nanotap::model::cantilever::Case;
+use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 use nanotap_flow::Flow;
 

@@ -1,14 +1,14 @@
 //! Drives through the base and on the lever itself, with one tone and two.
 
-use nanotap::case::Case;
-use nanotap::contact::ContactLaw;
-use nanotap::drive_form::Actuation;
+use nanotap::case::physical::free_response::response_at;
+use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::observables::{Observables, Spectrum};
-use nanotap::orbit::{OrbitOptions, orbit};
-use nanotap::parameter::Parameter;
-use nanotap::physical::free_response::response_at;
-use nanotap::subject::Subject;
+use nanotap::model::cantilever::Case;
+use nanotap::model::contact::ContactLaw;
+use nanotap::model::drive_form::Actuation;
+use nanotap::model::parameter::Parameter;
+use nanotap::observe::{Observables, Spectrum};
+use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::{Complex, Flow, Trajectory};
 
 use crate::contact_laws::on;

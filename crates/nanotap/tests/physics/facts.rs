@@ -1,9 +1,9 @@
 //! Known orbits and invariants. Numbers without another source are those of the
 //! project's model notes, found there by an independent program.
 
-use nanotap::case::{Case, CosineTerm};
 use nanotap::model::Model;
-use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::model::cantilever::{Case, CosineTerm};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
 
@@ -198,7 +198,7 @@ proptest! {
         let model = Model::cantilever(&case).unwrap();
         let start = vec![0.0; 2 * modes];
         let run = Trajectory::record(&model.system, &start, 12).unwrap();
-        let seen = nanotap::observables::Observables::of(&model, &run).unwrap();
+        let seen = nanotap::observe::Observables::of(&model, &run).unwrap();
         prop_assert!(seen.energy_balance.residual.abs() < 1e-11, "{:?}", seen.energy_balance);
 
         let doubled = Model::cantilever(&Case { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
@@ -238,7 +238,7 @@ fn clearance_of_a_long_run_is_the_least_of_its_periods() {
         let model = Model::cantilever(&case).unwrap();
         let seen = |state: &[f64], periods: usize| {
             let run = Trajectory::record(&model.system, state, periods).unwrap();
-            let clearance = nanotap::observables::Observables::of(&model, &run).unwrap();
+            let clearance = nanotap::observe::Observables::of(&model, &run).unwrap();
             (
                 clearance.beam_clearance.unwrap().height,
                 run.state_at(run.end()).unwrap(),

@@ -1,9 +1,9 @@
 //! The one-degree-of-freedom impact oscillator: closed forms, known orbits, chatter and
 //! sticking, and the soft stop in the limit of infinite stiffness.
 
-use nanotap::observables::Observables;
-use nanotap::orbit::{OrbitOptions, orbit};
-use nanotap::oscillator::{Oscillator, Stop};
+use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::observe::Observables;
+use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 
 fn rigid(omega: f64, restitution: f64) -> Oscillator {
@@ -202,7 +202,7 @@ fn stiff_soft_stop_tends_to_the_rigid_one() {
 /// doubled motion of gap 0 and r = 0.8 comes to impact at the drive's own phase 0.
 #[test]
 fn runs_that_impact_at_phase_zero_go_on() {
-    use nanotap::strobe::Strobe;
+    use nanotap::model::strobe::Strobe;
     use nanotap_dynamics::StroboscopicMap;
     let model = rigid(1.26, 0.8).model().unwrap();
     let mut map = Strobe::new(&model);

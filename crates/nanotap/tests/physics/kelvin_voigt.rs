@@ -1,10 +1,10 @@
 //! The surface of spring and damper that recovers by itself.
 
-use nanotap::case::Case;
-use nanotap::contact::ContactLaw;
 use nanotap::model::Model;
-use nanotap::observables::begins_contact;
-use nanotap::parameter::Parameter;
+use nanotap::model::cantilever::Case;
+use nanotap::model::contact::ContactLaw;
+use nanotap::model::parameter::Parameter;
+use nanotap::observe::begins_contact;
 use nanotap_flow::{Flow, Trajectory};
 
 use crate::contact_laws::on;

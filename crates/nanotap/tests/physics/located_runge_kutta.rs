@@ -3,9 +3,9 @@
 //! from the samples' mechanics and not from the product's regimes.
 
 use nalgebra::DVector;
-use nanotap::case::Case;
-use nanotap::contact::ContactLaw;
-use nanotap::galerkin::Galerkin;
+use nanotap::model::cantilever::Case;
+use nanotap::model::contact::ContactLaw;
+use nanotap::model::galerkin::Galerkin;
 
 /// The beam and where its sample is.
 #[derive(Clone)]

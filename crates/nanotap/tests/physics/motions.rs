@@ -1,17 +1,17 @@
 //! Which motions there are, and where they change: the analysis joined to the model.
 
-use nanotap::attractors::{AttractorsOptions, attractors};
-use nanotap::branch::{BranchOptions, branch};
-use nanotap::case::Case;
+use nanotap::case::subject::{Key, PlaneFamily, Subject};
 use nanotap::control::Control;
-use nanotap::lyapunov::{LyapunovOptions, Section, lyapunov, section};
 use nanotap::model::Model;
-use nanotap::orbit::{OrbitOptions, orbit};
-use nanotap::oscillator::{Oscillator, OscillatorParameter, Stop};
-use nanotap::parameter::Parameter;
-use nanotap::simulate::{Classification, SimulateOptions, simulate};
-use nanotap::start_box::default_box;
-use nanotap::subject::{Key, PlaneFamily, Subject};
+use nanotap::model::cantilever::Case;
+use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use nanotap::model::parameter::Parameter;
+use nanotap::study::attractors::{AttractorsOptions, attractors};
+use nanotap::study::branch::{BranchOptions, branch};
+use nanotap::study::lyapunov::{LyapunovOptions, Section, lyapunov, section};
+use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
+use nanotap::study::start_box::default_box;
 use nanotap_dynamics::TwoParameterFamily as _;
 use nanotap_dynamics::{DMatrix, StroboscopicMap as _};
 

@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use nanotap::case::Case;
+use nanotap::case::physical::free_response::free_response;
 use nanotap::model::Model;
-use nanotap::orbit::{OrbitOptions, OrbitReport, orbit};
-use nanotap::physical::free_response::free_response;
+use nanotap::model::cantilever::Case;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_dynamics::Complex;
 
 /// The period-1 orbit of a case, and its model.
@@ -141,7 +141,7 @@ fn an_optical_lever_reads_a_static_deflection_as_it_is() {
 /// A run's observables over many blocks are those of one orbit.
 #[test]
 fn a_long_run_reads_what_its_orbit_reads() {
-    use nanotap::simulate::{SimulateOptions, simulate};
+    use nanotap::study::simulate::{SimulateOptions, simulate};
     let case = Case {
         omega: 20.0,
         alpha1: 0.0,

@@ -1,9 +1,9 @@
 //! States and event times against 50-digit references: `tests/reference/*.json`, made
 //! with mpmath at 60 digits by two independent methods (eigenbasis and Taylor series).
 
-use nanotap::case::Case;
 use nanotap::model::Model;
-use nanotap::strobe::Strobe;
+use nanotap::model::cantilever::Case;
+use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 use nanotap_flow::Trajectory;
 use serde_json::Value;

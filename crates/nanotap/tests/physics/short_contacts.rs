@@ -1,7 +1,7 @@
 //! No contact is missed, however brief.
 
-use nanotap::case::Case;
 use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, Trajectory};
 

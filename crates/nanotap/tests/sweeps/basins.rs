@@ -1,10 +1,10 @@
 //! Basins on slices.
 
-use nanotap::basin::{Basin, BasinError, BasinOptions, SliceRange, figure, shares};
-use nanotap::case::Case;
+use nanotap::case::subject::Subject;
 use nanotap::dataset::{Share, Store, Values, Work};
-use nanotap::strobe::Strobe;
-use nanotap::subject::Subject;
+use nanotap::model::cantilever::Case;
+use nanotap::model::strobe::Strobe;
+use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, figure, shares};
 use nanotap_dynamics::{Control, SettleOptions, Verdict, settle};
 use std::sync::atomic::AtomicBool;
 

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use nanotap::case::Case;
+use nanotap::case::subject::Subject;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
-use nanotap::subject::Subject;
-use nanotap::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
+use nanotap::model::cantilever::Case;
+use nanotap::study::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
 use nanotap_dynamics::Control;
 
 use crate::folder::{Folder, assert_same, bytes};

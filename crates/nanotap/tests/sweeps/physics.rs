@@ -1,11 +1,11 @@
 //! What sweeps find, against what is known of the model.
 
-use nanotap::case::Case;
+use nanotap::case::subject::Subject;
 use nanotap::dataset::{Share, Store, Values, Work};
-use nanotap::orbit::OrbitOptions;
-use nanotap::oscillator::{Oscillator, Stop};
-use nanotap::subject::Subject;
-use nanotap::sweep::{
+use nanotap::model::cantilever::Case;
+use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::study::orbit::OrbitOptions;
+use nanotap::study::sweep::{
     Follow, Over, Starts, Summary, Sweep, SweepError, SweepOptions, figure, summary,
 };
 use nanotap_dynamics::Control;
@@ -139,7 +139,8 @@ fn the_orbit_at_three_is_recorded_as_it_is() {
     let swept = Swept::of(&paper(3.0, 0.1), &["omega=3:3:1"], |_| {});
     assert_eq!(swept.summary().periods.get(&1), Some(&1));
     assert!((swept.column("multiplier")[0] - 0.868_606).abs() < 1e-6);
-    let orbit = nanotap::orbit::orbit(&paper(3.0, 0.1).model().unwrap(), &OrbitOptions::default());
+    let orbit =
+        nanotap::study::orbit::orbit(&paper(3.0, 0.1).model().unwrap(), &OrbitOptions::default());
     let observables = orbit.unwrap().observables;
     for (name, expected) in [
         ("tip_max", observables.tip_max),
@@ -215,9 +216,9 @@ fn a_given_transient_is_run_as_given() {
         o.starts = Starts::Given(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]);
     });
     let model = subject.model().unwrap();
-    let run = nanotap::simulate::simulate(
+    let run = nanotap::study::simulate::simulate(
         &model,
-        &nanotap::simulate::SimulateOptions {
+        &nanotap::study::simulate::SimulateOptions {
             periods: 20,
             transient: Some(7),
             state: Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]),

@@ -1,0 +1,170 @@
+//! The census behind the verdicts on Figs. 6–17: every case of the paper with one to
+//! five modes.
+
+use super::PaperError;
+use super::check::{Check, Verdict, digits};
+use super::laboratory::{Counted, Laboratory};
+use super::section::{Section, Table};
+use nanotap::model::cantilever::Case;
+use nanotap::model::parameter::Parameter;
+
+/// Most modes of the census.
+const MOST_MODES: usize = 5;
+
+/// What the paper says coexists in one case.
+struct Coexistence {
+    id: &'static str,
+    omega: f64,
+    alpha1: f64,
+    paper: &'static str,
+    /// Stable motions by (period, how many).
+    periodic: &'static [(usize, usize)],
+    /// Whether a nonperiodic one is among them.
+    nonperiodic: bool,
+}
+
+const CLAIMS: [Coexistence; 4] = [
+    Coexistence {
+        id: "attractors-slow",
+        omega: 2.6,
+        alpha1: 0.1,
+        paper: "Figs. 6, 7: at Ω = 2.6, α₁ = 0.1 two period-1, a period-2 and a period-3 motion coexist",
+        periodic: &[(1, 2), (2, 1), (3, 1)],
+        nonperiodic: false,
+    },
+    Coexistence {
+        id: "attractors-fast",
+        omega: 20.0,
+        alpha1: 0.1,
+        paper: "Figs. 8–14: at Ω = 20, α₁ = 0.1 two period-1, a period-11, a period-28, two period-21 and a \
+                nonperiodic motion coexist",
+        periodic: &[(1, 2), (11, 1), (28, 1), (21, 2)],
+        nonperiodic: true,
+    },
+    Coexistence {
+        id: "attractors-bare-fast",
+        omega: 20.0,
+        alpha1: 0.0,
+        paper: "captions of Figs. 15–17: at Ω = 20, α₁ = 0 two period-1, a period-2 and two period-4 motions coexist",
+        periodic: &[(1, 2), (2, 1), (4, 2)],
+        nonperiodic: false,
+    },
+    Coexistence {
+        id: "attractors-bare-slow",
+        omega: 2.6,
+        alpha1: 0.0,
+        paper: "text on Figs. 15–17: at Ω = 2.6, α₁ = 0 two period-1, a period-2 and two period-4 motions coexist",
+        periodic: &[(1, 2), (2, 1), (4, 2)],
+        nonperiodic: false,
+    },
+];
+
+impl Coexistence {
+    /// Whether a census found all that.
+    fn holds(&self, counted: &Counted) -> bool {
+        self.periodic
+            .iter()
+            .all(|(period, count)| counted.stable(*period).len() >= *count)
+            && (!self.nonperiodic || !counted.chaos().is_empty())
+    }
+}
+
+/// Every attractor of the cases of Figs. 6–17.
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    mut section: Section,
+) -> Result<Section, PaperError> {
+    let mut table = Table::new(
+        "Every attractor found, from seeded starts in a box that fits the case",
+        [
+            "Ω",
+            "α₁",
+            "N",
+            "motion",
+            "starts",
+            "W min",
+            "W max",
+            "amplitude",
+            "largest |μ|, or λ₁ a period",
+        ],
+    );
+    for claim in &CLAIMS {
+        let mut kinds = Vec::new();
+        let mut agreeing = Vec::new();
+        let mut evidence = String::new();
+        let mut again = String::new();
+        for modes in 1..=laboratory.either(MOST_MODES, 3) {
+            let case = Case::paper()
+                .with_modes(modes)
+                .with(Parameter::Omega, claim.omega)
+                .with(Parameter::Alpha1, claim.alpha1);
+            let counted = laboratory.count(&case)?;
+            rows(&mut table, &counted)?;
+            kinds.push(format!("N = {modes}: {}", counted.kinds().join(", ")));
+            if claim.holds(&counted) {
+                agreeing.push(modes.to_string());
+            }
+            if modes == case.modes && modes == Case::paper().modes {
+                evidence = format!("N = 3, {}; {}", counted.summary(), counted.missed());
+                again = counted.rerun();
+            }
+        }
+        let mut here = kinds.join("; ");
+        if !agreeing.is_empty() {
+            here = format!("so it is with N = {}; {here}", agreeing.join(", "));
+        }
+        section = section.check(
+            Check::new(
+                claim.id,
+                claim.paper,
+                here,
+                Verdict::of(!agreeing.is_empty()),
+            )
+            .evidence(evidence)
+            .rerun(again),
+        );
+    }
+    Ok(section
+        .text(
+            "Each start is followed until Newton closes the orbit that it goes to, with multipliers that say stable, \
+             or until its Lyapunov exponents have been measured; no tolerance on how nearly a run repeats decides. \
+             Orbits that are the same up to a shift by whole drive periods are one.",
+        )
+        .table(table))
+}
+
+fn rows(table: &mut Table, counted: &Counted) -> Result<(), PaperError> {
+    let case = &counted.case;
+    let head = || {
+        [
+            case.omega.to_string(),
+            case.alpha1.to_string(),
+            case.modes.to_string(),
+        ]
+        .into_iter()
+    };
+    for (orbit, fraction) in counted.all_stable() {
+        let o = counted.look(orbit)?.observables;
+        table.row(head().chain([
+            format!("period {}", orbit.period),
+            format!("{} of {}", fraction.count, fraction.total),
+            format!("{:.5}", o.tip_min),
+            format!("{:.5}", o.tip_max),
+            format!("{:.5}", o.amplitude),
+            format!("|μ| = {}", digits(orbit.spectral_radius(), 5)),
+        ]));
+    }
+    for chaos in counted.chaos() {
+        let (exponent, error) = chaos.spectrum.largest();
+        let o = counted.watch(chaos.state)?;
+        table.row(head().chain([
+            format!("chaos, lifetime above {:.0} periods", chaos.lifetime.low),
+            format!("{} of {}", chaos.fraction.count, chaos.fraction.total),
+            format!("{:.3}", o.tip_min),
+            format!("{:.3}", o.tip_max),
+            format!("{:.3}", o.amplitude),
+            format!("λ₁ = {exponent:.3} ± {error:.3}"),
+        ]));
+    }
+    Ok(())
+}

@@ -1,0 +1,356 @@
+//! Figs. 15–17: no tip mass. Captions say Ω = 20, the text says Ω = 2.6: both are computed.
+
+use std::rc::Rc;
+
+use nanotap_dynamics::PeriodicOrbit;
+use nanotap_figures::{Figure, Panel};
+
+use super::PaperError;
+use super::check::{Check, Verdict, digits};
+use super::laboratory::{Counted, Laboratory, how_many};
+use super::motion_view::{KEY, View, empty_portrait};
+use super::section::{Picture, Section};
+use nanotap::model::cantilever::Case;
+use nanotap::model::parameter::Parameter;
+
+/// Longest period of the orbits looked for.
+const LONGEST: usize = 4;
+
+/// Both readings, with their censuses and orbits.
+struct Bare {
+    fast: Reading,
+    slow: Reading,
+}
+
+/// One reading of the three figures.
+struct Reading {
+    counted: Rc<Counted>,
+    orbits: Vec<PeriodicOrbit>,
+}
+
+impl Reading {
+    fn new(laboratory: &Laboratory<'_>, omega: f64) -> Result<Self, PaperError> {
+        let case = Case::paper()
+            .with(Parameter::Alpha1, 0.0)
+            .with(Parameter::Omega, omega);
+        let counted = laboratory.count(&case)?;
+        let orbits = laboratory.orbits(&counted, LONGEST, 256)?;
+        Ok(Self { counted, orbits })
+    }
+
+    fn unstable(&self, period: usize) -> Vec<&PeriodicOrbit> {
+        self.orbits
+            .iter()
+            .filter(|o| o.period == period && !o.is_stable())
+            .collect()
+    }
+
+    /// What there is of a period: "one attracts (W from … to …), one repels".
+    fn describe(&self, period: usize) -> Result<String, PaperError> {
+        let mut parts = Vec::new();
+        for (orbit, _) in self.counted.stable(period) {
+            let o = self.counted.look(orbit)?.observables;
+            parts.push(format!(
+                "one that attracts (W from {} to {})",
+                digits(o.tip_min, 4),
+                digits(o.tip_max, 5)
+            ));
+        }
+        for orbit in self.unstable(period) {
+            let o = self.counted.look(orbit)?.observables;
+            parts.push(format!(
+                "one that repels (W from {} to {})",
+                digits(o.tip_min, 4),
+                digits(o.tip_max, 5)
+            ));
+        }
+        let omega = self.counted.case.omega;
+        Ok(if parts.is_empty() {
+            format!("Ω = {omega}: no period-{period} motion")
+        } else {
+            format!("Ω = {omega}: {}", parts.join(", "))
+        })
+    }
+
+    /// An orbit of this period, a stable one first.
+    fn best(&self, period: usize) -> Option<&PeriodicOrbit> {
+        let stable = self.counted.stable(period).first().map(|(orbit, _)| *orbit);
+        stable.or_else(|| self.unstable(period).first().copied())
+    }
+
+    /// Time series and phase portrait of an orbit.
+    fn panels(&self, orbit: &PeriodicOrbit, periods: usize) -> Result<[Panel; 2], PaperError> {
+        let stability = if orbit.is_stable() {
+            "stable"
+        } else {
+            "unstable"
+        };
+        let omega = self.counted.case.omega;
+        let view = View::new(&self.counted.model, &orbit.states[0], periods)?;
+        let whole = View::new(&self.counted.model, &orbit.states[0], orbit.period)?;
+        Ok([
+            view.time_panel(format!("Ω = {omega}: period {}, {stability}", orbit.period)),
+            whole.portrait_panel(
+                format!("largest |μ| = {}", digits(orbit.spectral_radius(), 4)),
+                0.8,
+            ),
+        ])
+    }
+}
+
+impl Bare {
+    fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
+        Ok(Self {
+            fast: Reading::new(laboratory, 20.0)?,
+            slow: Reading::new(laboratory, 2.6)?,
+        })
+    }
+
+    fn check(
+        &self,
+        id: &str,
+        paper: &str,
+        period: usize,
+        claimed: usize,
+    ) -> Result<Check, PaperError> {
+        let stable = [&self.fast, &self.slow].map(|r| r.counted.stable(period).len());
+        let all = [&self.fast, &self.slow]
+            .map(|r| r.counted.stable(period).len() + r.unstable(period).len());
+        let here = format!(
+            "{}; {}",
+            self.fast.describe(period)?,
+            self.slow.describe(period)?
+        );
+        Ok(Check::new(id, paper, here, verdict(claimed, stable, all))
+            .evidence(format!(
+                "Ω = 20, {}; Ω = 2.6, {}; {}",
+                self.fast.counted.summary(),
+                self.slow.counted.summary(),
+                self.fast.counted.missed()
+            ))
+            .rerun(self.fast.counted.rerun()))
+    }
+}
+
+/// So many motions were `claimed`; two readings have so many `stable` ones and so many in
+/// `all`, unstable ones included. Reproduced if a reading has them all stable; ambiguous
+/// if only part of them attracts in the better reading; differs if none does.
+fn verdict(claimed: usize, stable: [usize; 2], all: [usize; 2]) -> Verdict {
+    let most = |counts: [usize; 2]| counts[0].max(counts[1]);
+    if most(stable) >= claimed {
+        Verdict::Reproduced
+    } else if most(stable) >= 1 && most(all) >= claimed {
+        Verdict::Ambiguous
+    } else {
+        Verdict::Differs
+    }
+}
+
+/// The picture of up to two orbits.
+fn picture(
+    name: &str,
+    title: &str,
+    caption: &str,
+    rows: &[Option<(&Reading, &PeriodicOrbit, usize)>],
+) -> Result<Picture, PaperError> {
+    let mut figure = Figure::new(rows.len(), 2).column_widths([1.7, 1.0]);
+    for row in rows {
+        let [time, portrait] = match row {
+            Some((reading, orbit, periods)) => reading.panels(orbit, *periods)?,
+            None => [
+                empty_portrait("no such motion"),
+                empty_portrait("no such motion"),
+            ],
+        };
+        figure = figure.with(time).with(portrait);
+    }
+    Ok(Picture::new(
+        name,
+        title,
+        format!("Eq. (26) with α₁ = 0, N = 3. {caption} {KEY}"),
+        figure,
+        64.0 * rows.len() as f64,
+    ))
+}
+
+/// Fig. 15.
+pub(super) fn fig15(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+    let bare = Bare::new(laboratory)?;
+    let kinds = |r: &Reading| r.counted.kinds().join(", ");
+    // The captions' reading is the better one if only there a subharmonic attracts.
+    let subharmonic = |r: &Reading| {
+        r.counted
+            .all_stable()
+            .iter()
+            .any(|(orbit, _)| orbit.period > 1)
+    };
+    let reading = match (subharmonic(&bare.fast), subharmonic(&bare.slow)) {
+        (true, false) => {
+            "only at Ω = 20 does a subharmonic exist, as Figs. 16 and 17 need: the captions look right"
+        }
+        (false, true) => {
+            "only at Ω = 2.6 does a subharmonic exist, as Figs. 16 and 17 need: the text looks right"
+        }
+        _ => "the motions that exist do not tell which is meant",
+    };
+    Ok(section
+        .text(
+            "The captions of Figs. 15–17 say Ω = 20; the text on them says Ω = 2.6. Section 4 also says once that α₁ = 0 \
+             in Figs. 16 and 17 and once in Figs. 15–17; the captions say 15–17.",
+        )
+        .picture(picture(
+            "fig15",
+            "Period-1 motions without a tip mass (Fig. 15)",
+            "(a, b) At Ω = 20, as the captions have it. (c, d) At Ω = 2.6, as the text has it.",
+            &[
+                bare.fast.best(1).map(|o| (&bare.fast, o, 4)),
+                bare.slow.best(1).map(|o| (&bare.slow, o, 4)),
+            ],
+        )?)
+        .check(bare.check("fig15", "Fig. 15: two period-1 motions coexist with α₁ = 0", 1, 2)?)
+        .check(
+            Check::new(
+                "fig15-omega",
+                "Figs. 15–17: Ω = 20 in the captions, Ω = 2.6 in the text",
+                reading,
+                Verdict::Ambiguous,
+            )
+            .evidence(format!("attractors at Ω = 20: {}; at Ω = 2.6: {}", kinds(&bare.fast), kinds(&bare.slow)))
+            .rerun(bare.slow.counted.rerun()),
+        )
+        .check(
+            Check::new(
+                "fig15-alpha1",
+                "section 4: α₁ = 0.1 in Figs. 5–15 and 0 in Figs. 16, 17; later α₁ = 0 in Figs. 15–17, as the captions say",
+                "α₁ = 0 is used for Figs. 15–17",
+                Verdict::Ambiguous,
+            )
+            .evidence("the paper contradicts itself; two of its three statements say 15–17")
+            .rerun(bare.fast.counted.rerun()),
+        ))
+}
+
+/// Fig. 16.
+pub(super) fn fig16(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+    let bare = Bare::new(laboratory)?;
+    let shown = match (bare.fast.best(2), bare.slow.best(2)) {
+        (Some(orbit), _) => (&bare.fast, orbit, 2, "The period-2 orbit."),
+        (None, Some(orbit)) => (&bare.slow, orbit, 2, "The period-2 orbit."),
+        (None, None) => {
+            let orbit = bare.fast.best(4).or_else(|| bare.fast.best(1));
+            let Some(orbit) = orbit else {
+                return Err(PaperError::Failed {
+                    what: "Fig. 16".into(),
+                    why: "no orbit at Ω = 20".into(),
+                });
+            };
+            let words = "No period-2 orbit was found, stable or not; the subharmonic that exists at Ω = 20 stands in its place.";
+            (&bare.fast, orbit, orbit.period, words)
+        }
+    };
+    let no_three = bare.slow.counted.stable(3).is_empty();
+    Ok(section
+        .picture(picture(
+            "fig16",
+            "Is there a period-2 motion without a tip mass? (Fig. 16)",
+            shown.3,
+            &[Some((shown.0, shown.1, shown.2))],
+        )?)
+        .check(bare.check(
+            "fig16",
+            "Fig. 16: a period-2 motion exists with α₁ = 0",
+            2,
+            1,
+        )?)
+        .check(
+            Check::new(
+                "fig16-no-period-3",
+                "section 4: no period-3 motion was found for α₁ = 0 at Ω = 2.6",
+                if no_three {
+                    "none attracts here either"
+                } else {
+                    "one attracts"
+                },
+                Verdict::of(no_three),
+            )
+            .evidence(format!(
+                "{}; {}",
+                bare.slow.counted.summary(),
+                bare.slow.counted.missed()
+            ))
+            .rerun(bare.slow.counted.rerun()),
+        ))
+}
+
+/// Fig. 17.
+pub(super) fn fig17(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+    let bare = Bare::new(laboratory)?;
+    let stable: Vec<&PeriodicOrbit> = bare
+        .fast
+        .counted
+        .stable(4)
+        .into_iter()
+        .map(|(orbit, _)| orbit)
+        .collect();
+    let unstable = bare.fast.unstable(4);
+    let mut rows: Vec<Option<(&Reading, &PeriodicOrbit, usize)>> = stable
+        .iter()
+        .chain(&unstable)
+        .take(2)
+        .map(|orbit| Some((&bare.fast, *orbit, 4)))
+        .collect();
+    if rows.is_empty() {
+        rows.push(None);
+    }
+    let tip = laboratory.count(&Case::paper())?;
+    let with_tip = tip.stable(4).is_empty();
+    Ok(section
+        .picture(picture(
+            "fig17",
+            "Period-4 motions without a tip mass at Ω = 20 (Fig. 17)",
+            &format!(
+                "{} {}",
+                match stable.len() {
+                    0 => "No period-4 motion attracts.".to_owned(),
+                    1 => "(a, b) The one that attracts.".to_owned(),
+                    n => format!("{n} attract."),
+                },
+                if unstable.is_empty() {
+                    ""
+                } else {
+                    "(c, d) The saddle beside it, which no run stays on."
+                }
+            ),
+            &rows,
+        )?)
+        .check(bare.check(
+            "fig17",
+            "Fig. 17: two period-4 motions coexist with α₁ = 0",
+            4,
+            2,
+        )?)
+        .check(
+            Check::new(
+                "fig17-no-tip-mass",
+                "section 4: period-4 motion is not found for α₁ = 0.1 (at Ω = 2.6)",
+                how_many(tip.stable(4).len(), "stable period-4 motion"),
+                Verdict::of(with_tip),
+            )
+            .evidence(tip.summary())
+            .rerun(tip.rerun()),
+        ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_claimed_motions_need_two_that_attract() {
+        assert_eq!(verdict(2, [2, 0], [2, 0]), Verdict::Reproduced);
+        // One attracts, its saddle partner repels: the paper may have seen either.
+        assert_eq!(verdict(2, [1, 0], [2, 0]), Verdict::Ambiguous);
+        assert_eq!(verdict(2, [1, 1], [1, 1]), Verdict::Differs);
+        assert_eq!(verdict(1, [0, 0], [3, 0]), Verdict::Differs);
+    }
+}

@@ -1,0 +1,314 @@
+//! Fig. 5: what attracts at each drive frequency, and the period-1 branch through all of
+//! it, stable or not.
+
+use nanotap_figures::{
+    Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel, Rule, Shape,
+};
+
+use super::check::{Check, Verdict};
+use super::followed_branch::{FollowedBranch, OMEGA, in_words};
+use super::frequency_sweep::{Column, Kind, draw, spaced, stretches, sweep, where_seen};
+use super::laboratory::{Laboratory, SEED};
+use super::section::{Picture, Section, Table};
+use super::{PaperError, rerun};
+use nanotap::case::subject::Subject;
+use nanotap::model::cantilever::Case;
+use nanotap::model::parameter::Parameter;
+
+/// Range of Ω drawn. The paper's axis cannot be read from its text, which names 2.0 to
+/// 2.15, 2.6, and what happens at higher frequencies.
+const RANGE: (f64, f64) = (1.5, 7.5);
+/// Range drawn larger: around Ω = 2.6.
+const CLOSE: (f64, f64) = (2.4, 3.3);
+/// Where the paper has nonperiodic motions evolving from period 2.
+const WINDOW: (f64, f64) = (2.0, 2.15);
+/// Deflections marked at the axis of the whole diagram.
+const MARKS: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 2.0];
+/// Where the period-1 branch is entered: it is stable there.
+const ENTRY: f64 = 3.5;
+/// Where the period-2 branch around Ω = 2.6 is entered.
+const ENTRY_TWO: f64 = 2.75;
+
+/// Fig. 5.
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
+    let (count, starts) = (laboratory.either(400, 40), laboratory.either(8, 2));
+    let case = Case::paper();
+    let subject = Subject::Cantilever(case.clone());
+    let wide = sweep(
+        laboratory,
+        &subject,
+        OMEGA,
+        &spaced(RANGE.0, RANGE.1, count),
+        starts,
+    )?;
+    let close_count = laboratory.either(181, 20);
+    let close = sweep(
+        laboratory,
+        &subject,
+        OMEGA,
+        &spaced(CLOSE.0, CLOSE.1, close_count),
+        starts,
+    )?;
+    let window = sweep(
+        laboratory,
+        &subject,
+        OMEGA,
+        &spaced(WINDOW.0, WINDOW.1, laboratory.either(31, 4)),
+        starts,
+    )?;
+    let one = FollowedBranch::from_rest(laboratory, &subject, (ENTRY, 1), RANGE)?;
+    let two = FollowedBranch::from_rest(laboratory, &subject, (ENTRY_TWO, 2), CLOSE)?;
+    let mut table = Table::new(
+        format!(
+            "What attracts, N = 3, {starts} seeded starts a value of Ω; shorter stretches than five values left out"
+        ),
+        ["Ω from", "to", "motions"],
+    );
+    for (from, to, kinds) in stretches(&wide) {
+        if to - from >= 4.0 * (RANGE.1 - RANGE.0) / count as f64 {
+            let words: Vec<String> = kinds.iter().map(|k| k.words()).collect();
+            table.row([format!("{from:.3}"), format!("{to:.3}"), words.join(", ")]);
+        }
+    }
+    let again = rerun::on_case(
+        "sweep",
+        &case,
+        &format!(
+            "--over omega={}:{}:{count} --starts {starts} --seed {SEED}",
+            RANGE.0, RANGE.1
+        ),
+    );
+    let window_again = rerun::on_case(
+        "sweep",
+        &case,
+        &format!(
+            "--over omega={}:{}:{} --starts {starts} --seed {SEED}",
+            WINDOW.0,
+            WINDOW.1,
+            window.len()
+        ),
+    );
+    let branch_again = rerun::on_case(
+        "branch",
+        &case.with(Parameter::Omega, ENTRY),
+        &format!(
+            "--parameter omega --from {ENTRY} --to {} --period 1",
+            RANGE.1
+        ),
+    );
+    let checks = [
+        subharmonics(&wide, [&one, &two], &again),
+        nonperiodic_window(&window, &close, &window_again),
+        further(&wide, &one, &branch_again),
+        period_three(&wide, &again),
+        coexistence(&wide, &again),
+    ];
+    let mut section = section
+        .text(
+            "At each drive frequency several seeded starts are followed until their motion is named; each motion gives \
+             one point a drive period, the greatest tip deflection in it. The line is the period-1 branch, followed by \
+             arclength continuation through its bifurcations, whether it attracts or not.",
+        )
+        .picture(picture(&wide, &close, [&one, &two], starts))
+        .table(one.table("Bifurcations of the period-1 branch"))
+        .table(two.table("Bifurcations of the period-2 branch around Ω = 2.6"))
+        .table(table);
+    for check in checks {
+        section = section.check(check);
+    }
+    Ok(section)
+}
+
+fn numbers(values: &[f64]) -> String {
+    if values.is_empty() {
+        return "nowhere".to_owned();
+    }
+    values
+        .iter()
+        .map(|v| format!("{v:.10}"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// "Period-1 and period-2 bifurcations are shown."
+fn subharmonics(wide: &[Column], [branch, doubled]: [&FollowedBranch; 2], again: &str) -> Check {
+    let (one, two) = (Kind::Periodic(1), Kind::Periodic(2));
+    let holds = wide.iter().any(|c| c.has(one))
+        && wide.iter().any(|c| c.has(two))
+        && !branch.flips().is_empty();
+    Check::new(
+        "fig5-periods-1-2",
+        "Fig. 5: period-1 and period-2 motions and their bifurcations",
+        format!(
+            "period 1 attracts at Ω = {}; period 2 at Ω = {}",
+            where_seen(wide, |c| c.has(one)),
+            where_seen(wide, |c| c.has(two))
+        ),
+        Verdict::of(holds),
+    )
+    .evidence(format!(
+        "the period-1 branch doubles its period at Ω = {}; the period-2 branch around Ω = 2.6 attracts at {}",
+        numbers(&branch.flips()),
+        in_words(&doubled.attracting())
+    ))
+    .rerun(again)
+}
+
+/// "In 2.0 ≤ Ω ≤ 2.15 nonperiodic motions evolving from period-2 are observed."
+fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check {
+    let nonperiodic = |c: &Column| c.motions.iter().any(|m| m.kind.is_nonperiodic());
+    let inside = window.iter().filter(|c| nonperiodic(c)).count();
+    let kinds: Vec<String> = stretches(window)
+        .iter()
+        .map(|(f, t, k)| {
+            format!(
+                "{f:.3}–{t:.3}: {}",
+                k.iter().map(|k| k.words()).collect::<Vec<_>>().join(", ")
+            )
+        })
+        .collect();
+    Check::new(
+        "fig5-window",
+        "section 4: for 2.0 ≤ Ω ≤ 2.15 nonperiodic motions evolve from period 2",
+        format!("at {inside} of {} values of Ω there is one ({})", window.len(), kinds.join("; ")),
+        Verdict::of(inside > 0),
+    )
+    .evidence(format!(
+        "what the statement describes exists at other frequencies: near Ω = 2.6 nonperiodic motion at {}, period 2 at {}",
+        where_seen(close, nonperiodic),
+        where_seen(close, |c| c.has(Kind::Periodic(2)))
+    ))
+    .rerun(again)
+}
+
+/// "If the driving frequency further increases, nonperiodic motions will evolve from period-1."
+fn further(wide: &[Column], branch: &FollowedBranch, again: &str) -> Check {
+    let tori: Vec<f64> = branch
+        .tori()
+        .into_iter()
+        .filter(|omega| *omega > WINDOW.1)
+        .collect();
+    let seen = wide.iter().any(|c| c.at > WINDOW.1 && c.has(Kind::Torus));
+    Check::new(
+        "fig5-further",
+        "section 4: if the driving frequency further increases, nonperiodic motions evolve from period-1 motions",
+        if tori.is_empty() {
+            "the period-1 branch has no Neimark–Sacker bifurcation above Ω = 2.15 in the range drawn".to_owned()
+        } else {
+            format!("the period-1 branch gives birth to tori at Ω = {}", numbers(&tori))
+        },
+        Verdict::of(!tori.is_empty() && seen),
+    )
+    .evidence(format!(
+        "quasi-periodic motion at Ω = {}; chaos at Ω = {}",
+        where_seen(wide, |c| c.has(Kind::Torus)),
+        where_seen(wide, |c| c.has(Kind::Chaos))
+    ))
+    .rerun(again)
+}
+
+/// "Other subharmonic motion like period-3 exists, which is not shown."
+fn period_three(wide: &[Column], again: &str) -> Check {
+    let three = Kind::Periodic(3);
+    Check::new(
+        "fig5-period-3",
+        "section 4: other subharmonics like period 3 exist, which Fig. 5 does not show",
+        format!(
+            "period 3 attracts at Ω = {}",
+            where_seen(wide, |c| c.has(three))
+        ),
+        Verdict::of(wide.iter().any(|c| c.has(three))),
+    )
+    .evidence("at Ω = 2.6 itself, where Fig. 7 has it, none does (see Fig. 7)")
+    .rerun(again)
+}
+
+/// "Several period-n motions coexist at one driving frequency."
+fn coexistence(wide: &[Column], again: &str) -> Check {
+    let several = |c: &Column| c.motions.len() > 1;
+    Check::new(
+        "fig5-coexistence",
+        "section 4: several period-n motions coexist at one driving frequency",
+        format!(
+            "more than one motion attracts at Ω = {}",
+            where_seen(wide, several)
+        ),
+        Verdict::of(wide.iter().any(several)),
+    )
+    .evidence("from as many starts as were tried at each value; others may exist beside")
+    .rerun(again)
+}
+
+fn picture(
+    wide: &[Column],
+    close: &[Column],
+    branches: [&FollowedBranch; 2],
+    starts: usize,
+) -> Picture {
+    let panel = |y: Axis, range: (f64, f64)| {
+        Panel::new(
+            Axis::linear("drive frequency $Ω$").range(range.0, range.1),
+            y,
+        )
+    };
+    let label = "$W_{max}$ in each drive period";
+    let whole = panel(
+        Axis::log(label).marks(MARKS.map(|w| (w, w.to_string()))),
+        RANGE,
+    )
+    .legend(Legend::Above)
+    .with(Band::x([WINDOW]));
+    let near = panel(Axis::linear(label), CLOSE)
+        .legend(Legend::Hidden)
+        .with(Rule::vertical(2.6));
+    let whole = with_branch(draw(whole, wide, 0.5), branches[0], Colour::BLUE, RANGE);
+    let near = with_branch(draw(near, close, 0.4), branches[0], Colour::BLUE, CLOSE);
+    let near = with_branch(near, branches[1], Colour::VERMILLION, CLOSE);
+    Picture::new(
+        "fig05",
+        "What attracts at each drive frequency, α₁ = 0.1 (Fig. 5)",
+        format!(
+            "Eq. (26), N = 3, {starts} seeded starts at each Ω; the ranges are chosen here. One point a drive period. \
+             Dashed: the period-1 branch and, in (b), the period-2 branch where they repel. Band in (a): \
+             2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic motions. (b) Colours as in (a); around Ω = 2.6 (upright line), the frequency of \
+             Figs. 6 and 7."
+        ),
+        Figure::new(2, 1).with(whole).with(near),
+        140.0,
+    )
+}
+
+/// Adds a branch where it repels, and where it bifurcates.
+fn with_branch(
+    mut panel: Panel,
+    branch: &FollowedBranch,
+    colour: Colour,
+    range: (f64, f64),
+) -> Panel {
+    for line in branch.repelling(range) {
+        panel = panel.with(Line::new(line).colour(colour).dash(Dash::Dashed).width(0.5));
+    }
+    let marks = |omegas: Vec<f64>| -> Vec<(f64, f64)> {
+        let inside = omegas
+            .into_iter()
+            .filter(|o| (range.0..=range.1).contains(o));
+        inside
+            .filter_map(|o| Some((o, branch.height(o)?)))
+            .collect()
+    };
+    let flips = Markers::new(marks(branch.flips()))
+        .shape(Shape::Diamond)
+        .colour(Colour::BLACK)
+        .size(1.6);
+    let tori = Markers::new(marks(branch.tori()))
+        .shape(Shape::Square)
+        .open()
+        .colour(Colour::BLACK)
+        .size(1.4);
+    panel
+        .with(flips.label("flip"))
+        .with(tori.label("Neimark–Sacker"))
+}

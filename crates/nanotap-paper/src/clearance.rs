@@ -1,0 +1,179 @@
+//! Fig. 2f: does another part of the beam than its tip touch the sample? The paper
+//! assumes that it does not and says that its cases were chosen so.
+
+use super::check::{Check, Verdict, digits};
+use super::damped_limit::response;
+use super::laboratory::Laboratory;
+use super::section::{Section, Table};
+use super::{PaperError, rerun};
+use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
+use nanotap::model::parameter::Parameter;
+use nanotap::observe::Clearance;
+use nanotap_flow::Trajectory;
+
+/// Drive periods of a motion that never repeats.
+const WATCHED: usize = 400;
+
+struct Row {
+    figure: &'static str,
+    motion: String,
+    case: Case,
+    state: Vec<f64>,
+    periods: usize,
+    clearance: Clearance,
+}
+
+/// Fig. 2f.
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
+    let mut rows = Vec::new();
+    let undamped = Case::paper_eq24();
+    let (model, orbit) = response(&undamped)?;
+    rows.extend(row(
+        "Fig. 4",
+        "periodic response".into(),
+        &undamped,
+        &model,
+        &orbit.state,
+        1,
+    )?);
+    for (figure, omega, alpha1) in [
+        ("Figs. 6, 7", 2.6, 0.1),
+        ("Figs. 8–14", 20.0, 0.1),
+        ("Figs. 15–17", 20.0, 0.0),
+        ("Figs. 15–17, text", 2.6, 0.0),
+    ] {
+        let case = Case::paper()
+            .with(Parameter::Omega, omega)
+            .with(Parameter::Alpha1, alpha1);
+        let counted = laboratory.count(&case)?;
+        for (orbit, _) in counted.all_stable() {
+            let motion = format!("period {}", orbit.period);
+            rows.extend(row(
+                figure,
+                motion,
+                &case,
+                &counted.model,
+                &orbit.states[0],
+                orbit.period,
+            )?);
+        }
+        for chaos in counted.chaos() {
+            let watched = laboratory.either(WATCHED, 50);
+            rows.extend(row(
+                figure,
+                "chaos".into(),
+                &case,
+                &counted.model,
+                chaos.state,
+                watched,
+            )?);
+        }
+    }
+    let mut table = Table::new(
+        "Least height V(ξ, τ) of the beam above the sample, in units of g₀, over each motion (N = 3)",
+        [
+            "figure",
+            "Ω",
+            "α₁",
+            "motion",
+            "least height",
+            "at ξ",
+            "verdict",
+        ],
+    );
+    for r in &rows {
+        let verdict = if r.clearance.touches() {
+            "the beam would touch"
+        } else {
+            "only the tip touches"
+        };
+        table.row([
+            r.figure.into(),
+            r.case.omega.to_string(),
+            r.case.alpha1.to_string(),
+            r.motion.clone(),
+            digits(r.clearance.height, 4),
+            digits(r.clearance.xi, 3),
+            verdict.into(),
+        ]);
+    }
+    let touching: Vec<&Row> = rows.iter().filter(|r| r.clearance.touches()).collect();
+    let here = if touching.is_empty() {
+        format!("so it is in all {} motions shown here", rows.len())
+    } else {
+        let list: Vec<String> = touching
+            .iter()
+            .map(|r| {
+                format!(
+                    "{} at Ω = {}, α₁ = {} ({} at ξ = {})",
+                    r.motion,
+                    r.case.omega,
+                    r.case.alpha1,
+                    digits(r.clearance.height, 3),
+                    digits(r.clearance.xi, 2)
+                )
+            })
+            .collect();
+        format!("not in {}", list.join(", "))
+    };
+    let shown = touching.first().copied().or(rows.first());
+    let again = shown.map_or_else(
+        || rerun::section("fig2f"),
+        |r| {
+            rerun::on_case(
+                "simulate",
+                &r.case,
+                &format!(
+                    "--transient 0 --periods {} {}",
+                    r.periods,
+                    rerun::state(&r.state)
+                ),
+            )
+        },
+    );
+    Ok(section
+        .text(
+            "Where the beam's height V(ξ, τ) = W(ξ, τ) + α₂ sin Ωτ + 1 vanishes anywhere, another part than the tip \
+             is in contact and the model no longer holds. With α₅ = 0 the tip is as long as g₀: where it sinks into \
+             the sample by its whole length, the end of the beam itself arrives.",
+        )
+        .check(
+            Check::new(
+                "fig2f",
+                "section 2: driving frequency, amplitude and parameters were chosen and examined so that only the tip touches",
+                here,
+                Verdict::of(touching.is_empty()),
+            )
+            .evidence("least height over the whole beam and the whole motion, from the closed form (table)")
+            .rerun(again),
+        )
+        .table(table))
+}
+
+fn row(
+    figure: &'static str,
+    motion: String,
+    case: &Case,
+    model: &Model,
+    state: &[f64],
+    periods: usize,
+) -> Result<Option<Row>, PaperError> {
+    let trajectory =
+        Trajectory::record(&model.system, state, periods).map_err(|error| PaperError::Failed {
+            what: motion.clone(),
+            why: error.to_string(),
+        })?;
+    let clearance = Clearance::of(model, &trajectory);
+    Ok(clearance.map(|clearance| Row {
+        figure,
+        motion,
+        case: case.clone(),
+        state: state.to_vec(),
+        periods,
+        clearance,
+    }))
+}

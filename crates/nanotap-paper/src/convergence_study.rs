@@ -1,0 +1,291 @@
+//! Fig. 4: the tip's motion at Ω = 4.1 without damping, with N = 1 … 4 modes, and how it
+//! goes on to N = 20.
+
+use nanotap_figures::{Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel};
+use rayon::prelude::*;
+
+use super::check::{Check, Verdict, digits};
+use super::damped_limit::response;
+use super::laboratory::Laboratory;
+use super::motion_view::View;
+use super::section::{Picture, Section, Table};
+use super::{PaperError, rerun};
+use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
+use nanotap::study::orbit::OrbitReport;
+
+/// Modes up to which the study goes on.
+const MOST: usize = 20;
+/// Modes in the paper's figure.
+const PAPER_MODES: usize = 4;
+/// Instants at which two motions are compared.
+const INSTANTS: usize = 1000;
+/// Drive periods of the run from rest.
+const RUN: usize = 30;
+/// A difference that the eye sees in a figure of this size, part of the amplitude.
+const VISIBLE: f64 = 0.05;
+
+struct Response {
+    modes: usize,
+    orbit: OrbitReport,
+    series: Vec<f64>,
+}
+
+/// Fig. 4.
+pub(super) fn section(
+    laboratory: &Laboratory<'_>,
+    section: Section,
+) -> Result<Section, PaperError> {
+    let most = laboratory.either(MOST, 8);
+    let responses: Vec<Response> = (1..=most)
+        .into_par_iter()
+        .map(|modes| {
+            let (model, orbit) = response(&Case::paper_eq24().with_modes(modes))?;
+            Ok(Response {
+                modes,
+                series: tip_series(&model, &orbit),
+                orbit,
+            })
+        })
+        .collect::<Result<_, PaperError>>()?;
+    let best = &responses[most - 1];
+    let to = |r: &Response, other: &Response| {
+        difference(&r.series, &other.series) / best.orbit.observables.amplitude
+    };
+    let mut table = Table::new(
+        format!(
+            "The periodic response with N modes; differences of W are the largest over the period, in parts of the amplitude with N = {most}"
+        ),
+        [
+            "N",
+            "W max",
+            "W min",
+            "in contact",
+            "to N − 1",
+            format!("to N = {most}").as_str(),
+            "largest ||μ| − 1|",
+        ],
+    );
+    for (i, r) in responses.iter().enumerate() {
+        let o = &r.orbit.observables;
+        table.row([
+            r.modes.to_string(),
+            format!("{:.5}", o.tip_max),
+            format!("{:.5}", o.tip_min),
+            format!("{:.1} %", 100.0 * o.contact_fraction),
+            if i == 0 {
+                String::new()
+            } else {
+                format!("{:.2} %", 100.0 * to(r, &responses[i - 1]))
+            },
+            format!("{:.2} %", 100.0 * to(r, best)),
+            digits(off_circle(&r.orbit), 1),
+        ]);
+    }
+    let single = to(&responses[0], &responses[1]);
+    let last = to(&responses[2], &responses[3]);
+    let off = responses
+        .iter()
+        .map(|r| off_circle(&r.orbit))
+        .fold(0.0, f64::max);
+    let contact = responses[2].orbit.observables.contact_fraction;
+    let rerun_orbit = |r: &Response| {
+        rerun::on_case(
+            "orbit",
+            &Case::paper_eq24().with_modes(r.modes),
+            &format!("--period 1 {}", rerun::state(&r.orbit.state)),
+        )
+    };
+    let enough = responses
+        .iter()
+        .position(|r| to(r, best) < 0.01)
+        .map_or(most, |i| i + 1);
+    Ok(section
+        .text(
+            "Eq. (24) has no damping, so nothing settles: a run from rest keeps its free vibration for ever, and \
+             \"the steady-state motion\" has to be chosen. Here it is the periodic motion that the steady state of \
+             the damped case (Eq. 26) becomes when the damping is taken away, solved for by shooting. All its \
+             multipliers lie on the unit circle: it neither attracts nor repels.",
+        )
+        .picture(overlay(&responses, laboratory)?)
+        .picture(convergence(&responses, &to, most))
+        .table(table)
+        .check(
+            Check::new(
+                "fig4-steady-state",
+                "Fig. 4: the tip motion is the steady-state motion",
+                "without damping no motion attracts; the periodic response exists for every N",
+                Verdict::Differs,
+            )
+            .evidence(format!(
+                "every multiplier is on the unit circle within {} (N = 1 … {most}), and the run from rest does not \
+                 approach the periodic response (Fig. 4, lower panels)",
+                digits(off, 1)
+            ))
+            .rerun(rerun_orbit(&responses[2])),
+        )
+        .check(
+            Check::new(
+                "fig4-one-mode",
+                "Fig. 4: N = 1 differs significantly from N = 2, 3, 4",
+                format!("N = 1 and N = 2 differ by {:.0} % of the amplitude", 100.0 * single),
+                Verdict::of(single > VISIBLE),
+            )
+            .evidence(format!(
+                "W reaches {} with N = 1, {} with N = 2, {} with N = 3",
+                digits(responses[0].orbit.observables.tip_max, 5),
+                digits(responses[1].orbit.observables.tip_max, 5),
+                digits(responses[2].orbit.observables.tip_max, 5)
+            ))
+            .rerun(rerun_orbit(&responses[0])),
+        )
+        .check(
+            Check::new(
+                "fig4-convergence",
+                "Fig. 4: for N = 3, 4 there is very little difference",
+                format!("N = 3 and N = 4 differ by {:.1} % of the amplitude", 100.0 * last),
+                Verdict::of(last < VISIBLE),
+            )
+            .evidence(format!(
+                "N = {enough} is within 1 % of N = {most}; convergence goes on slowly, because a point mass and a \
+                 point force excite every mode"
+            ))
+            .rerun(rerun_orbit(&responses[3])),
+        )
+        .check(
+            Check::new(
+                "fig4-contact-time",
+                "Fig. 4: the contact time is a significant portion of the cycle",
+                format!("{:.1} % of the period (N = 3)", 100.0 * contact),
+                Verdict::of(contact > 0.1),
+            )
+            .evidence("from the exact instants of contact of the periodic response")
+            .rerun(rerun_orbit(&responses[2])),
+        ))
+}
+
+/// Largest distance of a multiplier from the unit circle.
+fn off_circle(orbit: &OrbitReport) -> f64 {
+    orbit
+        .multipliers
+        .iter()
+        .map(|[re, im]| (re.hypot(*im) - 1.0).abs())
+        .fold(0.0, f64::max)
+}
+
+fn tip_series(model: &Model, orbit: &OrbitReport) -> Vec<f64> {
+    let tip = orbit.trajectory.signal(&model.tip);
+    let end = orbit.trajectory.end();
+    (0..INSTANTS)
+        .filter_map(|k| tip.at(end * k as f64 / INSTANTS as f64))
+        .collect()
+}
+
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+}
+
+fn overlay(responses: &[Response], laboratory: &Laboratory<'_>) -> Result<Picture, PaperError> {
+    let time = || Axis::linear("time $τ / T$ (drive periods)").tight();
+    let tip = || Axis::linear("tip deflection $W$");
+    let mut periodic = Panel::new(time(), tip())
+        .title("periodic response, solved for by shooting")
+        .legend(Legend::Above);
+    let mut from_rest = Panel::new(time(), tip())
+        .title("run from rest")
+        .legend(Legend::Hidden);
+    let dashes = [Dash::Dotted, Dash::DashDot, Dash::Dashed, Dash::Solid];
+    let colours = [
+        Colour::VERMILLION,
+        Colour::GREEN,
+        Colour::BLUE,
+        Colour::BLACK,
+    ];
+    let shown = PAPER_MODES.min(responses.len());
+    for (i, r) in responses.iter().take(shown).enumerate() {
+        let model = Model::cantilever(&Case::paper_eq24().with_modes(r.modes))?;
+        let view = View::new(&model, &r.orbit.state, 2)?;
+        if i + 1 == shown {
+            periodic =
+                periodic.with(Band::x(view.contacts()).label(format!("contact, N = {}", r.modes)));
+        }
+        let style = |line: Line| {
+            line.dash(dashes[i])
+                .colour(colours[i])
+                .label(format!("N = {}", r.modes))
+        };
+        periodic = periodic.with(style(view.tip_line()));
+        let rest = View::new(
+            &model,
+            &vec![0.0; model.dimension()],
+            laboratory.either(RUN, 8),
+        )?;
+        from_rest = from_rest.with(style(rest.tip_line()));
+    }
+    Ok(Picture::new(
+        "fig04",
+        "Tip motion at Ω = 4.1 with one to four modes, without damping (Fig. 4)",
+        "Eq. (24): α₁ = α₂ = 0.1, α₃ = α₅ = α₆ = 0, α₄ = 20. Without damping no motion attracts. (a) The periodic \
+         response, two periods: the limit of the damped steady state as damping vanishes; multipliers on the unit \
+         circle. (b) The run from rest, which keeps its free vibration; colours as in (a).",
+        Figure::new(2, 1).with(periodic).with(from_rest),
+        120.0,
+    ))
+}
+
+fn convergence(
+    responses: &[Response],
+    to: &dyn Fn(&Response, &Response) -> f64,
+    most: usize,
+) -> Picture {
+    let best = &responses[most - 1];
+    let all: Vec<(f64, f64)> = responses[..most - 1]
+        .iter()
+        .map(|r| (r.modes as f64, to(r, best)))
+        .filter(|p| p.1 > 0.0)
+        .collect();
+    let steps: Vec<(f64, f64)> = responses
+        .windows(2)
+        .map(|w| (w[1].modes as f64, to(&w[1], &w[0])))
+        .filter(|p| p.1 > 0.0)
+        .collect();
+    let marks = (1..=most)
+        .filter(|n| *n == 1 || n % 5 == 0 || *n < 5)
+        .map(|n| (n as f64, n.to_string()));
+    let panel = Panel::new(
+        Axis::linear("modes $N$")
+            .range(0.5, most as f64 + 0.5)
+            .marks(marks),
+        Axis::log("largest difference of $W$ / amplitude"),
+    )
+    .with(Line::new(all.clone()).colour(Colour::BLUE).width(0.6))
+    .with(
+        Markers::new(all)
+            .colour(Colour::BLUE)
+            .label(format!("to N = {most}")),
+    )
+    .with(
+        Line::new(steps.clone())
+            .colour(Colour::VERMILLION)
+            .width(0.6),
+    )
+    .with(
+        Markers::new(steps)
+            .colour(Colour::VERMILLION)
+            .open()
+            .label("to N − 1"),
+    );
+    Picture::new(
+        "fig04-convergence",
+        "How Fig. 4 goes on: the periodic response with more modes",
+        format!(
+            "Largest difference of the tip deflection over the period between N modes and {most} (filled) or one mode \
+             less (open), in parts of the amplitude. Same case as Fig. 4."
+        ),
+        Figure::single(panel),
+        70.0,
+    )
+}

@@ -1,0 +1,77 @@
+//! The periodic response of an undamped case: there is no attractor to wait for, so the
+//! damped one of Eq. (26) is followed by Newton while all damping is taken away.
+
+use nanotap_dynamics::{SettleOptions, ShootingOptions, Verdict, close_orbit, settle};
+
+use super::PaperError;
+use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
+use nanotap::model::parameter::Parameter;
+use nanotap::model::strobe::Strobe;
+use nanotap::study::orbit::{OrbitReport, report};
+
+/// Halvings of the damping before it is left out.
+const HALVINGS: i32 = 12;
+/// Damping of the beam and of the contact that the way begins with, Eq. (26).
+const START: (f64, f64) = (0.1, 0.2);
+
+/// The orbit that the steady state of the damped case becomes without damping, and its
+/// model.
+pub(super) fn response(undamped: &Case) -> Result<(Model, OrbitReport), PaperError> {
+    let failed = |why: String| PaperError::Failed {
+        what: format!(
+            "the periodic response at Ω = {}, N = {}",
+            undamped.omega, undamped.modes
+        ),
+        why,
+    };
+    let damped = |factor: f64| {
+        Model::cantilever(
+            &undamped
+                .clone()
+                .with(Parameter::Alpha3, factor * START.0)
+                .with(Parameter::Alpha6, factor * START.1),
+        )
+    };
+    let model = damped(1.0)?;
+    let rest = vec![0.0; model.dimension()];
+    let settled = settle(&mut Strobe::new(&model), &rest, &SettleOptions::default());
+    let (Verdict::Periodic(mut orbit) | Verdict::TransientChaos { mut orbit, .. }) =
+        settled.verdict
+    else {
+        return Err(failed("the damped motion is not periodic".into()));
+    };
+    let factors = (1..=HALVINGS).map(|k| 0.5f64.powi(k)).chain([0.0]);
+    let mut model = model;
+    for factor in factors {
+        model = damped(factor)?;
+        let start = orbit.states[0].clone();
+        orbit = close_orbit(
+            &mut Strobe::new(&model),
+            &start,
+            orbit.period,
+            &ShootingOptions::default(),
+        )
+        .map_err(|error| failed(error.to_string()))?;
+    }
+    let report = report(&model, &orbit, 20).map_err(|error| failed(error.to_string()))?;
+    Ok((model, report))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without damping the flow keeps volume: multipliers come in pairs μ, 1/μ, and
+    /// energy is neither fed nor drained over a period.
+    #[test]
+    fn the_response_is_on_the_unit_circle_and_does_no_work() {
+        let (_, orbit) = response(&Case::paper_eq24()).unwrap();
+        assert_eq!(orbit.period, 1);
+        for [re, im] in &orbit.multipliers {
+            assert!((re.hypot(*im) - 1.0).abs() < 1e-6);
+        }
+        assert!(orbit.observables.energy_balance.drive_work.abs() < 1e-9);
+        assert!(orbit.residual < 1e-12);
+    }
+}

@@ -1,0 +1,281 @@
+//! A branch of periodic orbits in the drive frequency, stable or not, with what the
+//! sections ask of it: its extrema, its bifurcations, where it attracts.
+
+use nanotap_dynamics::{
+    Bifurcation, BifurcationKind, Branch, ContinuationOptions, Direction, PeriodicOrbit,
+    SettleOptions, Verdict as Settled, continue_orbit, settle,
+};
+
+use super::PaperError;
+use super::frequency_sweep::maxima;
+use super::laboratory::Laboratory;
+use super::section::Table;
+use nanotap::case::subject::{Family, Key, Subject};
+use nanotap::model::parameter::Parameter;
+use nanotap::model::strobe::Strobe;
+
+/// The key of the drive frequency.
+pub(super) const OMEGA: Key = Key::Cantilever(Parameter::Omega);
+
+/// A branch in Ω, followed both ways from one orbit.
+pub(super) struct FollowedBranch {
+    /// Points in order along the branch.
+    points: Vec<Point>,
+    /// In order along the branch.
+    bifurcations: Vec<Bifurcation>,
+}
+
+struct Point {
+    omega: f64,
+    /// Greatest tip deflection in each of its drive periods.
+    maxima: Vec<f64>,
+    stable: bool,
+    /// The bifurcation, if any, between the point before and this one that changes stability.
+    since: Option<f64>,
+}
+
+impl FollowedBranch {
+    /// Follows the orbit of `period` on which a run from rest settles at Ω = `entry`.
+    pub(super) fn from_rest(
+        laboratory: &Laboratory<'_>,
+        subject: &Subject,
+        (entry, period): (f64, usize),
+        range: (f64, f64),
+    ) -> Result<Self, PaperError> {
+        let model = subject.with(OMEGA, entry).model()?;
+        let settled = settle(
+            &mut Strobe::new(&model),
+            &vec![0.0; model.dimension()],
+            &SettleOptions::default(),
+        );
+        match settled.verdict {
+            Settled::Periodic(orbit) | Settled::TransientChaos { orbit, .. }
+                if orbit.period == period =>
+            {
+                Self::from_orbit(laboratory, subject, entry, &orbit, range)
+            }
+            _ => Err(PaperError::Failed {
+                what: format!("the period-{period} branch"),
+                why: format!("a run from rest at Ω = {entry} does not settle on it"),
+            }),
+        }
+    }
+
+    /// Follows `orbit`, which exists at Ω = `entry`.
+    pub(super) fn from_orbit(
+        laboratory: &Laboratory<'_>,
+        subject: &Subject,
+        entry: f64,
+        orbit: &PeriodicOrbit,
+        range: (f64, f64),
+    ) -> Result<Self, PaperError> {
+        let family = Family {
+            subject: subject.clone(),
+            key: OMEGA,
+        };
+        let options = ContinuationOptions::over(range.0, range.1);
+        let follow = |direction| -> Result<Branch, PaperError> {
+            laboratory
+                .controlled(|control| {
+                    continue_orbit(&family, entry, orbit, direction, &options, control)
+                })
+                .map_err(|error| PaperError::Failed {
+                    what: format!("the period-{} branch from Ω = {entry}", orbit.period),
+                    why: error.to_string(),
+                })
+        };
+        let (down, up) = (
+            follow(Direction::Decreasing)?,
+            follow(Direction::Increasing)?,
+        );
+        let mut points = points_of(&down, subject)?;
+        points.reverse();
+        // Reversed, a bifurcation lies before the point that it lay after.
+        for k in (1..points.len()).rev() {
+            points[k].since = points[k - 1].since;
+        }
+        if let Some(first) = points.first_mut() {
+            first.since = None;
+        }
+        points.extend(points_of(&up, subject)?.into_iter().skip(1));
+        let mut bifurcations = down.bifurcations;
+        bifurcations.reverse();
+        bifurcations.extend(up.bifurcations);
+        Ok(Self {
+            points,
+            bifurcations,
+        })
+    }
+
+    fn of_kind(&self, kind: impl Fn(&BifurcationKind) -> bool) -> Vec<f64> {
+        self.bifurcations
+            .iter()
+            .filter(|b| kind(&b.kind))
+            .map(|b| b.parameter)
+            .collect()
+    }
+
+    /// Where it doubles its period.
+    pub(super) fn flips(&self) -> Vec<f64> {
+        self.of_kind(|k| matches!(k, BifurcationKind::Flip))
+    }
+
+    /// Where tori are born.
+    pub(super) fn tori(&self) -> Vec<f64> {
+        self.of_kind(|k| matches!(k, BifurcationKind::NeimarkSacker { .. }))
+    }
+
+    /// Least and greatest Ω that it reaches.
+    pub(super) fn extent(&self) -> (f64, f64) {
+        self.points
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| {
+                (low.min(p.omega), high.max(p.omega))
+            })
+    }
+
+    /// Stretches of Ω over which it attracts, lower end first, in order along the branch.
+    pub(super) fn attracting(&self) -> Vec<(f64, f64)> {
+        stable_stretches(self.points.iter().map(|p| (p.omega, p.stable, p.since)))
+    }
+
+    /// (Ω, greatest W) of each of its drive periods where it repels, stretches parted by gaps.
+    pub(super) fn repelling(&self, range: (f64, f64)) -> Vec<Vec<(f64, f64)>> {
+        let count = self.points.first().map_or(0, |p| p.maxima.len());
+        (0..count)
+            .map(|k| {
+                let inside = |p: &Point| !p.stable && (range.0..=range.1).contains(&p.omega);
+                self.points
+                    .iter()
+                    .map(|p| (p.omega, if inside(p) { p.maxima[k] } else { f64::NAN }))
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Greatest W on it at the point nearest to Ω.
+    pub(super) fn height(&self, omega: f64) -> Option<f64> {
+        let near = |p: &&Point| (p.omega - omega).abs();
+        let point = self
+            .points
+            .iter()
+            .min_by(|a, b| near(a).total_cmp(&near(b)))?;
+        point.maxima.iter().copied().max_by(f64::total_cmp)
+    }
+
+    /// Its bifurcations by Ω.
+    pub(super) fn table(&self, caption: &str) -> Table {
+        let mut table = Table::new(caption, ["Ω", "what happens", "known to"]);
+        let mut sorted: Vec<&Bifurcation> = self.bifurcations.iter().collect();
+        sorted.sort_by(|a, b| a.parameter.total_cmp(&b.parameter));
+        for b in sorted {
+            let what = match b.kind {
+                BifurcationKind::Fold => "fold",
+                BifurcationKind::Crossing => "another branch crosses",
+                BifurcationKind::Flip => "flip (period doubling)",
+                BifurcationKind::NeimarkSacker { .. } => "Neimark–Sacker: a torus is born",
+                BifurcationKind::Grazing { .. } => "grazing: a contact is born or dies",
+            };
+            table.row([
+                format!("{:.10}", b.parameter),
+                what.to_owned(),
+                format!("{:.0e}", b.uncertainty),
+            ]);
+        }
+        table
+    }
+}
+
+/// The points of one way; `since` is the bifurcation between the point before and this one.
+fn points_of(branch: &Branch, subject: &Subject) -> Result<Vec<Point>, PaperError> {
+    let changes_stability = |b: &&Bifurcation| !matches!(b.kind, BifurcationKind::Grazing { .. });
+    branch
+        .points
+        .iter()
+        .enumerate()
+        .map(|(k, point)| {
+            let model = subject.with(OMEGA, point.parameter).model()?;
+            let since = branch
+                .bifurcations
+                .iter()
+                .filter(changes_stability)
+                .rfind(|b| b.after_point + 1 == k);
+            Ok(Point {
+                omega: point.parameter,
+                maxima: maxima(&model, &point.orbit.states[0], point.orbit.period)?,
+                stable: point.orbit.is_stable(),
+                since: since.map(|b| b.parameter),
+            })
+        })
+        .collect()
+}
+
+/// Stretches of stable points, ended by the located bifurcations where there are any.
+fn stable_stretches(points: impl Iterator<Item = (f64, bool, Option<f64>)>) -> Vec<(f64, f64)> {
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    let mut open: Option<(f64, f64)> = None;
+    for (omega, stable, since) in points {
+        open = match (open, stable) {
+            (None, true) => Some((since.unwrap_or(omega), omega)),
+            (Some((from, _)), true) => Some((from, omega)),
+            (Some((from, last)), false) => {
+                found.push((from, since.unwrap_or(last)));
+                None
+            }
+            (None, false) => None,
+        };
+    }
+    found.extend(open);
+    found
+        .into_iter()
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect()
+}
+
+/// Stretches in words, those that overlap joined: "2.6076–2.6133, 2.6401–2.6512".
+pub(super) fn in_words(stretches: &[(f64, f64)]) -> String {
+    let mut sorted = stretches.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut joined: Vec<(f64, f64)> = Vec::new();
+    for (from, to) in sorted {
+        match joined.last_mut() {
+            Some(last) if from <= last.1 => last.1 = last.1.max(to),
+            _ => joined.push((from, to)),
+        }
+    }
+    if joined.is_empty() {
+        return "nowhere".to_owned();
+    }
+    let words = joined.iter().map(|(from, to)| format!("{from:.4}–{to:.4}"));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_end_at_the_bifurcations_between_points() {
+        let points = [
+            (1.0, true, None),
+            (2.0, true, None),
+            (3.0, false, Some(2.4)),
+            (4.0, true, Some(3.5)),
+            (3.8, true, None),
+        ];
+        assert_eq!(
+            stable_stretches(points.into_iter()),
+            [(1.0, 2.4), (3.5, 3.8)]
+        );
+        assert_eq!(stable_stretches(std::iter::empty()), []);
+        assert_eq!(
+            in_words(&[(3.5, 3.8), (1.0, 2.4)]),
+            "1.0000–2.4000, 3.5000–3.8000"
+        );
+        assert_eq!(
+            in_words(&[(1.0, 2.5), (2.0, 3.0), (1.2, 1.3)]),
+            "1.0000–3.0000"
+        );
+        assert_eq!(in_words(&[]), "nowhere");
+    }
+}

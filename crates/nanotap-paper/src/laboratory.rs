@@ -1,0 +1,332 @@
+//! What several sections need: censuses, each taken once, orbits, and a word on progress.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use nanotap_dynamics::{
+    AttractorKind, Census, CensusOptions, Control, Fraction, Lifetime, LyapunovOptions,
+    LyapunovSpectrum, OrbitSearch, PeriodicOrbit, SettleOptions, StartBox, census, find_orbits,
+};
+
+use nanotap_flow::Trajectory;
+
+use super::check::digits;
+use super::{PaperError, rerun};
+use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
+use nanotap::model::strobe::Strobe;
+use nanotap::observe::Observables;
+use nanotap::study::orbit::{OrbitReport, report};
+use nanotap::study::start_box::default_box;
+
+/// The seed of every set of starts.
+pub(super) const SEED: u64 = 1;
+/// Harmonics of an orbit; only its extrema and contacts are looked at.
+const HARMONICS: usize = 1;
+/// Drive periods over which a motion that never repeats is observed.
+const WATCHED: usize = 400;
+
+/// The place where the paper's cases are computed.
+pub(super) struct Laboratory<'a> {
+    quick: bool,
+    control: &'a Control<'a>,
+    /// Part of the whole work done before this section, and this section's own part.
+    share: Cell<(f64, f64)>,
+    /// Percent told so far: progress never goes back.
+    told: AtomicUsize,
+    counts: RefCell<Vec<Rc<Counted>>>,
+    spurious: RefCell<Option<Rc<super::time_step::Scan>>>,
+}
+
+impl<'a> Laboratory<'a> {
+    pub(super) fn new(quick: bool, control: &'a Control<'a>) -> Self {
+        Self {
+            quick,
+            control,
+            share: Cell::new((0.0, 1.0)),
+            told: AtomicUsize::new(0),
+            counts: RefCell::default(),
+            spurious: RefCell::default(),
+        }
+    }
+
+    /// A section begins: what is done before it and its own part of the whole.
+    pub(super) fn begin(&self, before: f64, own: f64) {
+        self.share.set((before, own));
+        tell(self.control, &self.told, before);
+    }
+
+    pub(super) fn quick(&self) -> bool {
+        self.quick
+    }
+
+    /// `full`, or `quick` in a hurry.
+    pub(super) fn either<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    /// Runs `work` with a control that tells how far the whole is.
+    pub(super) fn controlled<T>(&self, work: impl FnOnce(&Control<'_>) -> T) -> T {
+        let (before, own) = self.share.get();
+        let (control, told) = (self.control, &self.told);
+        let hear = |done: usize, total: usize| {
+            tell(
+                control,
+                told,
+                before + own * done as f64 / total.max(1) as f64,
+            );
+        };
+        work(&Control {
+            cancel: control.cancel,
+            progress: Some(&hear),
+        })
+    }
+
+    /// The census of `case`, taken when it is first asked for.
+    pub(super) fn count(&self, case: &Case) -> Result<Rc<Counted>, PaperError> {
+        if let Some(known) = self.counts.borrow().iter().find(|c| c.case == *case) {
+            return Ok(Rc::clone(known));
+        }
+        let model = Model::cantilever(case)?;
+        let starts = start_box(&model)?;
+        let count = self.either(256, 24);
+        let options = CensusOptions {
+            settle: SettleOptions {
+                lyapunov: LyapunovOptions {
+                    max_periods: self.either(4000, 1500),
+                    relative_error: 0.05,
+                    ..LyapunovOptions::default()
+                },
+                ..SettleOptions::default()
+            },
+            ..CensusOptions::default()
+        };
+        let map = Strobe::new(&model);
+        let census =
+            self.controlled(|control| census(&map, &starts.starts(SEED, count), &options, control));
+        if census.cancelled {
+            return Err(PaperError::Cancelled);
+        }
+        let counted = Rc::new(Counted {
+            case: case.clone(),
+            model,
+            census,
+            starts: count,
+        });
+        self.counts.borrow_mut().push(Rc::clone(&counted));
+        Ok(counted)
+    }
+
+    /// Every periodic orbit up to `longest`, stable or not, that Newton reaches from
+    /// starts in the box and from near returns of runs of `run` periods.
+    pub(super) fn orbits(
+        &self,
+        counted: &Counted,
+        longest: usize,
+        run: usize,
+    ) -> Result<Vec<PeriodicOrbit>, PaperError> {
+        let starts = start_box(&counted.model)?;
+        let search = OrbitSearch {
+            max_period: longest,
+            run,
+            ..OrbitSearch::default()
+        };
+        let map = Strobe::new(&counted.model);
+        let count = self.either(64, 12);
+        Ok(self
+            .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control)))
+    }
+
+    /// `count` starts in the box of a case.
+    pub(super) fn starts(counted: &Counted, count: usize) -> Result<Vec<Vec<f64>>, PaperError> {
+        let starts = start_box(&counted.model)?;
+        Ok(starts.starts(SEED, count))
+    }
+
+    /// What fixed time steps make of the paper's case at Ω = 20, computed once.
+    pub(super) fn spurious(&self) -> Result<Rc<super::time_step::Scan>, PaperError> {
+        if let Some(known) = &*self.spurious.borrow() {
+            return Ok(Rc::clone(known));
+        }
+        let scan = Rc::new(super::time_step::Scan::new(self)?);
+        *self.spurious.borrow_mut() = Some(Rc::clone(&scan));
+        Ok(scan)
+    }
+}
+
+/// Tells what part of the whole is done, unless more was told before: a section may have
+/// several tasks.
+fn tell(control: &Control<'_>, told: &AtomicUsize, part: f64) {
+    let percent = (100.0 * part) as usize;
+    if let Some(progress) = control.progress
+        && told.fetch_max(percent, Ordering::Relaxed) <= percent
+    {
+        progress(percent, 100);
+    }
+}
+
+/// The box that starts are taken from.
+fn start_box(model: &Model) -> Result<StartBox, PaperError> {
+    default_box(model).map_err(|error| PaperError::Failed {
+        what: "the box of starts".into(),
+        why: error.to_string(),
+    })
+}
+
+/// Chaos that nothing was seen to leave.
+pub(super) struct Chaos<'a> {
+    pub(super) spectrum: &'a LyapunovSpectrum,
+    pub(super) lifetime: Lifetime,
+    pub(super) fraction: Fraction,
+    /// A state on it.
+    pub(super) state: &'a [f64],
+}
+
+/// A case with its census.
+pub(super) struct Counted {
+    pub(super) case: Case,
+    pub(super) model: Model,
+    pub(super) census: Census,
+    /// Starts it was taken from.
+    pub(super) starts: usize,
+}
+
+impl Counted {
+    /// Stable orbits of `period`.
+    pub(super) fn stable(&self, period: usize) -> Vec<(&PeriodicOrbit, Fraction)> {
+        self.all_stable()
+            .into_iter()
+            .filter(|(orbit, _)| orbit.period == period)
+            .collect()
+    }
+
+    /// Every stable orbit.
+    pub(super) fn all_stable(&self) -> Vec<(&PeriodicOrbit, Fraction)> {
+        self.census
+            .attractors
+            .iter()
+            .filter_map(|a| match &a.kind {
+                AttractorKind::Periodic(orbit) => Some((orbit, a.fraction)),
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// Chaotic attractors.
+    pub(super) fn chaos(&self) -> Vec<Chaos<'_>> {
+        self.census
+            .attractors
+            .iter()
+            .filter_map(|a| match &a.kind {
+                AttractorKind::Chaotic { spectrum, lifetime } => Some(Chaos {
+                    spectrum,
+                    lifetime: *lifetime,
+                    fraction: a.fraction,
+                    state: &a.state,
+                }),
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// What a motion that never repeats looks like over [`WATCHED`] periods from `state`.
+    pub(super) fn watch(&self, state: &[f64]) -> Result<Observables, PaperError> {
+        let failed = |why: String| PaperError::Failed {
+            what: "a run to observe".into(),
+            why,
+        };
+        let trajectory = Trajectory::record(&self.model.system, state, WATCHED)
+            .map_err(|e| failed(e.to_string()))?;
+        Observables::of(&self.model, &trajectory)
+            .ok_or_else(|| failed("nothing was recorded".into()))
+    }
+
+    /// What a closed orbit of this case looks like.
+    pub(super) fn look(&self, orbit: &PeriodicOrbit) -> Result<OrbitReport, PaperError> {
+        report(&self.model, orbit, HARMONICS).map_err(|source| PaperError::Orbit {
+            what: format!("a period-{} orbit", orbit.period),
+            source,
+        })
+    }
+
+    /// What kinds of motion attract, most frequent first.
+    pub(super) fn kinds(&self) -> Vec<String> {
+        self.census
+            .attractors
+            .iter()
+            .map(|attractor| match &attractor.kind {
+                AttractorKind::Periodic(orbit) => format!("period {}", orbit.period),
+                AttractorKind::QuasiPeriodic(_) => "torus".to_owned(),
+                AttractorKind::Chaotic { .. } => "chaos".to_owned(),
+            })
+            .chain(
+                self.census
+                    .transient_chaos
+                    .iter()
+                    .map(|_| "transient chaos".to_owned()),
+            )
+            .collect()
+    }
+
+    /// All attractors in words.
+    pub(super) fn summary(&self) -> String {
+        let mut parts: Vec<String> = Vec::new();
+        for attractor in &self.census.attractors {
+            let count = attractor.fraction.count;
+            parts.push(match &attractor.kind {
+                AttractorKind::Periodic(orbit) => format!(
+                    "a stable period-{} orbit ({count} starts, largest |μ| {})",
+                    orbit.period,
+                    digits(orbit.spectral_radius(), 4)
+                ),
+                AttractorKind::QuasiPeriodic(_) => format!("a torus ({count} starts)"),
+                AttractorKind::Chaotic { spectrum, lifetime } => {
+                    let (exponent, error) = spectrum.largest();
+                    format!(
+                        "chaos ({count} starts, λ₁ = {exponent:.3} ± {error:.3} a period; no escape seen, so \
+                         its mean lifetime is above {:.0} periods at 95 %)",
+                        lifetime.low
+                    )
+                }
+            });
+        }
+        if let Some(chaos) = &self.census.transient_chaos {
+            parts.push(format!(
+                "transient chaos ({} starts still on it)",
+                chaos.wandering.count
+            ));
+        }
+        if !self.census.undecided.is_empty() {
+            parts.push(format!("{} starts undecided", self.census.undecided.len()));
+        }
+        format!("of {} starts: {}", self.starts, parts.join("; "))
+    }
+
+    /// How much of the box an attractor can have that no start found.
+    pub(super) fn missed(&self) -> String {
+        format!(
+            "an attractor that none of {} starts found has less than {:.1} % of the box (95 %)",
+            self.starts,
+            100.0 * Fraction::new(0, self.starts).high
+        )
+    }
+
+    /// The command line that takes this census.
+    pub(super) fn rerun(&self) -> String {
+        rerun::on_case(
+            "attractors",
+            &self.case,
+            &format!("--starts {} --seed {SEED}", self.starts),
+        )
+    }
+}
+
+/// A number of things of one kind, in words: "no stable period-2 orbit".
+pub(super) fn how_many(count: usize, kind: &str) -> String {
+    match count {
+        0 => format!("no {kind}"),
+        1 => format!("one {kind}"),
+        n => format!("{n} {kind}s"),
+    }
+}

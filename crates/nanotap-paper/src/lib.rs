@@ -1,0 +1,441 @@
+//! The paper once more: every figure 2e–17 and every number in its text, what it says,
+//! what holds here, whether the two agree, the evidence, and a command to see for oneself.
+//!
+//! "Multi-modal analysis on the intermittent contact dynamics of atomic force microscope",
+//! J. Sound Vib. (2011). No parameter is tuned to agree: each case is the printed one, and
+//! where the print contradicts itself every reading is computed.
+
+mod attractors;
+mod bare_tip;
+mod bifurcation_diagram;
+mod check;
+mod clearance;
+mod convergence_study;
+mod damped_limit;
+mod equations;
+mod fast_drive;
+mod followed_branch;
+mod frequencies;
+mod frequency_sweep;
+mod html;
+mod impact;
+mod laboratory;
+mod markdown;
+mod motion_view;
+mod rerun;
+mod section;
+mod slow_drive;
+mod time_step;
+mod write;
+
+use nanotap_dynamics::Control;
+
+use nanotap::case::near_name::near_name;
+use nanotap::model::ModelError;
+use nanotap::study::orbit::OrbitError;
+
+pub use check::{Check, Verdict};
+use laboratory::Laboratory;
+pub use section::{Picture, Section, Table};
+pub use write::Written;
+
+/// What to compute.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Names of the sections wanted; none: all.
+    pub only: Vec<String>,
+    /// Fewer starts and parameter values: seconds instead of minutes, with wider bounds.
+    pub quick: bool,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum PaperError {
+    /// A section was asked for that there is not.
+    #[error("no section `{given}`{hint}; there are {known}")]
+    UnknownSection {
+        /// What was asked for.
+        given: String,
+        /// The nearest one, as a question.
+        hint: String,
+        /// What there is.
+        known: String,
+    },
+    /// The work was stopped.
+    #[error("stopped before the report was done")]
+    Cancelled,
+    /// A case has no model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// An orbit was not found.
+    #[error("{what}: {source}")]
+    Orbit {
+        /// What was looked for.
+        what: String,
+        /// Why it was not found.
+        source: OrbitError,
+    },
+    /// Something else that should have worked did not.
+    #[error("{what}: {why}")]
+    Failed {
+        /// What was being done.
+        what: String,
+        /// Why it failed.
+        why: String,
+    },
+    /// A picture could not be drawn.
+    #[error("{name}: {source}")]
+    Figure {
+        /// The picture.
+        name: String,
+        /// Why.
+        source: nanotap_figures::FigureError,
+    },
+    /// A file could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+}
+
+/// The whole report.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Its sections, in the order of the paper.
+    pub sections: Vec<Section>,
+    /// Whether it was made in a hurry.
+    pub quick: bool,
+}
+
+impl Report {
+    /// Every check of every section.
+    pub fn checks(&self) -> impl Iterator<Item = &Check> {
+        self.sections.iter().flat_map(|section| &section.checks)
+    }
+
+    /// How many checks came to `verdict`.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.checks().filter(|c| c.verdict == verdict).count()
+    }
+}
+
+/// A section's name, its heading, and how it is made.
+struct Topic {
+    id: &'static str,
+    title: &'static str,
+    /// About how many seconds it takes, of two cores.
+    weight: u32,
+    make: fn(&Laboratory<'_>, Section) -> Result<Section, PaperError>,
+}
+
+/// Every section, in the order of the paper; evidence that serves several comes last.
+const TOPICS: &[Topic] = &[
+    Topic {
+        id: "eq7",
+        title: "Eq. (7): the damping parameters",
+        weight: 1,
+        make: equations::damping_units,
+    },
+    Topic {
+        id: "eq14",
+        title: "Eq. (14): the drive's cosine term",
+        weight: 6,
+        make: equations::cosine_term,
+    },
+    Topic {
+        id: "eq23",
+        title: "Eq. (23): frequencies of the bare beam",
+        weight: 1,
+        make: equations::bare_frequencies,
+    },
+    Topic {
+        id: "eq25",
+        title: "Eq. (25): frequencies in contact",
+        weight: 1,
+        make: equations::contact_frequencies,
+    },
+    Topic {
+        id: "alpha4",
+        title: "Section 4: contact stiffness of ten samples",
+        weight: 1,
+        make: equations::samples,
+    },
+    Topic {
+        id: "scaling",
+        title: "Section 3: frequencies that do not depend on amplitude",
+        weight: 1,
+        make: equations::scaling,
+    },
+    Topic {
+        id: "fig2e",
+        title: "Fig. 2e: the first three modes",
+        weight: 1,
+        make: frequencies::mode_shapes,
+    },
+    Topic {
+        id: "fig2f",
+        title: "Fig. 2f: does another part of the beam touch?",
+        weight: 2,
+        make: clearance::section,
+    },
+    Topic {
+        id: "fig3",
+        title: "Fig. 3: frequencies against tip mass and contact stiffness",
+        weight: 1,
+        make: frequencies::maps,
+    },
+    Topic {
+        id: "fig4",
+        title: "Fig. 4: how many modes are enough at Ω = 4.1",
+        weight: 2,
+        make: convergence_study::section,
+    },
+    Topic {
+        id: "fig5",
+        title: "Fig. 5: the bifurcation diagram",
+        weight: 25,
+        make: bifurcation_diagram::section,
+    },
+    Topic {
+        id: "fig6",
+        title: "Fig. 6: two period-1 motions at Ω = 2.6, α₁ = 0.1",
+        weight: 6,
+        make: slow_drive::fig6,
+    },
+    Topic {
+        id: "fig7",
+        title: "Fig. 7: period 2 and period 3 at Ω = 2.6, α₁ = 0.1",
+        weight: 1,
+        make: slow_drive::fig7,
+    },
+    Topic {
+        id: "fig8",
+        title: "Fig. 8: a period-1 motion at Ω = 20, α₁ = 0.1",
+        weight: 20,
+        make: fast_drive::fig8,
+    },
+    Topic {
+        id: "fig9",
+        title: "Fig. 9: another period-1 motion at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig9,
+    },
+    Topic {
+        id: "fig10",
+        title: "Fig. 10: period 11 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig10,
+    },
+    Topic {
+        id: "fig11",
+        title: "Fig. 11: period 28 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig11,
+    },
+    Topic {
+        id: "fig12",
+        title: "Fig. 12: period 21 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig12,
+    },
+    Topic {
+        id: "fig13",
+        title: "Fig. 13: another period 21 at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig13,
+    },
+    Topic {
+        id: "fig14",
+        title: "Fig. 14: a nonperiodic motion at Ω = 20, α₁ = 0.1",
+        weight: 1,
+        make: fast_drive::fig14,
+    },
+    Topic {
+        id: "fig15",
+        title: "Fig. 15: two period-1 motions with α₁ = 0",
+        weight: 1,
+        make: bare_tip::fig15,
+    },
+    Topic {
+        id: "fig16",
+        title: "Fig. 16: period 2 with α₁ = 0",
+        weight: 1,
+        make: bare_tip::fig16,
+    },
+    Topic {
+        id: "fig17",
+        title: "Fig. 17: two period-4 motions with α₁ = 0",
+        weight: 1,
+        make: bare_tip::fig17,
+    },
+    Topic {
+        id: "impact",
+        title: "Fig. 1: rigid and soft stops",
+        weight: 15,
+        make: impact::section,
+    },
+    Topic {
+        id: "attractors",
+        title: "Evidence: every motion that attracts, N = 1 … 5",
+        weight: 15,
+        make: attractors::section,
+    },
+    Topic {
+        id: "time-step",
+        title: "Evidence: what fixed time steps add",
+        weight: 1,
+        make: time_step::section,
+    },
+];
+
+/// Makes the report. Progress is told in percent of the whole.
+///
+/// # Errors
+/// When a section is asked for that there is not, the work is stopped, or a computation
+/// that should work does not.
+pub fn report(options: &Options, control: &Control<'_>) -> Result<Report, PaperError> {
+    let topics = chosen(&options.only)?;
+    let whole: u32 = topics.iter().map(|topic| topic.weight).sum();
+    let laboratory = Laboratory::new(options.quick, control);
+    let mut sections = Vec::with_capacity(topics.len());
+    let mut begun = 0;
+    for topic in topics {
+        let share = |weight: u32| f64::from(weight) / f64::from(whole);
+        laboratory.begin(share(begun), share(topic.weight));
+        sections.push((topic.make)(
+            &laboratory,
+            Section::new(topic.id, topic.title),
+        )?);
+        if control.is_cancelled() {
+            return Err(PaperError::Cancelled);
+        }
+        begun += topic.weight;
+    }
+    Ok(Report {
+        sections,
+        quick: options.quick,
+    })
+}
+
+/// Names of all sections.
+pub fn section_names() -> impl Iterator<Item = &'static str> {
+    TOPICS.iter().map(|topic| topic.id)
+}
+
+/// Whether `given` names this topic, or one of its checks (`fig8-amplitude` is of `fig8`).
+fn names(given: &str, topic: &Topic) -> bool {
+    let given = given.to_lowercase();
+    given
+        .strip_prefix(topic.id)
+        .is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+}
+
+/// The topics that `only` names, in the order of the paper; all, if it is empty.
+fn chosen(only: &[String]) -> Result<Vec<&'static Topic>, PaperError> {
+    if only.is_empty() {
+        return Ok(TOPICS.iter().collect());
+    }
+    for given in only {
+        if TOPICS.iter().any(|topic| names(given, topic)) {
+            continue;
+        }
+        let known: Vec<&str> = section_names().collect();
+        let hint = near_name(given, known.iter().copied())
+            .map_or_else(String::new, |id| format!(" (did you mean `{id}`?)"));
+        return Err(PaperError::UnknownSection {
+            given: given.clone(),
+            hint,
+            known: section_names().collect::<Vec<_>>().join(", "),
+        });
+    }
+    let wanted = |topic: &&Topic| only.iter().any(|given| names(given, topic));
+    Ok(TOPICS.iter().filter(wanted).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_have_names_of_their_own() {
+        let names: std::collections::BTreeSet<_> = section_names().collect();
+        assert_eq!(names.len(), TOPICS.len());
+    }
+
+    #[test]
+    fn unknown_sections_are_refused_with_the_nearest() {
+        let error = chosen(&["fgi4".to_owned()]).err().unwrap().to_string();
+        assert!(
+            error.contains("`fgi4`") && error.contains("did you mean `fig4`?"),
+            "{error}"
+        );
+        let some = chosen(&["FIG17".to_owned(), "eq7".to_owned()]).unwrap();
+        assert_eq!(
+            some.iter().map(|t| t.id).collect::<Vec<_>>(),
+            ["eq7", "fig17"]
+        );
+        let of_check = chosen(&["fig8-amplitude".to_owned()]).unwrap();
+        assert_eq!(of_check.iter().map(|t| t.id).collect::<Vec<_>>(), ["fig8"]);
+    }
+
+    /// What is known beforehand of the paper, from the equations themselves.
+    #[test]
+    fn quick_sections_say_what_is_known() {
+        let only = ["eq7", "eq23", "eq25", "alpha4", "fig2e", "fig3", "fig17"];
+        let options = Options {
+            only: only.map(str::to_owned).to_vec(),
+            quick: true,
+        };
+        let report = report(&options, &Control::default()).unwrap();
+        assert_eq!(report.sections.len(), only.len());
+        let verdict = |id: &str| report.checks().find(|c| c.id == id).unwrap().verdict;
+        assert_eq!(verdict("eq7"), Verdict::Differs);
+        assert_eq!(verdict("eq23"), Verdict::Reproduced);
+        // 7.79, 20.33, 55.81 are the digits of five modes.
+        assert_eq!(verdict("eq25"), Verdict::Reproduced);
+        assert_eq!(verdict("alpha4-samples"), Verdict::Differs);
+        // One period-4 orbit attracts at Ω = 20, α1 = 0, and its saddle partner does not.
+        assert_eq!(verdict("fig17"), Verdict::Ambiguous);
+        for check in report.checks() {
+            assert!(!check.evidence.is_empty(), "{}", check.id);
+            assert!(check.rerun.starts_with("nanotap "), "{}", check.id);
+            assert!(
+                names(&check.id, section_of(&report, &check.id)),
+                "{}",
+                check.id
+            );
+        }
+    }
+
+    /// The topic of the section that holds a check.
+    fn section_of(report: &Report, id: &str) -> &'static Topic {
+        let section = report
+            .sections
+            .iter()
+            .find(|s| s.checks.iter().any(|c| c.id == id))
+            .unwrap();
+        TOPICS.iter().find(|t| t.id == section.id).unwrap()
+    }
+
+    #[test]
+    fn work_that_was_stopped_gives_no_report() {
+        let stop = std::sync::atomic::AtomicBool::new(true);
+        let control = Control {
+            cancel: Some(&stop),
+            progress: None,
+        };
+        assert!(matches!(
+            report(
+                &Options {
+                    quick: true,
+                    ..Options::default()
+                },
+                &control
+            ),
+            Err(PaperError::Cancelled)
+        ));
+    }
+}

@@ -1,0 +1,435 @@
+//! Figs. 6 and 7: the motions at Ω = 2.6 with a tip mass.
+
+use std::rc::Rc;
+
+use nanotap_dynamics::{
+    PeriodicOrbit, SettleOptions, StroboscopicMap as _, Verdict as Settled, settle,
+};
+use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Points, Shape};
+
+use super::PaperError;
+use super::check::{Check, Verdict, digits};
+use super::followed_branch::{FollowedBranch, OMEGA, in_words};
+use super::laboratory::{Counted, Laboratory, SEED, how_many};
+use super::motion_view::{KEY, View, empty_portrait};
+use super::rerun;
+use super::section::{Picture, Section, Table};
+use nanotap::case::subject::Subject;
+use nanotap::model::Model;
+use nanotap::model::cantilever::Case;
+use nanotap::model::strobe::Strobe;
+use nanotap::study::start_box::default_box;
+
+/// Longest period of the unstable orbits looked for.
+const LONGEST: usize = 3;
+/// Range of Ω over which the orbits are followed.
+const BRANCH_RANGE: (f64, f64) = (2.3, 3.6);
+/// Drive periods of chaos drawn against time, and in the phase portrait.
+const SHOWN: (usize, usize) = (16, 200);
+
+/// The case of both figures with its census and its orbits, stable or not.
+struct Slow {
+    counted: Rc<Counted>,
+    orbits: Vec<PeriodicOrbit>,
+}
+
+impl Slow {
+    fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
+        Self::with_modes(laboratory, Case::paper().modes)
+    }
+
+    fn with_modes(laboratory: &Laboratory<'_>, modes: usize) -> Result<Self, PaperError> {
+        let counted = laboratory.count(&Case::paper().with_modes(modes))?;
+        let orbits = laboratory.orbits(&counted, LONGEST, laboratory.either(3000, 600))?;
+        Ok(Self { counted, orbits })
+    }
+
+    fn of_period(&self, period: usize) -> Vec<&PeriodicOrbit> {
+        self.orbits.iter().filter(|o| o.period == period).collect()
+    }
+
+    /// Orbits of a period in words: "one period-1 orbit, W from … to …, unstable (μ = −1.392)".
+    fn describe(&self, period: usize) -> Result<String, PaperError> {
+        let orbits = self.of_period(period);
+        let mut parts = Vec::new();
+        for orbit in &orbits {
+            let o = self.counted.look(orbit)?.observables;
+            let stability = if orbit.is_stable() {
+                "stable"
+            } else {
+                "unstable"
+            };
+            parts.push(format!(
+                "W from {} to {}, {stability}, μ = {}",
+                digits(o.tip_min, 4),
+                digits(o.tip_max, 4),
+                multiplier(orbit)
+            ));
+        }
+        Ok(if orbits.is_empty() {
+            format!("no period-{period} orbit found")
+        } else {
+            format!(
+                "{} ({})",
+                how_many(orbits.len(), &format!("period-{period} orbit")),
+                parts.join("; ")
+            )
+        })
+    }
+
+    /// The branch of an orbit that exists at Ω = `omega`.
+    fn branch(
+        &self,
+        laboratory: &Laboratory<'_>,
+        omega: f64,
+        orbit: &PeriodicOrbit,
+    ) -> Result<FollowedBranch, PaperError> {
+        let subject = Subject::Cantilever(self.counted.case.clone());
+        FollowedBranch::from_orbit(laboratory, &subject, omega, orbit, BRANCH_RANGE)
+    }
+
+    fn rerun_orbit(&self, period: usize) -> String {
+        match self.of_period(period).first() {
+            Some(orbit) => rerun::on_case(
+                "orbit",
+                &self.counted.case,
+                &format!("--period {period} {}", rerun::state(&orbit.states[0])),
+            ),
+            None => self.counted.rerun(),
+        }
+    }
+
+    /// The check of "so many motions of this period".
+    fn check(
+        &self,
+        id: &str,
+        paper: &str,
+        period: usize,
+        claimed: usize,
+    ) -> Result<Check, PaperError> {
+        let found = self.counted.stable(period).len();
+        let here = format!(
+            "{} attracts; {}",
+            how_many(found, &format!("period-{period} motion")),
+            self.describe(period)?
+        );
+        Ok(Check::new(id, paper, here, Verdict::of(found >= claimed))
+            .evidence(format!(
+                "{}; {}",
+                self.counted.summary(),
+                self.counted.missed()
+            ))
+            .rerun(self.rerun_orbit(period)))
+    }
+}
+
+/// The largest multiplier in words.
+fn multiplier(orbit: &PeriodicOrbit) -> String {
+    orbit.multipliers.first().map_or_else(String::new, |m| {
+        if m.im == 0.0 {
+            digits(m.re, 4)
+        } else {
+            format!("{} ± {}i", digits(m.re, 4), digits(m.im.abs(), 4))
+        }
+    })
+}
+
+/// Fig. 6.
+pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+    let slow = Slow::new(laboratory)?;
+    let model = &slow.counted.model;
+    let mut figure = Figure::new(2, 2).column_widths([1.7, 1.0]);
+    let mut words = Vec::new();
+    if let Some(chaos) = slow.counted.chaos().first() {
+        let series = View::new(model, chaos.state, SHOWN.0)?;
+        let tangle = View::new(model, chaos.state, laboratory.either(SHOWN.1, 60))?;
+        let dots = View::new(model, chaos.state, laboratory.either(3000, 300))?.strobe_dots();
+        let portrait = tangle
+            .tangle_into(empty_portrait("chaos"), Colour::SKY)
+            .with(dots.colour(Colour::BLACK));
+        figure = figure
+            .with(series.time_panel("the attractor: chaos"))
+            .with(portrait);
+        words.push("(a, b) The one attractor that any start found: chaos; dots are states at drive phase 0.");
+    } else if let Some((orbit, _)) = slow.counted.all_stable().first() {
+        let view = View::new(model, &orbit.states[0], orbit.period)?;
+        figure = figure
+            .with(view.time_panel("the attractor"))
+            .with(view.portrait_panel("", 0.8));
+        words.push("(a, b) The attractor.");
+    }
+    if let Some(orbit) = slow.of_period(1).first() {
+        let stability = if orbit.is_stable() {
+            "stable"
+        } else {
+            "unstable"
+        };
+        let series = View::new(model, &orbit.states[0], 2)?;
+        let loop_view = View::new(model, &orbit.states[0], 1)?;
+        figure = figure
+            .with(series.time_panel(format!("period 1, {stability}")))
+            .with(loop_view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
+        words.push("(c, d) The only period-1 orbit that Newton found.");
+    }
+    let mut check = slow.check(
+        "fig6",
+        "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1",
+        1,
+        2,
+    )?;
+    if let Some(orbit) = slow.of_period(1).first() {
+        let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
+        check.evidence = format!(
+            "{}; the orbit attracts at Ω = {}",
+            check.evidence,
+            in_words(&branch.attracting())
+        );
+    }
+    Ok(section
+        .picture(Picture::new(
+            "fig06",
+            "Motions at Ω = 2.6, α₁ = 0.1, in place of two coexisting period-1 motions (Fig. 6)",
+            format!("Eq. (26), N = 3. {} {KEY}", words.join(" ")),
+            figure,
+            128.0,
+        ))
+        .check(check))
+}
+
+/// Fig. 7.
+pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+    let slow = Slow::new(laboratory)?;
+    let model = &slow.counted.model;
+    let mut figure = Figure::new(2, 2).column_widths([1.7, 1.0]);
+    let mut captions = vec!["Eq. (26), N = 3.".to_owned()];
+    for (period, letters) in [(2, "(a, b)"), (3, "(c, d)")] {
+        let Some(orbit) = slow.of_period(period).first().copied() else {
+            continue;
+        };
+        let stability = if orbit.is_stable() {
+            "stable"
+        } else {
+            "unstable"
+        };
+        let view = View::new(model, &orbit.states[0], period)?;
+        figure = figure
+            .with(view.time_panel(format!("period {period}, {stability}")))
+            .with(view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
+        captions.push(format!(
+            "{letters} The period-{period} orbit, closed by Newton; no run stays on it."
+        ));
+    }
+    let mut no_three = String::new();
+    if slow.of_period(3).is_empty()
+        && let Some(chaos) = slow.counted.chaos().first()
+    {
+        let returns = Returns::of(model, chaos.state, laboratory.either(4000, 400))?;
+        figure = figure.with(returns.panel()).with(returns.pieces(model));
+        no_three = returns.words();
+        captions.push(format!(
+            "(c) How near any state of the chaotic motion comes back after n drive periods, {} periods watched: \
+             after an odd number never, because (d) the attractor has two pieces that are visited in turn. No \
+             period-3 orbit lies on it.",
+            returns.watched
+        ));
+    }
+    captions.push(KEY.to_owned());
+    let mut two = slow.check(
+        "fig7-period-2",
+        "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1",
+        2,
+        1,
+    )?;
+    if let Some(orbit) = slow.of_period(2).first() {
+        let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
+        two.evidence = format!(
+            "{}; the orbit attracts at Ω = {}",
+            two.evidence,
+            in_words(&branch.attracting())
+        );
+    }
+    let mut three = slow.check(
+        "fig7-period-3",
+        "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1",
+        3,
+        1,
+    )?;
+    if !no_three.is_empty() {
+        three.evidence = format!("{}; {no_three}", three.evidence);
+    }
+    let subject = Subject::Cantilever(slow.counted.case.clone());
+    if let Some((omega, orbit)) = period_three(&subject)? {
+        let branch = slow.branch(laboratory, omega, &orbit)?;
+        let (from, to) = branch.extent();
+        three.evidence = format!(
+            "{}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and attracts at {}",
+            three.evidence,
+            in_words(&branch.attracting())
+        );
+    }
+    Ok(section
+        .picture(Picture::new(
+            "fig07",
+            "The period-2 orbit, and why there is no period 3, at Ω = 2.6, α₁ = 0.1 (Fig. 7)",
+            captions.join(" "),
+            figure,
+            128.0,
+        ))
+        .table(doubled_by_modes(laboratory)?)
+        .check(two)
+        .check(three))
+}
+
+/// Where the period-2 orbit attracts, with one to five modes: how near Ω = 2.6 comes to it.
+fn doubled_by_modes(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
+    let mut table = Table::new(
+        format!(
+            "Where the period-2 orbit that exists at Ω = 2.6 attracts, for Ω from {} to {}",
+            BRANCH_RANGE.0, BRANCH_RANGE.1
+        ),
+        ["N", "μ at Ω = 2.6", "attracts at Ω ="],
+    );
+    for modes in 1..=laboratory.either(5, 2) {
+        let slow = Slow::with_modes(laboratory, modes)?;
+        for orbit in slow.of_period(2) {
+            let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
+            table.row([
+                modes.to_string(),
+                multiplier(orbit),
+                in_words(&branch.attracting()),
+            ]);
+        }
+    }
+    Ok(table)
+}
+
+/// A stable period-3 orbit near the frequency where the bifurcation diagram shows one.
+fn period_three(subject: &Subject) -> Result<Option<(f64, PeriodicOrbit)>, PaperError> {
+    let omega = 3.15;
+    let model = subject.with(OMEGA, omega).model()?;
+    let area = default_box(&model).map_err(|error| PaperError::Failed {
+        what: "the box of starts".into(),
+        why: error.to_string(),
+    })?;
+    let mut map = Strobe::new(&model);
+    let found = area.starts(SEED, 32).into_iter().find_map(|start| {
+        match settle(&mut map, &start, &SettleOptions::default()).verdict {
+            Settled::Periodic(orbit) if orbit.period == 3 => Some(orbit),
+            _ => None,
+        }
+    });
+    Ok(found.map(|orbit| (omega, orbit)))
+}
+
+/// Longest return looked at.
+const LONGEST_RETURN: usize = 12;
+
+/// How near a motion comes back.
+struct Returns {
+    /// Nearest return after 1, 2, … drive periods, in parts of the motion's size.
+    nearest: Vec<f64>,
+    states: Vec<Vec<f64>>,
+    watched: usize,
+}
+
+impl Returns {
+    fn of(model: &Model, state: &[f64], watched: usize) -> Result<Self, PaperError> {
+        let failed = |error: nanotap_flow::FlowError| PaperError::Failed {
+            what: "a run on the chaotic attractor".into(),
+            why: error.to_string(),
+        };
+        let mut map = Strobe::new(model);
+        let mut states = vec![state.to_vec()];
+        for k in 0..watched {
+            let mut next = states[k].clone();
+            map.advance(&mut next).map_err(failed)?;
+            states.push(next);
+        }
+        let norm = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let size = states.iter().map(|x| norm(x)).fold(0.0, f64::max);
+        let distance = |a: &[f64], b: &[f64]| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| (a - b).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
+        let nearest = (1..=LONGEST_RETURN)
+            .map(|n| {
+                states
+                    .iter()
+                    .zip(&states[n..])
+                    .map(|(a, b)| distance(a, b))
+                    .fold(f64::INFINITY, f64::min)
+                    / size
+            })
+            .collect();
+        Ok(Self {
+            nearest,
+            states,
+            watched,
+        })
+    }
+
+    /// Nearest returns after odd numbers of periods (`parity` 1) or even ones (0).
+    fn best(&self, parity: usize) -> f64 {
+        self.nearest
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| (i + 1) % 2 == parity)
+            .map(|(_, d)| *d)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    fn words(&self) -> String {
+        format!(
+            "in {} periods on the attractor no state comes back after an odd number of periods nearer than {} of its \
+             size (even: {}), so it holds no orbit of period 3",
+            self.watched,
+            digits(self.best(1), 1),
+            digits(self.best(0), 1)
+        )
+    }
+
+    fn panel(&self) -> Panel {
+        let of = |parity: usize| {
+            let points = self
+                .nearest
+                .iter()
+                .enumerate()
+                .filter(move |(i, _)| (i + 1) % 2 == parity);
+            points
+                .map(|(i, d)| ((i + 1) as f64, *d))
+                .collect::<Vec<_>>()
+        };
+        Panel::new(
+            Axis::linear("drive periods $n$")
+                .range(0.0, LONGEST_RETURN as f64 + 1.0)
+                .marks((1..=LONGEST_RETURN).map(|n| (n as f64, n.to_string()))),
+            Axis::log("nearest return / size of motion"),
+        )
+        .title("no near return after an odd number of periods")
+        .legend(Legend::Hidden)
+        .with(Markers::new(of(0)).colour(Colour::BLUE))
+        .with(
+            Markers::new(of(1))
+                .colour(Colour::VERMILLION)
+                .shape(Shape::Diamond)
+                .size(1.9),
+        )
+    }
+
+    /// The strobe states, those of even and of odd periods apart.
+    fn pieces(&self, model: &Model) -> Panel {
+        let (drive, rate) = (model.system.drive(), model.tip_rate());
+        let of = |parity: usize| {
+            let states = self.states.iter().skip(parity).step_by(2);
+            states
+                .map(|x| (model.tip.at(drive, x, 0.0), rate.at(drive, x, 0.0)))
+                .collect::<Vec<_>>()
+        };
+        empty_portrait("states at drive phase 0")
+            .with(Points::new(of(0)).diameter(0.4).colour(Colour::BLUE))
+            .with(Points::new(of(1)).diameter(0.4).colour(Colour::VERMILLION))
+    }
+}

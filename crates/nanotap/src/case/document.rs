@@ -1,0 +1,222 @@
+//! A case as a document: every parameter, and what stands behind it in SI.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use crate::case::physical::{MappingRow, Resolved};
+use crate::case::subject::Subject;
+use crate::model::cantilever::Case;
+use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use crate::study::setpoint::SetpointReport;
+use crate::study::studied::Studied;
+
+/// A case, checked and resolved.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum CaseDocument {
+    /// A cantilever: `kind`, the case's keys, `period` and, of a physical case, `physical`.
+    Cantilever(Box<CantileverDocument>),
+    /// An oscillator: `kind`, the keys of its case file, `period`.
+    Oscillator(OscillatorDocument),
+}
+
+/// A cantilever.
+#[derive(Clone, Debug, Serialize)]
+pub struct CantileverDocument {
+    /// `cantilever`.
+    pub kind: &'static str,
+    /// Its parameters.
+    #[serde(flatten)]
+    pub case: Case,
+    /// Drive period 2π/Ω.
+    pub period: f64,
+    /// What is known of it in SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalSummary>,
+    /// How its setpoint was solved for the distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setpoint_solved: Option<SetpointReport>,
+}
+
+/// The physical quantities behind a case, in SI, frequencies in Hz.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalSummary {
+    /// Spring constant at the tip, N/m.
+    pub k: f64,
+    /// First resonance, with the tip, Hz.
+    pub f0: f64,
+    /// Quality factor.
+    #[serde(rename = "Q")]
+    pub quality_factor: f64,
+    /// Mass of the beam, kg.
+    pub beam_mass: f64,
+    /// Mass of the tip, kg.
+    pub tip_mass: f64,
+    /// Amplitude of the base, m, or of the force on the lever, N.
+    pub drive_amplitude: f64,
+    /// Drive frequency, Hz.
+    pub drive_frequency: f64,
+    /// Free amplitude of the tip, m.
+    pub free_amplitude: f64,
+    /// Its phase behind the drive.
+    pub free_phase_degrees: f64,
+    /// What phases are counted from.
+    pub phase_reference: &'static str,
+    /// Free amplitude of the second tone, m, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_free_amplitude: Option<f64>,
+    /// Frequency of the second tone, Hz, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_frequency: Option<f64>,
+    /// Amplitude of the second tone, m or N, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_amplitude: Option<f64>,
+    /// Setpoint amplitude over free amplitude, if given.
+    pub setpoint: Option<f64>,
+    /// Contact stiffness, N/m.
+    pub contact_stiffness: f64,
+    /// Contact damping, N s/m.
+    pub contact_damping: f64,
+    /// Stiffness of a standard linear solid's relaxing arm, N/m; 0 of other samples.
+    pub relaxation_stiffness: f64,
+    /// Its relaxation time, s.
+    pub relaxation_time: f64,
+    /// Gap of the tip, m.
+    pub tip_gap: f64,
+    /// Gap of the beam, m.
+    pub beam_gap: f64,
+    /// The model's unit of length, m.
+    pub length_unit: f64,
+    /// The model's unit of time, s.
+    pub time_unit: f64,
+    /// The model's unit of force, N.
+    pub force_unit: f64,
+    /// The model's unit of energy, J.
+    pub energy_unit: f64,
+}
+
+impl PhysicalSummary {
+    /// What is known of a resolved case.
+    pub fn of(resolved: &Resolved) -> Self {
+        let Resolved {
+            lever,
+            parameters,
+            scales,
+            ..
+        } = resolved;
+        let second = resolved.case.tone2_ratio;
+        Self {
+            k: lever.k,
+            f0: lever.f0,
+            quality_factor: lever.quality_factor,
+            beam_mass: lever.beam_mass,
+            tip_mass: parameters.tip_mass,
+            drive_amplitude: parameters.drive_amplitude,
+            drive_frequency: parameters.drive_frequency,
+            free_amplitude: resolved.free_amplitude,
+            free_phase_degrees: resolved.free_phase,
+            phase_reference: resolved.phase_reference(),
+            second_free_amplitude: resolved.second_free_amplitude,
+            second_frequency: second.map(|ratio| ratio.value() * parameters.drive_frequency),
+            second_amplitude: second.map(|_| parameters.tone2_amplitude),
+            setpoint: resolved.setpoint,
+            contact_stiffness: parameters.contact_stiffness,
+            contact_damping: parameters.contact_damping,
+            relaxation_stiffness: parameters.relaxation_stiffness,
+            relaxation_time: parameters.relaxation_time,
+            tip_gap: parameters.tip_gap,
+            beam_gap: scales.length,
+            length_unit: scales.length,
+            time_unit: scales.time,
+            force_unit: scales.force,
+            energy_unit: scales.energy,
+        }
+    }
+}
+
+/// An oscillator, its keys those of the case file.
+#[derive(Clone, Debug, Serialize)]
+pub struct OscillatorDocument {
+    /// `vibro_impact` or `impact`.
+    pub kind: &'static str,
+    /// Its parameters.
+    #[serde(flatten)]
+    pub values: BTreeMap<&'static str, f64>,
+    /// Drive period 2π/ω.
+    pub period: f64,
+}
+
+impl OscillatorDocument {
+    fn of(given: &Oscillator) -> Self {
+        Self {
+            kind: match given.stop {
+                Stop::Soft { .. } => "vibro_impact",
+                Stop::Rigid { .. } => "impact",
+            },
+            values: OscillatorParameter::ALL
+                .into_iter()
+                .filter_map(|parameter| Some((parameter.name(), given.get(parameter)?)))
+                .collect(),
+            period: TAU / given.omega,
+        }
+    }
+}
+
+impl CaseDocument {
+    /// The document of what is studied.
+    pub fn of(studied: &Studied) -> Self {
+        match &studied.subject {
+            Subject::Oscillator(oscillator) => Self::Oscillator(OscillatorDocument::of(oscillator)),
+            Subject::Cantilever(case) => Self::cantilever(case.clone(), studied),
+            // Where the quantities that vary make no sense, the case as it was read.
+            Subject::Physical(_) => {
+                let read = || studied.resolved.as_ref().map(|r| r.case.clone());
+                let case = studied.subject.case().or_else(read);
+                Self::cantilever(case.unwrap_or_else(Case::paper), studied)
+            }
+        }
+    }
+
+    fn cantilever(case: Case, studied: &Studied) -> Self {
+        let resolved = studied.subject.resolved().or(studied.resolved.as_ref());
+        Self::Cantilever(Box::new(CantileverDocument {
+            kind: "cantilever",
+            period: case.period(),
+            case,
+            physical: resolved.map(PhysicalSummary::of),
+            setpoint_solved: studied.setpoint.clone(),
+        }))
+    }
+}
+
+/// One parameter between the two worlds, as a document.
+#[derive(Clone, Debug, Serialize)]
+pub struct MappingDocument {
+    /// The key of the dimensionless model.
+    pub parameter: &'static str,
+    /// Its value there.
+    pub value: f64,
+    /// What it is: `M/(mL)`.
+    pub formula: &'static str,
+    /// The physical quantity.
+    pub quantity: &'static str,
+    /// Its value in SI.
+    pub si: f64,
+    /// Its SI unit.
+    pub unit: &'static str,
+}
+
+impl From<MappingRow> for MappingDocument {
+    fn from(row: MappingRow) -> Self {
+        Self {
+            parameter: row.parameter.name(),
+            value: row.value,
+            formula: row.formula,
+            quantity: row.quantity,
+            si: row.si,
+            unit: row.kind.si_unit(),
+        }
+    }
+}

@@ -1,0 +1,479 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::model::contact::ContactLaw;
+use crate::model::drive_form::Actuation;
+
+const PAPER: &str = "[model]\nmodes = 3\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\n\
+                     alpha4 = 20.0\nalpha5 = 0.0\nalpha6 = 0.2\nomega = 2.6\n";
+
+fn parse(text: &str, overrides: &[&str]) -> Result<CaseFile, CaseFileError> {
+    let source = Source {
+        name: "c.toml".into(),
+        text: text.into(),
+    };
+    let overrides: Vec<String> = overrides.iter().map(|&word| word.into()).collect();
+    CaseFile::parse(Some(source), &overrides)
+}
+
+fn dimensionless(text: &str, overrides: &[&str]) -> Case {
+    match parse(text, overrides) {
+        Ok(CaseFile::Dimensionless(case)) => case,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The words of the refusal of `text` with `overrides`.
+fn refusal(text: &str, overrides: &[&str]) -> String {
+    parse(text, overrides).unwrap_err().to_string()
+}
+
+#[test]
+fn the_papers_case_by_either_name_of_each_key() {
+    assert_eq!(dimensionless(PAPER, &[]), Case::paper());
+    let mut readable = PAPER.to_owned();
+    for parameter in Parameter::ALL {
+        readable = readable.replace(parameter.name(), parameter.alias());
+    }
+    assert!(readable.contains("contact_stiffness = 20.0"));
+    assert_eq!(dimensionless(&readable, &[]), Case::paper());
+}
+
+#[test]
+fn modes_and_gap_have_defaults_and_nothing_else_has() {
+    let short = PAPER
+        .replace("modes = 3\n", "")
+        .replace("alpha5 = 0.0\n", "");
+    assert_eq!(dimensionless(&short, &[]), Case::paper());
+    for parameter in Parameter::ALL
+        .into_iter()
+        .filter(|p| *p != Parameter::Alpha5)
+    {
+        let lines: Vec<&str> = PAPER
+            .lines()
+            .filter(|line| !line.starts_with(parameter.name()))
+            .collect();
+        let words = refusal(&lines.join("\n"), &[]);
+        assert!(
+            words.contains(&format!("lacks {}", parameter.name())),
+            "{words}"
+        );
+    }
+}
+
+#[test]
+fn overrides_win_over_the_file_by_any_name() {
+    let expected = Case {
+        modes: 4,
+        ..Case::paper().with(Parameter::Omega, 20.0)
+    };
+    assert_eq!(dimensionless(PAPER, &["omega=20", "modes=4"]), expected);
+    assert_eq!(
+        dimensionless(PAPER, &["drive_frequency=20", "model.modes = 4"]),
+        expected
+    );
+    assert_eq!(
+        dimensionless(PAPER, &["omega=3", "omega=20", "modes=4"]),
+        expected
+    );
+    let printed = dimensionless(PAPER, &["cosine_term=printed"]);
+    assert_eq!(printed.cosine_term, CosineTerm::Printed);
+}
+
+#[test]
+fn without_a_file_all_that_is_missing_is_told_at_once() {
+    let error = CaseFile::parse(None, &["alpha1=0.1".into(), "omega=2".into()]).unwrap_err();
+    assert_eq!(error.problems.len(), 1);
+    let words = error.to_string();
+    assert!(
+        words.contains("lacks alpha2, alpha3, alpha4, alpha6;"),
+        "{words}"
+    );
+    let nothing = CaseFile::parse(None, &[]).unwrap_err().to_string();
+    assert!(
+        nothing.starts_with("no case was given; name a case file, or"),
+        "{nothing}"
+    );
+    let all = [
+        "alpha1=0.1",
+        "alpha2=0.1",
+        "alpha3=0.1",
+        "alpha4=20",
+        "alpha6=0.2",
+        "omega=2.6",
+    ];
+    let all: Vec<String> = all.iter().map(|&word| word.into()).collect();
+    assert_eq!(
+        CaseFile::parse(None, &all),
+        Ok(CaseFile::Dimensionless(Case::paper()))
+    );
+}
+
+#[test]
+fn every_refusal_says_place_key_value_and_remedy() {
+    for (change, to, words) in [
+        (
+            "omega = 2.6",
+            "omgea = 2.6",
+            "c.toml:9:1: `omgea` (= 2.6) is not a key of [model]; did you mean `omega`?",
+        ),
+        (
+            "omega = 2.6",
+            "omega = \"2.6\"",
+            "c.toml:9:9: `omega` = \"2.6\" is text, not a number; write it without quotes: omega = 2.6",
+        ),
+        (
+            "omega = 2.6",
+            "omega = \"65 kHz\"",
+            "quantities with units belong in a physical case",
+        ),
+        (
+            "omega = 2.6",
+            "omega = nan",
+            "c.toml:9:9: `omega` = nan: must be a finite number",
+        ),
+        (
+            "omega = 2.6",
+            "omega = -inf",
+            "`omega` = -inf: must be a finite number",
+        ),
+        (
+            "omega = 2.6",
+            "omega = 1e999",
+            "`omega` = 1e999: must be a finite number",
+        ),
+        (
+            "omega = 2.6",
+            "omega = 0",
+            "`omega` = 0: must be more than 0",
+        ),
+        (
+            "omega = 2.6",
+            "omega = true",
+            "`omega` = true is a boolean, not a number",
+        ),
+        (
+            "omega = 2.6",
+            "omega = [1]",
+            "`omega` = [1] is an array, not a number",
+        ),
+        (
+            "omega = 2.6",
+            "omega = 2.6\ndrive_frequency = 2",
+            "c.toml:10:1: `omega` and `drive_frequency` are the same key",
+        ),
+        (
+            "omega = 2.6",
+            "omega = 2.6\nomega = 2",
+            "c.toml:10:1: the same key stands here twice",
+        ),
+        ("omega = 2.6", "omega = ", "c.toml:9:"),
+        (
+            "alpha1 = 0.1",
+            "alpha1 = -0.1",
+            "c.toml:3:10: `alpha1` = -0.1: must be 0 or more",
+        ),
+        (
+            "modes = 3",
+            "modes = 0",
+            "c.toml:2:9: `modes` = 0 is outside 1 … 50; write a whole number",
+        ),
+        ("modes = 3", "modes = -1", "`modes` = -1 is outside 1 … 50"),
+        (
+            "modes = 3",
+            "modes = 1000000000",
+            "`modes` = 1000000000 is outside 1 … 50",
+        ),
+        (
+            "modes = 3",
+            "modes = 99999999999999999999",
+            "is outside 1 … 50",
+        ),
+        (
+            "modes = 3",
+            "modes = 3.5",
+            "`modes` = 3.5 is not a whole number",
+        ),
+        ("modes = 3", "modes = \"3\"", "`modes` = \"3\" is text"),
+        (
+            "modes = 3",
+            "kind = \"cantilver\"",
+            "did you mean \"cantilever\"?",
+        ),
+        (
+            "modes = 3",
+            "kind = 3",
+            "`kind` = 3 is not one of \"cantilever\", \"vibro_impact\", \"impact\"",
+        ),
+        (
+            "modes = 3",
+            "cosine_term = \"print\"",
+            "did you mean \"printed\"?",
+        ),
+        (
+            "modes = 3",
+            "restitution = 0.8",
+            "it belongs to kind = \"impact\"",
+        ),
+        (
+            "modes = 3",
+            "temperature = 300",
+            "the keys are alpha1, alpha2",
+        ),
+        (
+            "[model]",
+            "[modle]",
+            "c.toml:1:2: `[modle]` is not a table of a case; did you mean [model]?",
+        ),
+        (
+            "[model]\n",
+            "",
+            "c.toml:1:1: `modes` and 7 more keys stand outside any table; put a line [model] before it",
+        ),
+        (
+            "[model]",
+            "[sample]\nstiffness = \"20 N/m\"\n[model]",
+            "`alpha1` and 6 more keys are dimensionless, but [sample] makes this a physical case",
+        ),
+    ] {
+        let text = PAPER.replace(change, to);
+        assert_ne!(text, PAPER, "the change is made");
+        let refused = refusal(&text, &[]);
+        assert!(refused.contains(words), "{to}: {refused}");
+    }
+    assert!(refusal("", &[]).contains("c.toml: an empty case: it lacks alpha1"));
+}
+
+#[test]
+fn a_bad_override_is_named_as_it_was_written() {
+    for (word, words) in [
+        (
+            "omgea=2",
+            "--set omgea=2: `omgea` (= 2) is not a key of [model]; did you mean `omega`?",
+        ),
+        (
+            "omega=nan",
+            "--set omega=nan: `omega` = nan: must be a finite number",
+        ),
+        (
+            "omega",
+            "--set omega: no `=` in it; write a key and a value",
+        ),
+        (
+            "modle.omega=2",
+            "--set modle.omega=2: `modle` is not a table of a case; did you mean [model]?",
+        ),
+        (
+            "stiffness=20 N/m",
+            "did you mean `sample.stiffness`, of a physical case?",
+        ),
+        (
+            "sample.stiffness=20 N/m",
+            "`alpha1` and 6 more keys are dimensionless, but [sample] makes",
+        ),
+        (
+            "gap.tipp=1 nm",
+            "`tipp` (= 1 nm) is not a key of [gap]; did you mean `tip`?",
+        ),
+    ] {
+        let refused = refusal(PAPER, &[word]);
+        assert!(refused.contains(words), "{word}: {refused}");
+    }
+}
+
+#[test]
+fn all_problems_are_told_in_the_order_of_the_file() {
+    let text = PAPER
+        .replace("alpha1 = 0.1", "alpha1 = -1")
+        .replace("omega = 2.6", "temperature = 300");
+    let error = parse(&text, &["alpha2=x"]).unwrap_err();
+    let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
+    assert_eq!(lines.len(), 4, "{error}");
+    for (line, start) in lines.iter().zip([
+        "c.toml:1:2: the case lacks omega",
+        "c.toml:3:10",
+        "c.toml:9:1",
+        "--set",
+    ]) {
+        assert!(line.starts_with(start), "{line}");
+    }
+}
+
+#[test]
+fn oscillators_are_read_and_checked() {
+    let impact = "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0\nforcing = 1\n\
+                  omega = 2.5\ngap = 0\nrestitution = 0.8\n";
+    let expected = Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.0,
+        forcing: 1.0,
+        omega: 2.5,
+        gap: 0.0,
+        stop: Stop::Rigid { restitution: 0.8 },
+    };
+    assert_eq!(parse(impact, &[]), Ok(CaseFile::Oscillator(expected)));
+    let soft = parse(
+        &impact.replace("restitution = 0.8\n", ""),
+        &[
+            "kind=vibro_impact",
+            "contact_stiffness=20",
+            "contact_damping=0.2",
+        ],
+    );
+    let stop = Stop::Soft {
+        stiffness: 20.0,
+        damping: 0.2,
+    };
+    assert_eq!(
+        soft,
+        Ok(CaseFile::Oscillator(Oscillator { stop, ..expected }))
+    );
+    for (word, words) in [
+        ("mass=0", "`mass` = 0: a positive, finite number is needed"),
+        ("mass=-1", "positive"),
+        ("stiffness=-1", "at least 0"),
+        ("restitution=1.1", "a number from 0 to 1"),
+        ("omega=inf", "finite"),
+        ("modes=2", "it belongs to kind = \"cantilever\""),
+        ("sample.damping=1", "an oscillator takes no [sample]"),
+    ] {
+        let refused = refusal(impact, &[word]);
+        assert!(refused.contains(words), "{word}: {refused}");
+    }
+}
+
+#[test]
+fn physical_tables_keep_their_quantities_and_places() {
+    let text = "[cantilever]\nk = \"2.8 N/m\"\nf0 = \"75 kHz\"\nQ = 200\n\
+                [sample]\nstiffness = \"20 N/m\"\n[model]\nmodes = 2\n";
+    let Ok(CaseFile::Physical(tables)) = parse(text, &["sample.stiffness=30 N/m"]) else {
+        panic!("{:?}", parse(text, &[]));
+    };
+    assert_eq!(tables.modes, 2);
+    assert_eq!(
+        tables.get("cantilever", "k").unwrap().value,
+        Value::Text("2.8 N/m".into())
+    );
+    assert_eq!(
+        tables.get("cantilever", "Q").unwrap().value,
+        Value::Integer(200)
+    );
+    let stiffness = tables.get("sample", "stiffness").unwrap();
+    assert_eq!(stiffness.value, Value::Text("30 N/m".into()));
+    assert!(stiffness.is_override());
+    assert!(tables.get("sample", "damping").is_none());
+    assert!(refusal(&text.replace("f0", "fo"), &[]).contains("did you mean `f0`?"));
+    assert!(
+        refusal(&text.replace("200", "false"), &[]).contains("`cantilever.Q` = false is a boolean")
+    );
+}
+
+#[test]
+fn laws_and_drives_are_read_and_checked() {
+    let recovers = dimensionless(PAPER, &["contact=kelvin-voigt"]);
+    assert_eq!(recovers.contact, ContactLaw::KelvinVoigt);
+    let solid = [
+        "contact=standard-linear-solid",
+        "alpha6=0",
+        "relaxation_stiffness=40",
+        "relaxation_time=0.005",
+    ];
+    let read = dimensionless(PAPER, &solid);
+    assert_eq!(
+        (read.relaxation_stiffness, read.relaxation_time),
+        (40.0, 0.005)
+    );
+    // The solid's damper is its arm's, so a file without alpha6 lacks nothing.
+    let file = PAPER.replace("alpha6 = 0.2\n", "");
+    assert_eq!(dimensionless(&file, &[solid[0], solid[2], solid[3]]), read);
+    let driven = dimensionless(
+        PAPER,
+        &[
+            "actuation=tip",
+            "tone2_ratio=25/4",
+            "tone2_amplitude=0.01",
+            "tone2_phase=90",
+        ],
+    );
+    assert_eq!(driven.actuation, Actuation::Tip);
+    assert_eq!(driven.tone2_ratio, "6.25".parse().ok());
+    assert_eq!(
+        dimensionless(PAPER, &["tone2_ratio=6.25"]).tone2_ratio,
+        driven.tone2_ratio
+    );
+    for (words, refusal_words) in [
+        (
+            &["contact=kelvin-voight"][..],
+            "did you mean \"kelvin-voigt\"?",
+        ),
+        (&solid[..1], "`alpha6` = 0.2: must be 0 with contact"),
+        (&solid[..2], "lacks relaxation_stiffness, relaxation_time"),
+        (
+            &["relaxation_time=0.1"],
+            "belongs to contact = \"standard-linear-solid\"",
+        ),
+        (
+            &["tone2_amplitude=0.1"],
+            "there is no second tone: give tone2_ratio",
+        ),
+        (&["tone2_ratio=3.14159"], "the nearest is"),
+        (&["tone2_ratio=two"], "is no ratio of frequencies"),
+        (&["tone2_ratio=1"], "the same frequency"),
+        (&["actuation=magnet"], "\"base\", \"tip\", \"distributed\""),
+        (
+            &["actuation=tip", "cosine_term=printed"],
+            "belongs to the drive through the base",
+        ),
+    ] {
+        let refused = refusal(PAPER, words);
+        assert!(refused.contains(refusal_words), "{words:?}: {refused}");
+    }
+}
+
+#[test]
+fn a_case_written_out_is_read_back() {
+    let case = Case {
+        modes: 7,
+        alpha5: -0.125,
+        alpha4: 1e-9 / 3.0,
+        cosine_term: CosineTerm::Printed,
+        ..Case::paper()
+    };
+    assert_eq!(dimensionless(&to_toml(&case), &[]), case);
+    let case = Case {
+        contact: ContactLaw::StandardLinearSolid,
+        alpha6: 0.0,
+        relaxation_stiffness: 40.0,
+        relaxation_time: 0.1 / 3.0,
+        actuation: Actuation::Distributed,
+        tone2_ratio: "25/4".parse().ok(),
+        tone2_amplitude: 0.01,
+        tone2_phase: -12.5,
+        ..Case::paper()
+    };
+    assert_eq!(dimensionless(&to_toml(&case), &[]), case);
+}
+
+proptest! {
+    #[test]
+    fn no_text_makes_it_panic(text in ".*", word in ".*") {
+        let _ = parse(&text, &[&word]).map_err(|error| error.to_string());
+    }
+
+    #[test]
+    fn nearly_right_texts_do_not_make_it_panic(
+        at in 0..PAPER.len(), cut in 0..20_usize, put in "[\\[\\]=.\"'\\\\#a-z0-9\u{80}-\u{2ff}\n-]{0,8}",
+    ) {
+        let end = (at + cut).min(PAPER.len());
+        let text = format!("{}{put}{}", &PAPER[..at], &PAPER[end..]);
+        if let Err(error) = parse(&text, &[]) {
+            prop_assert!(!error.problems.is_empty());
+            for problem in &error.problems {
+                if let Place::Span(span) = &problem.place {
+                    prop_assert!(text.get(span.clone()).is_some(), "{span:?} of {}", text.len());
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,392 @@
+//! Real levers and materials by name, from `catalogue.toml` beside this file and from files
+//! of the user's own in the same format:
+//!
+//! ```toml
+//! [lever."my lever"]
+//! k = "2.4 N/m"
+//! f0 = "71 kHz"
+//! tip_radius = "12 nm"
+//! source = "calibrated by thermal noise on 3 May"
+//!
+//! [material.gelatin]
+//! modulus = "20 kPa"
+//! poisson = 0.5
+//! source = "own indentation"
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::error::PhysicalError;
+use super::lever::BeamGeometry;
+use super::quantity::{Kind, QuantityError};
+use super::sample::Elastic;
+use crate::case::near_name::near_names;
+
+/// A lever as its box describes it. No quality factor: that depends on what surrounds it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lever {
+    /// Its name.
+    pub name: String,
+    /// Other names it answers to.
+    pub aliases: Vec<String>,
+    /// Spring constant in N/m.
+    pub k: f64,
+    /// First free resonance in Hz, with its tip.
+    pub f0: f64,
+    /// Dimensions of the beam.
+    pub geometry: Option<BeamGeometry>,
+    /// Radius of the tip's apex in m.
+    pub tip_radius: Option<f64>,
+    /// Height of the tip in m.
+    pub tip_height: Option<f64>,
+    /// Where the numbers come from.
+    pub source: String,
+}
+
+/// A material of samples and tips.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Its name.
+    pub name: String,
+    /// Other names it answers to.
+    pub aliases: Vec<String>,
+    /// Young's modulus and Poisson's ratio.
+    pub elastic: Elastic,
+    /// Density in kg/m³, where a tip may be made of it.
+    pub density: Option<f64>,
+    /// Where the numbers come from.
+    pub source: String,
+}
+
+/// Why a catalogue cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CatalogueError {
+    /// The file cannot be opened.
+    #[error("catalogue {origin}: {reason}")]
+    File {
+        /// The file.
+        origin: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// Not the TOML it should be; the reason names line and column.
+    #[error("catalogue {origin}: {reason}")]
+    Format {
+        /// The file.
+        origin: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A quantity that cannot be read.
+    #[error("catalogue {origin}, {entry}.{key}: {source}")]
+    Quantity {
+        /// The file.
+        origin: String,
+        /// The lever or material.
+        entry: String,
+        /// The key.
+        key: &'static str,
+        /// What is wrong.
+        source: Box<QuantityError>,
+    },
+    /// A quantity with an impossible value, or dimensions given in part.
+    #[error("catalogue {origin}, {entry}.{key}: {reason}")]
+    Impossible {
+        /// The file.
+        origin: String,
+        /// The lever or material.
+        entry: String,
+        /// The key.
+        key: &'static str,
+        /// What is wrong.
+        reason: &'static str,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    lever: BTreeMap<String, LeverText>,
+    #[serde(default)]
+    material: BTreeMap<String, MaterialText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LeverText {
+    #[serde(default)]
+    aliases: Vec<String>,
+    k: String,
+    f0: String,
+    length: Option<String>,
+    width: Option<String>,
+    thickness: Option<String>,
+    tip_radius: Option<String>,
+    tip_height: Option<String>,
+    source: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MaterialText {
+    #[serde(default)]
+    aliases: Vec<String>,
+    modulus: String,
+    poisson: f64,
+    density: Option<String>,
+    source: String,
+}
+
+/// Levers and materials by name. Names are compared without regard to case, spaces, hyphens
+/// and underscores.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Catalogue {
+    levers: BTreeMap<String, Lever>,
+    materials: BTreeMap<String, Material>,
+}
+
+impl Catalogue {
+    /// The levers and materials that come with the program.
+    ///
+    /// # Errors
+    /// None as shipped (a test reads them all); [`CatalogueError`] if the file in the source
+    /// tree was edited into something faulty.
+    pub fn builtin() -> Result<Self, CatalogueError> {
+        let mut catalogue = Self::default();
+        catalogue.extend(include_str!("catalogue.toml"), "built in")?;
+        Ok(catalogue)
+    }
+
+    /// Adds the entries of a TOML text; entries of the same name are replaced. `origin` names
+    /// it in messages.
+    ///
+    /// # Errors
+    /// [`CatalogueError`] names the entry and key at fault; nothing is added then.
+    pub fn extend(&mut self, text: &str, origin: &str) -> Result<(), CatalogueError> {
+        let file: File = toml::from_str(text).map_err(|error| CatalogueError::Format {
+            origin: origin.to_owned(),
+            reason: error.to_string().trim_end().to_owned(),
+        })?;
+        let levers = file
+            .lever
+            .into_iter()
+            .map(|(name, text)| Ok((folded(&name), text.read(name, origin)?)))
+            .collect::<Result<Vec<_>, CatalogueError>>()?;
+        let materials = file
+            .material
+            .into_iter()
+            .map(|(name, text)| Ok((folded(&name), text.read(name, origin)?)))
+            .collect::<Result<Vec<_>, CatalogueError>>()?;
+        self.levers.extend(levers);
+        self.materials.extend(materials);
+        Ok(())
+    }
+
+    /// Adds the entries of a TOML file, as [`Catalogue::extend`].
+    ///
+    /// # Errors
+    /// [`CatalogueError`] if the file cannot be opened or read.
+    pub fn extend_from_file(&mut self, path: &Path) -> Result<(), CatalogueError> {
+        let origin = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| CatalogueError::File {
+            origin: origin.clone(),
+            reason: error.to_string(),
+        })?;
+        self.extend(&text, &origin)
+    }
+
+    /// All levers by name.
+    pub fn levers(&self) -> impl Iterator<Item = &Lever> {
+        self.levers.values()
+    }
+
+    /// All materials by name.
+    pub fn materials(&self) -> impl Iterator<Item = &Material> {
+        self.materials.values()
+    }
+
+    /// The lever that answers to `name`; `key` is what asked for it.
+    ///
+    /// # Errors
+    /// [`PhysicalError::UnknownName`] with the nearest name.
+    pub fn lever(&self, key: &str, name: &str) -> Result<&Lever, PhysicalError> {
+        let wanted = folded(name);
+        self.levers
+            .get(&wanted)
+            .or_else(|| self.levers().find(|lever| answers(&lever.aliases, &wanted)))
+            .ok_or_else(|| {
+                unknown(
+                    key,
+                    name,
+                    "lever",
+                    self.levers().map(|lever| (&lever.name, &lever.aliases)),
+                )
+            })
+    }
+
+    /// The material that answers to `name`; `key` is what asked for it.
+    ///
+    /// # Errors
+    /// [`PhysicalError::UnknownName`] with the nearest name.
+    pub fn material(&self, key: &str, name: &str) -> Result<&Material, PhysicalError> {
+        let wanted = folded(name);
+        self.materials
+            .get(&wanted)
+            .or_else(|| {
+                self.materials()
+                    .find(|material| answers(&material.aliases, &wanted))
+            })
+            .ok_or_else(|| {
+                let names = self
+                    .materials()
+                    .map(|material| (&material.name, &material.aliases));
+                unknown(key, name, "material", names)
+            })
+    }
+}
+
+fn answers(aliases: &[String], wanted: &str) -> bool {
+    aliases.iter().any(|alias| folded(alias) == wanted)
+}
+
+fn unknown<'a>(
+    key: &str,
+    name: &str,
+    what: &'static str,
+    known: impl Iterator<Item = (&'a String, &'a Vec<String>)>,
+) -> PhysicalError {
+    let (names, aliases): (Vec<&str>, Vec<&Vec<String>>) = known
+        .map(|(name, aliases)| (name.as_str(), aliases))
+        .unzip();
+    let candidates = names
+        .iter()
+        .copied()
+        .chain(aliases.into_iter().flatten().map(String::as_str));
+    let suggestion = match near_names(name, candidates).first() {
+        Some(near) => format!("did you mean \"{near}\"?"),
+        None => format!("known are {}", names.join(", ")),
+    };
+    PhysicalError::UnknownName {
+        key: key.to_owned(),
+        name: name.to_owned(),
+        what,
+        suggestion,
+    }
+}
+
+/// A name as it is compared: lower case, letters and digits only.
+fn folded(name: &str) -> String {
+    name.chars()
+        .filter(|c| !matches!(c, ' ' | '-' | '_'))
+        .flat_map(char::to_lowercase)
+        .collect()
+}
+
+/// Reads the quantities of one entry.
+struct EntryReader<'a> {
+    origin: &'a str,
+    entry: &'a str,
+}
+
+impl EntryReader<'_> {
+    fn positive(&self, key: &'static str, text: &str, kind: Kind) -> Result<f64, CatalogueError> {
+        let value = kind
+            .parse(text)
+            .map_err(|source| CatalogueError::Quantity {
+                origin: self.origin.to_owned(),
+                entry: self.entry.to_owned(),
+                key,
+                source: Box::new(source),
+            })?;
+        if value > 0.0 {
+            Ok(value)
+        } else {
+            Err(self.impossible(key, "it must be above zero"))
+        }
+    }
+
+    fn optional(
+        &self,
+        key: &'static str,
+        text: Option<&str>,
+        kind: Kind,
+    ) -> Result<Option<f64>, CatalogueError> {
+        text.map(|text| self.positive(key, text, kind)).transpose()
+    }
+
+    fn impossible(&self, key: &'static str, reason: &'static str) -> CatalogueError {
+        CatalogueError::Impossible {
+            origin: self.origin.to_owned(),
+            entry: self.entry.to_owned(),
+            key,
+            reason,
+        }
+    }
+}
+
+impl LeverText {
+    fn read(self, name: String, origin: &str) -> Result<Lever, CatalogueError> {
+        let reader = EntryReader {
+            origin,
+            entry: &name,
+        };
+        let length = reader.optional("length", self.length.as_deref(), Kind::Length)?;
+        let width = reader.optional("width", self.width.as_deref(), Kind::Length)?;
+        let thickness = reader.optional("thickness", self.thickness.as_deref(), Kind::Length)?;
+        let geometry = match (length, width, thickness) {
+            (Some(length), Some(width), Some(thickness)) => Some(BeamGeometry {
+                length,
+                width,
+                thickness,
+            }),
+            (None, None, None) => None,
+            _ => {
+                return Err(reader.impossible(
+                    "length",
+                    "length, width and thickness are given together or not at all",
+                ));
+            }
+        };
+        Ok(Lever {
+            k: reader.positive("k", &self.k, Kind::Stiffness)?,
+            f0: reader.positive("f0", &self.f0, Kind::Frequency)?,
+            geometry,
+            tip_radius: reader.optional("tip_radius", self.tip_radius.as_deref(), Kind::Length)?,
+            tip_height: reader.optional("tip_height", self.tip_height.as_deref(), Kind::Length)?,
+            aliases: self.aliases,
+            source: self.source,
+            name,
+        })
+    }
+}
+
+impl MaterialText {
+    fn read(self, name: String, origin: &str) -> Result<Material, CatalogueError> {
+        let reader = EntryReader {
+            origin,
+            entry: &name,
+        };
+        let modulus = reader.positive("modulus", &self.modulus, Kind::Pressure)?;
+        if !(self.poisson > -1.0 && self.poisson <= 0.5) {
+            return Err(reader.impossible(
+                "poisson",
+                "Poisson's ratio of a stable solid lies above -1 and not above 0.5",
+            ));
+        }
+        Ok(Material {
+            elastic: Elastic {
+                modulus,
+                poisson: self.poisson,
+            },
+            density: reader.optional("density", self.density.as_deref(), Kind::Density)?,
+            aliases: self.aliases,
+            source: self.source,
+            name,
+        })
+    }
+}

@@ -1,0 +1,469 @@
+//! The lever: from what its box and its spectrum say, or from its dimensions and material,
+//! to stiffness, beam mass and tip mass.
+//!
+//! With k = 3EI/L³ and T = √(mL⁴/EI) the beam's mass is mL = kT²/3, and its first free
+//! frequency, measured with the tip on it, is f₀ = Ω₁(α1)/(2πT), where Ω₁ is the first root of
+//! the exact beam with tip mass α1 = M/(mL). Any two of k, mL and f₀ give the third once the
+//! tip's mass is known; f₂/f₁ depends on α1 alone and tells it.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use super::error::PhysicalError;
+use super::quantity::Kind;
+use super::remark::Remark;
+use super::section::Reader;
+use super::tip::TipMass;
+use crate::model::exact_beam;
+
+/// Dimensions of a beam of rectangular cross-section, in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeamGeometry {
+    /// Length L.
+    pub length: f64,
+    /// Width b.
+    pub width: f64,
+    /// Thickness h, in the direction of bending.
+    pub thickness: f64,
+}
+
+impl BeamGeometry {
+    /// k = 3EI/L³ = E b h³/(4 L³) for Young's modulus E in Pa; in N/m.
+    pub fn stiffness(self, modulus: f64) -> f64 {
+        modulus * self.width * (self.thickness / self.length).powi(3) / 4.0
+    }
+
+    /// mL = ϱ L b h for the density ϱ in kg/m³; in kg.
+    pub fn mass(self, density: f64) -> f64 {
+        density * self.length * self.width * self.thickness
+    }
+}
+
+/// What is known of a lever; SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeverData {
+    /// Static spring constant at the tip, k.
+    pub k: Option<f64>,
+    /// First free resonance in Hz, with the tip, f₀.
+    pub f0: Option<f64>,
+    /// Quality factor of the first free resonance, Q.
+    pub quality_factor: f64,
+    /// Dimensions.
+    pub geometry: Option<BeamGeometry>,
+    /// Young's modulus along the beam.
+    pub modulus: Option<f64>,
+    /// Density.
+    pub density: Option<f64>,
+    /// The mass at its end.
+    pub tip_mass: TipMass,
+}
+
+/// A lever with all that the model needs; SI units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lever {
+    /// Static spring constant at the tip, k = 3EI/L³, in N/m.
+    pub k: f64,
+    /// Mass of the beam without the tip, mL, in kg.
+    pub beam_mass: f64,
+    /// Mass of the tip over mass of the beam, α1.
+    pub tip_mass_ratio: f64,
+    /// First free resonance in Hz, with the tip.
+    pub f0: f64,
+    /// Quality factor of the first free resonance.
+    pub quality_factor: f64,
+    /// Its length in m, if known: only slopes need it.
+    pub length: Option<f64>,
+}
+
+/// The largest tip mass ratio considered. Beyond it the beam is a massless spring to six
+/// digits.
+const LARGEST_RATIO: f64 = 1e6;
+
+impl Lever {
+    /// The lever that the data describe, with remarks on what had to be assumed.
+    ///
+    /// # Errors
+    /// [`PhysicalError`] if the data do not determine a lever or describe an impossible one;
+    /// it says in which range the value would have to lie.
+    pub fn resolve(data: &LeverData) -> Result<(Self, Vec<Remark>), PhysicalError> {
+        check(data)?;
+        let mut remarks = Vec::new();
+        let from_geometry = |material: Option<f64>, property: fn(BeamGeometry, f64) -> f64| {
+            Some(property(data.geometry?, material?))
+        };
+        let bending = from_geometry(data.modulus, BeamGeometry::stiffness);
+        let weight = from_geometry(data.density, BeamGeometry::mass);
+        if let (Some(measured), Some(computed)) = (data.k, bending) {
+            remarks.push(comparison(
+                "spring constant",
+                Kind::Stiffness,
+                measured,
+                computed,
+            ));
+        }
+        let (k, beam_mass, ratio) = match (data.k.or(bending), data.f0, weight) {
+            (Some(k), Some(f0), weight) => {
+                let ratio = ratio_from_resonance(data.tip_mass, k, f0)?;
+                let time = first_frequency(ratio)? / (TAU * f0);
+                let mass = k * time * time / 3.0;
+                if let Some(weight) = weight {
+                    remarks.push(comparison("beam mass", Kind::Mass, mass, weight));
+                }
+                (k, mass, ratio)
+            }
+            (Some(k), None, Some(mass)) => (k, mass, ratio_to_beam(data.tip_mass, mass)?),
+            (None, Some(f0), Some(mass)) => {
+                let ratio = match data.tip_mass {
+                    TipMass::SecondMode(f2) => ratio_from_second_mode(f2, f0)?,
+                    other => ratio_to_beam(other, mass)?,
+                };
+                let time = first_frequency(ratio)? / (TAU * f0);
+                (3.0 * mass / (time * time), mass, ratio)
+            }
+            (Some(_), None, None) => {
+                return Err(PhysicalError::missing(
+                    "cantilever.f0",
+                    "the beam's mass follows from it; else give length, width, thickness and \
+                     density",
+                ));
+            }
+            (None, _, _) => {
+                return Err(PhysicalError::missing(
+                    "cantilever.k",
+                    "give it, or length, width, thickness and modulus, or a lever of the \
+                     catalogue",
+                ));
+            }
+        };
+        let time = (3.0 * beam_mass / k).sqrt();
+        let lever = Self {
+            k,
+            beam_mass,
+            tip_mass_ratio: ratio,
+            f0: data.f0.unwrap_or(first_frequency(ratio)? / (TAU * time)),
+            quality_factor: data.quality_factor,
+            length: data.geometry.map(|geometry| geometry.length),
+        };
+        remarks.extend(lever.remarks(data));
+        Ok((lever, remarks))
+    }
+
+    /// Mass of the tip, M = α1 mL, in kg.
+    pub fn tip_mass(&self) -> f64 {
+        self.tip_mass_ratio * self.beam_mass
+    }
+
+    /// The model's unit of time, T = √(mL⁴/EI) = √(3mL/k), in s.
+    pub fn time_unit(&self) -> f64 {
+        (3.0 * self.beam_mass / self.k).sqrt()
+    }
+
+    /// Ω₁ of the exact free beam with the tip: 2πf₀T.
+    pub fn first_frequency(&self) -> f64 {
+        TAU * self.f0 * self.time_unit()
+    }
+
+    /// The beam's damping α3 that gives the first free resonance its quality factor.
+    ///
+    /// The damping acts along the beam and not on the tip's mass, so the mode that has
+    /// modal mass ∫φ² + α1φ(1)² is damped by α3∫φ² only, and Q = Ω₁(1 + α1φ(1)²/∫φ²)/α3:
+    /// for the bare beam α3 = ω₀₁/Q. Corrections are of order 1/Q².
+    pub fn damping(&self) -> f64 {
+        let omega = self.first_frequency();
+        omega * modal_mass_factor(omega.sqrt(), self.tip_mass_ratio) / self.quality_factor
+    }
+
+    fn remarks(&self, data: &LeverData) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        if let TipMass::SecondMode(f2) = data.tip_mass {
+            let error = data.f0.map_or(f64::NAN, |f0| {
+                ratio_from_second_mode(1.01 * f2, f0).unwrap_or(f64::NAN) - self.tip_mass_ratio
+            });
+            remarks.push(Remark::note(format!(
+                "f2/f1 tells a tip mass of {} ({} of the beam's); 1 % more in f2 would add {} \
+                 to that fraction",
+                Kind::Mass.format(self.tip_mass()),
+                Kind::Number.format(self.tip_mass_ratio),
+                Kind::Number.format_digits(error, 2)
+            )));
+        }
+        if self.tip_mass_ratio > 1.0 {
+            remarks.push(Remark::warning(format!(
+                "the tip is {} times as heavy as the beam",
+                Kind::Number.format(self.tip_mass_ratio)
+            )));
+        }
+        if self.quality_factor < 5.0 {
+            remarks.push(Remark::warning(
+                "at a quality factor below 5 the free amplitude peaks away from f0, and \
+                 damping by a liquid adds mass that this model does not have",
+            ));
+        }
+        if let Some(geometry) = data.geometry
+            && geometry.thickness > 0.1 * geometry.length
+        {
+            remarks.push(Remark::warning(
+                "the beam is thicker than a tenth of its length: shear, which is left out, \
+                 lowers its higher modes",
+            ));
+        }
+        remarks
+    }
+}
+
+fn check(data: &LeverData) -> Result<(), PhysicalError> {
+    let positive = |key: &str, kind: Kind, value: Option<f64>| match value {
+        Some(value) if !(value > 0.0 && value.is_finite()) => Err(PhysicalError::impossible(
+            format!("cantilever.{key}"),
+            kind.format(value),
+            "it must be above zero",
+        )),
+        _ => Ok(()),
+    };
+    positive("k", Kind::Stiffness, data.k)?;
+    positive("f0", Kind::Frequency, data.f0)?;
+    positive("Q", Kind::Number, Some(data.quality_factor))?;
+    positive("modulus", Kind::Pressure, data.modulus)?;
+    positive("density", Kind::Density, data.density)?;
+    if let Some(geometry) = data.geometry {
+        positive("length", Kind::Length, Some(geometry.length))?;
+        positive("width", Kind::Length, Some(geometry.width))?;
+        positive("thickness", Kind::Length, Some(geometry.thickness))?;
+    }
+    let (key, kind, value) = match data.tip_mass {
+        TipMass::Absolute(mass) => ("tip.mass", Kind::Mass, mass),
+        TipMass::Ratio(ratio) => ("tip.mass_ratio", Kind::Number, ratio),
+        TipMass::SecondMode(f2) => ("cantilever.f2", Kind::Frequency, f2),
+    };
+    if value >= 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(PhysicalError::impossible(
+        key,
+        kind.format(value),
+        "it must not be negative",
+    ))
+}
+
+fn comparison(what: &str, kind: Kind, used: f64, other: f64) -> Remark {
+    let text = format!(
+        "{what}: {} is used; dimensions and material give {}",
+        kind.format(used),
+        kind.format(other)
+    );
+    if (used / other).ln().abs() > 2.0_f64.ln() {
+        Remark::warning(text)
+    } else {
+        Remark::note(text)
+    }
+}
+
+/// α1 from the tip's mass where k and f₀ are known: α1Ω₁²(α1) = 3Mω₀²/k, which grows from 0
+/// to 3.
+fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64) -> Result<f64, PhysicalError> {
+    let mass = match tip {
+        TipMass::Ratio(ratio) => return bounded(ratio),
+        TipMass::SecondMode(f2) => return ratio_from_second_mode(f2, f0),
+        TipMass::Absolute(mass) => mass,
+    };
+    let heaviest = k / (TAU * f0).powi(2);
+    let wanted = 3.0 * mass / heaviest;
+    ratio_where(|ratio| Ok(ratio * first_frequency(ratio)?.powi(2) >= wanted))?.ok_or_else(|| {
+        PhysicalError::impossible(
+            "tip.mass",
+            Kind::Mass.format(mass),
+            format!(
+                "with this k and f0 it must be below k/(2 pi f0)^2 = {}, which a beam without \
+                 mass would carry",
+                Kind::Mass.format(heaviest)
+            ),
+        )
+    })
+}
+
+/// α1 where the beam's mass is known.
+fn ratio_to_beam(tip: TipMass, beam_mass: f64) -> Result<f64, PhysicalError> {
+    match tip {
+        TipMass::Ratio(ratio) => bounded(ratio),
+        TipMass::Absolute(mass) => bounded(mass / beam_mass),
+        TipMass::SecondMode(_) => Err(PhysicalError::missing(
+            "cantilever.f0",
+            "f2 tells the tip's mass only together with f0",
+        )),
+    }
+}
+
+fn bounded(ratio: f64) -> Result<f64, PhysicalError> {
+    if ratio <= LARGEST_RATIO {
+        return Ok(ratio);
+    }
+    Err(PhysicalError::impossible(
+        "tip.mass_ratio",
+        Kind::Number.format(ratio),
+        format!("a tip more than {LARGEST_RATIO:e} times as heavy as the beam is not a lever"),
+    ))
+}
+
+/// α1 from the measured f₂/f₁, which grows with α1 from that of the bare beam, 6.2669: at
+/// first with its square, so that light tips are not told from none.
+fn ratio_from_second_mode(f2: f64, f0: f64) -> Result<f64, PhysicalError> {
+    let measured = f2 / f0;
+    let bare = frequency_ratio(0.0)?;
+    let refused = |reason: String| {
+        PhysicalError::impossible(
+            "cantilever.f2",
+            format!(
+                "{} (f2/f1 = {})",
+                Kind::Frequency.format(f2),
+                Kind::Number.format_digits(measured, 5)
+            ),
+            reason,
+        )
+    };
+    if measured < bare {
+        return Err(refused(format!(
+            "a uniform beam with a tip has f2/f1 of at least {bare:.4}, reached without tip \
+             mass; a smaller ratio would need a negative one (a tapered lever, or a torsional mode \
+             taken for the second?); leave f2 out if the difference is within its error"
+        )));
+    }
+    ratio_where(|ratio| Ok(frequency_ratio(ratio)? >= measured))?.ok_or_else(|| {
+        refused(format!(
+            "it must lie above {bare:.4} f1 and below {:.0} f1",
+            frequency_ratio(LARGEST_RATIO).unwrap_or(f64::INFINITY)
+        ))
+    })
+}
+
+/// The α1 up to [`LARGEST_RATIO`] at which a condition begins to hold that, once it holds,
+/// holds for all larger ones; none if it never does.
+fn ratio_where(
+    holds: impl Fn(f64) -> Result<bool, PhysicalError>,
+) -> Result<Option<f64>, PhysicalError> {
+    if holds(0.0)? {
+        return Ok(Some(0.0));
+    }
+    if !holds(LARGEST_RATIO)? {
+        return Ok(None);
+    }
+    // α1 = t/(1 − t) keeps full relative accuracy for light tips and reaches heavy ones.
+    let ratio = |t: f64| t / (1.0 - t);
+    let (mut low, mut high) = (0.0, LARGEST_RATIO / (1.0 + LARGEST_RATIO));
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return Ok(Some(ratio(high)));
+        }
+        if holds(ratio(middle))? {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+}
+
+/// Ω₁ of the exact free beam.
+fn first_frequency(ratio: f64) -> Result<f64, PhysicalError> {
+    Ok(exact_beam::frequencies(ratio, 0.0, 1)?[0])
+}
+
+/// Ω₂/Ω₁ of the exact free beam.
+fn frequency_ratio(ratio: f64) -> Result<f64, PhysicalError> {
+    let frequencies = exact_beam::frequencies(ratio, 0.0, 2)?;
+    Ok(frequencies[1] / frequencies[0])
+}
+
+/// 1 + α1φ(1)²/∫φ² for the free mode of wave number β with tip mass α1.
+///
+/// By Rayleigh's principle d ln ω²/dα1 = −φ(1)²/(∫φ² + α1φ(1)²); the left side follows from
+/// 1 + cos β cosh β = α1 β D, D = sin β cosh β − cos β sinh β, whence with
+/// q = β sin β sinh β/D the factor is (1 + α1 + 2α1q)/(1 − 3α1 + 2α1q).
+fn modal_mass_factor(beta: f64, ratio: f64) -> f64 {
+    let q = if beta < 1.0 {
+        // Both cancel to third order: q = (3/2)(1 − x/360 …)/(1 − x/840 …), x = 4β⁴.
+        let x = 4.0 * beta.powi(4);
+        let upper = 1.0 - x / 360.0 * (1.0 - x / 5040.0 * (1.0 - x / 24024.0));
+        let lower = 1.0 - x / 840.0 * (1.0 - x / 7920.0 * (1.0 - x / 32760.0));
+        1.5 * upper / lower
+    } else {
+        let (sin, cos) = beta.sin_cos();
+        beta * sin * beta.sinh() / (sin * beta.cosh() - cos * beta.sinh())
+    };
+    (1.0 + ratio + 2.0 * ratio * q) / (1.0 - 3.0 * ratio + 2.0 * ratio * q)
+}
+
+pub(crate) const KEYS: &[&str] = &[
+    "lever",
+    "k",
+    "f0",
+    "f2",
+    "Q",
+    "length",
+    "width",
+    "thickness",
+    "modulus",
+    "density",
+];
+
+impl LeverData {
+    /// The section `[cantilever]`; what it does not say comes from a lever of the catalogue.
+    pub(crate) fn read(
+        reader: &Reader<'_>,
+        lever: Option<&super::catalogue::Lever>,
+        tip_mass: Option<TipMass>,
+    ) -> Result<Self, PhysicalError> {
+        let f2 = reader.positive("f2", Kind::Frequency)?;
+        let tip_mass = match (f2, tip_mass) {
+            (Some(_), Some(_)) => {
+                return Err(PhysicalError::conflict(
+                    reader.path("f2"),
+                    "a tip mass in [tip]",
+                    "f2 tells the tip's mass",
+                ));
+            }
+            (Some(f2), None) => TipMass::SecondMode(f2),
+            (None, Some(mass)) => mass,
+            (None, None) => TipMass::Absolute(0.0),
+        };
+        Ok(Self {
+            k: reader
+                .positive("k", Kind::Stiffness)?
+                .or_else(|| lever.map(|lever| lever.k)),
+            f0: reader
+                .positive("f0", Kind::Frequency)?
+                .or_else(|| lever.map(|lever| lever.f0)),
+            quality_factor: reader.positive("Q", Kind::Number)?.ok_or_else(|| {
+                PhysicalError::missing(
+                    reader.path("Q"),
+                    "it depends on what surrounds the lever: a few hundred in air, a few in \
+                     water, tens of thousands in vacuum; take it from the free resonance",
+                )
+            })?,
+            geometry: read_geometry(reader)?.or_else(|| lever.and_then(|lever| lever.geometry)),
+            modulus: reader.positive("modulus", Kind::Pressure)?,
+            density: reader.positive("density", Kind::Density)?,
+            tip_mass,
+        })
+    }
+}
+
+fn read_geometry(reader: &Reader<'_>) -> Result<Option<BeamGeometry>, PhysicalError> {
+    let keys = ["length", "width", "thickness"];
+    if keys.iter().all(|key| reader.text(key).is_none()) {
+        return Ok(None);
+    }
+    let needed = |key: &str| {
+        reader.positive(key, Kind::Length)?.ok_or_else(|| {
+            PhysicalError::missing(
+                reader.path(key),
+                "length, width and thickness are given together or not at all",
+            )
+        })
+    };
+    Ok(Some(BeamGeometry {
+        length: needed("length")?,
+        width: needed("width")?,
+        thickness: needed("thickness")?,
+    }))
+}

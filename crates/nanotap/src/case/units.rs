@@ -1,0 +1,130 @@
+//! The units in which motions are shown: the model's own, or SI where the case has them.
+
+use crate::case::physical::{Kind, Scales};
+
+/// What multiplies the model's numbers before they are shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Units {
+    /// The model's own, without a name.
+    Model,
+    /// SI, with the prefix that fits.
+    Si(Scales),
+}
+
+/// SI prefixes by power of ten.
+const PREFIXES: [(i32, &str); 11] = [
+    (-18, "a"),
+    (-15, "f"),
+    (-12, "p"),
+    (-9, "n"),
+    (-6, "µ"),
+    (-3, "m"),
+    (0, ""),
+    (3, "k"),
+    (6, "M"),
+    (9, "G"),
+    (12, "T"),
+];
+
+impl Units {
+    /// SI where `scales` are known.
+    pub fn of(scales: Option<&Scales>) -> Self {
+        scales.map_or(Self::Model, |scales| Self::Si(*scales))
+    }
+
+    /// The SI value of the model's unit of `kind`; `None` in the model's own units, and
+    /// for kinds that motions do not have.
+    pub fn si(&self, kind: Kind) -> Option<f64> {
+        let Self::Si(scales) = self else { return None };
+        Some(match kind {
+            Kind::Length => scales.length,
+            Kind::Time => scales.time,
+            Kind::Velocity => scales.velocity,
+            Kind::Force => scales.force,
+            Kind::Energy => scales.energy,
+            Kind::Power => scales.power,
+            Kind::Frequency => scales.frequency,
+            _ => return None,
+        })
+    }
+
+    /// For an axis that holds numbers of the model up to `size`: what they are to be
+    /// multiplied with, and the unit in brackets with a blank before it (empty in the
+    /// model's own units).
+    pub fn axis(&self, kind: Kind, size: f64) -> (f64, String) {
+        let Some(si) = self.si(kind) else {
+            return (1.0, String::new());
+        };
+        let (factor, unit) = prefixed(kind, si, size);
+        (factor, format!(" ({unit})"))
+    }
+}
+
+/// For numbers up to `size` of which 1 is `si` in SI: what they are to be multiplied with,
+/// and the unit with the prefix that fits.
+pub fn prefixed(kind: Kind, si: f64, size: f64) -> (f64, String) {
+    // A kilogram has a prefix already.
+    let (unit, si) = if kind == Kind::Mass {
+        ("g", 1e3 * si)
+    } else {
+        (kind.si_unit(), si)
+    };
+    let shown = (size * si).abs();
+    let takes_prefix = kind != Kind::AngularFrequency;
+    let power = if takes_prefix && shown > 0.0 && shown.is_finite() {
+        (3 * (shown.log10() / 3.0).floor() as i32).clamp(-18, 12)
+    } else {
+        0
+    };
+    let prefix = PREFIXES
+        .iter()
+        .find(|(p, _)| *p == power)
+        .map_or("", |(_, name)| name);
+    (si / 10f64.powi(power), format!("{prefix}{unit}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::physical::{Catalogue, Resolved};
+
+    /// A lever of k = 3 N/m with its beam 1 µm above the sample: EI/L³ = 1 N/m, so the
+    /// model's unit of force is 1 µN (see the mapping's own tests for the rest).
+    fn resolved() -> Resolved {
+        let text = "[cantilever]\nk = \"3 N/m\"\nf0 = \"75 kHz\"\nQ = 200\n[sample]\nstiffness = \"20 N/m\"\n\
+                    [drive]\nfrequency = \"75 kHz\"\namplitude = \"1 nm\"\n[gap]\ntip = \"1 nm\"\nbeam = \"1 um\"\n";
+        let source = crate::case::file::Source {
+            name: "case.toml".into(),
+            text: text.into(),
+        };
+        let Ok(crate::case::file::CaseFile::Physical(tables)) =
+            crate::case::file::CaseFile::parse(Some(source), &[])
+        else {
+            panic!("a physical case");
+        };
+        tables.resolve(&Catalogue::builtin().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn axes_take_the_prefix_that_fits() {
+        let units = Units::of(Some(&resolved().scales));
+        let (factor, unit) = units.axis(Kind::Length, 0.02);
+        assert_eq!(unit, " (nm)");
+        // 0.02 of 1 µm is 20 nm.
+        assert!((factor * 0.02 - 20.0).abs() < 1e-9);
+        let (factor, unit) = units.axis(Kind::Force, 0.005);
+        assert_eq!(unit, " (nN)");
+        assert!((factor * 0.005 - 5.0).abs() < 1e-9);
+        assert_eq!(units.axis(Kind::Length, 0.0).1, " (m)");
+        // 3 of 1 ng.
+        let (factor, unit) = prefixed(Kind::Mass, 1e-12, 3.0);
+        assert_eq!(unit, "ng");
+        assert!((factor * 3.0 - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_models_own_units_have_no_name() {
+        assert_eq!(Units::of(None).axis(Kind::Force, 3.0), (1.0, String::new()));
+        assert_eq!(Units::Model.si(Kind::Energy), None);
+    }
+}

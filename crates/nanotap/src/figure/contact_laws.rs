@@ -1,0 +1,101 @@
+//! Figures of the same motion on different samples: loops of force and indentation, and what
+//! becomes of them with the drive frequency.
+
+use nanotap_figures::{Axis, DOUBLE_COLUMN, Dash, Figure, LINES, Legend, Line, Panel, Rule};
+
+use crate::case::physical::Kind;
+use crate::case::units::Units;
+use crate::figure::branch::{Shown, runs};
+use crate::study::branch::PointReport;
+use crate::study::contact_laws::{Comparison, SampleMotion};
+
+/// Loops of force and indentation on each sample; where the orbits were followed, energy
+/// and amplitude against the drive frequency too, unstable dashed.
+pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
+    let loops = loops_panel(comparison, units);
+    if comparison.samples.iter().all(|s| s.branch.is_none()) {
+        return Figure::single(loops).width(110.0).height(80.0);
+    }
+    Figure::new(1, 3)
+        .width(DOUBLE_COLUMN)
+        .height(72.0)
+        .with(loops)
+        .with(followed_panel(comparison, Shown::Dissipation, units))
+        .with(followed_panel(comparison, Shown::FirstHarmonic, units))
+}
+
+/// The largest size of some numbers.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |m, v| m.max(v.abs()))
+}
+
+fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
+    let orbits = || comparison.samples.iter().filter_map(|s| s.orbit.as_ref());
+    let deepest = largest(orbits().map(|o| o.observables.indentation));
+    let strongest = largest(orbits().map(|o| o.observables.peak_force));
+    let (length, length_unit) = units.axis(Kind::Length, deepest);
+    let (force, force_unit) = units.axis(Kind::Force, strongest);
+    let mut panel = Panel::new(
+        // Most of the flight is far off and says nothing.
+        Axis::linear(format!("indentation $-V_T${length_unit}"))
+            .range(-0.25 * length * deepest, 1.05 * length * deepest),
+        Axis::linear(format!("force on the tip{force_unit}")),
+    )
+    .legend(Legend::Above)
+    .with(Rule::horizontal(0.0));
+    for (k, sample) in comparison.samples.iter().enumerate() {
+        let Some(orbit) = &sample.orbit else { continue };
+        let seen = orbit
+            .force_loop
+            .iter()
+            .map(|[x, f]| (length * x, force * f))
+            .map(|(x, f)| {
+                let shown = x >= -0.25 * length * deepest;
+                (if shown { x } else { f64::NAN }, f)
+            });
+        panel = panel.with(
+            Line::new(seen)
+                .colour(LINES[k % LINES.len()])
+                .label(sample.contact.name()),
+        );
+    }
+    panel
+}
+
+fn followed_panel(comparison: &Comparison, shown: Shown, units: &Units) -> Panel {
+    let value = |p: &PointReport| shown.of(&p.sight, &p.multipliers);
+    let points = |s: &SampleMotion| -> Vec<PointReport> {
+        s.branch
+            .as_ref()
+            .map_or_else(Vec::new, |b| b.points.clone())
+    };
+    let all: Vec<PointReport> = comparison.samples.iter().flat_map(points).collect();
+    let (label, kind) = shown.label(true);
+    let (factor, unit) = units.axis(kind, largest(all.iter().map(value)));
+    let (frequency, frequency_unit) =
+        units.axis(Kind::Frequency, largest(all.iter().map(|p| p.parameter)));
+    let mut panel = Panel::new(
+        Axis::linear(format!("drive frequency $Ω${frequency_unit}")).tight(),
+        Axis::linear(format!("{label}{unit}")),
+    );
+    for (k, sample) in comparison.samples.iter().enumerate() {
+        let Some(branch) = &sample.branch else {
+            continue;
+        };
+        for index in 0..branch.branches.len() {
+            let own: Vec<&PointReport> =
+                branch.points.iter().filter(|p| p.branch == index).collect();
+            for (stable, run) in runs(&own) {
+                let curve = run
+                    .iter()
+                    .map(|p| (frequency * p.parameter, factor * value(p)));
+                let mut line = Line::new(curve).colour(LINES[k % LINES.len()]);
+                if !stable {
+                    line = line.dash(Dash::Dashed).width(0.6);
+                }
+                panel = panel.with(line);
+            }
+        }
+    }
+    panel
+}

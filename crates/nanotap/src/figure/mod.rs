@@ -1,0 +1,7 @@
+//! The figures: of each study's report, a description that `nanotap-figures` draws.
+
+pub mod approach;
+pub mod attractors;
+pub mod branch;
+pub mod contact_laws;
+pub mod motion;

@@ -1,0 +1,540 @@
+//! The beam's equations of motion as regimes of a piecewise-linear system: the free beam,
+//! and the sample's force at its tip as a contact law has it.
+//!
+//! Every regime is the free beam's with `M⁻¹p f` added to its accelerations, where the
+//! force f is a combination of the tip's height V_T, its rate and the sample's memory.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::sensitivity::RegimeTangent;
+use nanotap_flow::{
+    Complex, Drive, Exit, FlowError, HarmonicVector, Output, Reset, SpectralBasis, System,
+};
+
+use crate::model::cantilever::CosineTerm;
+use crate::model::contact::dual::Dual;
+use crate::model::contact::law::{Answer, Combination, Law, Square};
+use crate::model::drive_form::Actuation;
+use crate::model::galerkin::{Forcing, Galerkin, Gap, Regime};
+use crate::model::parameter::Parameter;
+use crate::model::spectrum::Spectrum;
+use crate::model::{BeamOutputs, Forgetting, Powers, Product};
+
+/// The free beam in the state (a, ȧ, s), ready for a sample.
+pub(crate) struct Beam<'a> {
+    galerkin: &'a Galerkin,
+    drive: &'a Drive,
+    layout: Layout,
+    /// `ẋ = A x + f` in flight, the memory's row zero.
+    matrix: DMatrix<f64>,
+    forcing: HarmonicVector,
+    /// What a force at the tip adds to ẋ: M⁻¹p at the velocities.
+    kick: DVector<f64>,
+    /// V_T and its rate.
+    height: Output,
+    height_rate: Output,
+}
+
+/// What a beam with its sample shows; see the fields of [`Model`](crate::model::Model).
+pub(crate) struct Outputs {
+    pub(crate) tip: Output,
+    pub(crate) gap: Output,
+    pub(crate) height: Output,
+    pub(crate) force: Vec<Output>,
+    pub(crate) beam: BeamOutputs,
+    pub(crate) forgetting: Option<Forgetting>,
+}
+
+/// Where things stand in a state.
+#[derive(Clone, Copy)]
+struct Layout {
+    modes: usize,
+    memory: usize,
+    tones: usize,
+}
+
+impl Layout {
+    const fn dimension(self) -> usize {
+        2 * self.modes + self.memory
+    }
+
+    /// Weights of the displacements (`block` 0) or velocities (`block` 1).
+    fn row(self, weights: &DVector<f64>, block: usize) -> Output {
+        let mut row = RowDVector::zeros(self.dimension());
+        row.columns_mut(block * self.modes, self.modes)
+            .tr_copy_from(weights);
+        Output::linear(row, self.tones)
+    }
+
+    /// `factor` times the memory.
+    fn memory(self, factor: f64) -> Output {
+        let mut row = RowDVector::zeros(self.dimension());
+        if self.memory > 0 {
+            row[2 * self.modes] = factor;
+        }
+        Output::linear(row, self.tones)
+    }
+
+    /// A vector at the velocities.
+    fn at_velocities(self, v: &DVector<f64>) -> DVector<f64> {
+        let mut state = DVector::zeros(self.dimension());
+        state.rows_mut(self.modes, self.modes).copy_from(v);
+        state
+    }
+
+    /// `[[0, 1], [−K, −C]]`, the memory's row and column zero.
+    fn companion(self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> DMatrix<f64> {
+        let (n, size) = (self.modes, self.dimension());
+        let mut matrix = DMatrix::zeros(size, size);
+        for i in 0..n {
+            matrix[(i, n + i)] = 1.0;
+            for j in 0..n {
+                matrix[(n + i, j)] = -stiffness[(i, j)];
+                matrix[(n + i, n + j)] = -damping[(i, j)];
+            }
+        }
+        matrix
+    }
+
+    /// Accelerations as the forcing of the state equation.
+    fn accelerations(self, of: &Forcing) -> HarmonicVector {
+        let forcing = HarmonicVector::zeros(self.dimension(), self.tones)
+            .with_tone(
+                0,
+                &self.at_velocities(&of.sine),
+                &self.at_velocities(&of.cosine),
+            )
+            .with_constant(&self.at_velocities(&of.constant));
+        match &of.second {
+            Some([sine, cosine]) => {
+                forcing.with_tone(1, &self.at_velocities(sine), &self.at_velocities(cosine))
+            }
+            None => forcing,
+        }
+    }
+
+    fn gap(self, gap: &Gap) -> Output {
+        let output = self
+            .row(&gap.tip, 0)
+            .with_tone(0, gap.sine, 0.0)
+            .with_constant(gap.constant);
+        match gap.second {
+            Some([sine, cosine]) => output.with_tone(1, sine, cosine),
+            None => output,
+        }
+    }
+}
+
+/// `matrix + column · row`, and the same of the forcing.
+fn add_force(
+    matrix: &mut DMatrix<f64>,
+    forcing: &mut HarmonicVector,
+    column: &DVector<f64>,
+    force: &Output,
+) {
+    matrix.ger(1.0, column, &force.row.transpose(), 1.0);
+    forcing.constant.axpy(force.constant, column, 1.0);
+    for (tone, z) in forcing.tones.iter_mut().zip(&force.tones) {
+        *tone += column.map(|v| z * v);
+    }
+}
+
+impl<'a> Beam<'a> {
+    /// The free beam of `galerkin`, with room for a memory or none.
+    pub(crate) fn new(
+        galerkin: &'a Galerkin,
+        drive: &'a Drive,
+        has_memory: bool,
+    ) -> Result<Self, FlowError> {
+        let layout = Layout {
+            modes: galerkin.modes.count(),
+            memory: usize::from(has_memory),
+            tones: drive.frequencies().len(),
+        };
+        let free = Regime::Free.index();
+        let solve = Solve::new(galerkin)?;
+        let matrix = layout.companion(
+            &solve.matrix(&galerkin.stiffness[free]),
+            &solve.matrix(&galerkin.damping[free]),
+        );
+        let forcing = layout.accelerations(&solve.forcing(&galerkin.forcing[free]));
+        let kick = layout.at_velocities(&solve.vector(&galerkin.gap.tip));
+        let height = layout.gap(&galerkin.gap);
+        let height_rate = height.rate(&matrix, &forcing, drive);
+        Ok(Self {
+            galerkin,
+            drive,
+            layout,
+            matrix,
+            forcing,
+            kick,
+            height,
+            height_rate,
+        })
+    }
+
+    /// A combination as an output.
+    fn combined(&self, combination: &Combination) -> Output {
+        self.with_numbers(combination, |dual| dual.value)
+    }
+
+    fn with_numbers(&self, combination: &Combination, number: impl Fn(Dual) -> f64) -> Output {
+        self.height
+            .scaled(number(combination.height))
+            .plus(number(combination.rate), &self.height_rate)
+            .plus(1.0, &self.layout.memory(number(combination.memory)))
+    }
+
+    /// One regime. `known` says that its spectrum is that of a beam with spring and damper
+    /// at its tip, beside a memory that fades by itself.
+    pub(crate) fn regime(
+        &self,
+        regime: Regime,
+        answer: &Answer,
+        known: bool,
+    ) -> Result<nanotap_flow::Regime, FlowError> {
+        let r = regime.index();
+        let (mut matrix, mut forcing) = (self.matrix.clone(), self.forcing.clone());
+        add_force(
+            &mut matrix,
+            &mut forcing,
+            &self.kick,
+            &self.combined(&answer.force),
+        );
+        if let Some(memory) = self.memory_unit() {
+            let rate = self.combined(&answer.memory_rate);
+            add_force(&mut matrix, &mut forcing, &memory, &rate);
+        }
+        if !known {
+            return nanotap_flow::Regime::new(r, matrix, forcing, self.drive);
+        }
+        let basis = if let Ok(s) = Spectrum::new(self.galerkin, regime) {
+            SpectralBasis::from_simple_eigenpairs(s.eigenvalues, s.right_state, s.left_state)?
+        } else {
+            // (Nearly) critical damping has no basis of eigenvectors; the general
+            // decomposition groups what belongs together.
+            let n = 2 * self.layout.modes;
+            let beam = matrix.view((0, 0), (n, n)).into_owned();
+            SpectralBasis::of(&beam, self.drive.period(), r)?
+        };
+        let basis = match self.memory_unit() {
+            Some(_) => with_fading_memory(basis, answer.memory_rate.memory.value),
+            None => basis,
+        };
+        nanotap_flow::Regime::with_basis(r, matrix, forcing, self.drive, basis)
+    }
+
+    /// The memory's direction in the state.
+    fn memory_unit(&self) -> Option<DVector<f64>> {
+        (self.layout.memory > 0).then(|| {
+            let mut unit = DVector::zeros(self.layout.dimension());
+            unit[2 * self.layout.modes] = 1.0;
+            unit
+        })
+    }
+
+    /// The way out of flight, and out of contact.
+    pub(crate) fn exits(&self, law: &Law) -> Vec<Vec<Exit>> {
+        let mut begins = Exit::new(self.combined(&law.gap), 1);
+        let mut ends = Exit::new(self.combined(&law.hold), 0);
+        if let Some([met, left]) = law.onsets {
+            begins = begins.with_onset(met);
+            ends = ends.with_onset(left);
+        }
+        if let Some(left) = &law.left {
+            ends = ends.with_reset(self.memory_jump(&self.combined(left), 1.0));
+        }
+        vec![vec![begins], vec![ends]]
+    }
+
+    /// A jump of the memory to a value, the rest of the state times `rest`.
+    pub(crate) fn memory_jump(&self, value: &Output, rest: f64) -> Reset {
+        let size = self.layout.dimension();
+        let mut matrix = DMatrix::from_diagonal_element(size, size, rest);
+        let mut offset = HarmonicVector::zeros(size, self.layout.tones);
+        if let Some(memory) = self.memory_unit() {
+            let at = 2 * self.layout.modes;
+            matrix.row_mut(at).copy_from(&value.row);
+            offset.constant = &memory * value.constant;
+            for (tone, z) in offset.tones.iter_mut().zip(&value.tones) {
+                *tone = memory.map(|v| z * v);
+            }
+        }
+        Reset { matrix, offset }
+    }
+
+    /// What the joined system shows.
+    pub(crate) fn outputs(&self, law: &Law) -> Outputs {
+        let modes = &self.galerkin.modes;
+        Outputs {
+            tip: self.layout.row(&modes.tip, 0),
+            gap: self.combined(&law.gap),
+            height: self.height.clone(),
+            force: [&law.flight, &law.contact]
+                .map(|answer| self.combined(&answer.force))
+                .into(),
+            beam: BeamOutputs {
+                modes: Arc::clone(modes),
+                slope: self.layout.row(&modes.tip_slope, 0),
+                base: self.base(),
+            },
+            forgetting: law.left.map(|_| Forgetting {
+                rate: law.flight.memory_rate.memory.value,
+                // Contact begins with the force −α6 ġ, and ġ has −ṡ in it: a state that
+                // comes δs/ġ later has missed α6 δs of momentum.
+                kick: &self.kick * -law.contact.force.rate.value,
+            }),
+        }
+    }
+
+    /// The drive itself, α2 sin Ωτ and the second tone.
+    fn drive_output(&self) -> Output {
+        let case = &self.galerkin.case;
+        let drive = self.layout.memory(0.0).with_tone(0, case.alpha2, 0.0);
+        if case.tone2_ratio.is_none() {
+            return drive;
+        }
+        let (sin, cos) = case.tone2_phase.to_radians().sin_cos();
+        drive.with_tone(1, case.tone2_amplitude * cos, case.tone2_amplitude * sin)
+    }
+
+    /// Displacement of the base: the drive, if it acts there.
+    fn base(&self) -> Output {
+        let moves = self.galerkin.case.actuation == Actuation::Base;
+        self.drive_output().scaled(f64::from(u8::from(moves)))
+    }
+
+    /// Energy flows in each regime.
+    pub(crate) fn powers(&self, law: &Law, system: &System) -> Vec<Powers> {
+        [&law.flight, &law.contact]
+            .into_iter()
+            .enumerate()
+            .map(|(r, answer)| self.powers_in(&system.regimes()[r], answer))
+            .collect()
+    }
+
+    /// Energy flows in one regime, in the frame of the resting sample. With y = α2 sin Ωτ,
+    /// the clamp pushes with R = d/dτ(I·ȧ + ẏ + α1(p·ȧ + ẏ)) + α3(I·ȧ + ẏ) − f and
+    /// delivers R ẏ (a drive on the lever itself its force times the speed there, and y = 0);
+    /// the beam's damping, which acts on the velocity of the beam
+    /// through the medium, takes α3 ∫(Ẇ + ẏ)² dξ; the sample takes and stores what its law
+    /// says. The printed Eq. (14) is a further force on the modes, whose work counts as the
+    /// drive's.
+    fn powers_in(&self, flow: &nanotap_flow::Regime, answer: &Answer) -> Powers {
+        let (case, modes) = (&self.galerkin.case, &self.galerkin.modes);
+        let (base, force) = (self.base(), self.combined(&answer.force));
+        let rate = |o: &Output| o.rate(flow.matrix(), flow.forcing(), self.drive);
+        let base_rate = rate(&base);
+        let integral = self.layout.row(&modes.integral, 1);
+        let tip_speed = self.layout.row(&modes.tip, 1).plus(1.0, &base_rate);
+        let mean_speed = integral.plus(1.0, &base_rate);
+        let momentum = mean_speed.plus(case.alpha1, &tip_speed);
+        let clamp = rate(&momentum)
+            .plus(case.alpha3, &mean_speed)
+            .plus(-1.0, &force);
+        let product = |weight, a: &Output, b: &Output| Product {
+            weight,
+            a: a.clone(),
+            b: b.clone(),
+        };
+        let tip_rate = self.layout.row(&modes.tip, 1);
+        let mut drive = vec![match case.actuation {
+            Actuation::Base => product(1.0, &clamp, &base_rate),
+            Actuation::Tip => product(1.0, &self.drive_output(), &tip_rate),
+            Actuation::Distributed => product(1.0, &self.drive_output(), &integral),
+        }];
+        if case.cosine_term == CosineTerm::Printed && case.actuation == Actuation::Base {
+            // Printed minus corrected: of each tone −A α3 (1 − w) I cos(wτ + θ), acting on ȧ.
+            let mut extra = base.clone();
+            for (z, w) in extra.tones.iter_mut().zip(self.drive.frequencies()) {
+                // From sine to cosine is a quarter turn.
+                *z *= Complex::new(0.0, -case.alpha3 * (1.0 - w));
+            }
+            drive.push(product(1.0, &extra, &integral));
+        }
+        let unit = |j: usize, block: usize| {
+            let mut unit = DVector::zeros(case.modes);
+            unit[j] = 1.0;
+            self.layout.row(&unit, block)
+        };
+        // ∫(Ẇ + ẏ)² = |ȧ|² + ẏ (2 I·ȧ + ẏ)
+        let mut squared_speed: Vec<Product> = (0..case.modes)
+            .map(|j| product(1.0, &unit(j, 1), &unit(j, 1)))
+            .collect();
+        squared_speed.push(product(
+            1.0,
+            &base_rate,
+            &integral.scaled(2.0).plus(1.0, &base_rate),
+        ));
+        let weighted = |factor: f64| {
+            squared_speed.iter().map(move |p| Product {
+                weight: p.weight * factor,
+                ..p.clone()
+            })
+        };
+        let mut stored: Vec<Product> = weighted(0.5).collect();
+        stored.push(product(0.5 * case.alpha1, &tip_speed, &tip_speed));
+        stored.extend(
+            (0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))),
+        );
+        stored.extend(self.squares(&answer.stored));
+        Powers {
+            drive,
+            beam: weighted(case.alpha3).collect(),
+            sample: self.squares(&answer.dissipated).collect(),
+            stored,
+        }
+    }
+
+    fn squares<'b>(&'b self, squares: &'b [Square]) -> impl Iterator<Item = Product> + 'b {
+        squares.iter().map(|square| {
+            let of = self.combined(&square.of);
+            Product {
+                weight: square.weight,
+                a: of.clone(),
+                b: of,
+            }
+        })
+    }
+
+    /// The derivative of all this with respect to a parameter.
+    pub(crate) fn derivative(&self, parameter: Parameter) -> Result<BeamTangent, FlowError> {
+        let derivative = self.galerkin.derivative(parameter);
+        let free = Regime::Free.index();
+        let solve = Solve::new(self.galerkin)?;
+        // ∂(M⁻¹K) = M⁻¹(∂K − ∂M M⁻¹K), and so on.
+        let of_matrix = |change: &DMatrix<f64>, of: &DMatrix<f64>| {
+            solve.matrix(&(change - &derivative.mass * solve.matrix(of)))
+        };
+        let of_vector = |change: &DVector<f64>, of: &DVector<f64>| {
+            solve.vector(&(change - &derivative.mass * solve.vector(of)))
+        };
+        let galerkin = self.galerkin;
+        let mut matrix = self.layout.companion(
+            &of_matrix(&derivative.stiffness[free], &galerkin.stiffness[free]),
+            &of_matrix(&derivative.damping[free], &galerkin.damping[free]),
+        );
+        let n = self.layout.modes;
+        matrix.view_mut((0, n), (n, n)).fill(0.0);
+        let (df, f) = (&derivative.forcing[free], &galerkin.forcing[free]);
+        let forcing = self.layout.accelerations(&Forcing {
+            sine: of_vector(&df.sine, &f.sine),
+            cosine: of_vector(&df.cosine, &f.cosine),
+            constant: of_vector(&df.constant, &f.constant),
+            second: df
+                .second
+                .as_ref()
+                .zip(f.second.as_ref())
+                .map(|(df, f)| [0, 1].map(|k| of_vector(&df[k], &f[k]))),
+        });
+        let height = self.layout.gap(&derivative.gap);
+        let mut height_rate = self.layout.row(&derivative.gap.tip, 1);
+        // ∂(iω z) = iω ∂z + i ∂ω z, and every tone's ω goes with Ω.
+        let log_omega = if parameter == Parameter::Omega {
+            1.0 / galerkin.case.omega
+        } else {
+            0.0
+        };
+        for (k, rate) in height_rate.tones.iter_mut().enumerate() {
+            let turn = Complex::new(0.0, self.drive.frequencies()[k]);
+            *rate = turn * (height.tones[k] + self.height.tones[k] * log_omega);
+        }
+        let zero = DVector::zeros(n);
+        let kick = self
+            .layout
+            .at_velocities(&of_vector(&zero, &galerkin.gap.tip));
+        Ok(BeamTangent {
+            matrix,
+            forcing,
+            kick,
+            height,
+            height_rate,
+        })
+    }
+}
+
+/// The derivative of a [`Beam`] with respect to one parameter, at constant drive phase.
+pub(crate) struct BeamTangent {
+    matrix: DMatrix<f64>,
+    forcing: HarmonicVector,
+    kick: DVector<f64>,
+    height: Output,
+    height_rate: Output,
+}
+
+impl BeamTangent {
+    /// The derivative of a combination.
+    pub(crate) fn combined(&self, beam: &Beam<'_>, combination: &Combination) -> Output {
+        beam.with_numbers(combination, |dual| dual.derivative)
+            .plus(combination.height.value, &self.height)
+            .plus(combination.rate.value, &self.height_rate)
+    }
+
+    /// The derivative of a regime.
+    pub(crate) fn regime(&self, beam: &Beam<'_>, answer: &Answer) -> RegimeTangent {
+        let (mut matrix, mut forcing) = (self.matrix.clone(), self.forcing.clone());
+        let mut add = |column: &DVector<f64>, force: &Output| {
+            add_force(&mut matrix, &mut forcing, column, force);
+        };
+        add(&self.kick, &beam.combined(&answer.force));
+        add(&beam.kick, &self.combined(beam, &answer.force));
+        if let Some(memory) = beam.memory_unit() {
+            add(&memory, &self.combined(beam, &answer.memory_rate));
+        }
+        RegimeTangent { matrix, forcing }
+    }
+}
+
+/// M⁻¹.
+struct Solve {
+    mass: nalgebra::Cholesky<f64, nalgebra::Dyn>,
+}
+
+impl Solve {
+    fn new(galerkin: &Galerkin) -> Result<Self, FlowError> {
+        let mass = galerkin.mass.clone().cholesky();
+        mass.map(|mass| Self { mass }).ok_or(FlowError::NotFinite {
+            what: "the mass matrix",
+        })
+    }
+
+    fn matrix(&self, of: &DMatrix<f64>) -> DMatrix<f64> {
+        self.mass.solve(of)
+    }
+
+    fn vector(&self, of: &DVector<f64>) -> DVector<f64> {
+        self.mass.solve(of)
+    }
+
+    fn forcing(&self, of: &Forcing) -> Forcing {
+        Forcing {
+            sine: self.vector(&of.sine),
+            cosine: self.vector(&of.cosine),
+            constant: self.vector(&of.constant),
+            second: of
+                .second
+                .as_ref()
+                .map(|tone| [0, 1].map(|k| self.vector(&tone[k]))),
+        }
+    }
+}
+
+/// The basis of a beam's regime beside one more state that fades at `rate` by itself.
+fn with_fading_memory(basis: SpectralBasis, rate: f64) -> SpectralBasis {
+    let (n, m) = basis.right.shape();
+    let zero = Complex::new(0.0, 0.0);
+    let one = Complex::new(1.0, 0.0);
+    let mut eigenvalues = basis.eigenvalues;
+    eigenvalues.push(Complex::new(rate, 0.0));
+    let mut right = basis.right.resize(n + 1, m + 1, zero);
+    let mut left = basis.left.resize(m + 1, n + 1, zero);
+    right[(n, m)] = one;
+    left[(m, n)] = one;
+    SpectralBasis {
+        eigenvalues,
+        right,
+        left,
+        clusters: basis.clusters,
+    }
+}

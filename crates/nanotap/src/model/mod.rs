@@ -1,0 +1,302 @@
+//! The model of a case as a piecewise-linear system with the outputs that someone
+//! wants to see.
+//!
+//! State: `(a_1 … a_N, ȧ_1 … ȧ_N)` for the cantilever, after which comes the memory of a
+//! sample that recovers (see [`contact`](crate::model::contact)), zero at rest; `(x, ẋ)` for an
+//! oscillator. Regime 0 is free flight. Everything that analyses or shows a motion works on a
+//! [`Model`] and asks no more where it came from.
+
+pub mod beam;
+mod beam_equations;
+pub mod cantilever;
+pub mod contact;
+pub mod drive_form;
+pub mod exact_beam;
+pub mod galerkin;
+pub mod oscillator;
+pub mod parameter;
+pub mod spectrum;
+pub mod strobe;
+
+use std::sync::{Arc, OnceLock};
+
+pub use nanotap_flow::FlowError;
+use nanotap_flow::sensitivity::SystemTangent;
+use nanotap_flow::{Drive, Output, System};
+
+use crate::case::file::CaseFileError;
+use crate::model::beam::Modes;
+use crate::model::beam_equations::Beam;
+use crate::model::cantilever::{Case, CaseError};
+use crate::model::contact::ContactLaw;
+use crate::model::galerkin::{Galerkin, Regime};
+use crate::model::parameter::Parameter;
+
+/// Why a case has no model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// The case itself makes no sense.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The oscillator makes no sense.
+    #[error(transparent)]
+    Oscillator(#[from] crate::model::oscillator::OscillatorError),
+    /// The quantities of a physical case make no sense.
+    #[error(transparent)]
+    Physical(#[from] Box<CaseFileError>),
+    /// Its equations cannot be solved in closed form.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+}
+
+/// A piecewise-linear system with names for what it shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// The system.
+    pub system: Arc<System>,
+    /// Which regimes are contact.
+    pub contact: Vec<bool>,
+    /// Tip displacement relative to the base, W (the oscillator's x).
+    pub tip: Output,
+    /// Height of the tip over the free surface of the sample, positive in flight, negative
+    /// in contact: V_T, less the position of a surface that recovers.
+    pub gap: Output,
+    /// Height V_T of the tip over the undeformed surface; minus the indentation in contact.
+    pub height: Output,
+    /// Force of the sample on the tip, positive when it pushes the tip away; an entry
+    /// a regime.
+    pub force: Vec<Output>,
+    /// What feeds and drains energy: see [`Model::power`].
+    pub(crate) power: PowersOnDemand,
+    /// What an impact takes, as a factor of the square of the gap's rate: ½ m (1 − r²)
+    /// for a rigid stop, 0 otherwise.
+    pub impact_loss: f64,
+    /// The beam's modes, if it is a beam.
+    pub beam: Option<BeamOutputs>,
+    /// How many numbers at the end of the state are the sample's.
+    pub memory: usize,
+    /// Phase of a second tone in rad.
+    pub second_phase: f64,
+    /// What a sample's memory that is overwritten at the end of each contact does to
+    /// volumes of states.
+    pub forgetting: Option<Forgetting>,
+}
+
+/// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
+/// the beam when it is met again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forgetting {
+    /// Its rate in flight, ≤ 0.
+    pub rate: f64,
+    /// How much the state changes per change of `s` where contact begins.
+    pub kick: nalgebra::DVector<f64>,
+}
+
+/// What feeds and drains energy in one regime, as sums of `weight · a · b` over pairs
+/// of outputs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Powers {
+    /// Power that the drive delivers.
+    pub drive: Vec<Product>,
+    /// Power that the beam's own damping takes.
+    pub beam: Vec<Product>,
+    /// Power that the sample's damping takes.
+    pub sample: Vec<Product>,
+    /// Kinetic and elastic energy stored (an energy, not a power).
+    pub stored: Vec<Product>,
+}
+
+/// [`Powers`] of every regime, worked out when first asked for: of the thousands of models
+/// that a sweep sets up, few ever are.
+#[derive(Clone, Debug)]
+pub(crate) struct PowersOnDemand {
+    known: OnceLock<Vec<Powers>>,
+    /// What they follow from, where they are not known from the start.
+    equations: Option<Arc<Galerkin>>,
+}
+
+impl PowersOnDemand {
+    /// Of these equations.
+    pub(crate) fn of(equations: Galerkin) -> Self {
+        Self {
+            known: OnceLock::new(),
+            equations: Some(Arc::new(equations)),
+        }
+    }
+}
+
+impl From<Vec<Powers>> for PowersOnDemand {
+    fn from(known: Vec<Powers>) -> Self {
+        Self {
+            known: known.into(),
+            equations: None,
+        }
+    }
+}
+
+impl PartialEq for PowersOnDemand {
+    /// Whether they are the same, worked out or not.
+    fn eq(&self, other: &Self) -> bool {
+        self.equations == other.equations && (self.equations.is_some() || self.known == other.known)
+    }
+}
+
+/// `weight · a · b`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Product {
+    /// The weight.
+    pub weight: f64,
+    /// One factor.
+    pub a: Output,
+    /// The other.
+    pub b: Output,
+}
+
+/// What only a beam has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BeamOutputs {
+    /// Its modes.
+    pub modes: Arc<Modes>,
+    /// Slope ∂W/∂ξ at the tip: what an optical lever reads.
+    pub slope: Output,
+    /// Displacement of the base: α2 sin Ωτ and what a second tone adds, 0 if the drive acts
+    /// on the lever itself.
+    pub base: Output,
+}
+
+impl BeamOutputs {
+    /// Height V(ξ, τ) = W(ξ, τ) + α2 sin Ωτ + 1 of the beam's point ξ above the sample
+    /// (in units of g₀): where it vanishes, the beam itself touches.
+    pub fn height(&self, xi: f64) -> Output {
+        let shapes = self.modes.shapes(xi);
+        let mut height = self.base.clone().with_constant(1.0);
+        for (r, shape) in height.row.iter_mut().zip(shapes.iter()) {
+            *r = *shape;
+        }
+        height
+    }
+}
+
+impl Model {
+    /// The cantilever of `case`, Eqs. (8)–(18).
+    ///
+    /// # Errors
+    /// When the case is not valid, or a regime is driven at an undamped resonance.
+    pub fn cantilever(case: &Case) -> Result<Self, ModelError> {
+        let galerkin = Galerkin::new(case)?;
+        let drive = drive_of(case)?;
+        let law = ContactLaw::law(case, None);
+        let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
+        let regimes = vec![
+            beam.regime(Regime::Free, &law.flight, true)?,
+            beam.regime(Regime::Contact, &law.contact, law.plain_contact)?,
+        ];
+        let system = Arc::new(System::new(drive.clone(), regimes, beam.exits(&law))?);
+        let outputs = beam.outputs(&law);
+        Ok(Self {
+            contact: vec![false, true],
+            tip: outputs.tip,
+            gap: outputs.gap,
+            height: outputs.height,
+            force: outputs.force,
+            power: PowersOnDemand::of(galerkin),
+            impact_loss: 0.0,
+            beam: Some(outputs.beam),
+            memory: usize::from(law.has_memory),
+            forgetting: outputs.forgetting,
+            second_phase: case.tone2_phase.to_radians(),
+            system,
+        })
+    }
+
+    /// What feeds and drains energy; an entry a regime.
+    pub fn power(&self) -> &[Powers] {
+        self.power.known.get_or_init(|| {
+            let Some(galerkin) = &self.power.equations else {
+                return Vec::new();
+            };
+            let law = ContactLaw::law(&galerkin.case, None);
+            Beam::new(galerkin, self.system.drive(), law.has_memory)
+                .map(|beam| beam.powers(&law, &self.system))
+                .unwrap_or_default()
+        })
+    }
+
+    /// Dimension of the state.
+    pub fn dimension(&self) -> usize {
+        self.system.dimension()
+    }
+
+    /// Speed of the tip displacement, Ẇ (the oscillator's ẋ).
+    pub fn tip_rate(&self) -> Output {
+        // The state holds the velocities, so that every regime says the same.
+        let free = &self.system.regimes()[0];
+        self.tip
+            .rate(free.matrix(), free.forcing(), self.system.drive())
+    }
+
+    /// Displacement of the tip at which it touches: −(α2 sin Ωτ + α5) for the cantilever,
+    /// which moves up from the sample, more or less where a surface recovers; where the stop
+    /// stands for an oscillator.
+    pub fn surface(&self) -> Output {
+        let towards = if self.beam.is_some() { -1.0 } else { 1.0 };
+        self.tip.plus(towards, &self.gap)
+    }
+
+    /// The drive period: that of the stroboscopic map, after which every tone repeats.
+    pub fn period(&self) -> f64 {
+        self.system.drive().period()
+    }
+
+    /// Angular frequency of the drive, of several tones the first.
+    pub fn frequency(&self) -> f64 {
+        let drive = self.system.drive();
+        let first = drive.frequencies().first().copied();
+        first.unwrap_or(std::f64::consts::TAU / drive.period())
+    }
+
+    /// How many periods of the first tone the drive period has.
+    pub fn repetition(&self) -> usize {
+        let first = self.system.drive().harmonics().first().copied();
+        first.unwrap_or(1) as usize
+    }
+}
+
+/// The drive's tones: the first, and the second if there is one.
+fn drive_of(case: &Case) -> Result<Drive, FlowError> {
+    match case.tone2_ratio {
+        None => Drive::single(case.omega),
+        Some(ratio) => Drive::new(case.period(), &[ratio.denominator(), ratio.numerator()]),
+    }
+}
+
+/// The derivative of the cantilever's system with respect to one parameter.
+///
+/// # Errors
+/// As [`Model::cantilever`].
+pub fn cantilever_tangent(
+    case: &Case,
+    model: &Model,
+    parameter: Parameter,
+) -> Result<SystemTangent, ModelError> {
+    let galerkin = Galerkin::new(case)?;
+    let law = ContactLaw::law(case, Some(parameter));
+    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let change = beam.derivative(parameter)?;
+    let mut tangent = SystemTangent::zeros(&model.system);
+    for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
+        tangent.regimes[r] = change.regime(&beam, answer);
+    }
+    tangent.guards = vec![
+        vec![change.combined(&beam, &law.gap)],
+        vec![change.combined(&beam, &law.hold)],
+    ];
+    if let Some(left) = &law.left {
+        let change = change.combined(&beam, left);
+        tangent.resets[1][0] = Some(beam.memory_jump(&change, 0.0));
+    }
+    if parameter == Parameter::Omega {
+        tangent.log_period = -1.0 / case.omega;
+    }
+    Ok(tangent)
+}

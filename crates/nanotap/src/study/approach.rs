@@ -1,0 +1,463 @@
+//! Approach and retract curves: the sample is brought near in steps, then taken away, and at
+//! each distance the motion is followed from where the one before ended, so that hysteresis
+//! shows. Through every periodic motion found, branches are continued in the distance, stable
+//! and unstable, with their folds, flips and grazings located.
+//!
+//! A motion counts only if [`settle()`] could name it: a periodic one is the orbit itself,
+//! closed by Newton and seen to be approached; a chaotic or quasi-periodic one is described
+//! by a recording; of what is undecided no numbers are given.
+//!
+//! The distance is the gap between tip and sample at rest, `alpha5` of the cantilever (zc of
+//! AFM people, with which the piezo moves) and `gap` of an oscillator. The model's unit of
+//! length stays that of the case: the beam's own gap changes with the tip's, but only whether
+//! the beam touches depends on it.
+//!
+//! Fails: a jump is located to a step of the distance only (the fold behind it exactly, where
+//! its branch was followed); of branches that no motion on the way lies on nothing is known.
+
+use nanotap_dynamics::{Control, PeriodicOrbit, SettleOptions, settle};
+use nanotap_flow::Trajectory;
+use serde::Serialize;
+
+use super::FreeMotion;
+use crate::case::subject::{Key, Subject};
+use crate::model::oscillator::OscillatorParameter;
+use crate::model::parameter::Parameter;
+use crate::model::strobe::Strobe;
+use crate::model::{FlowError, Model, ModelError};
+use crate::observe::Clearance;
+use crate::observe::PhysicalSight;
+use crate::study::branch::{BranchError, BranchOptions, BranchReport, Sight, branches_through};
+use crate::study::simulate::{Classification, Named};
+use crate::study::studied::Studied;
+use crate::study::sweep::{SweepOptions, nearest};
+
+/// How to approach. Distances are in the model's unit of length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ApproachOptions {
+    /// Where to begin, far away; `None`: 1.25 times the tip's free reach.
+    pub from: Option<f64>,
+    /// Where to turn back; `None`: 0, where the sample stands at the tip's rest position.
+    pub to: Option<f64>,
+    /// Distances each way, both ends included.
+    pub points: usize,
+    /// Whether branches are continued through the periodic motions found.
+    pub branches: bool,
+    /// Doublings of these that are followed.
+    pub doublings: usize,
+    /// Longest period looked for.
+    pub max_period: usize,
+    /// Periods recorded of a motion that is not periodic.
+    pub periods: usize,
+}
+
+impl Default for ApproachOptions {
+    fn default() -> Self {
+        Self {
+            from: None,
+            to: None,
+            points: 80,
+            branches: true,
+            doublings: 1,
+            max_period: 32,
+            periods: 256,
+        }
+    }
+}
+
+/// Where the default curve begins, in units of the tip's free reach: far enough to see the
+/// free motion, and branches that reach beyond it.
+const BEYOND: f64 = 1.25;
+
+/// Why there is no curve.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ApproachError {
+    /// Fewer than two distances.
+    #[error("{given} distances make no curve: at least 2 are needed")]
+    Points {
+        /// What was given.
+        given: usize,
+    },
+    /// Distances that are none, or the wrong way round.
+    #[error(
+        "an approach goes from far to near: it cannot go from {from} to {to}; the first distance \
+         must be the greater, both finite"
+    )]
+    Range {
+        /// Where it was to begin.
+        from: f64,
+        /// Where it was to end.
+        to: f64,
+    },
+    /// Nothing moves.
+    #[error(
+        "the drive does not move the tip, so that no distance says where the curve should \
+         begin; give it"
+    )]
+    NoDrive,
+    /// Nothing to record.
+    #[error("at least one period must be recorded of motions that are not periodic")]
+    NoPeriods,
+    /// A longest period of 0.
+    #[error("no motion has the longest period 0: at least 1 is needed")]
+    NoPeriod,
+    /// The case makes no sense.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The branches could not be followed.
+    #[error(transparent)]
+    Branch(#[from] BranchError),
+}
+
+/// Which way the sample moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Way {
+    /// Towards the tip.
+    Approach,
+    /// Away from it.
+    Retract,
+}
+
+impl Way {
+    /// The word for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Approach => "approach",
+            Self::Retract => "retract",
+        }
+    }
+}
+
+/// The motion at one distance on one way.
+#[derive(Clone, Debug, Serialize)]
+pub struct ApproachPoint {
+    /// Which way.
+    pub way: Way,
+    /// The distance, in the model's unit of length.
+    pub gap: f64,
+    /// The distance in m, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zc: Option<f64>,
+    /// What the motion is.
+    pub classification: Classification,
+    /// Its minimal period, if periodic.
+    pub period: Option<usize>,
+    /// Largest |multiplier|, if periodic.
+    pub spectral_radius: Option<f64>,
+    /// What it looks like; nothing if undecided or unbounded.
+    #[serde(flatten)]
+    pub sight: Option<Sight>,
+    /// The same in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalSight>,
+    /// Why it is undecided, if it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// The orbit.
+    #[serde(skip)]
+    pub orbit: Option<PeriodicOrbit>,
+}
+
+/// An interval of distances in which approach and retract show different motions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Hysteresis {
+    /// Nearest distance of the interval, in the model's unit of length.
+    pub near: f64,
+    /// Farthest distance.
+    pub far: f64,
+    /// Greatest difference of the amplitude at the drive's frequency within it.
+    pub difference: f64,
+}
+
+/// Approach and retract curves, with the branches behind them.
+#[derive(Clone, Debug, Serialize)]
+pub struct ApproachReport {
+    /// The key of the distance in a case file.
+    pub parameter: &'static str,
+    /// Where the approach begins.
+    pub from: f64,
+    /// Where it turns back.
+    pub to: f64,
+    /// Free amplitude A₀ at the drive's frequency.
+    pub free_amplitude: f64,
+    /// Free phase, degrees behind the drive.
+    pub free_phase: f64,
+    /// Distance at which the free motion begins to touch.
+    pub free_reach: f64,
+    /// The motions in the order in which they were met: there, then back.
+    pub table: Vec<ApproachPoint>,
+    /// Least height of the beam above the sample in the motion at the nearest distance, in the
+    /// model's unit of length: where it is not above zero, another part than the tip touches.
+    pub beam_clearance: Option<f64>,
+    /// Where the two ways differ.
+    pub hysteresis: Vec<Hysteresis>,
+    /// Whether the way back ends in the motion with which the way there began; if not, it
+    /// begins too near.
+    pub returned: bool,
+    /// Branches through the periodic motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub branches: Option<BranchReport>,
+    /// Whether the work was stopped before it was done.
+    pub cancelled: bool,
+}
+
+/// The key of the distance between tip and sample.
+pub const fn gap_key(subject: &Subject) -> Key {
+    match subject {
+        Subject::Cantilever(_) | Subject::Physical(_) => Key::Cantilever(Parameter::Alpha5),
+        Subject::Oscillator(_) => Key::Oscillator(OscillatorParameter::Gap),
+    }
+}
+
+/// Brings the sample near and takes it away.
+///
+/// # Errors
+/// [`ApproachError`] when the options make no sense for the case.
+pub fn approach(
+    studied: &Studied,
+    options: &ApproachOptions,
+    control: &Control<'_>,
+) -> Result<ApproachReport, ApproachError> {
+    let subject = &studied.subject;
+    let key = gap_key(subject);
+    let free = FreeMotion::of(&subject.model()?);
+    let distances = distances(&free, options)?;
+    let (from, to) = (distances[0], distances[distances.len() - 1]);
+    let mut table = Vec::with_capacity(2 * distances.len());
+    let mut walk = Walk {
+        studied,
+        options,
+        settle: budgets(options),
+        state: None,
+    };
+    let there = distances.iter().map(|gap| (Way::Approach, *gap));
+    let back = distances.iter().rev().map(|gap| (Way::Retract, *gap));
+    let total = 2 * distances.len();
+    for (k, (way, gap)) in there.chain(back).enumerate() {
+        if control.is_cancelled() {
+            break;
+        }
+        table.push(walk.step(way, gap)?);
+        if let Some(report) = control.progress {
+            report(k + 1, total);
+        }
+    }
+    let branches = if options.branches && !control.is_cancelled() {
+        let quiet = Control {
+            progress: None,
+            ..*control
+        };
+        branches(subject, key, &table, (from, to), options, &quiet)?
+    } else {
+        None
+    };
+    Ok(ApproachReport {
+        parameter: key.name(),
+        from,
+        to,
+        free_amplitude: free.amplitude,
+        free_phase: free.phase,
+        free_reach: free.reach,
+        beam_clearance: beam_clearance(studied, &table),
+        hysteresis: hysteresis(&table, free.amplitude),
+        returned: returned(&table, free.amplitude),
+        table,
+        branches,
+        cancelled: control.is_cancelled(),
+    })
+}
+
+/// The distances from far to near.
+fn distances(free: &FreeMotion, options: &ApproachOptions) -> Result<Vec<f64>, ApproachError> {
+    if options.points < 2 {
+        return Err(ApproachError::Points {
+            given: options.points,
+        });
+    }
+    if options.periods == 0 {
+        return Err(ApproachError::NoPeriods);
+    }
+    if options.max_period == 0 {
+        return Err(ApproachError::NoPeriod);
+    }
+    if options.from.is_none() && !(free.reach > 0.0 && free.reach.is_finite()) {
+        return Err(ApproachError::NoDrive);
+    }
+    let from = options.from.unwrap_or(BEYOND * free.reach);
+    let to = options.to.unwrap_or_else(|| from.min(0.0));
+    if !(from.is_finite() && to.is_finite() && from > to) {
+        return Err(ApproachError::Range { from, to });
+    }
+    let last = (options.points - 1) as f64;
+    Ok((0..options.points)
+        .map(|k| {
+            let share = k as f64 / last;
+            // Both ends exactly.
+            from * (1.0 - share) + to * share
+        })
+        .collect())
+}
+
+/// Each motion is one of many: a sweep's budgets, but for the patience that a lever of high
+/// quality factor needs.
+fn budgets(options: &ApproachOptions) -> SettleOptions {
+    let sweep = SweepOptions {
+        max_period: options.max_period,
+        ..SweepOptions::new(Vec::new())
+    };
+    SettleOptions {
+        max_transient: 2048,
+        ..sweep.settle()
+    }
+}
+
+/// A motion that is followed.
+struct Walk<'a> {
+    studied: &'a Studied,
+    options: &'a ApproachOptions,
+    settle: SettleOptions,
+    /// Where the last motion ended.
+    state: Option<Vec<f64>>,
+}
+
+impl Walk<'_> {
+    fn step(&mut self, way: Way, gap: f64) -> Result<ApproachPoint, ModelError> {
+        let subject = &self.studied.subject;
+        let model = subject.with(gap_key(subject), gap).model()?;
+        let start = self
+            .state
+            .take()
+            .unwrap_or_else(|| vec![0.0; model.dimension()]);
+        let settled = settle(&mut Strobe::new(&model), &start, &self.settle);
+        let named = Named::of(&settled.verdict);
+        let seen = match (&named.orbit, named.classification) {
+            (Some(orbit), _) => Sight::of(&model, orbit).map(Some),
+            (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
+            (None, _) => self.recorded(&model, &settled.state).map(Some),
+        };
+        let (classification, sight, reason) = match seen {
+            Ok(Some(sight)) => (named.classification, Some(sight), None),
+            Ok(None) => (named.classification, None, Some(named.evidence)),
+            Err(error) => (Classification::Undecided, None, Some(error.to_string())),
+        };
+        // The next motion starts on this one's orbit, not where its decay was when Newton
+        // saw the end of it. A motion that ran off is not followed: the next starts from rest.
+        self.state = match &named.orbit {
+            Some(orbit) => Some(nearest(orbit, &settled.state).to_vec()),
+            None => (classification != Classification::Unbounded).then_some(settled.state),
+        };
+        let resolved = self.studied.resolved.as_ref();
+        Ok(ApproachPoint {
+            way,
+            gap,
+            zc: resolved.map(|resolved| gap * resolved.scales.length),
+            classification,
+            period: named.orbit.as_ref().map(|orbit| orbit.period),
+            spectral_radius: named.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
+            physical: sight
+                .as_ref()
+                .zip(resolved)
+                .map(|(sight, resolved)| PhysicalSight::of(sight, resolved)),
+            sight,
+            reason,
+            orbit: named.orbit,
+        })
+    }
+
+    fn recorded(&self, model: &Model, state: &[f64]) -> Result<Sight, FlowError> {
+        let periods = self.options.periods;
+        let trajectory = Trajectory::record(&model.system, state, periods)?;
+        Ok(Sight::of_recording(model, &trajectory, periods))
+    }
+}
+
+/// Branches through all periodic motions of the table.
+fn branches(
+    subject: &Subject,
+    key: Key,
+    table: &[ApproachPoint],
+    (from, to): (f64, f64),
+    options: &ApproachOptions,
+    control: &Control<'_>,
+) -> Result<Option<BranchReport>, BranchError> {
+    let seeds: Vec<(f64, PeriodicOrbit)> = table
+        .iter()
+        .filter_map(|point| Some((point.gap, point.orbit.clone()?)))
+        .collect();
+    if seeds.is_empty() {
+        return Ok(None);
+    }
+    let how = BranchOptions {
+        doublings: options.doublings,
+        ..BranchOptions::over(key, from, to)
+    };
+    branches_through(subject, &seeds, &how, control).map(Some)
+}
+
+/// Relative difference of amplitudes that is no longer rounding.
+const DIFFERENT: f64 = 1e-6;
+
+/// The intervals in which the two ways differ.
+fn hysteresis(table: &[ApproachPoint], free_amplitude: f64) -> Vec<Hysteresis> {
+    let back: Vec<&ApproachPoint> = table.iter().filter(|p| p.way == Way::Retract).collect();
+    let mut intervals: Vec<Hysteresis> = Vec::new();
+    let mut open = false;
+    for there in table.iter().filter(|p| p.way == Way::Approach) {
+        // The same numbers, since both ways take the same list.
+        let found = back.iter().find(|p| p.gap.to_bits() == there.gap.to_bits());
+        let difference = found.and_then(|back| difference(there, back, free_amplitude));
+        if let Some(difference) = difference {
+            match intervals.last_mut().filter(|_| open) {
+                Some(interval) => {
+                    interval.near = there.gap;
+                    interval.difference = interval.difference.max(difference);
+                }
+                None => intervals.push(Hysteresis {
+                    near: there.gap,
+                    far: there.gap,
+                    difference,
+                }),
+            }
+        }
+        open = difference.is_some();
+    }
+    intervals
+}
+
+/// The beam's clearance at the nearest distance on the way there.
+fn beam_clearance(studied: &Studied, table: &[ApproachPoint]) -> Option<f64> {
+    let nearest = table.iter().rfind(|p| p.way == Way::Approach)?;
+    let orbit = nearest.orbit.as_ref()?;
+    let subject = &studied.subject;
+    let model = subject.with(gap_key(subject), nearest.gap).model().ok()?;
+    let start = orbit.states.first()?;
+    let trajectory = Trajectory::record(&model.system, start, orbit.period).ok()?;
+    let clearance = Clearance::of(&model, &trajectory)?;
+    // The sample moves towards the whole lever; the model's beam stands where the case has it.
+    let moved = studied
+        .resolved
+        .as_ref()
+        .map_or(0.0, |resolved| nearest.gap - resolved.case.alpha5);
+    Some(clearance.height + moved)
+}
+
+fn returned(table: &[ApproachPoint], free_amplitude: f64) -> bool {
+    table
+        .first()
+        .zip(table.last())
+        .is_some_and(|(first, last)| difference(first, last, free_amplitude).is_none())
+}
+
+/// How much two motions at one distance differ; `None` if they are one as far as is known.
+/// Recordings of one chaotic band never agree to the digit, so that only what both periodic
+/// motions are, or the class, counts.
+fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Option<f64> {
+    let (x, y) = (a.sight.as_ref()?, b.sight.as_ref()?);
+    let amplitudes = (x.first_harmonic - y.first_harmonic).abs();
+    let periodic = a.period.is_some() && b.period.is_some();
+    let differ = a.classification != b.classification
+        || a.period != b.period
+        || (periodic && amplitudes > DIFFERENT * free_amplitude);
+    differ.then_some(amplitudes)
+}

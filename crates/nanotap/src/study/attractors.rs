@@ -1,0 +1,457 @@
+//! Every motion that coexists: a census from many seeded starts, each attractor with what
+//! can be read off it.
+
+use nanotap_dynamics::{
+    AttractorKind, Census, CensusOptions, Control, Fraction, OrbitSearch, PeriodicOrbit,
+    SettleOptions, StartBox, StartBoxError, census, find_orbits,
+};
+use serde::Serialize;
+
+use crate::case::physical::Resolved;
+use crate::model::Model;
+use crate::model::strobe::Strobe;
+use crate::observe::time_series::state_names;
+use crate::observe::{Observables, PhysicalMotion};
+use crate::study::orbit::{OrbitError, OrbitReport, report};
+use crate::study::simulate::{Classification, SimulateError, largest_exponent, observe};
+use crate::study::start_box::default_box;
+
+/// How to look for attractors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AttractorsOptions {
+    /// Starts.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Where the starts lie; `None`: [`default_box`].
+    pub start_box: Option<StartBox>,
+    /// Budgets of each start.
+    pub settle: SettleOptions,
+    /// Starts settled before any attractor is known.
+    pub pilots: usize,
+    /// Longest period of unstable orbits to list; 0: none.
+    pub unstable: usize,
+    /// Harmonics reported of each orbit.
+    pub harmonics: usize,
+}
+
+impl Default for AttractorsOptions {
+    fn default() -> Self {
+        let census = CensusOptions::default();
+        Self {
+            starts: 256,
+            seed: 1,
+            start_box: None,
+            settle: census.settle,
+            pilots: census.pilots,
+            unstable: 0,
+            harmonics: 20,
+        }
+    }
+}
+
+/// Why there was no census.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum AttractorsError {
+    /// Nothing to start from.
+    #[error("at least one start is needed, 0 were asked for")]
+    NoStarts,
+    /// More than fit in memory.
+    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
+    TooManyStarts {
+        /// How many were asked for.
+        starts: usize,
+    },
+    /// The box makes no sense.
+    #[error(transparent)]
+    Box(#[from] StartBoxError),
+    /// The box has another dimension than the model.
+    #[error("the box has {found} sides where {expected} are needed")]
+    Dimension {
+        /// Its sides.
+        found: usize,
+        /// The dimension of the model.
+        expected: usize,
+    },
+    /// An attractor could not be followed once more.
+    #[error(transparent)]
+    Motion(#[from] SimulateError),
+    /// An orbit could not be followed once more.
+    #[error(transparent)]
+    Orbit(#[from] OrbitError),
+}
+
+/// What a census found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Attractors {
+    /// Starts.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Where the starts lay: name of the coordinate, lower and upper end.
+    #[serde(rename = "box")]
+    pub sides: Vec<Side>,
+    /// Attractors, most frequent first.
+    pub attractors: Vec<AttractorReport>,
+    /// Starts without a verdict.
+    pub undecided: Vec<UndecidedStart>,
+    /// Part of the starts without a verdict.
+    pub undecided_fraction: Share,
+    /// Part of the starts that left every bound.
+    pub unbounded: Share,
+    /// Chaos that ends, if some starts escaped from it while others had not yet.
+    pub transient_chaos: Option<TransientChaosReport>,
+    /// Unstable orbits, if they were looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unstable: Option<Vec<OrbitReport>>,
+    /// Whether the work was stopped before all starts were done.
+    pub cancelled: bool,
+}
+
+/// A side of the box of starts.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Side {
+    /// The coordinate.
+    pub coordinate: String,
+    /// Lower end.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+}
+
+/// A part of the starts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Share {
+    /// How many.
+    pub count: usize,
+    /// As a part of all.
+    pub fraction: f64,
+    /// Its 95 % interval (Wilson's).
+    pub fraction_interval: [f64; 2],
+}
+
+impl From<Fraction> for Share {
+    fn from(f: Fraction) -> Self {
+        Self {
+            count: f.count,
+            fraction: f.estimate,
+            fraction_interval: [f.low, f.high],
+        }
+    }
+}
+
+/// One attractor.
+#[derive(Clone, Debug, Serialize)]
+pub struct AttractorReport {
+    /// What it is.
+    pub classification: Classification,
+    /// What part of the starts goes there.
+    #[serde(flatten)]
+    pub share: Share,
+    /// Lyapunov exponents per drive period, largest first; of an orbit from its multipliers.
+    pub lyapunov: Vec<f64>,
+    /// One standard error of each, where they are measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lyapunov_errors: Option<Vec<f64>>,
+    /// Why it is named so, in words.
+    pub evidence: String,
+    /// The orbit, if it is periodic.
+    #[serde(flatten)]
+    pub orbit: Option<OrbitReport>,
+    /// What was seen of it, if it is not.
+    #[serde(flatten)]
+    pub wandering: Option<Wandering>,
+    /// The same in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalMotion>,
+}
+
+impl Attractors {
+    /// The same with every attractor told in SI too, of the case `resolved`.
+    #[must_use]
+    pub fn in_si(mut self, resolved: &Resolved) -> Self {
+        for attractor in &mut self.attractors {
+            attractor.physical = match (&attractor.orbit, &attractor.wandering) {
+                (Some(orbit), _) => Some(PhysicalMotion::of(
+                    &orbit.observables,
+                    Some(&orbit.spectrum),
+                    resolved,
+                )),
+                (None, Some(seen)) => Some(PhysicalMotion::of(&seen.observables, None, resolved)),
+                (None, None) => None,
+            };
+        }
+        self
+    }
+}
+
+/// A motion that does not repeat.
+#[derive(Clone, Debug, Serialize)]
+pub struct Wandering {
+    /// None.
+    pub period: Option<usize>,
+    /// A state on it, at drive phase 0.
+    pub state: Vec<f64>,
+    /// What can be read off it over [`OBSERVED_PERIODS`] periods.
+    #[serde(flatten)]
+    pub observables: Observables,
+}
+
+/// A start without a verdict.
+#[derive(Clone, Debug, Serialize)]
+pub struct UndecidedStart {
+    /// Its number.
+    pub start: usize,
+    /// Where it began.
+    pub state: Vec<f64>,
+    /// Why there is none.
+    pub reason: String,
+}
+
+/// Chaos that ends.
+#[derive(Clone, Debug, Serialize)]
+pub struct TransientChaosReport {
+    /// Lyapunov exponents per drive period while it lasts.
+    pub lyapunov: Vec<f64>,
+    /// One standard error of each.
+    pub lyapunov_errors: Vec<f64>,
+    /// Mean lifetime in drive periods.
+    pub lifetime: f64,
+    /// Its 95 % interval.
+    pub lifetime_interval: [f64; 2],
+    /// Escapes that it rests on.
+    pub escapes: usize,
+    /// Part of the starts still wandering at the end.
+    pub wandering: Share,
+    /// Where the escaped ones went: index of the attractor and how many.
+    pub destinations: Vec<(usize, usize)>,
+}
+
+/// Most starts of a census: 480 MB of states at N = 3.
+pub const MOST_STARTS: usize = 10_000_000;
+/// Drive periods over which a motion that does not repeat is observed.
+pub const OBSERVED_PERIODS: usize = 512;
+/// A state this many times larger than the box has left every bound.
+const OUT_OF_BOUNDS: f64 = 1e6;
+
+/// Takes the census.
+///
+/// # Errors
+/// [`AttractorsError`] when the options make no sense.
+pub fn attractors(
+    model: &Model,
+    options: &AttractorsOptions,
+    control: &Control<'_>,
+) -> Result<Attractors, AttractorsError> {
+    if options.starts == 0 {
+        return Err(AttractorsError::NoStarts);
+    }
+    if options.starts > MOST_STARTS {
+        return Err(AttractorsError::TooManyStarts {
+            starts: options.starts,
+        });
+    }
+    let start_box = options
+        .start_box
+        .clone()
+        .map_or_else(|| default_box(model), Ok)?;
+    if start_box.dimension() != model.dimension() {
+        let (found, expected) = (start_box.dimension(), model.dimension());
+        return Err(AttractorsError::Dimension { found, expected });
+    }
+    let starts = start_box.starts(options.seed, options.starts);
+    let map = Strobe::new(model);
+    let settle = bounded(&options.settle, &start_box);
+    let found = census(
+        &map,
+        &starts,
+        &CensusOptions {
+            pilots: options.pilots,
+            settle,
+        },
+        control,
+    );
+    let unstable = if options.unstable > 0 {
+        Some(unstable_orbits(model, &map, &starts, options, control)?)
+    } else {
+        None
+    };
+    let sides = state_names(model)
+        .into_iter()
+        .zip(start_box.lower().iter().zip(start_box.upper()))
+        .map(|(coordinate, (&lower, &upper))| Side {
+            coordinate,
+            lower,
+            upper,
+        })
+        .collect();
+    described(model, &found, &starts, options, sides, unstable)
+}
+
+/// The budgets with a bound on the states that fits the box.
+fn bounded(settle: &SettleOptions, start_box: &StartBox) -> SettleOptions {
+    let widest = start_box
+        .lower()
+        .iter()
+        .chain(start_box.upper())
+        .fold(0.0, |m: f64, v| m.max(v.abs()));
+    let bound = if widest > 0.0 {
+        OUT_OF_BOUNDS * widest
+    } else {
+        settle.bound
+    };
+    SettleOptions {
+        bound,
+        ..settle.clone()
+    }
+}
+
+fn described(
+    model: &Model,
+    found: &Census,
+    starts: &[Vec<f64>],
+    options: &AttractorsOptions,
+    sides: Vec<Side>,
+    unstable: Option<Vec<OrbitReport>>,
+) -> Result<Attractors, AttractorsError> {
+    let attractors = found
+        .attractors
+        .iter()
+        .map(|a| one(model, &a.kind, &a.state, a.fraction, options.harmonics))
+        .collect::<Result<_, _>>()?;
+    let transient_chaos = found
+        .transient_chaos
+        .as_ref()
+        .map(|t| TransientChaosReport {
+            lyapunov: t.spectrum.exponents.clone(),
+            lyapunov_errors: t.spectrum.errors.clone(),
+            lifetime: t.lifetime.mean,
+            lifetime_interval: [t.lifetime.low, t.lifetime.high],
+            escapes: t.lifetime.escapes,
+            wandering: t.wandering.into(),
+            destinations: t.destinations.clone(),
+        });
+    Ok(Attractors {
+        starts: starts.len(),
+        seed: options.seed,
+        sides,
+        attractors,
+        undecided: found
+            .undecided
+            .iter()
+            .map(|(k, reason)| UndecidedStart {
+                start: *k,
+                state: starts[*k].clone(),
+                reason: reason.to_string(),
+            })
+            .collect(),
+        undecided_fraction: Fraction::new(found.undecided.len(), starts.len()).into(),
+        unbounded: found.unbounded.into(),
+        transient_chaos,
+        unstable,
+        cancelled: found.cancelled,
+    })
+}
+
+fn one(
+    model: &Model,
+    kind: &AttractorKind,
+    state: &[f64],
+    fraction: Fraction,
+    harmonics: usize,
+) -> Result<AttractorReport, AttractorsError> {
+    let wandering = || -> Result<Option<Wandering>, AttractorsError> {
+        let observables = observe(model, state, OBSERVED_PERIODS)?;
+        Ok(Some(Wandering {
+            period: None,
+            state: state.to_vec(),
+            observables,
+        }))
+    };
+    let (classification, spectrum, evidence, orbit, wandering) = match kind {
+        AttractorKind::Periodic(orbit) => {
+            let evidence = format!(
+                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
+                orbit.period,
+                orbit.residual,
+                orbit.spectral_radius()
+            );
+            (Classification::Periodic, None, evidence, Some(orbit), None)
+        }
+        AttractorKind::QuasiPeriodic(torus) => {
+            let evidence = format!(
+                "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
+                largest_exponent(&torus.spectrum),
+                torus.birkhoff_digits,
+                torus.nearest_return
+            );
+            (
+                Classification::QuasiPeriodic,
+                Some(&torus.spectrum),
+                evidence,
+                None,
+                wandering()?,
+            )
+        }
+        AttractorKind::Chaotic { spectrum, lifetime } => {
+            let evidence = format!(
+                "{}; none of {} starts escaped in {:.0} periods together (mean lifetime above {:.0} at 95 %)",
+                largest_exponent(spectrum),
+                fraction.count,
+                lifetime.exposure,
+                lifetime.low
+            );
+            (
+                Classification::Chaotic,
+                Some(spectrum),
+                evidence,
+                None,
+                wandering()?,
+            )
+        }
+    };
+    Ok(AttractorReport {
+        classification,
+        share: fraction.into(),
+        lyapunov: spectrum.map_or_else(
+            || orbit.map_or_else(Vec::new, orbit_exponents),
+            |s| s.exponents.clone(),
+        ),
+        lyapunov_errors: spectrum.map(|s| s.errors.clone()),
+        evidence,
+        orbit: orbit.map(|o| report(model, o, harmonics)).transpose()?,
+        wandering,
+        physical: None,
+    })
+}
+
+/// Lyapunov exponents of an orbit: log|μ| a drive period.
+pub fn orbit_exponents(orbit: &PeriodicOrbit) -> Vec<f64> {
+    orbit
+        .multipliers
+        .iter()
+        .map(|m| m.norm().ln() / orbit.period as f64)
+        .collect()
+}
+
+/// Starts from which unstable orbits are looked for.
+const SEARCHED_STARTS: usize = 64;
+
+fn unstable_orbits(
+    model: &Model,
+    map: &Strobe,
+    starts: &[Vec<f64>],
+    options: &AttractorsOptions,
+    control: &Control<'_>,
+) -> Result<Vec<OrbitReport>, AttractorsError> {
+    let search = OrbitSearch {
+        max_period: options.unstable,
+        ..OrbitSearch::default()
+    };
+    let searched = &starts[..starts.len().min(SEARCHED_STARTS)];
+    find_orbits(map, searched, &search, control)
+        .iter()
+        .filter(|orbit| !orbit.is_stable())
+        .map(|orbit| Ok(report(model, orbit, options.harmonics)?))
+        .collect()
+}

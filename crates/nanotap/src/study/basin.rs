@@ -1,0 +1,743 @@
+//! Basins of attraction on a two-dimensional slice of initial states.
+//!
+//! First the attractors: a census of quasi-random starts in the slice itself, or of
+//! states that were given. Then every point of the slice is followed until it is inside
+//! a neighbourhood that contracts to one of them ([`nanotap_dynamics::basin`], which says
+//! what that proves and what is evidence only).
+//!
+//! An attractor that is met by fewer than about one start in the number of the census is
+//! missed; its basin shows as "unsettled".
+
+use nanotap_dynamics::{
+    Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, Control, Label,
+    LyapunovOptions, SettleOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
+};
+use nanotap_figures::{
+    Axis as FigureAxis, CategoryMap, Colour, Figure, Legend, Markers, ONE_AND_A_HALF_COLUMNS,
+    Panel, Points, Shape, category,
+};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::case::subject::Subject;
+use crate::dataset::schema::Kind;
+use crate::dataset::{
+    Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
+    attributes, chunk_files, work,
+};
+use crate::model::ModelError;
+use crate::model::strobe::Strobe;
+use crate::observe::time_series::state_names;
+use crate::study::attractors::MOST_STARTS;
+use crate::study::simulate::{Classification, SimulateError, starting_state};
+
+/// Most points along an axis, and of a slice.
+const MOST: usize = 1_000_000;
+const MOST_POINTS: usize = 4_000_000_000;
+/// Points that a chunk should not exceed, and chunks that a large slice is cut into.
+const CHUNK_POINTS: usize = 1 << 20;
+const CHUNKS: usize = 64;
+/// Strobe points by which an attractor is shown.
+const SHOWN: usize = 512;
+/// Labels of points that go to no attractor.
+const UNSETTLED: i32 = -1;
+const UNBOUNDED: i32 = -2;
+const FAILED: i32 = -3;
+/// The computed variable, and the attribute with the list of attractors.
+const VARIABLE: &str = "attractor";
+const ATTRACTORS: &str = "attractors";
+/// The attribute with the names of the entries of a state.
+const ENTRIES: &str = "state_entries";
+
+/// One axis of a slice: `a1=-1:1:200`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SliceRange {
+    /// The name of the entry of the state.
+    pub name: String,
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// How many values, both ends included.
+    pub count: usize,
+}
+
+impl SliceRange {
+    /// Reads `name=from:to:count`.
+    ///
+    /// # Errors
+    /// [`BasinError::Range`] with what was given and what would be right.
+    pub fn parse(given: &str) -> Result<Self, BasinError> {
+        let refuse = |what: String| BasinError::Range {
+            given: given.into(),
+            what,
+        };
+        let form =
+            || refuse("write it as in a1=-1:1:200: name, first value, last value, count".into());
+        let (name, range) = given.split_once('=').ok_or_else(form)?;
+        let parts: Vec<&str> = range.split(':').map(str::trim).collect();
+        let [from, to, count] = parts.as_slice() else {
+            return Err(form());
+        };
+        let number = |text: &str| match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(refuse(format!("`{text}` is no finite number"))),
+        };
+        let (from, to) = (number(from)?, number(to)?);
+        let count = count
+            .parse()
+            .map_err(|_| refuse(format!("`{count}` is no whole number")))?;
+        if !(2..=MOST).contains(&count) {
+            return Err(refuse(format!(
+                "{count} points; from 2 to {MOST} can be had"
+            )));
+        }
+        if from >= to {
+            return Err(refuse(format!(
+                "from {from} to {to}; the last value must be greater"
+            )));
+        }
+        Ok(Self {
+            name: name.trim().into(),
+            from,
+            to,
+            count,
+        })
+    }
+
+    fn axis(&self, names: &[String]) -> Result<SliceAxis, BasinError> {
+        let coordinate =
+            names
+                .iter()
+                .position(|n| *n == self.name)
+                .ok_or_else(|| BasinError::Name {
+                    given: self.name.clone(),
+                    known: names.join(", "),
+                })?;
+        Ok(SliceAxis {
+            coordinate,
+            from: self.from,
+            to: self.to,
+            count: self.count,
+        })
+    }
+}
+
+/// Which slice, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BasinOptions {
+    /// The horizontal axis.
+    pub x: SliceRange,
+    /// The vertical axis.
+    pub y: SliceRange,
+    /// The other entries of the state (those of the axes do not matter); `None`: 0.
+    pub state: Option<Vec<f64>>,
+    /// States on the attractors, if they are known; `None`: a census finds them.
+    pub attractors: Option<Vec<Vec<f64>>>,
+    /// Starts of the census.
+    pub starts: usize,
+    /// Their seed.
+    pub seed: u64,
+    /// Periods after which a point is called unsettled.
+    pub periods: usize,
+    /// Longest period looked for.
+    pub max_period: usize,
+}
+
+impl BasinOptions {
+    /// The slice through rest, with a census of 64 starts and up to 1000 periods a point.
+    pub fn new(x: SliceRange, y: SliceRange) -> Self {
+        let (starts, periods, max_period) = (64, 1000, 64);
+        Self {
+            x,
+            y,
+            state: None,
+            attractors: None,
+            starts,
+            seed: 1,
+            periods,
+            max_period,
+        }
+    }
+
+    fn settle(&self) -> SettleOptions {
+        SettleOptions {
+            max_period: self.max_period,
+            lyapunov: LyapunovOptions {
+                max_periods: 5000,
+                ..LyapunovOptions::default()
+            },
+            ..SettleOptions::default()
+        }
+    }
+}
+
+/// Why basins could not be computed.
+#[derive(Debug, thiserror::Error)]
+pub enum BasinError {
+    /// Words that are no axis.
+    #[error("`{given}`: {what}")]
+    Range {
+        /// What was given.
+        given: String,
+        /// What is wrong, and what would be right.
+        what: String,
+    },
+    /// A name that is no entry of the state.
+    #[error("the state has no entry `{given}`; there are {known}")]
+    Name {
+        /// What was given.
+        given: String,
+        /// What there is.
+        known: String,
+    },
+    /// More than fit in memory.
+    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
+    TooManyStarts {
+        /// How many were asked for.
+        starts: usize,
+    },
+    /// A number that must be larger.
+    #[error("{what}; at least 1 is needed")]
+    Zero {
+        /// What was 0.
+        what: &'static str,
+    },
+    /// The slice makes no sense.
+    #[error(transparent)]
+    Slice(#[from] nanotap_dynamics::BasinError),
+    /// A state does not fit.
+    #[error(transparent)]
+    State(#[from] SimulateError),
+    /// The case makes no sense.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Nothing attracts.
+    #[error("no attractor was found: {why}")]
+    NoAttractor {
+        /// What the starts came to instead.
+        why: String,
+    },
+    /// Stopped during the census.
+    #[error("stopped before the attractors were known")]
+    Cancelled,
+}
+
+/// An attractor, as the dataset holds it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// What it is.
+    pub classification: String,
+    /// Its minimal period, if it is an orbit.
+    pub period: Option<usize>,
+    /// Largest modulus of a multiplier, if it is an orbit.
+    pub multiplier: Option<f64>,
+    /// Largest Lyapunov exponent a period, if it was measured.
+    pub lyapunov: Option<f64>,
+    /// States at drive phase 0: a whole orbit, or a stretch of another motion.
+    pub states: Vec<Vec<f64>>,
+}
+
+/// Basins on a slice: prepared, ready to be computed chunk by chunk.
+#[derive(Debug)]
+pub struct Basin {
+    map: Strobe,
+    basins: Basins,
+    schema: Schema,
+    known: Vec<Known>,
+}
+
+impl Basin {
+    /// Checks the options and finds the attractors.
+    ///
+    /// # Errors
+    /// When the options make no sense, nothing attracts, or `control` stopped it.
+    pub fn new(
+        subject: &Subject,
+        options: &BasinOptions,
+        control: &Control<'_>,
+    ) -> Result<Self, BasinError> {
+        for (what, number) in [
+            ("0 starts", options.starts),
+            ("0 periods a point", options.periods),
+            ("0 as the longest period", options.max_period),
+        ] {
+            if number == 0 {
+                return Err(BasinError::Zero { what });
+            }
+        }
+        if options.starts > MOST_STARTS {
+            return Err(BasinError::TooManyStarts {
+                starts: options.starts,
+            });
+        }
+        if options.x.count.saturating_mul(options.y.count) > MOST_POINTS {
+            let what = format!(
+                "{} by {} points; {MOST_POINTS} at most",
+                options.x.count, options.y.count
+            );
+            return Err(BasinError::Range {
+                given: options.x.name.clone(),
+                what,
+            });
+        }
+        let model = subject.model()?;
+        let names = state_names(&model);
+        let origin = starting_state(&model, options.state.as_deref())?;
+        let slice = Slice::new(origin, options.x.axis(&names)?, options.y.axis(&names)?)?;
+        let starts = match &options.attractors {
+            Some(states) => {
+                for state in states {
+                    starting_state(&model, Some(state))?;
+                }
+                states.clone()
+            }
+            None => starts_in(&slice, model.dimension(), options)?,
+        };
+        let map = Strobe::new(&model);
+        let how = CensusOptions {
+            settle: options.settle(),
+            ..CensusOptions::default()
+        };
+        let found = census(&map, &starts, &how, control);
+        if found.cancelled {
+            return Err(BasinError::Cancelled);
+        }
+        if found.attractors.is_empty() {
+            let why = format!(
+                "of {} starts {} left every bound, {} remained undecided{}",
+                starts.len(),
+                found.unbounded.count,
+                found.undecided.len(),
+                found
+                    .undecided
+                    .first()
+                    .map_or(String::new(), |(_, reason)| format!(" ({reason})")),
+            );
+            return Err(BasinError::NoAttractor { why });
+        }
+        let known: Vec<Known> = found
+            .attractors
+            .iter()
+            .map(|a| Known::of(a, &mut map.clone()))
+            .collect();
+        let budget = Budget {
+            max_periods: options.periods,
+            ..Budget::default()
+        };
+        let basins = Basins::new(&map, slice, &found.attractors, budget)?;
+        let schema = schema(subject, options, &names, &basins, &known);
+        Ok(Self {
+            map,
+            basins,
+            schema,
+            known,
+        })
+    }
+
+    /// What its dataset holds.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    /// The attractors; a label is an index into them.
+    pub fn attractors(&self) -> &[Known] {
+        &self.known
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.basins.len()
+    }
+
+    /// Computes the chunks that `store`, made for [`schema`](Self::schema), still lacks.
+    ///
+    /// # Errors
+    /// When the work was stopped (what is finished stays), or the store refuses.
+    pub fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
+        work(
+            store,
+            how,
+            rows,
+            |block, item| Some(self.row(block, item)),
+            |_, rows| columns(&rows),
+        )
+    }
+
+    /// The files of one chunk, computed on this thread: the same bytes wherever that is.
+    /// `None` when it was stopped, and for a chunk that there is not.
+    pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        let grid = &self.schema.grid;
+        let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
+        let labels = (0..rows(&block))
+            .map(|item| (!control.is_cancelled()).then(|| self.row(&block, item)))
+            .collect::<Option<Vec<_>>>()?;
+        Some(chunk_files(&self.schema, &block, &columns(&labels)))
+    }
+
+    /// The labels of one row of the slice.
+    fn row(&self, block: &Block, item: usize) -> Vec<Label> {
+        let length = self.schema.grid.axes[1].length;
+        let y = block.ranges[0].start + item;
+        let range = y * length..(y + 1) * length;
+        self.basins.chunk(&mut self.map.clone(), range)
+    }
+}
+
+/// Rows of the slice in a chunk.
+fn rows(block: &Block) -> usize {
+    block.ranges[0].len()
+}
+
+fn columns(rows: &[Vec<Label>]) -> Vec<Values> {
+    vec![Values::Whole(
+        rows.iter().flatten().copied().map(number).collect(),
+    )]
+}
+
+/// Quasi-random starts in the slice.
+fn starts_in(
+    slice: &Slice,
+    dimension: usize,
+    options: &BasinOptions,
+) -> Result<Vec<Vec<f64>>, BasinError> {
+    // The first point has the least values along both axes, the last the greatest.
+    let (mut lower, mut upper) = (vec![0.0; dimension], vec![0.0; dimension]);
+    slice.state(0, &mut lower);
+    slice.state(slice.len() - 1, &mut upper);
+    let sides = StartBox::new(lower, upper).map_err(|error| BasinError::Range {
+        given: options.x.name.clone(),
+        what: error.to_string(),
+    })?;
+    Ok(sides.starts(options.seed, options.starts))
+}
+
+impl Known {
+    fn of(attractor: &Attractor, map: &mut Strobe) -> Self {
+        let spectrum = |s: &nanotap_dynamics::LyapunovSpectrum| Some(s.largest().0);
+        match &attractor.kind {
+            AttractorKind::Periodic(orbit) => Self {
+                classification: Classification::Periodic.name().into(),
+                period: Some(orbit.period),
+                multiplier: Some(orbit.spectral_radius()),
+                lyapunov: None,
+                states: orbit.states.clone(),
+            },
+            AttractorKind::QuasiPeriodic(torus) => Self {
+                classification: Classification::QuasiPeriodic.name().into(),
+                period: None,
+                multiplier: None,
+                lyapunov: spectrum(&torus.spectrum),
+                states: stretch(map, &attractor.state),
+            },
+            AttractorKind::Chaotic { spectrum: s, .. } => Self {
+                classification: Classification::Chaotic.name().into(),
+                period: None,
+                multiplier: None,
+                lyapunov: spectrum(s),
+                states: stretch(map, &attractor.state),
+            },
+        }
+    }
+
+    /// What it is called: `period 4`, `chaotic`.
+    pub fn name(&self) -> String {
+        self.period
+            .map_or_else(|| self.classification.clone(), |n| format!("period {n}"))
+    }
+}
+
+/// Strobe states along a motion.
+fn stretch(map: &mut Strobe, start: &[f64]) -> Vec<Vec<f64>> {
+    let mut state = start.to_vec();
+    let mut states = Vec::new();
+    while states.len() < SHOWN && map.advance(&mut state).is_ok() {
+        states.push(state.clone());
+    }
+    states
+}
+
+fn number(label: Label) -> i32 {
+    match label {
+        Label::Attractor(index) => i32::try_from(index).unwrap_or(UNSETTLED),
+        Label::Unsettled => UNSETTLED,
+        Label::Unbounded => UNBOUNDED,
+        Label::Failed => FAILED,
+    }
+}
+
+fn schema(
+    subject: &Subject,
+    options: &BasinOptions,
+    names: &[String],
+    basins: &Basins,
+    known: &[Known],
+) -> Schema {
+    let (x, y) = (&options.x, &options.y);
+    let rows = (basins.len().div_ceil(CHUNKS)).min(CHUNK_POINTS) / x.count;
+    let grid = Grid {
+        axes: vec![
+            Axis::new(&y.name, y.count, rows),
+            Axis::new(&x.name, x.count, x.count),
+        ],
+    };
+    let mut all = attributes::of_case(
+        &format!("basins over {} and {}", x.name, y.name),
+        "basin",
+        subject,
+    );
+    all.insert(ATTRACTORS.into(), attributes::text(&known));
+    all.insert(ENTRIES.into(), names.join(" ").into());
+    all.insert("seed".into(), json!(options.seed));
+    let recipe = json!({
+        "x": x,
+        "y": y,
+        "state": options.state,
+        "given": options.attractors,
+        "starts": options.starts,
+        "seed": options.seed,
+        "periods": options.periods,
+        "max_period": options.max_period,
+    });
+    all.insert("basin".into(), attributes::text(&recipe));
+    let coordinate = |range: &SliceRange| {
+        let axis = SliceAxis {
+            coordinate: 0,
+            from: range.from,
+            to: range.to,
+            count: range.count,
+        };
+        let values = Values::Real((0..range.count).map(|k| axis.value(k)).collect());
+        Coordinate::of(
+            &range.name,
+            values,
+            "initial value of this entry of the state",
+            "model units",
+        )
+    };
+    let comment = "index into the attribute `attractors` (JSON); -1: none within the periods, \
+                   -2: left every bound, -3: could not be followed";
+    Schema {
+        grid,
+        variables: vec![
+            Variable::new(
+                VARIABLE,
+                Kind::Whole,
+                "attractor that the start goes to",
+                "1",
+            )
+            .attribute("comment", comment),
+        ],
+        coordinates: vec![coordinate(y), coordinate(x)],
+        attributes: all,
+    }
+}
+
+/// What part of a slice goes where.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Shares {
+    /// Points of the slice.
+    pub points: usize,
+    /// The attractors, with the part of the points that goes to each.
+    pub attractors: Vec<AttractorShare>,
+    /// Part of the points that reached none within the periods.
+    pub unsettled: f64,
+    /// Part of the points that left every bound.
+    pub unbounded: f64,
+    /// Part of the points that could not be followed.
+    pub failed: f64,
+}
+
+/// An attractor and its part of a slice.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AttractorShare {
+    /// What it is.
+    pub classification: String,
+    /// Its minimal period, if it is an orbit.
+    pub period: Option<usize>,
+    /// A state on it.
+    pub state: Vec<f64>,
+    /// Part of the points of the slice that goes there.
+    pub fraction: f64,
+}
+
+/// The attractors that a dataset of basins holds.
+fn known(store: &Store) -> Result<Vec<Known>, StoreError> {
+    let text = store
+        .schema()
+        .attributes
+        .get(ATTRACTORS)
+        .and_then(|v| v.as_str());
+    text.and_then(|text| serde_json::from_str(text).ok())
+        .ok_or_else(|| StoreError::NotAStore {
+            path: store.path().into(),
+            what: "it holds no basins".into(),
+        })
+}
+
+fn labels(store: &Store, block: &Block) -> Result<Vec<i32>, StoreError> {
+    match store.read_chunk(block, 0)? {
+        Values::Whole(labels) => Ok(labels),
+        _ => Err(StoreError::NotAStore {
+            path: store.path().into(),
+            what: "it holds no basins".into(),
+        }),
+    }
+}
+
+/// What part of a finished dataset goes where.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+pub fn shares(store: &Store) -> Result<Shares, StoreError> {
+    store.require_all()?;
+    let known = known(store)?;
+    let mut counts = vec![0usize; known.len()];
+    let [mut unsettled, mut unbounded, mut failed] = [0usize; 3];
+    for chunk in 0..store.chunks() {
+        for label in labels(store, &store.schema().grid.block(chunk))? {
+            match usize::try_from(label).ok().and_then(|k| counts.get_mut(k)) {
+                Some(count) => *count += 1,
+                None if label == UNBOUNDED => unbounded += 1,
+                None if label == FAILED => failed += 1,
+                None => unsettled += 1,
+            }
+        }
+    }
+    let points = store.schema().grid.entries();
+    let part = |count: usize| count as f64 / points as f64;
+    let attractors = known
+        .into_iter()
+        .zip(counts)
+        .map(|(attractor, count)| AttractorShare {
+            classification: attractor.classification,
+            period: attractor.period,
+            state: attractor.states.into_iter().next().unwrap_or_default(),
+            fraction: part(count),
+        })
+        .collect();
+    Ok(Shares {
+        points,
+        attractors,
+        unsettled: part(unsettled),
+        unbounded: part(unbounded),
+        failed: part(failed),
+    })
+}
+
+/// The picture of a finished dataset: a colour an attractor, and where (seen along the
+/// other entries of the state) the attractors' own strobe points lie.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+pub fn figure(store: &Store) -> Result<Figure, StoreError> {
+    store.require_all()?;
+    let known = known(store)?;
+    let axes = &store.schema().grid.axes;
+    let (rows, columns) = (axes[0].length, axes[1].length);
+    // After the attractors' own categories come those of points without one.
+    let others = [
+        (UNSETTLED, "unsettled", 190),
+        (UNBOUNDED, "unbounded", 60),
+        (FAILED, "not followed", 120),
+    ];
+    let mut present = std::collections::BTreeSet::new();
+    let mut cells: Vec<Option<i32>> = vec![None; rows * columns];
+    for chunk in 0..store.chunks() {
+        let block = store.schema().grid.block(chunk);
+        let labels = labels(store, &block)?;
+        for (entry, label) in block.entries().zip(labels) {
+            present.insert(label);
+            cells[entry[0] * columns + entry[1]] = Some(label);
+        }
+    }
+    let (y, x) = (values(store, &axes[0].name), values(store, &axes[1].name));
+    let shown: Vec<_> = others
+        .iter()
+        .filter(|(label, ..)| present.contains(label))
+        .collect();
+    let cells = cells.into_iter().map(|label| {
+        let label = label?;
+        let other = || Some(known.len() + shown.iter().position(|(l, ..)| *l == label)?);
+        usize::try_from(label)
+            .ok()
+            .filter(|k| *k < known.len())
+            .or_else(other)
+    });
+    let mut layer = CategoryMap::new(columns, rows, cells, edges(&x), edges(&y));
+    for (index, attractor) in known.iter().enumerate() {
+        layer = layer.category_in(attractor.name(), category(index));
+    }
+    for (_, name, grey) in shown {
+        layer = layer.category_in(*name, Colour::rgb(*grey, *grey, *grey));
+    }
+    let mut panel = Panel::new(
+        FigureAxis::linear(symbol(&axes[1].name)),
+        FigureAxis::linear(symbol(&axes[0].name)),
+    )
+    .with(layer)
+    .legend(Legend::Right);
+    let names = names(store);
+    let place = |name: &str| names.iter().position(|n| n == name);
+    if let (Some(kx), Some(ky)) = (place(&axes[1].name), place(&axes[0].name)) {
+        let inside = |p: &(f64, f64)| {
+            let within = |v: f64, (low, high): (f64, f64)| low <= v && v <= high;
+            within(p.0, edges(&x)) && within(p.1, edges(&y))
+        };
+        for (index, attractor) in known.iter().enumerate() {
+            let points: Vec<(f64, f64)> = attractor
+                .states
+                .iter()
+                .filter_map(|s| Some((*s.get(kx)?, *s.get(ky)?)))
+                .filter(inside)
+                .collect();
+            panel = if attractor.period.is_some() {
+                let marks = Markers::new(points).shape(Shape::Circle).size(1.6);
+                panel.with(marks.colour(category(index)).white_edge())
+            } else {
+                panel.with(Points::new(points).diameter(0.3).colour(Colour::BLACK))
+            };
+        }
+    }
+    Ok(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
+}
+
+fn values(store: &Store, name: &str) -> Vec<f64> {
+    match store.schema().coordinate(name).map(|c| &c.values) {
+        Some(Values::Real(values)) => values.clone(),
+        _ => vec![0.0, 1.0],
+    }
+}
+
+/// The outer edges of cells around evenly spaced values.
+fn edges(values: &[f64]) -> (f64, f64) {
+    let (from, to) = (values[0], values[values.len() - 1]);
+    let half = 0.5 * (to - from) / (values.len() - 1).max(1) as f64;
+    (from - half, to + half)
+}
+
+/// The names of the entries of the attractors' states.
+fn names(store: &Store) -> Vec<String> {
+    let text = store
+        .schema()
+        .attributes
+        .get(ENTRIES)
+        .and_then(|v| v.as_str())
+        .unwrap_or_default();
+    text.split(' ').map(Into::into).collect()
+}
+
+/// `$a_1$` of `a1`.
+fn symbol(name: &str) -> String {
+    let (letter, number) = name.split_at(1.min(name.len()));
+    let letter = if letter == "v" && !number.is_empty() {
+        "ȧ"
+    } else {
+        letter
+    };
+    if number.is_empty() {
+        format!("${letter}$")
+    } else {
+        format!("${letter}_{{{number}}}$")
+    }
+}

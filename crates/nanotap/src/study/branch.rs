@@ -1,0 +1,825 @@
+//! Branches of periodic orbits in one parameter, stable and unstable, with their
+//! bifurcations, and the loci of these in two parameters.
+
+use nanotap_dynamics::{
+    Bifurcation, BifurcationKind, Branch, BranchPoint, CensusOptions, Complex, ContinuationError,
+    ContinuationOptions, Control, Diagram, DiagramBranch, DiagramOptions, Direction, LocusOptions,
+    PeriodicOrbit, SettleOptions, StartBoxError, assemble_diagram, census, continue_orbit,
+    trace_locus,
+};
+use nanotap_flow::{FlowError, Trajectory};
+use serde::Serialize;
+
+use crate::case::subject::{Family, Key, PlaneFamily, Subject};
+use crate::model::strobe::Strobe;
+use crate::model::{Model, ModelError};
+use crate::observe::PhysicalSight;
+use crate::observe::{above_rounding, begins_contact, contact_work, lag, virial};
+use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
+use crate::study::start_box::default_box;
+
+/// How to follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BranchOptions {
+    /// The parameter.
+    pub key: Key,
+    /// Its value at the start.
+    pub from: f64,
+    /// The other end of its range.
+    pub to: f64,
+    /// Period of the orbit at the start; `None`: that of the motion where a run settles.
+    pub period: Option<usize>,
+    /// State near which the orbit at the start is looked for; `None`: where a run settles.
+    pub state: Option<Vec<f64>>,
+    /// Doublings to follow: 0 for the one branch alone.
+    pub doublings: usize,
+    /// Seeds from a census instead of the one orbit at the start.
+    pub census: Option<SeedOptions>,
+    /// A second parameter and its range: loci of the bifurcations are traced in both.
+    pub second: Option<(Key, f64, f64)>,
+    /// Longest step, as a part of the range.
+    pub max_step: f64,
+    /// Points after which a branch is cut.
+    pub max_points: usize,
+    /// Branches after which no more are followed.
+    pub max_branches: usize,
+}
+
+/// A census at several parameter values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeedOptions {
+    /// Parameter values, evenly spaced over the range, its ends included.
+    pub values: usize,
+    /// Starts at each.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Longest period.
+    pub max_period: usize,
+}
+
+impl Default for SeedOptions {
+    fn default() -> Self {
+        Self {
+            values: 5,
+            starts: 48,
+            seed: 1,
+            max_period: 16,
+        }
+    }
+}
+
+impl BranchOptions {
+    /// Defaults for one parameter over a range.
+    pub fn over(key: Key, from: f64, to: f64) -> Self {
+        let continuation = ContinuationOptions::over(from, to);
+        Self {
+            key,
+            from,
+            to,
+            period: None,
+            state: None,
+            doublings: 0,
+            census: None,
+            second: None,
+            max_step: continuation.max_step,
+            max_points: 20_000,
+            max_branches: 64,
+        }
+    }
+
+    fn continuation(&self) -> ContinuationOptions {
+        let over = ContinuationOptions::over(self.from, self.to);
+        ContinuationOptions {
+            max_step: self.max_step,
+            initial_step: over.initial_step.min(self.max_step),
+            max_points: self.max_points,
+            ..over
+        }
+    }
+
+    fn diagram(&self) -> DiagramOptions {
+        DiagramOptions {
+            continuation: self.continuation(),
+            doublings: self.doublings,
+            max_branches: self.max_branches,
+        }
+    }
+}
+
+/// Why there is no branch.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum BranchError {
+    /// A range that is none.
+    #[error(
+        "{name} cannot be followed from {from} to {to}: two different, finite values are needed"
+    )]
+    Range {
+        /// The parameter.
+        name: &'static str,
+        /// Its start.
+        from: f64,
+        /// Its end.
+        to: f64,
+    },
+    /// A step that is none.
+    #[error("a longest step of {given} is no part of the range: between 0 and 1 is needed")]
+    Step {
+        /// What was given.
+        given: f64,
+    },
+    /// The case at a parameter value makes no sense.
+    #[error("at {name} = {value}: {error}")]
+    Model {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Why not.
+        error: ModelError,
+    },
+    /// No orbit at the start.
+    #[error("at {name} = {value}: {error}")]
+    Start {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Why not.
+        error: OrbitError,
+    },
+    /// A census found no periodic motion anywhere.
+    #[error(
+        "no stable orbit was found at any of {values} values of {name}, so there is nothing to follow"
+    )]
+    NoSeeds {
+        /// The parameter.
+        name: &'static str,
+        /// Values tried.
+        values: usize,
+    },
+    /// The second parameter is the first.
+    #[error("the second parameter must be another than {name}")]
+    SameParameter {
+        /// The parameter.
+        name: &'static str,
+    },
+    /// The default box makes no sense.
+    #[error(transparent)]
+    Box(#[from] StartBoxError),
+    /// The branch could not be begun.
+    #[error(transparent)]
+    Continuation(#[from] ContinuationError),
+    /// A point could not be followed once more.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+}
+
+/// Branches with their points and bifurcations.
+#[derive(Clone, Debug, Serialize)]
+pub struct BranchReport {
+    /// The parameter's key.
+    pub parameter: &'static str,
+    /// Its value at the start.
+    pub from: f64,
+    /// The other end of its range.
+    pub to: f64,
+    /// The branches.
+    pub branches: Vec<BranchSummary>,
+    /// Their points, branch by branch, in order along the arc.
+    pub points: Vec<PointReport>,
+    /// Their bifurcations.
+    pub bifurcations: Vec<BifurcationReport>,
+    /// Loci in two parameters, if a second one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loci: Option<Loci>,
+    /// What could not be followed.
+    pub failures: Vec<FailureReport>,
+    /// Whether the work was stopped before it was done.
+    pub cancelled: bool,
+    /// The parameter, for figures.
+    #[serde(skip)]
+    pub key: Key,
+}
+
+/// One branch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BranchSummary {
+    /// Period of its orbits.
+    pub period: usize,
+    /// Index of the branch that it left at a flip.
+    pub parent: Option<usize>,
+    /// Doublings between it and a seed.
+    pub depth: usize,
+    /// Points.
+    pub points: usize,
+    /// Least and greatest parameter reached.
+    pub range: [f64; 2],
+    /// Why it ends.
+    pub end: String,
+}
+
+/// One orbit of a branch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PointReport {
+    /// Index of its branch.
+    pub branch: usize,
+    /// Period.
+    pub period: usize,
+    /// The parameter.
+    pub parameter: f64,
+    /// State at drive phase 0.
+    pub state: Vec<f64>,
+    /// Floquet multipliers, largest modulus first.
+    pub multipliers: Vec<[f64; 2]>,
+    /// Whether every multiplier is inside the unit circle.
+    pub stable: bool,
+    /// What it looks like.
+    #[serde(flatten)]
+    pub sight: Sight,
+    /// The same in SI, where the parameter is a quantity of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalSight>,
+}
+
+/// What an orbit of a branch looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Sight {
+    /// Greatest tip displacement.
+    pub tip_max: f64,
+    /// Least tip displacement.
+    pub tip_min: f64,
+    /// Half of peak to peak.
+    pub amplitude: f64,
+    /// Part of the time in contact.
+    pub contact_fraction: f64,
+    /// Contacts begun a drive period.
+    pub contacts_per_period: f64,
+    /// Greatest force of the sample on the tip.
+    pub peak_force: f64,
+    /// Greatest speed of approach at which a contact begins.
+    pub impact_speed: f64,
+    /// Amplitude of the tip deflection at the drive's frequency.
+    pub first_harmonic: f64,
+    /// Its phase behind the drive, degrees.
+    pub phase: f64,
+    /// Time mean of the tip deflection.
+    pub mean_deflection: f64,
+    /// Time mean of the force of the sample on the tip.
+    pub mean_force: f64,
+    /// Greatest depth of the tip below the resting surface.
+    pub indentation: f64,
+    /// Time in contact in one drive period.
+    pub contact_time: f64,
+    /// Energy that the sample takes in one drive period.
+    pub dissipation: f64,
+    /// Mean of force times deflection, ⟨F W⟩.
+    pub virial: f64,
+}
+
+impl Sight {
+    /// Of an orbit of `model`.
+    ///
+    /// # Errors
+    /// When the flow along it fails.
+    pub fn of(model: &Model, orbit: &PeriodicOrbit) -> Result<Self, FlowError> {
+        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+        let trajectory = Trajectory::record(&model.system, start, orbit.period)?;
+        Ok(Self::of_recording(model, &trajectory, orbit.period))
+    }
+
+    /// Of `trajectory`, a recording of `periods` drive periods of any motion.
+    pub fn of_recording(model: &Model, trajectory: &Trajectory, periods: usize) -> Self {
+        let tip = trajectory.signal(&model.tip);
+        let range = |s: &nanotap_flow::trajectory::PiecewiseSignal| {
+            s.range()
+                .map_or((0.0, 0.0), |(low, high)| (low.value, high.value))
+        };
+        let (tip_min, tip_max) = range(&tip);
+        let (gap_min, _) = range(&trajectory.signal(&model.height));
+        let force = trajectory.signal_by_regime(&model.force);
+        let (_, peak) = range(&force);
+        let contact: f64 = (0..model.contact.len())
+            .filter(|&r| model.contact[r])
+            .map(|r| trajectory.time_in(r))
+            .sum();
+        let begins = || {
+            trajectory
+                .events()
+                .iter()
+                .filter(|e| begins_contact(model, e.from, e.to))
+        };
+        let first = tip.fourier(model.frequency());
+        let periods = periods as f64;
+        Self {
+            tip_max,
+            tip_min,
+            amplitude: 0.5 * (tip_max - tip_min),
+            contact_fraction: contact / trajectory.end(),
+            contacts_per_period: begins().count() as f64 / periods,
+            peak_force: peak.max(0.0),
+            impact_speed: begins().map(|e| -e.rate).fold(0.0, f64::max),
+            first_harmonic: first.norm(),
+            phase: lag(first),
+            mean_deflection: tip.mean(),
+            mean_force: force.mean(),
+            indentation: (-gap_min).max(0.0),
+            contact_time: contact / periods,
+            dissipation: above_rounding(
+                contact_work(model, trajectory, &force) / periods,
+                peak,
+                -gap_min,
+            ),
+            virial: virial(model, &force, &tip),
+        }
+    }
+}
+
+/// A bifurcation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BifurcationReport {
+    /// fold, flip, neimark-sacker, grazing or crossing.
+    pub kind: &'static str,
+    /// Index of its branch.
+    pub branch: usize,
+    /// Period of the orbit.
+    pub period: usize,
+    /// The parameter.
+    pub parameter: f64,
+    /// Width of the last bracket of the parameter.
+    pub uncertainty: f64,
+    /// State at drive phase 0.
+    pub state: Vec<f64>,
+    /// Floquet multipliers.
+    pub multipliers: Vec<[f64; 2]>,
+    /// Of a Neimark–Sacker point: angle of the pair in degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
+    /// Of a grazing: when, in drive periods from the state.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// What it looks like.
+    #[serde(flatten)]
+    pub sight: Sight,
+    /// The same in SI, where the parameter is a quantity of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalSight>,
+}
+
+/// Loci of bifurcations in two parameters.
+#[derive(Clone, Debug, Serialize)]
+pub struct Loci {
+    /// The second parameter's key.
+    pub second: &'static str,
+    /// Its range.
+    pub range: [f64; 2],
+    /// The curves.
+    pub curves: Vec<LocusReport>,
+    /// The second parameter, for figures.
+    #[serde(skip)]
+    pub key: Key,
+}
+
+/// One locus.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LocusReport {
+    /// fold, flip, neimark-sacker, grazing or crossing.
+    pub kind: &'static str,
+    /// Period of the orbits on it.
+    pub period: usize,
+    /// The first parameter along it.
+    pub first: Vec<f64>,
+    /// The second parameter along it.
+    pub second: Vec<f64>,
+    /// Why it ends, at its first and last point.
+    pub ends: [String; 2],
+}
+
+/// Something that could not be followed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FailureReport {
+    /// Where.
+    pub parameter: f64,
+    /// Why.
+    pub reason: String,
+}
+
+/// The word for a kind of bifurcation.
+pub const fn kind_name(kind: BifurcationKind) -> &'static str {
+    match kind {
+        BifurcationKind::Fold => "fold",
+        BifurcationKind::Crossing => "crossing",
+        BifurcationKind::Flip => "flip",
+        BifurcationKind::NeimarkSacker { .. } => "neimark-sacker",
+        BifurcationKind::Grazing { .. } => "grazing",
+    }
+}
+
+/// Follows the branches on which given orbits lie, each with its value of the parameter,
+/// both ways over the whole range; `period`, `state` and `census` of the options do not
+/// matter.
+///
+/// # Errors
+/// As [`branch`].
+pub fn branches_through(
+    subject: &Subject,
+    seeds: &[(f64, PeriodicOrbit)],
+    options: &BranchOptions,
+    control: &Control<'_>,
+) -> Result<BranchReport, BranchError> {
+    check(subject, options)?;
+    let family = Family {
+        subject: subject.clone(),
+        key: options.key,
+    };
+    let diagram = assemble_diagram(&family, seeds, &options.diagram(), control);
+    let mut report = described(subject, options, &diagram)?;
+    report.cancelled = control.is_cancelled();
+    Ok(report)
+}
+
+/// Follows branches of `subject`.
+///
+/// # Errors
+/// [`BranchError`] when the options make no sense or there is nothing to follow.
+pub fn branch(
+    subject: &Subject,
+    options: &BranchOptions,
+    control: &Control<'_>,
+) -> Result<BranchReport, BranchError> {
+    check(subject, options)?;
+    let family = Family {
+        subject: subject.clone(),
+        key: options.key,
+    };
+    let continuation = options.continuation();
+    let seeds = match &options.census {
+        Some(census) => census_seeds(subject, options, census, control)?,
+        None => vec![(options.from, first_orbit(subject, options)?)],
+    };
+    let diagram = if options.doublings == 0 && options.census.is_none() {
+        let direction = if options.to > options.from {
+            Direction::Increasing
+        } else {
+            Direction::Decreasing
+        };
+        let (parameter, orbit) = &seeds[0];
+        let branch = continue_orbit(
+            &family,
+            *parameter,
+            orbit,
+            direction,
+            &continuation,
+            control,
+        )?;
+        Diagram {
+            branches: vec![DiagramBranch {
+                branch,
+                parent: None,
+                depth: 0,
+            }],
+            failures: Vec::new(),
+        }
+    } else {
+        assemble_diagram(&family, &seeds, &options.diagram(), control)
+    };
+    let mut report = described(subject, options, &diagram)?;
+    if let Some((key, low, high)) = options.second {
+        report.loci = Some(loci(
+            subject,
+            options,
+            &diagram,
+            (key, low, high),
+            &mut report.failures,
+            control,
+        ));
+    }
+    report.cancelled = control.is_cancelled();
+    Ok(report)
+}
+
+fn check(subject: &Subject, options: &BranchOptions) -> Result<(), BranchError> {
+    let ranges = [(options.key, options.from, options.to)];
+    for (key, from, to) in ranges.into_iter().chain(options.second) {
+        let name = key.name();
+        if !(from.is_finite() && to.is_finite() && from != to) {
+            return Err(BranchError::Range { name, from, to });
+        }
+        for value in [from, to] {
+            subject
+                .with(key, value)
+                .model()
+                .map_err(|error| BranchError::Model { name, value, error })?;
+        }
+    }
+    if !(options.max_step > 0.0 && options.max_step <= 1.0) {
+        return Err(BranchError::Step {
+            given: options.max_step,
+        });
+    }
+    match options.second {
+        Some((key, ..)) if key == options.key => {
+            Err(BranchError::SameParameter { name: key.name() })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn model_at(subject: &Subject, key: Key, value: f64) -> Result<Model, BranchError> {
+    let name = key.name();
+    subject
+        .with(key, value)
+        .model()
+        .map_err(|error| BranchError::Model { name, value, error })
+}
+
+fn first_orbit(subject: &Subject, options: &BranchOptions) -> Result<PeriodicOrbit, BranchError> {
+    let model = model_at(subject, options.key, options.from)?;
+    let wanted = OrbitOptions {
+        period: options.period,
+        state: options.state.clone(),
+        ..OrbitOptions::default()
+    };
+    let failed = |error| BranchError::Start {
+        name: options.key.name(),
+        value: options.from,
+        error,
+    };
+    let found = orbit(&model, &wanted).map_err(failed)?;
+    // Newton again, from where it is, for the orbit itself.
+    nanotap_dynamics::close_orbit_from_points(
+        &mut Strobe::new(&model),
+        &found.states.concat(),
+        found.period,
+        &wanted.shooting,
+    )
+    .map_err(|error| failed(error.into()))
+}
+
+/// Stable orbits at several values of the parameter.
+fn census_seeds(
+    subject: &Subject,
+    options: &BranchOptions,
+    seeds: &SeedOptions,
+    control: &Control<'_>,
+) -> Result<Vec<(f64, PeriodicOrbit)>, BranchError> {
+    let values = seeds.values.max(2);
+    let mut found = Vec::new();
+    for k in 0..values {
+        if control.is_cancelled() {
+            break;
+        }
+        let t = k as f64 / (values - 1) as f64;
+        let value = options.from + t * (options.to - options.from);
+        let model = model_at(subject, options.key, value)?;
+        let starts = default_box(&model)?.starts(seeds.seed, seeds.starts);
+        let census_options = CensusOptions {
+            settle: SettleOptions {
+                max_period: seeds.max_period,
+                ..SettleOptions::default()
+            },
+            ..CensusOptions::default()
+        };
+        let taken = census(&Strobe::new(&model), &starts, &census_options, control);
+        for attractor in taken.attractors {
+            if let nanotap_dynamics::AttractorKind::Periodic(orbit) = attractor.kind {
+                found.push((value, orbit));
+            }
+        }
+    }
+    if found.is_empty() && !control.is_cancelled() {
+        return Err(BranchError::NoSeeds {
+            name: options.key.name(),
+            values,
+        });
+    }
+    Ok(found)
+}
+
+fn described(
+    subject: &Subject,
+    options: &BranchOptions,
+    diagram: &Diagram,
+) -> Result<BranchReport, BranchError> {
+    let key = options.key;
+    let mut report = BranchReport {
+        parameter: key.name(),
+        from: options.from,
+        to: options.to,
+        branches: Vec::new(),
+        points: Vec::new(),
+        bifurcations: Vec::new(),
+        loci: None,
+        failures: diagram
+            .failures
+            .iter()
+            .map(|(parameter, reason)| FailureReport {
+                parameter: *parameter,
+                reason: reason.clone(),
+            })
+            .collect(),
+        cancelled: false,
+        key,
+    };
+    // A seed at an end of the range has nothing on one side, and a branch that was followed
+    // from both of its ends is one.
+    let branches = &diagram.branches;
+    let kept: Vec<usize> = (0..branches.len())
+        .filter(|&k| branches[k].branch.points.len() > 1)
+        .filter(|&k| {
+            let span = (options.to - options.from).abs();
+            !(0..k).any(|earlier| are_one(&branches[earlier].branch, &branches[k].branch, span))
+        })
+        .collect();
+    for (index, &k) in kept.iter().enumerate() {
+        let DiagramBranch {
+            branch,
+            parent,
+            depth,
+        } = &diagram.branches[k];
+        let parent = parent.and_then(|p| kept.iter().position(|&k| k == p));
+        report.branches.push(summary(branch, parent, *depth));
+        for p in &branch.points {
+            report.points.push(point(subject, key, index, p)?);
+        }
+        for b in &branch.bifurcations {
+            report
+                .bifurcations
+                .push(bifurcation(subject, key, index, b)?);
+        }
+    }
+    Ok(report)
+}
+
+/// Whether two branches pass through just the same bifurcations, of which there are some.
+fn are_one(a: &Branch, b: &Branch, span: f64) -> bool {
+    let same = |x: &Bifurcation, y: &Bifurcation| {
+        kind_name(x.kind) == kind_name(y.kind) && (x.parameter - y.parameter).abs() <= 1e-7 * span
+    };
+    let among = |x: &Branch, y: &Branch| {
+        x.bifurcations
+            .iter()
+            .all(|p| y.bifurcations.iter().any(|q| same(p, q)))
+    };
+    a.period == b.period && !a.bifurcations.is_empty() && among(a, b) && among(b, a)
+}
+
+fn summary(branch: &Branch, parent: Option<usize>, depth: usize) -> BranchSummary {
+    let parameters = || branch.points.iter().map(|p| p.parameter);
+    BranchSummary {
+        period: branch.period,
+        parent,
+        depth,
+        points: branch.points.len(),
+        range: [
+            parameters().fold(f64::INFINITY, f64::min),
+            parameters().fold(f64::NEG_INFINITY, f64::max),
+        ],
+        end: branch.end.to_string(),
+    }
+}
+
+fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
+    multipliers.iter().map(|m| [m.re, m.im]).collect()
+}
+
+/// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.
+fn seen(
+    subject: &Subject,
+    key: Key,
+    parameter: f64,
+    orbit: &PeriodicOrbit,
+) -> Result<(Sight, Option<PhysicalSight>), BranchError> {
+    let here = subject.with(key, parameter);
+    let model = here.model().map_err(|error| BranchError::Model {
+        name: key.name(),
+        value: parameter,
+        error,
+    })?;
+    let sight = Sight::of(&model, orbit)?;
+    let physical = here
+        .resolved()
+        .map(|resolved| PhysicalSight::of(&sight, resolved));
+    Ok((sight, physical))
+}
+
+fn point(
+    subject: &Subject,
+    key: Key,
+    branch: usize,
+    p: &BranchPoint,
+) -> Result<PointReport, BranchError> {
+    let (sight, physical) = seen(subject, key, p.parameter, &p.orbit)?;
+    Ok(PointReport {
+        branch,
+        period: p.orbit.period,
+        parameter: p.parameter,
+        state: p.orbit.states.first().cloned().unwrap_or_default(),
+        multipliers: pairs(&p.orbit.multipliers),
+        stable: p.orbit.is_stable(),
+        sight,
+        physical,
+    })
+}
+
+fn bifurcation(
+    subject: &Subject,
+    key: Key,
+    branch: usize,
+    b: &Bifurcation,
+) -> Result<BifurcationReport, BranchError> {
+    let (sight, physical) = seen(subject, key, b.parameter, &b.orbit)?;
+    let (angle, time) = match b.kind {
+        BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
+        BifurcationKind::Grazing { time } => (None, Some(time)),
+        _ => (None, None),
+    };
+    Ok(BifurcationReport {
+        kind: kind_name(b.kind),
+        branch,
+        period: b.orbit.period,
+        parameter: b.parameter,
+        uncertainty: b.uncertainty,
+        state: b.orbit.states.first().cloned().unwrap_or_default(),
+        multipliers: pairs(&b.orbit.multipliers),
+        angle,
+        time,
+        sight,
+        physical,
+    })
+}
+
+/// Points of each half of a locus at most.
+const LOCUS_POINTS: usize = 6000;
+
+/// Curves of all bifurcations, each once: one that lies on a curve already traced is left.
+fn loci(
+    subject: &Subject,
+    options: &BranchOptions,
+    diagram: &Diagram,
+    (key, low, high): (Key, f64, f64),
+    failures: &mut Vec<FailureReport>,
+    control: &Control<'_>,
+) -> Loci {
+    let family = PlaneFamily {
+        subject: subject.clone(),
+        keys: [options.key, key],
+    };
+    let here = subject.get(key);
+    let first = (options.from.min(options.to), options.from.max(options.to));
+    // The value at which the bifurcations were found belongs to the box.
+    let second = (low.min(high).min(here), low.max(high).max(here));
+    let limits = LocusOptions {
+        max_points: LOCUS_POINTS,
+        ..LocusOptions::over(first, second)
+    };
+    let mut curves: Vec<LocusReport> = Vec::new();
+    for b in diagram.branches.iter().flat_map(|b| &b.branch.bifurcations) {
+        if control.is_cancelled() {
+            break;
+        }
+        let near = 1e-6 * (first.1 - first.0);
+        let known = |c: &LocusReport| {
+            c.kind == kind_name(b.kind)
+                && c.period == b.orbit.period
+                && crossings(c, here).any(|at| (at - b.parameter).abs() <= near)
+        };
+        if curves.iter().any(known) {
+            continue;
+        }
+        match trace_locus(&family, b, here, &limits, control) {
+            Ok(locus) => curves.push(LocusReport {
+                kind: kind_name(locus.kind),
+                period: b.orbit.period,
+                first: locus.points.iter().map(|p| p.first).collect(),
+                second: locus.points.iter().map(|p| p.second).collect(),
+                ends: locus.ends.map(|end| end.to_string()),
+            }),
+            Err(error) => failures.push(FailureReport {
+                parameter: b.parameter,
+                reason: format!("the locus of its {}: {error}", kind_name(b.kind)),
+            }),
+        }
+    }
+    Loci {
+        second: key.name(),
+        range: [second.0, second.1],
+        curves,
+        key,
+    }
+}
+
+/// Where a locus crosses a value of the second parameter.
+fn crossings(curve: &LocusReport, second: f64) -> impl Iterator<Item = f64> {
+    curve
+        .first
+        .windows(2)
+        .zip(curve.second.windows(2))
+        .filter_map(move |(x, y)| {
+            if y[0] == second {
+                return Some(x[0]);
+            }
+            let t = (second - y[0]) / (y[1] - y[0]);
+            (0.0..=1.0).contains(&t).then(|| x[0] + t * (x[1] - x[0]))
+        })
+}

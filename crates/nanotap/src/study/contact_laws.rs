@@ -1,0 +1,309 @@
+//! The same lever and drive on each of the samples: what difference the contact law makes.
+//!
+//! The samples share spring α4 and damper; the standard linear solid has the damper in series
+//! with an arm of a given stiffness, so that with an ever stiffer arm it becomes the
+//! Kelvin–Voigt surface. Compared are the periodic orbit of one period on each, stable or
+//! not, and how it goes on with the drive frequency.
+
+use nanotap_dynamics::{Control, SettleOptions, ShootingOptions, close_orbit, settle};
+use nanotap_flow::trajectory::PiecewiseSignal;
+use serde::Serialize;
+
+use crate::case::subject::{Key, Subject};
+use crate::model::cantilever::Case;
+use crate::model::contact::ContactLaw;
+use crate::model::parameter::Parameter;
+use crate::model::strobe::Strobe;
+use crate::model::{Model, ModelError};
+use crate::observe::Observables;
+use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
+use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit};
+use crate::study::simulate::{Classification, Named};
+
+/// How to compare.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparisonOptions {
+    /// Period of the orbits.
+    pub period: usize,
+    /// Stiffness of the standard linear solid's arm; `None`: the case's own, or twice α4.
+    pub arm: Option<f64>,
+    /// Drive frequencies over which the orbits are followed; `None`: not at all.
+    pub frequencies: Option<(f64, f64)>,
+}
+
+impl Default for ComparisonOptions {
+    fn default() -> Self {
+        Self {
+            period: 1,
+            arm: None,
+            frequencies: None,
+        }
+    }
+}
+
+/// Why there is no comparison.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ComparisonError {
+    /// The damper has no arm to stand in.
+    #[error("a relaxing arm of stiffness {arm} holds no damper: a positive, finite one is needed")]
+    Arm {
+        /// What was asked for, or twice α4.
+        arm: f64,
+    },
+    /// The case makes no sense.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// There is no such orbit.
+    #[error(transparent)]
+    Orbit(#[from] OrbitError),
+    /// The orbits cannot be followed.
+    #[error(transparent)]
+    Branch(#[from] BranchError),
+}
+
+/// The motion on one sample.
+#[derive(Clone, Debug, Serialize)]
+pub struct SampleMotion {
+    /// The law.
+    pub contact: ContactLaw,
+    /// The case with this law.
+    pub case: Case,
+    /// What a run from rest goes to.
+    pub from_rest: Classification,
+    /// Its period, if periodic.
+    pub from_rest_period: Option<usize>,
+    /// The orbit of the asked period, if there is one.
+    #[serde(flatten)]
+    pub orbit: Option<OrbitLook>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// The branch through it in the drive frequency, if it was followed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub branch: Option<BranchReport>,
+}
+
+/// What an orbit looks like.
+#[derive(Clone, Debug, Serialize)]
+pub struct OrbitLook {
+    /// Minimal period in drive periods.
+    pub period: usize,
+    /// State at drive phase 0.
+    pub state: Vec<f64>,
+    /// Largest |multiplier|.
+    pub spectral_radius: f64,
+    /// Whether it attracts.
+    pub stable: bool,
+    /// What can be read off it.
+    #[serde(flatten)]
+    pub observables: Observables,
+    /// Indentation −V_T and force along the orbit.
+    #[serde(rename = "loop")]
+    pub force_loop: Vec<[f64; 2]>,
+}
+
+/// The motions on all samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Drive frequency Ω.
+    pub omega: f64,
+    /// Period of the orbits.
+    pub period: usize,
+    /// The motions, in the order of [`ContactLaw::ALL`].
+    pub samples: Vec<SampleMotion>,
+}
+
+/// The case with each law, spring and damper the same.
+///
+/// # Errors
+/// [`ComparisonError::Arm`] when the arm's stiffness is not positive.
+pub fn cases(case: &Case, arm: Option<f64>) -> Result<Vec<Case>, ComparisonError> {
+    let is_solid = case.contact == ContactLaw::StandardLinearSolid;
+    let own = is_solid.then_some(case.relaxation_stiffness);
+    let arm = arm.or(own).unwrap_or(2.0 * case.alpha4);
+    if !(arm > 0.0 && arm.is_finite()) {
+        return Err(ComparisonError::Arm { arm });
+    }
+    let damper = if is_solid {
+        case.relaxation_stiffness * case.relaxation_time
+    } else {
+        case.alpha6
+    };
+    Ok(ContactLaw::ALL
+        .into_iter()
+        .map(|contact| {
+            let solid = contact == ContactLaw::StandardLinearSolid;
+            Case {
+                contact,
+                alpha6: if solid { 0.0 } else { damper },
+                relaxation_stiffness: if solid { arm } else { 0.0 },
+                relaxation_time: if solid { damper / arm } else { 0.0 },
+                ..case.clone()
+            }
+        })
+        .collect())
+}
+
+/// Compares the samples under the lever and drive of `case`.
+///
+/// # Errors
+/// [`ComparisonError`] when the case or the options make no sense; a law under which there
+/// is no such orbit is no error.
+pub fn compare(
+    case: &Case,
+    options: &ComparisonOptions,
+    control: &Control<'_>,
+) -> Result<Comparison, ComparisonError> {
+    if options.period == 0 {
+        return Err(OrbitError::NoPeriod.into());
+    }
+    let samples = cases(case, options.arm)?
+        .into_iter()
+        .map(|case| motion(case, options, control))
+        .collect::<Result<_, _>>()?;
+    Ok(Comparison {
+        omega: case.omega,
+        period: options.period,
+        samples,
+    })
+}
+
+fn motion(
+    case: Case,
+    options: &ComparisonOptions,
+    control: &Control<'_>,
+) -> Result<SampleMotion, ComparisonError> {
+    let model = Model::cantilever(&case)?;
+    let rest = vec![0.0; model.dimension()];
+    let mut map = Strobe::new(&model);
+    let named = Named::of(&settle(&mut map, &rest, &SettleOptions::default()).verdict);
+    let asked = OrbitOptions {
+        period: Some(options.period),
+        harmonics: 0,
+        ..OrbitOptions::default()
+    };
+    let (found, reason) = match orbit(&model, &asked) {
+        Ok(found) => (Some(found), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
+    let branch = match (&found, options.frequencies) {
+        (Some(found), Some(range)) => Some(followed(&case, &mut map, found, range, control)?),
+        _ => None,
+    };
+    Ok(SampleMotion {
+        contact: case.contact,
+        case,
+        from_rest: named.classification,
+        from_rest_period: named.orbit.map(|o| o.period),
+        orbit: found.map(|found| look(&model, found)),
+        reason,
+        branch,
+    })
+}
+
+/// The branch of an orbit in the drive frequency.
+fn followed(
+    case: &Case,
+    map: &mut Strobe,
+    found: &OrbitReport,
+    (from, to): (f64, f64),
+    control: &Control<'_>,
+) -> Result<BranchReport, ComparisonError> {
+    let key = Key::Cantilever(Parameter::Omega);
+    let options = BranchOptions::over(key, from, to);
+    // Closed already: this only puts it in the form that branches begin with.
+    let seed = close_orbit(map, &found.state, found.period, &ShootingOptions::default())
+        .map_err(OrbitError::from)?;
+    let subject = Subject::Cantilever(case.clone());
+    Ok(branches_through(
+        &subject,
+        &[(case.omega, seed)],
+        &options,
+        control,
+    )?)
+}
+
+fn look(model: &Model, found: OrbitReport) -> OrbitLook {
+    let height = found.trajectory.signal(&model.height);
+    let force = found.trajectory.signal_by_regime(&model.force);
+    OrbitLook {
+        period: found.period,
+        spectral_radius: found
+            .multipliers
+            .first()
+            .map_or(0.0, |[re, im]| re.hypot(*im)),
+        stable: found.stable,
+        force_loop: force_loop(&height, &force),
+        state: found.state,
+        observables: found.observables,
+    }
+}
+
+/// Points on each piece of a loop.
+const LOOP_POINTS: u32 = 160;
+
+/// Indentation and force, piece by piece up to its very ends, where the force may jump.
+fn force_loop(height: &PiecewiseSignal, force: &PiecewiseSignal) -> Vec<[f64; 2]> {
+    height
+        .pieces
+        .iter()
+        .zip(&force.pieces)
+        .flat_map(|(h, f)| {
+            (0..=LOOP_POINTS).map(|k| {
+                let s = h.length * f64::from(k) / f64::from(LOOP_POINTS);
+                [-h.signal.at(s), f.signal.at(s)]
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The loop's area is the energy that the sample takes, less what a surface loses while
+    /// it recovers.
+    #[test]
+    fn loops_enclose_what_the_sample_takes_in_contact() {
+        let case = Case::paper().with(Parameter::Omega, 20.0);
+        let options = ComparisonOptions::default();
+        let found = compare(&case, &options, &Control::default()).unwrap();
+        let mut loss = Vec::new();
+        for sample in &found.samples {
+            let orbit = sample.orbit.as_ref().unwrap();
+            let area: f64 = orbit
+                .force_loop
+                .windows(2)
+                .map(|w| 0.5 * (w[0][1] + w[1][1]) * (w[1][0] - w[0][0]))
+                .sum();
+            let taken = orbit.observables.dissipation;
+            // Work on the surface is all that the sample gets, and an orbit stores none.
+            assert!((area / taken - 1.0).abs() < 1e-3, "{area} {taken}");
+            loss.push(taken);
+        }
+        let pulls = |k: usize| {
+            found.samples[k]
+                .orbit
+                .as_ref()
+                .unwrap()
+                .observables
+                .least_force
+        };
+        assert!(pulls(0) < -0.1 && pulls(1) > -1e-12 && pulls(2) > -1e-12);
+        // What the paper's damper takes from a leaving tip it takes from no free surface.
+        assert!(loss[0] > loss[1]);
+    }
+
+    #[test]
+    fn samples_share_spring_and_damper() {
+        let all = cases(&Case::paper(), None).unwrap();
+        assert_eq!(all[2].relaxation_stiffness, 40.0);
+        assert!((all[2].relaxation_stiffness * all[2].relaxation_time - 0.2).abs() < 1e-15);
+        // And from a solid back to the same three.
+        assert_eq!(cases(&all[2], None).unwrap()[1].alpha6, all[1].alpha6);
+        assert!(all.iter().all(|case| case.validate().is_ok()));
+        for arm in [0.0, -1.0, f64::NAN] {
+            assert!(cases(&Case::paper(), Some(arm)).is_err());
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Which modes matter: the same motion computed with N = 1 … K modes.
+
+use serde::Serialize;
+
+use crate::model::cantilever::Case;
+use crate::model::{Model, ModelError};
+use crate::observe::mode_share::ReadingsReport;
+use crate::observe::time_series::with_modes;
+use crate::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use crate::study::simulate::Classification;
+
+/// A motion at each number of modes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Convergence {
+    /// Numbers of modes N.
+    pub modes: Vec<usize>,
+    /// Greatest difference of the tip deflection W over the orbit to the motion with
+    /// the most modes, as a part of its amplitude; null where the motions differ in
+    /// kind (another period, or none).
+    pub difference: Vec<Option<f64>>,
+    /// What each is, one a number of modes.
+    pub motions: Vec<Motion>,
+    /// The least N from which on the difference stays below the tolerance.
+    pub enough: Option<usize>,
+    /// The tolerance.
+    pub tolerance: f64,
+    /// The verdict in words.
+    pub verdict: String,
+    /// What an experimenter reads, how much each number of modes misses of it, and which modes
+    /// take part.
+    #[serde(flatten)]
+    pub readings: ReadingsReport,
+    /// The orbits, for figures.
+    #[serde(skip)]
+    pub orbits: Vec<Option<OrbitReport>>,
+    /// The models, one a number of modes.
+    #[serde(skip)]
+    pub models: Vec<Model>,
+}
+
+/// The motion with one number of modes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Motion {
+    /// N.
+    pub modes: usize,
+    /// What it is.
+    pub classification: Classification,
+    /// Its period.
+    pub period: Option<usize>,
+    /// Greatest tip displacement.
+    pub tip_max: Option<f64>,
+    /// Least tip displacement.
+    pub tip_min: Option<f64>,
+    /// Part of the time in contact.
+    pub contact_fraction: Option<f64>,
+    /// Largest |multiplier|.
+    pub spectral_radius: Option<f64>,
+    /// Why it is no orbit, if it is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// Points of an orbit at which two motions are compared.
+const COMPARED_POINTS: usize = 400;
+
+/// The motion of `case` with 1 … `largest` modes: the orbit of the asked period (or
+/// where a run from rest settles).
+///
+/// # Errors
+/// When the case makes no sense.
+pub fn convergence(
+    case: &Case,
+    largest: usize,
+    tolerance: f64,
+    options: &OrbitOptions,
+) -> Result<Convergence, ModelError> {
+    let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
+    let mut motions = Vec::new();
+    let models: Vec<Model> = (1..=largest)
+        .map(|modes| Model::cantilever(&case.clone().with_modes(modes)))
+        .collect::<Result<_, _>>()?;
+    for (modes, model) in (1..).zip(&models) {
+        let guess = OrbitOptions {
+            state: carried(orbits.last(), modes),
+            ..options.clone()
+        };
+        let found = orbit(model, &guess).or_else(|_| {
+            orbit(
+                model,
+                &OrbitOptions {
+                    state: None,
+                    ..guess
+                },
+            )
+        });
+        motions.push(motion(modes, found.as_ref().map_err(ToString::to_string)));
+        orbits.push(found.ok());
+    }
+    let difference = differences(&orbits, &models);
+    let enough = enough(&difference, tolerance);
+    let verdict = verdict(enough, &difference, largest, tolerance);
+    let readings = ReadingsReport::of(&orbits, &models, tolerance);
+    Ok(Convergence {
+        modes: (1..=largest).collect(),
+        difference,
+        motions,
+        enough,
+        tolerance,
+        verdict,
+        readings,
+        orbits,
+        models,
+    })
+}
+
+/// The state of the motion with one mode less, the new mode at rest: a guess near which
+/// the same motion is looked for. Only where a period was asked for or found.
+fn carried(previous: Option<&Option<OrbitReport>>, modes: usize) -> Option<Vec<f64>> {
+    let previous = previous?.as_ref()?;
+    let memory = previous.state.len() - 2 * (modes - 1);
+    Some(with_modes(&previous.state, memory, modes))
+}
+
+fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
+    match found {
+        Ok(o) => Motion {
+            modes,
+            classification: Classification::Periodic,
+            period: Some(o.period),
+            tip_max: Some(o.observables.tip_max),
+            tip_min: Some(o.observables.tip_min),
+            contact_fraction: Some(o.observables.contact_fraction),
+            spectral_radius: o.multipliers.first().map(|[re, im]| re.hypot(*im)),
+            reason: None,
+        },
+        Err(reason) => Motion {
+            modes,
+            classification: Classification::Undecided,
+            period: None,
+            tip_max: None,
+            tip_min: None,
+            contact_fraction: None,
+            spectral_radius: None,
+            reason: Some(reason),
+        },
+    }
+}
+
+fn tip_series(report: &OrbitReport, model: &Model) -> Option<Vec<f64>> {
+    let tip = report.trajectory.signal(&model.tip);
+    let length = report.trajectory.end();
+    (0..COMPARED_POINTS)
+        .map(|i| tip.at(length * i as f64 / COMPARED_POINTS as f64))
+        .collect()
+}
+
+fn differences(orbits: &[Option<OrbitReport>], models: &[Model]) -> Vec<Option<f64>> {
+    let best = orbits.last().and_then(Option::as_ref);
+    let reference = best
+        .zip(models.last())
+        .and_then(|(o, model)| tip_series(o, model));
+    orbits
+        .iter()
+        .zip(models)
+        .map(|(o, model)| {
+            let (report, best, reference) = (o.as_ref()?, best?, reference.as_ref()?);
+            if report.period != best.period {
+                return None;
+            }
+            let series = tip_series(report, model)?;
+            // The same motion may have been found a few drive periods on.
+            let shift = COMPARED_POINTS / best.period;
+            let distance = |k: usize| {
+                (0..COMPARED_POINTS)
+                    .map(|j| (series[(j + k * shift) % COMPARED_POINTS] - reference[j]).abs())
+                    .fold(0.0, f64::max)
+            };
+            let least = (0..best.period).map(distance).fold(f64::INFINITY, f64::min);
+            Some(least / best.observables.amplitude)
+        })
+        .collect()
+}
+
+fn enough(difference: &[Option<f64>], tolerance: f64) -> Option<usize> {
+    let within = |d: &Option<f64>| d.is_some_and(|d| d <= tolerance);
+    let first = difference
+        .iter()
+        .rposition(|d| !within(d))
+        .map_or(0, |last| last + 1);
+    // The last entry is the reference itself and proves nothing.
+    (first + 1 < difference.len()).then_some(first + 1)
+}
+
+fn verdict(
+    enough: Option<usize>,
+    difference: &[Option<f64>],
+    largest: usize,
+    tolerance: f64,
+) -> String {
+    let percent = 100.0 * tolerance;
+    match (enough, difference.last()) {
+        (_, None | Some(None)) => {
+            format!("no orbit was found with {largest} modes, so nothing can be compared")
+        }
+        (Some(n), _) => format!(
+            "{n} modes are enough: from there on the tip moves within {percent} % of {largest} modes"
+        ),
+        (None, _) => {
+            format!("{largest} modes are not shown to be enough at {percent} %: take more")
+        }
+    }
+}

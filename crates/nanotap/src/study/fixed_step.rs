@@ -1,0 +1,399 @@
+//! The paper's own method beside the exact flow: fourth-order Runge–Kutta with a fixed
+//! step in each regime, switching on the grid.
+//!
+//! It is there to show what it does wrong. Its contacts begin and end up to a step late,
+//! which acts like a small force that differs from period to period: what looks like a
+//! subharmonic of a high period can be a product of the step. Therefore the period read off its
+//! strobe points is called apparent, and what the exact flow makes of the same motion
+//! stands beside it.
+
+use std::time::Instant;
+
+use nanotap_dynamics::{SettleOptions, settle};
+use nanotap_flow::fixed_step::FixedStep;
+pub use nanotap_flow::fixed_step::Switching;
+use serde::Serialize;
+
+use crate::model::Model;
+use crate::model::strobe::Strobe;
+use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
+
+/// How to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FixedStepOptions {
+    /// Drive periods recorded.
+    pub periods: usize,
+    /// Drive periods thrown away first.
+    pub transient: usize,
+    /// The state at the start; `None`: rest.
+    pub state: Option<Vec<f64>>,
+    /// How many of the last states at drive phase 0 to keep.
+    pub strobe: usize,
+    /// Steps a drive period in each regime: free flight, contact.
+    pub steps: [u32; 2],
+    /// Where within a step the regime is looked at.
+    pub switching: Switching,
+    /// Budgets for naming what the exact flow does.
+    pub settle: SettleOptions,
+}
+
+impl Default for FixedStepOptions {
+    fn default() -> Self {
+        Self {
+            periods: 128,
+            transient: 500,
+            state: None,
+            strobe: 1,
+            steps: [200, 200],
+            switching: Switching::EveryStep,
+            settle: SettleOptions::default(),
+        }
+    }
+}
+
+/// Why there was no such run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FixedStepError {
+    /// As for the exact flow.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// Jumps of the state are beyond it.
+    #[error(
+        "fixed steps know no jumps of the state: neither rigid impacts nor a Kelvin–Voigt surface, which is \
+         left without force, can be run this way"
+    )]
+    Rigid,
+    /// The numbers overflowed.
+    #[error(
+        "the fixed-step run grew beyond the range of double precision in period {period}: take more steps"
+    )]
+    Overflow {
+        /// In which drive period.
+        period: usize,
+    },
+}
+
+/// A switch, where the grid noticed it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GridEvent {
+    /// When, counted from the end of the transient.
+    pub tau: f64,
+    /// `contact_start` or `contact_end`.
+    pub kind: &'static str,
+}
+
+/// A finished run.
+#[derive(Clone, Debug, Serialize)]
+pub struct FixedStepRun {
+    /// `rk4`.
+    pub method: &'static str,
+    /// Steps a drive period in free flight and in contact.
+    pub steps: [u32; 2],
+    /// `every_step` or `every_stage`.
+    pub switching: &'static str,
+    /// Drive periods recorded.
+    pub periods: usize,
+    /// Drive periods thrown away first.
+    pub transient: usize,
+    /// The state at the end of the transient.
+    pub start: Vec<f64>,
+    /// Smallest n for which the strobe points repeat after n periods to
+    /// [`APPARENT_CLOSURE`] of their size; proves nothing.
+    pub apparent_period: Option<usize>,
+    /// How nearly they repeat, as a part of their size.
+    pub closure: f64,
+    /// Longest apparent period looked for: half of the recording, 64 at most.
+    pub longest_apparent: usize,
+    /// Largest tip displacement on the grid.
+    pub tip_max: f64,
+    /// Least tip displacement on the grid.
+    pub tip_min: f64,
+    /// Half of peak to peak.
+    pub amplitude: f64,
+    /// Part of the steps in contact, weighted with their length.
+    pub contact_fraction: f64,
+    /// States at the end of each of the last periods asked for.
+    pub strobe: Vec<Vec<f64>>,
+    /// Switches noticed.
+    pub events: Vec<GridEvent>,
+    /// Speed, drive periods a second.
+    pub periods_per_second: f64,
+    /// What the exact flow does from the last state.
+    pub exact: ExactVerdict,
+    /// Time, tip displacement and its rate, for figures: the first recorded periods.
+    #[serde(skip)]
+    pub curve: Vec<[f64; 3]>,
+    /// All strobe points of the recording, tip displacement and its rate, for figures.
+    #[serde(skip)]
+    pub strobe_curve: Vec<[f64; 2]>,
+}
+
+/// What the exact flow makes of a motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExactVerdict {
+    /// Its class.
+    pub classification: Classification,
+    /// Its period.
+    pub period: Option<usize>,
+    /// Why.
+    pub evidence: String,
+}
+
+/// Nearness, as a part of the motion's size, at which the eye takes a run as periodic.
+pub const APPARENT_CLOSURE: f64 = 1e-6;
+/// Longest apparent period looked for.
+const LONGEST_APPARENT: usize = 64;
+/// Drive periods kept for figures.
+const CURVE_PERIODS: usize = 64;
+
+/// Runs `model` with fixed steps.
+///
+/// # Errors
+/// When the start does not fit, the stop is rigid, or the run overflows.
+pub fn fixed_step_run(
+    model: &Model,
+    options: &FixedStepOptions,
+) -> Result<FixedStepRun, FixedStepError> {
+    let state = starting_state(model, options.state.as_deref())?;
+    if options.periods == 0 {
+        return Err(SimulateError::NoPeriods.into());
+    }
+    if model
+        .system
+        .exits()
+        .iter()
+        .flatten()
+        .any(|e| e.reset.is_some())
+    {
+        return Err(FixedStepError::Rigid);
+    }
+    let mut run = FixedStep::new(&model.system, &state, &options.steps, options.switching)
+        .map_err(SimulateError::from)?;
+    let clock = Instant::now();
+    for period in 0..options.transient {
+        run.run_period(|_, _| {});
+        finite(run.state(), period)?;
+    }
+    let start = run.state().to_vec();
+    let mut grid = Grid::new(model, &start);
+    let mut strobes = Vec::with_capacity(options.periods);
+    for period in 0..options.periods {
+        run.run_period(|phase, x| grid.see(period, phase, x));
+        finite(run.state(), options.transient + period)?;
+        strobes.push(run.state().to_vec());
+    }
+    let seconds = clock.elapsed().as_secs_f64().max(1e-9);
+    let (apparent_period, closure) = apparent_period(&strobes);
+    let last = strobes.last().cloned().unwrap_or_default();
+    let named = Named::of(&settle(&mut Strobe::new(model), &last, &options.settle).verdict);
+    let rate = model.tip_rate();
+    let at = |o: &nanotap_flow::Output, x: &[f64]| o.at(model.system.drive(), x, 0.0);
+    Ok(FixedStepRun {
+        method: "rk4",
+        steps: options.steps,
+        switching: match options.switching {
+            Switching::EveryStep => "every_step",
+            Switching::EveryStage => "every_stage",
+        },
+        periods: options.periods,
+        transient: options.transient,
+        start,
+        apparent_period,
+        closure,
+        longest_apparent: LONGEST_APPARENT.min(options.periods / 2),
+        tip_max: grid.high,
+        tip_min: grid.low,
+        amplitude: 0.5 * (grid.high - grid.low),
+        contact_fraction: grid.in_contact / (options.periods as f64 * model.period()),
+        strobe_curve: strobes
+            .iter()
+            .map(|x| [at(&model.tip, x), at(&rate, x)])
+            .collect(),
+        strobe: strobes.split_off(strobes.len().saturating_sub(options.strobe)),
+        events: grid.events,
+        periods_per_second: (options.transient + options.periods) as f64 / seconds,
+        exact: ExactVerdict {
+            classification: named.classification,
+            period: named.orbit.map(|o| o.period),
+            evidence: named.evidence,
+        },
+        curve: grid.curve,
+    })
+}
+
+fn finite(state: &[f64], period: usize) -> Result<(), FixedStepError> {
+    if state.iter().all(|v| v.is_finite()) {
+        Ok(())
+    } else {
+        Err(FixedStepError::Overflow { period })
+    }
+}
+
+/// What is read off the grid.
+struct Grid<'a> {
+    model: &'a Model,
+    rate: nanotap_flow::Output,
+    low: f64,
+    high: f64,
+    in_contact: f64,
+    contact: bool,
+    before: f64,
+    events: Vec<GridEvent>,
+    curve: Vec<[f64; 3]>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(model: &'a Model, start: &[f64]) -> Self {
+        let drive = model.system.drive();
+        let tip = model.tip.at(drive, start, 0.0);
+        let rate = model.tip_rate();
+        Self {
+            low: tip,
+            high: tip,
+            in_contact: 0.0,
+            contact: model.gap.at(drive, start, 0.0) <= 0.0,
+            before: 0.0,
+            events: Vec::new(),
+            curve: vec![[0.0, tip, rate.at(drive, start, 0.0)]],
+            rate,
+            model,
+        }
+    }
+
+    fn see(&mut self, period: usize, phase: f64, x: &[f64]) {
+        let drive = self.model.system.drive();
+        let tau = period as f64 * self.model.period() + phase;
+        let tip = self.model.tip.at(drive, x, phase);
+        self.low = self.low.min(tip);
+        self.high = self.high.max(tip);
+        if self.contact {
+            self.in_contact += tau - self.before;
+        }
+        self.before = tau;
+        let contact = self.model.gap.at(drive, x, phase) <= 0.0;
+        if contact != self.contact {
+            let kind = if contact {
+                "contact_start"
+            } else {
+                "contact_end"
+            };
+            self.events.push(GridEvent { tau, kind });
+            self.contact = contact;
+        }
+        if period < CURVE_PERIODS {
+            self.curve.push([tau, tip, self.rate.at(drive, x, phase)]);
+        }
+    }
+}
+
+/// The smallest period to which the last strobe points repeat, and how nearly.
+fn apparent_period(strobes: &[Vec<f64>]) -> (Option<usize>, f64) {
+    let largest = |a: &[f64]| a.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let tail = &strobes[strobes.len().saturating_sub(2 * LONGEST_APPARENT)..];
+    let scale = tail
+        .iter()
+        .map(|x| largest(x))
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let mut nearest = f64::INFINITY;
+    for n in 1..=(tail.len() / 2).min(LONGEST_APPARENT) {
+        let closure = tail
+            .iter()
+            .zip(&tail[n..])
+            .map(|(a, b)| {
+                a.iter()
+                    .zip(b)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max)
+            })
+            .fold(0.0, f64::max)
+            / scale;
+        nearest = nearest.min(closure);
+        if closure <= APPARENT_CLOSURE {
+            return (Some(n), closure);
+        }
+    }
+    (None, nearest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::cantilever::Case;
+    use crate::model::parameter::Parameter;
+
+    /// Without contact the method is of fourth order and finds the forced response.
+    #[test]
+    fn without_contact_it_converges_to_the_exact_flow() {
+        let case = Case::paper()
+            .with_modes(1)
+            .with(Parameter::Alpha5, 10.0)
+            .with(Parameter::Alpha3, 1.0);
+        let model = Model::cantilever(&case).unwrap();
+        let run = |steps| {
+            let options = FixedStepOptions {
+                steps: [steps; 2],
+                transient: 60,
+                ..Default::default()
+            };
+            fixed_step_run(&model, &options).unwrap()
+        };
+        let exact =
+            crate::study::orbit::orbit(&model, &crate::study::orbit::OrbitOptions::default())
+                .unwrap();
+        let error = |run: &FixedStepRun| (run.strobe[0][0] - exact.state[0]).abs();
+        let (coarse, fine) = (run(50), run(100));
+        assert_eq!(
+            (fine.apparent_period, fine.exact.period),
+            (Some(1), Some(1))
+        );
+        let order = (error(&coarse) / error(&fine)).log2();
+        assert!((order - 4.0).abs() < 0.3, "{order}");
+        assert!(fine.events.is_empty() && fine.contact_fraction == 0.0);
+    }
+
+    /// A contact is noticed at a grid point, never before it happens and less than a
+    /// step late.
+    #[test]
+    fn contacts_are_noticed_late() {
+        let case = Case::paper().with(Parameter::Omega, 3.0);
+        let model = Model::cantilever(&case).unwrap();
+        let exact =
+            crate::study::orbit::orbit(&model, &crate::study::orbit::OrbitOptions::default())
+                .unwrap();
+        let steps = 4000;
+        let options = FixedStepOptions {
+            steps: [steps; 2],
+            state: Some(exact.state.clone()),
+            transient: 0,
+            periods: 2,
+            ..Default::default()
+        };
+        let run = fixed_step_run(&model, &options).unwrap();
+        assert_eq!(run.events[0].kind, "contact_start");
+        let late = run.events[0].tau - exact.events[0].tau;
+        let step = model.period() / f64::from(steps);
+        assert!(late > -0.01 * step && late < 1.01 * step, "{late} {step}");
+    }
+
+    #[test]
+    fn what_it_cannot_do_is_refused() {
+        let model = Model::cantilever(&Case::paper()).unwrap();
+        let few = FixedStepOptions {
+            steps: [3, 3],
+            transient: 2000,
+            ..Default::default()
+        };
+        assert!(matches!(
+            fixed_step_run(&model, &few),
+            Err(FixedStepError::Overflow { .. })
+        ));
+        let none = FixedStepOptions {
+            steps: [0, 10],
+            ..Default::default()
+        };
+        assert!(matches!(
+            fixed_step_run(&model, &none),
+            Err(FixedStepError::Simulate(_))
+        ));
+    }
+}

@@ -1,0 +1,66 @@
+//! What the tip does far from the sample, of any model, from the steady response of its
+//! regime of free flight.
+
+use nanotap_flow::Complex;
+
+use crate::model::Model;
+use crate::observe::lag;
+
+/// The motion far from the sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeMotion {
+    /// Amplitude of the tip deflection at the drive's frequency, A₀.
+    pub amplitude: f64,
+    /// Its phase behind the drive, degrees in (−180, 180].
+    pub phase: f64,
+    /// How far the tip swings towards the sample, its base's motion included: contact begins
+    /// at this distance. Of two tones the sum of both.
+    pub reach: f64,
+}
+
+impl FreeMotion {
+    /// Of `model`.
+    pub fn of(model: &Model) -> Self {
+        let Some(free) = model.system.regimes().first() else {
+            return Self {
+                amplitude: 0.0,
+                phase: 0.0,
+                reach: 0.0,
+            };
+        };
+        let tones = |output| free.project(output).tones;
+        let first = tones(&model.tip)
+            .first()
+            .copied()
+            .unwrap_or(Complex::new(0.0, 0.0));
+        Self {
+            amplitude: first.norm(),
+            phase: lag(first),
+            reach: tones(&model.gap).iter().map(|tone| tone.norm()).sum(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::physical::free_response::free_response;
+    use crate::model::cantilever::Case;
+
+    /// The closed form for the cantilever, solved otherwise.
+    #[test]
+    fn agrees_with_the_closed_form() {
+        for omega in [1.0, 2.6, 3.4, 20.0] {
+            let case = Case {
+                omega,
+                ..Case::paper()
+            };
+            let z = free_response(&case).unwrap();
+            let free = FreeMotion::of(&Model::cantilever(&case).unwrap());
+            assert!((free.amplitude / (case.alpha2 * z.norm()) - 1.0).abs() < 1e-11);
+            assert!((free.phase + z.arg().to_degrees()).abs() < 1e-9);
+            let reach = case.alpha2 * (z + 1.0).norm();
+            assert!((free.reach / reach - 1.0).abs() < 1e-11);
+        }
+    }
+}

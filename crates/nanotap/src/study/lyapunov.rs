@@ -1,0 +1,259 @@
+//! Lyapunov spectrum and Poincaré section of any motion.
+
+use std::sync::Arc;
+
+use nalgebra::RowDVector;
+use nanotap_dynamics::{
+    LyapunovSpectrum, SettleOptions, StroboscopicMap, lyapunov_spectrum, settle,
+};
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Flow, FlowError, Output, Trajectory};
+use serde::Serialize;
+
+pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
+
+use crate::model::Model;
+use crate::model::strobe::Strobe;
+use crate::observe::begins_contact;
+use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
+
+/// How to measure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LyapunovOptions {
+    /// Drive periods thrown away first.
+    pub transient: usize,
+    /// The state at the start; `None`: rest.
+    pub state: Option<Vec<f64>>,
+    /// Drive periods averaged over.
+    pub periods: usize,
+    /// What the section is taken at.
+    pub section: Section,
+    /// Points of the section.
+    pub points: usize,
+    /// Budgets for naming the motion.
+    pub settle: SettleOptions,
+}
+
+impl Default for LyapunovOptions {
+    fn default() -> Self {
+        Self {
+            transient: 1000,
+            state: None,
+            periods: 20_000,
+            section: Section::Phase(0.0),
+            points: 5000,
+            settle: SettleOptions::default(),
+        }
+    }
+}
+
+/// Where a motion is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Section {
+    /// Once a drive period at this phase, 0 … 1.
+    Phase(f64),
+    /// At the beginning of every contact.
+    Contact,
+}
+
+/// A point of a section.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SectionPoint {
+    /// Drive phase, 0 … 1.
+    pub phase: f64,
+    /// Tip displacement.
+    pub tip: f64,
+    /// Its rate.
+    pub tip_rate: f64,
+    /// Rate of the gap (negative: closing).
+    pub gap_rate: f64,
+    /// The state.
+    pub state: Vec<f64>,
+}
+
+/// The spectrum and the section.
+#[derive(Clone, Debug, Serialize)]
+pub struct LyapunovReport {
+    /// What the motion was found to be.
+    pub classification: Classification,
+    /// Its period, if periodic.
+    pub period: Option<usize>,
+    /// Why it was named so.
+    pub evidence: String,
+    /// Drive periods thrown away first.
+    pub transient: usize,
+    /// Drive periods averaged over.
+    pub periods: usize,
+    /// Exponents, natural logarithm per drive period, largest first.
+    pub exponents: Vec<f64>,
+    /// One standard error of each.
+    pub errors: Vec<f64>,
+    /// Their sum: how fast volumes of states shrink.
+    pub sum: f64,
+    /// The same from the trace of the equations and the time in contact: the check.
+    pub sum_by_trace: f64,
+    /// Kaplan–Yorke dimension of the strobe points.
+    pub kaplan_yorke_dimension: f64,
+    /// Mean strobe state.
+    pub mean: Vec<f64>,
+    /// The section, for files and figures.
+    #[serde(skip)]
+    pub section: Vec<SectionPoint>,
+    /// Where the section was taken.
+    pub section_at: Section,
+}
+
+/// Measures the spectrum of `model`'s motion and cuts it.
+///
+/// # Errors
+/// When the start makes no sense or the flow fails.
+pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovReport, SimulateError> {
+    let mut state = starting_state(model, options.state.as_deref())?;
+    if options.periods == 0 {
+        return Err(SimulateError::NoPeriods);
+    }
+    let mut map = Strobe::new(model);
+    for _ in 0..options.transient {
+        map.advance(&mut state)?;
+    }
+    let start = state.clone();
+    let fixed = SpectrumOptions {
+        min_periods: options.periods,
+        max_periods: options.periods,
+        ..SpectrumOptions::default()
+    };
+    let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
+        SimulateError::Flow(FlowError::NotFinite {
+            what: "the tangent vectors of the motion",
+        })
+    })?;
+    let named = Named::of(&settle(&mut map, &start, &options.settle).verdict);
+    Ok(LyapunovReport {
+        classification: named.classification,
+        period: named.orbit.map(|o| o.period),
+        evidence: named.evidence,
+        transient: options.transient,
+        periods: spectrum.periods,
+        sum: spectrum.exponents.iter().sum(),
+        sum_by_trace: sum_by_trace(model, &start, &spectrum)?,
+        kaplan_yorke_dimension: spectrum.kaplan_yorke_dimension(),
+        exponents: spectrum.exponents,
+        errors: spectrum.errors,
+        mean: spectrum.mean,
+        section: section(model, &start, options.section, options.points)?,
+        section_at: options.section,
+    })
+}
+
+/// Σλ = ⟨tr A_free t_free + tr A_contact t_contact⟩ and, of a rigid stop, 2 log r an
+/// impact, over as many periods from the same start.
+fn sum_by_trace(
+    model: &Model,
+    start: &[f64],
+    spectrum: &LyapunovSpectrum,
+) -> Result<f64, FlowError> {
+    let traces: Vec<f64> = model
+        .system
+        .regimes()
+        .iter()
+        .map(|r| r.matrix().trace())
+        .collect();
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(start, 0.0)?;
+    let mut sum = 0.0;
+    for _ in 0..spectrum.periods {
+        let mut recorder = Recorder::default();
+        flow.run_period(&mut recorder)?;
+        let trajectory = recorder.finish(Arc::clone(&model.system));
+        sum += trajectory
+            .segments()
+            .iter()
+            .map(|s| traces[s.regime] * s.length)
+            .sum::<f64>();
+        sum += trajectory
+            .events()
+            .iter()
+            .filter_map(|e| {
+                let exit = model.system.exits()[e.from]
+                    .iter()
+                    .find(|x| x.target == e.to)?;
+                Some(2.0 * exit.reset.as_ref()?.matrix.determinant().abs().ln())
+            })
+            .sum::<f64>();
+    }
+    Ok(sum / spectrum.periods as f64)
+}
+
+/// `points` points of the section of the motion from `start`, and fewer where contacts
+/// are rarer than one in eight periods.
+///
+/// # Errors
+/// When the flow fails.
+pub fn section(
+    model: &Model,
+    start: &[f64],
+    at: Section,
+    points: usize,
+) -> Result<Vec<SectionPoint>, FlowError> {
+    /// Periods watched for each point.
+    const RAREST: usize = 8;
+    let tip_rate = model.tip_rate();
+    let drive = model.system.drive();
+    let period = model.period();
+    let gap_rate = {
+        let free = &model.system.regimes()[0];
+        model.gap.rate(free.matrix(), free.forcing(), drive)
+    };
+    let point = |state: Vec<f64>, time: f64| SectionPoint {
+        phase: time / period,
+        tip: model.tip.at(drive, &state, time),
+        tip_rate: tip_rate.at(drive, &state, time),
+        gap_rate: gap_rate.at(drive, &state, time),
+        state,
+    };
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(start, 0.0)?;
+    let mut found = Vec::with_capacity(points);
+    for _ in 0..points.saturating_mul(RAREST) {
+        if found.len() >= points {
+            break;
+        }
+        let mut recorder = Recorder::default();
+        flow.run_period(&mut recorder)?;
+        let trajectory = recorder.finish(Arc::clone(&model.system));
+        match at {
+            Section::Phase(phase) => {
+                let time = phase.rem_euclid(1.0) * period;
+                found.extend(trajectory.state_at(time).map(|state| point(state, time)));
+            }
+            Section::Contact => {
+                for event in trajectory
+                    .events()
+                    .iter()
+                    .filter(|e| begins_contact(model, e.from, e.to))
+                {
+                    let state = state_before(&trajectory, event.time);
+                    found.extend(state.map(|state| point(state, event.time)));
+                }
+            }
+        }
+    }
+    found.truncate(points);
+    Ok(found)
+}
+
+/// The state just before a switch at `time`: an impact turns the velocity round.
+fn state_before(trajectory: &Trajectory, time: f64) -> Option<Vec<f64>> {
+    let system = trajectory.system();
+    let (n, tones) = (system.dimension(), system.drive().frequencies().len());
+    (0..n)
+        .map(|i| {
+            let mut row = RowDVector::zeros(n);
+            row[i] = 1.0;
+            let signal = trajectory.signal(&Output::linear(row, tones));
+            let piece = signal.pieces.iter().rev().find(|p| p.start < time)?;
+            Some(piece.signal.at((time - piece.start).min(piece.length)))
+        })
+        .collect()
+}

@@ -1,0 +1,21 @@
+//! The studies: one room each, with its options, its run and its report.
+
+pub mod approach;
+pub mod attractors;
+pub mod basin;
+pub mod branch;
+pub mod contact_laws;
+pub mod convergence;
+pub mod fixed_step;
+mod free_motion;
+pub mod lyapunov;
+pub mod modes;
+pub mod orbit;
+pub mod setpoint;
+pub mod simulate;
+pub mod start_box;
+pub mod studied;
+pub mod sweep;
+pub mod window;
+
+pub use free_motion::FreeMotion;

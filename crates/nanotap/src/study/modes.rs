@@ -1,0 +1,175 @@
+//! The frequencies of the lever, in free flight and with the tip in contact: those of the
+//! Galerkin equations, those of the beam without truncation, and what damping makes of them.
+
+use nalgebra::Complex;
+use nanotap_figures::{Axis, Figure, Line, Panel, Rule};
+use serde::Serialize;
+
+use crate::model::beam::Modes;
+use crate::model::cantilever::{Case, CaseError};
+use crate::model::exact_beam;
+use crate::model::galerkin::Regime;
+use crate::model::spectrum::{self, Spectrum, SpectrumError, TipLoad};
+
+/// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModeTable {
+    /// N.
+    pub modes: usize,
+    /// Free flight, Galerkin.
+    pub free: Vec<f64>,
+    /// Contact, Galerkin.
+    pub contact: Vec<f64>,
+    /// Free flight, the exact beam.
+    pub exact_free: Vec<f64>,
+    /// Contact, the exact beam.
+    pub exact_contact: Vec<f64>,
+    /// Eigenvalues [Re, Im ≥ 0] of the damped Galerkin equations in free flight, by
+    /// ascending size; `None` where they are too nearly defective to be told apart.
+    pub free_eigenvalues: Option<Vec<[f64; 2]>>,
+    /// The same in contact.
+    pub contact_eigenvalues: Option<Vec<[f64; 2]>>,
+}
+
+/// Why there is no mode table.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModeTableError {
+    /// The case is not valid.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The frequencies could not be computed.
+    #[error(transparent)]
+    Spectrum(#[from] SpectrumError),
+}
+
+impl ModeTable {
+    /// The modes of `case`.
+    ///
+    /// # Errors
+    /// [`ModeTableError::Case`] if the case is not valid.
+    pub fn new(case: &Case) -> Result<Self, ModeTableError> {
+        case.validate()?;
+        let beam = Modes::new(case.modes).map_err(CaseError::from)?;
+        let galerkin = |regime| spectrum::frequencies(&beam, TipLoad::of(case, regime));
+        let eigenvalues = |regime| {
+            let spectrum = Spectrum::of_beam(&beam, case.alpha3, TipLoad::of(case, regime));
+            spectrum
+                .ok()
+                .map(|spectrum| spectrum.eigenvalues.into_iter().map(pair).collect())
+        };
+        Ok(Self {
+            modes: case.modes,
+            free: galerkin(Regime::Free)?,
+            contact: galerkin(Regime::Contact)?,
+            exact_free: exact_beam::frequencies(case.alpha1, 0.0, case.modes)?,
+            exact_contact: exact_beam::frequencies(case.alpha1, case.alpha4, case.modes)?,
+            free_eigenvalues: eigenvalues(Regime::Free),
+            contact_eigenvalues: eigenvalues(Regime::Contact),
+        })
+    }
+}
+
+fn pair(eigenvalue: Complex<f64>) -> [f64; 2] {
+    [eigenvalue.re, eigenvalue.im]
+}
+
+/// The damping ratio ζ = −Re λ/|λ| of an eigenvalue [Re, Im].
+pub fn damping_ratio([re, im]: [f64; 2]) -> f64 {
+    let size = re.hypot(im);
+    // An eigenvalue zero belongs to no beam; it would damp nothing.
+    if size == 0.0 { 0.0 } else { -re / size }
+}
+
+/// The mode shapes φ_j(ξ) of the bare beam, the paper's Fig. 2e.
+pub fn shapes_figure(beam: &Modes) -> Figure {
+    const POINTS: usize = 401;
+    // Beyond these the lines cannot be told apart.
+    const MOST_NAMED: usize = 8;
+    let mut panel = Panel::new(
+        Axis::linear("position along the beam $ξ = x/L$").range(0.0, 1.0),
+        Axis::linear("mode shape $φ_j(ξ)$"),
+    )
+    .with(Rule::horizontal(0.0));
+    for mode in beam.iter() {
+        let shape = (0..POINTS).map(|point| {
+            let xi = point as f64 / (POINTS - 1) as f64;
+            (xi, mode.shape(xi))
+        });
+        let line = Line::new(shape);
+        panel = panel.with(if beam.count() <= MOST_NAMED {
+            line.label(format!("mode {}", mode.number))
+        } else {
+            line
+        });
+    }
+    Figure::single(panel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::parameter::Parameter;
+
+    #[test]
+    fn equation_25_and_the_exact_beam() {
+        // Eq. (25) of the paper prints 7.79, 20.33, 55.81 for the contact frequencies at
+        // α1 = 0.1, α4 = 20: its digits are those of five modes. The exact ones are roots
+        // of the transcendental equation.
+        let table = ModeTable::new(&Case::paper().with_modes(5)).unwrap();
+        for (computed, printed) in table.contact.iter().zip([7.79, 20.33, 55.81]) {
+            assert!(
+                (computed - printed).abs() <= 0.005 + 1e-9,
+                "{computed} {printed}"
+            );
+        }
+        for (computed, exact) in table
+            .exact_contact
+            .iter()
+            .zip([7.790952, 20.324970, 55.718523])
+        {
+            assert!((computed - exact).abs() < 1e-6, "{computed} {exact}");
+        }
+    }
+
+    #[test]
+    fn galerkin_lies_above_the_exact_beam_and_contact_above_free() {
+        // Rayleigh–Ritz: a truncated basis can only stiffen; so can a spring.
+        let table = ModeTable::new(&Case::paper().with_modes(8)).unwrap();
+        for k in 0..8 {
+            assert!(table.free[k] >= table.exact_free[k] * (1.0 - 1e-12));
+            assert!(table.contact[k] >= table.exact_contact[k] * (1.0 - 1e-12));
+            assert!(table.contact[k] >= table.free[k]);
+        }
+    }
+
+    #[test]
+    fn without_tip_and_spring_every_frequency_is_the_bare_beams() {
+        let bare = Case::paper()
+            .with(Parameter::Alpha1, 0.0)
+            .with(Parameter::Alpha4, 0.0)
+            .with_modes(4);
+        let table = ModeTable::new(&bare).unwrap();
+        // β² of cos β cosh β = −1: 3.51602, 22.0345, 61.6972, 120.902 (any table of modes).
+        for (column, expected) in [3.51602, 22.0345, 61.6972, 120.902].into_iter().enumerate() {
+            for row in [
+                &table.free,
+                &table.contact,
+                &table.exact_free,
+                &table.exact_contact,
+            ] {
+                assert!((row[column] / expected - 1.0).abs() < 5e-6);
+            }
+        }
+        // λ² + α3 λ + β⁴ = 0 for each mode by itself: ζ = α3/(2ω).
+        let free = table.free_eigenvalues.unwrap();
+        for (eigenvalue, frequency) in free.into_iter().zip(&table.free) {
+            assert!((damping_ratio(eigenvalue) - 0.1 / (2.0 * frequency)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn bad_cases_are_refused() {
+        let bad = Case::paper().with(Parameter::Alpha1, -1.0);
+        assert!(matches!(ModeTable::new(&bad), Err(ModeTableError::Case(_))));
+    }
+}

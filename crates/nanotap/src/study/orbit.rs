@@ -1,0 +1,372 @@
+//! A periodic orbit by Newton, with its stability and what can be read off it.
+
+use nalgebra::DVector;
+use nanotap_dynamics::{
+    Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
+    Stability, Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
+};
+use nanotap_flow::{FlowError, Trajectory};
+use serde::Serialize;
+
+use crate::model::strobe::Strobe;
+use crate::model::{Forgetting, Model};
+use crate::observe::{Observables, Spectrum};
+use crate::study::simulate::{ContactEvent, Named, SimulateError, contact_events, starting_state};
+use crate::study::start_box::default_box;
+
+/// How to look for an orbit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OrbitOptions {
+    /// Its period; `None`: the one where the run settles.
+    pub period: Option<usize>,
+    /// Where to start; `None`: where a run from rest settles.
+    pub state: Option<Vec<f64>>,
+    /// Harmonics of the drive frequency reported.
+    pub harmonics: usize,
+    /// Budgets of the run from rest.
+    pub settle: SettleOptions,
+    /// Newton's budgets.
+    pub shooting: ShootingOptions,
+}
+
+impl Default for OrbitOptions {
+    fn default() -> Self {
+        Self {
+            period: None,
+            state: None,
+            harmonics: 20,
+            settle: SettleOptions::default(),
+            shooting: ShootingOptions::default(),
+        }
+    }
+}
+
+/// Why no orbit was found.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum OrbitError {
+    /// A period of 0.
+    #[error("a period of at least 1 is needed, 0 was given")]
+    NoPeriod,
+    /// More harmonics than anything has.
+    #[error("{harmonics} harmonics are too many; {MOST_HARMONICS} at most")]
+    TooManyHarmonics {
+        /// How many were asked for.
+        harmonics: usize,
+    },
+    /// The start makes no sense.
+    #[error(transparent)]
+    Start(#[from] SimulateError),
+    /// The flow failed.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// Newton found nothing.
+    #[error(transparent)]
+    Newton(#[from] ShootingError),
+    /// There may be none.
+    #[error(
+        "no orbit of period {period} was found, neither near the motion nor from starts all over the box \
+         of states; say --state to look near one"
+    )]
+    NotFound {
+        /// The period asked for.
+        period: usize,
+    },
+    /// The run settles on something that is not periodic.
+    #[error(
+        "the run from this start is not periodic ({evidence}); say --period to look for an orbit of that period"
+    )]
+    NotPeriodic {
+        /// What it is.
+        evidence: String,
+    },
+}
+
+/// A periodic orbit and everything that is known about it.
+#[derive(Clone, Debug, Serialize)]
+pub struct OrbitReport {
+    /// Minimal period in drive periods.
+    pub period: usize,
+    /// State at drive phase 0.
+    pub state: Vec<f64>,
+    /// States at phase 0 of all its periods.
+    pub states: Vec<Vec<f64>>,
+    /// Largest entry of Pⁿ(x) − x.
+    pub residual: f64,
+    /// Estimated distance of the state from the true orbit.
+    pub error: f64,
+    /// Floquet multipliers, real and imaginary part, largest modulus first.
+    pub multipliers: Vec<[f64; 2]>,
+    /// Whether every multiplier is inside the unit circle.
+    pub stable: bool,
+    /// What the multipliers say, in a word: stable, unstable or marginal.
+    pub stability: &'static str,
+    /// |log|det DPⁿ| − trace formula|: zero to rounding of an exact Jacobian. Where a sample
+    /// forgets at the end of each contact, the product of the other multipliers stands for
+    /// the determinant, which is zero.
+    pub determinant_defect: f64,
+    /// Contacts begun and ended.
+    pub events: Vec<ContactEvent>,
+    /// What can be read off it.
+    #[serde(flatten)]
+    pub observables: Observables,
+    /// Harmonics, distortion and phase.
+    #[serde(flatten)]
+    pub spectrum: Spectrum,
+    /// Its full length, for figures.
+    #[serde(skip)]
+    pub trajectory: Trajectory,
+}
+
+/// Most harmonics of the drive frequency that are reported.
+pub const MOST_HARMONICS: usize = 100_000;
+
+/// Finds a periodic orbit of `model`.
+///
+/// # Errors
+/// When none is found, with the reason.
+pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, OrbitError> {
+    if options.period == Some(0) {
+        return Err(OrbitError::NoPeriod);
+    }
+    if options.harmonics > MOST_HARMONICS {
+        return Err(OrbitError::TooManyHarmonics {
+            harmonics: options.harmonics,
+        });
+    }
+    let start = starting_state(model, options.state.as_deref())?;
+    let mut map = Strobe::new(model);
+    let found = match (options.period, &options.state) {
+        (Some(period), Some(_)) => close_orbit(&mut map, &start, period, &options.shooting)?,
+        (period, _) => settled(model, &mut map, &start, period, options)?,
+    };
+    report(model, &found, options.harmonics)
+}
+
+/// The orbit where a run from `start` settles, or one of the asked period: near its end, or
+/// anywhere.
+fn settled(
+    model: &Model,
+    map: &mut Strobe,
+    start: &[f64],
+    period: Option<usize>,
+    options: &OrbitOptions,
+) -> Result<PeriodicOrbit, OrbitError> {
+    let end = settle(map, start, &options.settle);
+    if let Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } = &end.verdict
+        && period.is_none_or(|p| p % orbit.period == 0)
+    {
+        return Ok(orbit.clone());
+    }
+    match period {
+        None => Err(OrbitError::NotPeriodic {
+            evidence: Named::of(&end.verdict).evidence,
+        }),
+        Some(period) => near_recurrence(map, &end.state, period, &options.shooting)
+            .ok()
+            .filter(|orbit| orbit.period == period)
+            .map_or_else(|| searched(model, map, period, options), Ok),
+    }
+}
+
+/// Starts in the default box from which Newton is tried.
+const SEARCHED_STARTS: usize = 64;
+/// Periods run from each of them in search of near returns.
+const SEARCHED_PERIODS: usize = 256;
+
+/// An orbit of just this period, the least unstable one that Newton finds from starts all
+/// over the default box; failing that, what it finds from where the run ended.
+fn searched(
+    model: &Model,
+    map: &mut Strobe,
+    period: usize,
+    options: &OrbitOptions,
+) -> Result<PeriodicOrbit, OrbitError> {
+    let starts = default_box(model)
+        .map(|b| b.starts(1, SEARCHED_STARTS))
+        .unwrap_or_default();
+    let search = OrbitSearch {
+        max_period: period,
+        run: SEARCHED_PERIODS.max(8 * period),
+        shooting: options.shooting.clone(),
+        ..OrbitSearch::default()
+    };
+    let found = find_orbits(map, &starts, &search, &Control::default());
+    found
+        .into_iter()
+        .find(|orbit| orbit.period == period)
+        .ok_or(OrbitError::NotFound { period })
+}
+
+/// States looked at for a near return.
+const RECURRENCE_PERIODS: usize = 2000;
+/// Near returns given to Newton.
+const RECURRENCE_TRIES: usize = 12;
+
+/// Closes an orbit of the given period from the nearest returns of a wandering motion.
+fn near_recurrence(
+    map: &mut Strobe,
+    state: &[f64],
+    period: usize,
+    shooting: &ShootingOptions,
+) -> Result<PeriodicOrbit, OrbitError> {
+    use nanotap_dynamics::StroboscopicMap as _;
+    let mut states = vec![state.to_vec()];
+    for k in 0..RECURRENCE_PERIODS + period {
+        let mut next = states[k].clone();
+        map.advance(&mut next)?;
+        states.push(next);
+    }
+    let distance =
+        |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let mut order: Vec<usize> = (0..RECURRENCE_PERIODS).collect();
+    order.sort_by(|&a, &b| {
+        distance(&states[a], &states[a + period])
+            .total_cmp(&distance(&states[b], &states[b + period]))
+    });
+    let mut last = None;
+    let mut smaller = None;
+    for &k in order.iter().take(RECURRENCE_TRIES) {
+        let points: Vec<f64> = states[k..k + period].concat();
+        match close_orbit_from_points(map, &points, period, shooting) {
+            Ok(orbit) if orbit.period == period => return Ok(orbit),
+            Ok(orbit) => smaller = Some(orbit),
+            Err(error) => last = Some(error),
+        }
+    }
+    match (smaller, last) {
+        (Some(orbit), _) => Ok(orbit),
+        (None, Some(error)) => Err(error.into()),
+        (None, None) => Err(OrbitError::NoPeriod),
+    }
+}
+
+/// Everything about a closed orbit of `model`.
+///
+/// # Errors
+/// When the flow along it fails.
+pub fn report(
+    model: &Model,
+    orbit: &PeriodicOrbit,
+    harmonics: usize,
+) -> Result<OrbitReport, OrbitError> {
+    let start = orbit.states.first().cloned().unwrap_or_default();
+    let trajectory = Trajectory::record(&model.system, &start, orbit.period)?;
+    let observables = Observables::of(model, &trajectory).ok_or(OrbitError::NoPeriod)?;
+    Ok(OrbitReport {
+        period: orbit.period,
+        state: start,
+        states: orbit.states.clone(),
+        residual: orbit.residual,
+        error: orbit.error,
+        multipliers: orbit
+            .multipliers
+            .iter()
+            .map(|m: &Complex<f64>| [m.re, m.im])
+            .collect(),
+        stable: orbit.is_stable(),
+        stability: match orbit.stability {
+            Stability::Stable => "stable",
+            Stability::Unstable { .. } => "unstable",
+            Stability::Marginal => "marginal",
+        },
+        determinant_defect: determinant_defect(model, orbit, &trajectory),
+        events: contact_events(model, &trajectory, 0.0),
+        spectrum: Spectrum::of(model, &trajectory, orbit.period, harmonics),
+        observables,
+        trajectory,
+    })
+}
+
+/// How far the multipliers are from Liouville's formula.
+fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Trajectory) -> f64 {
+    let expected = log_determinant(model, trajectory);
+    match &model.forgetting {
+        Some(forgetting) if !trajectory.events().is_empty() => {
+            // One direction is lost, and its multiplier is zero.
+            let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
+            let found: f64 = kept.iter().map(|m| m.norm().ln()).sum();
+            (found - expected - log_remembered(model, forgetting, trajectory)).abs()
+        }
+        _ => (orbit.log_determinant - expected).abs(),
+    }
+}
+
+/// What a memory that is set anew at the end of each contact adds to log|det| of the rest.
+///
+/// With S the saltation where contact begins, Φ the flow of a flight of length t and p the
+/// tip's row, a contact, a flight and the next contact's beginning map the beam's state by
+/// S Φ + κ e^{rt} pᵀ, κ the kick per change of memory. By the lemma on determinants its
+/// determinant is that of S Φ times 1 + e^{rt} pᵀ Φ⁻¹ κ, since S⁻¹κ = κ.
+fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajectory) -> f64 {
+    let flight = &model.system.regimes()[0];
+    let basis = flight.basis();
+    let tip = &model.height.row;
+    let back = |length: f64| {
+        if !basis.clusters.is_empty() {
+            return (flight.matrix() * -length).exp() * &forgetting.kick;
+        }
+        let kicked = &basis.left * forgetting.kick.map(|v| Complex::new(v, 0.0));
+        let turned = kicked.zip_map(
+            &DVector::from_column_slice(&basis.eigenvalues),
+            |q, rate| q * (rate * -length).exp(),
+        );
+        (&basis.right * turned).map(|z| z.re)
+    };
+    let factor = |length: f64| 1.0 + (forgetting.rate * length).exp() * (tip * back(length))[0];
+    flights(model, trajectory)
+        .map(|length| factor(length).abs().ln())
+        .sum()
+}
+
+/// Lengths of the flights between contacts of one repetition of an orbit.
+fn flights(model: &Model, trajectory: &Trajectory) -> impl Iterator<Item = f64> {
+    let begins: Vec<f64> = trajectory
+        .events()
+        .iter()
+        .filter(|e| model.contact[e.to])
+        .map(|e| e.time)
+        .collect();
+    let (end, whole) = (trajectory.end(), begins.len());
+    trajectory
+        .events()
+        .iter()
+        .filter(|e| !model.contact[e.to])
+        .map(move |e| {
+            let next = begins.iter().copied().find(|t| *t > e.time);
+            let around = || begins.first().map_or(end, |t| t + end);
+            (next.unwrap_or_else(around) - e.time) * f64::from(u8::from(whole > 0))
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
+/// log|det DPⁿ| from Liouville's formula: every switch has determinant ±(product of
+/// the resets), every segment e^{tr A · length}.
+fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
+    // A memory that is forgotten is left out, and its jump with it.
+    let forgets = model.forgetting.as_ref();
+    let forgotten = match forgets {
+        Some(f) if !trajectory.events().is_empty() => f.rate * trajectory.end(),
+        _ => 0.0,
+    };
+    let flow: f64 = trajectory
+        .segments()
+        .iter()
+        .map(|s| model.system.regimes()[s.regime].matrix().trace() * s.length)
+        .sum::<f64>()
+        - forgotten;
+    // A rigid impact's saltation has determinant r² (the reset once, the change of
+    // time of flight once).
+    let impacts: f64 = trajectory
+        .events()
+        .iter()
+        .filter_map(|e| {
+            let exit = model.system.exits()[e.from]
+                .iter()
+                .find(|x| x.target == e.to)?;
+            let reset = exit.reset.as_ref().filter(|_| forgets.is_none())?;
+            Some(2.0 * reset.matrix.determinant().abs().ln())
+        })
+        .sum();
+    flow + impacts
+}

@@ -1,0 +1,510 @@
+//! One run: the transient thrown away, the motion recorded, observed and named.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+pub use nanotap_dynamics::SettleOptions;
+use nanotap_dynamics::{LyapunovSpectrum, PeriodicOrbit, StroboscopicMap, Verdict, settle};
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Flow, FlowError, Trajectory};
+use serde::Serialize;
+
+use crate::model::Model;
+use crate::model::strobe::Strobe;
+use crate::observe::{Observables, begins_contact};
+
+/// How to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulateOptions {
+    /// Drive periods recorded.
+    pub periods: usize,
+    /// Drive periods thrown away first; `None`: as many as the motion is measured to need.
+    pub transient: Option<usize>,
+    /// The state at the start; `None`: rest.
+    pub state: Option<Vec<f64>>,
+    /// How many of the last states at drive phase 0 to keep.
+    pub strobe: usize,
+    /// Budgets for naming the motion.
+    pub settle: SettleOptions,
+}
+
+impl Default for SimulateOptions {
+    fn default() -> Self {
+        Self {
+            periods: 50,
+            transient: None,
+            state: None,
+            strobe: 1,
+            settle: SettleOptions::default(),
+        }
+    }
+}
+
+/// Why a run failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// The starting state has the wrong length.
+    #[error("the state has {found} numbers where {expected} are needed: {layout}")]
+    State {
+        /// Its length.
+        found: usize,
+        /// The dimension of the model.
+        expected: usize,
+        /// What the numbers are.
+        layout: &'static str,
+    },
+    /// A number of the starting state is none.
+    #[error("number {number} of the state is {value}; a finite number is needed")]
+    StateValue {
+        /// Which, from 1.
+        number: usize,
+        /// What was given.
+        value: f64,
+    },
+    /// Nothing to record.
+    #[error("at least one period must be recorded, 0 were asked for")]
+    NoPeriods,
+    /// The flow failed.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+}
+
+/// What a motion was found to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Classification {
+    /// It goes to a stable periodic orbit, closed by Newton.
+    Periodic,
+    /// It fills a torus.
+    QuasiPeriodic,
+    /// It is chaotic for as long as it was watched.
+    Chaotic,
+    /// It leaves every bound.
+    Unbounded,
+    /// None of these could be shown.
+    Undecided,
+}
+
+impl Classification {
+    /// The word for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Periodic => "periodic",
+            Self::QuasiPeriodic => "quasi-periodic",
+            Self::Chaotic => "chaotic",
+            Self::Unbounded => "unbounded",
+            Self::Undecided => "undecided",
+        }
+    }
+}
+
+/// A switch between flight and contact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ContactEvent {
+    /// When, counted from the end of the transient.
+    pub tau: f64,
+    /// Which way.
+    pub kind: ContactEventKind,
+    /// Rate of the gap just before it.
+    pub gap_rate: f64,
+}
+
+/// Which way a switch goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactEventKind {
+    /// The tip meets the sample.
+    ContactStart,
+    /// The tip leaves it.
+    ContactEnd,
+    /// The tip bounces off a rigid stop.
+    Impact,
+}
+
+/// A finished run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Simulation {
+    /// Drive periods recorded.
+    pub periods: usize,
+    /// Drive periods thrown away first.
+    pub transient: usize,
+    /// The state at the end of the transient, where the recording starts.
+    pub start: Vec<f64>,
+    /// What the motion was found to be, followed on from the end of the transient.
+    pub classification: Classification,
+    /// Its minimal period in drive periods, if periodic.
+    pub period: Option<usize>,
+    /// Why it was named so, in words.
+    pub evidence: String,
+    /// Lyapunov exponents per drive period, if they were measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lyapunov: Option<Vec<f64>>,
+    /// States at the end of each of the last periods asked for.
+    pub strobe: Vec<Vec<f64>>,
+    /// Contacts begun and ended.
+    pub events: Vec<ContactEvent>,
+    /// What can be read off the recorded stretch.
+    #[serde(flatten)]
+    pub observables: Observables,
+    /// Speed of the propagation alone, drive periods a second.
+    pub periods_per_second: f64,
+    /// Evaluations of the gap a drive period.
+    pub evaluations_per_period: f64,
+    /// The stable orbit it goes to, if periodic.
+    #[serde(skip)]
+    pub orbit: Option<PeriodicOrbit>,
+    /// The first recorded periods, for figures and time series.
+    #[serde(skip)]
+    pub trajectory: Trajectory,
+}
+
+/// Periods observed in one piece; bounds the memory of long runs.
+const BLOCK: usize = 512;
+/// A run that starts at a periodic orbit is as near as rounding lets it be.
+const ARRIVED: f64 = 1e-11;
+/// Longest approach to a weakly stable orbit that is waited for.
+const LONGEST_APPROACH: usize = 200_000;
+
+/// Runs `model`.
+///
+/// # Errors
+/// When the state does not fit or the flow fails.
+pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, SimulateError> {
+    let mut state = starting_state(model, options.state.as_deref())?;
+    if options.periods == 0 {
+        return Err(SimulateError::NoPeriods);
+    }
+    let mut map = Strobe::new(model);
+    let transient = if let Some(transient) = options.transient {
+        map.advance_by(&mut state, transient)?;
+        transient
+    } else {
+        measured_transient(&mut map, &mut state, &options.settle)?
+    };
+    let record = record(model, &state, options)?;
+    let named = Named::of(&settle(&mut map, &state, &options.settle).verdict);
+    Ok(Simulation {
+        periods: options.periods,
+        transient,
+        start: state,
+        classification: named.classification,
+        period: named.orbit.as_ref().map(|o| o.period),
+        evidence: named.evidence,
+        lyapunov: named.spectrum.map(|s| s.exponents),
+        strobe: record.strobe,
+        events: record.events,
+        observables: record.observables,
+        periods_per_second: record.periods_per_second,
+        evaluations_per_period: record.evaluations_per_period,
+        orbit: named.orbit,
+        trajectory: record.trajectory,
+    })
+}
+
+/// The state to start from: as given, or rest. A sample with a memory is relaxed where the
+/// state does not say otherwise.
+///
+/// # Errors
+/// [`SimulateError::State`] when its length does not fit.
+pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
+    let n = model.dimension();
+    let Some(state) = state else {
+        return Ok(vec![0.0; n]);
+    };
+    let mut state = state.to_vec();
+    if state.len() + model.memory == n {
+        state.resize(n, 0.0);
+    }
+    if state.len() != n {
+        let layout = if model.memory > 0 {
+            "the modal amplitudes a_1 … a_N, then their rates, then (if not 0) the sample's memory"
+        } else if model.beam.is_some() {
+            "the modal amplitudes a_1 … a_N, then their rates"
+        } else {
+            "x, then its rate"
+        };
+        return Err(SimulateError::State {
+            found: state.len(),
+            expected: n,
+            layout,
+        });
+    }
+    if let Some((k, &value)) = state.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        return Err(SimulateError::StateValue {
+            number: k + 1,
+            value,
+        });
+    }
+    Ok(state)
+}
+
+/// Runs until the motion has been named and, if it goes to a periodic orbit, has
+/// arrived there to rounding.
+fn measured_transient(
+    map: &mut Strobe,
+    state: &mut Vec<f64>,
+    options: &SettleOptions,
+) -> Result<usize, SimulateError> {
+    let settled = settle(map, state, options);
+    let mut periods = settled.periods;
+    state.copy_from_slice(&settled.state);
+    let (Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. }) = &settled.verdict
+    else {
+        return Ok(periods);
+    };
+    let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
+    let mut previous = f64::INFINITY;
+    for k in 0..LONGEST_APPROACH {
+        let distance = orbit
+            .states
+            .iter()
+            .map(|x| {
+                x.iter()
+                    .zip(&*state)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max)
+            })
+            .fold(f64::INFINITY, f64::min);
+        if distance <= near {
+            break;
+        }
+        // At the floor of rounding the distance no longer falls.
+        if k % 1000 == 999 {
+            if distance > 0.9 * previous {
+                break;
+            }
+            previous = distance;
+        }
+        map.advance(state)?;
+        periods += 1;
+    }
+    Ok(periods)
+}
+
+struct Record {
+    strobe: Vec<Vec<f64>>,
+    events: Vec<ContactEvent>,
+    observables: Observables,
+    periods_per_second: f64,
+    evaluations_per_period: f64,
+    trajectory: Trajectory,
+}
+
+fn record(
+    model: &Model,
+    state: &[f64],
+    options: &SimulateOptions,
+) -> Result<Record, SimulateError> {
+    let (periods_per_second, evaluations_per_period) = speed(model, state, options.periods)?;
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(state, 0.0)?;
+    let mut strobe = Vec::new();
+    let mut events = Vec::new();
+    let mut first: Option<Trajectory> = None;
+    let mut observables: Option<Observables> = None;
+    let mut done = 0;
+    while done < options.periods {
+        let block = BLOCK.min(options.periods - done);
+        let mut recorder = Recorder::default();
+        for k in 0..block {
+            flow.run_period(&mut recorder)?;
+            if done + k + 1 + options.strobe > options.periods {
+                let mut x = vec![0.0; model.dimension()];
+                flow.state(&mut x);
+                strobe.push(x);
+            }
+        }
+        let trajectory = recorder.finish(Arc::clone(&model.system));
+        let offset = done as f64 * model.period();
+        events.extend(contact_events(model, &trajectory, offset));
+        if let Some(next) = Observables::of(model, &trajectory) {
+            observables = Some(observables.map_or_else(|| next.clone(), |o| o.joined(&next)));
+        }
+        first.get_or_insert(trajectory);
+        done += block;
+    }
+    // Both are there: at least one period was recorded.
+    let (Some(trajectory), Some(observables)) = (first, observables) else {
+        return Err(SimulateError::NoPeriods);
+    };
+    Ok(Record {
+        strobe,
+        events,
+        observables,
+        periods_per_second,
+        evaluations_per_period,
+        trajectory,
+    })
+}
+
+/// What can be read off `periods` drive periods from `state` at drive phase 0.
+///
+/// # Errors
+/// When the flow fails or nothing is to be recorded.
+pub fn observe(model: &Model, state: &[f64], periods: usize) -> Result<Observables, SimulateError> {
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(state, 0.0)?;
+    let mut observables: Option<Observables> = None;
+    let mut done = 0;
+    while done < periods {
+        let block = BLOCK.min(periods - done);
+        let mut recorder = Recorder::default();
+        for _ in 0..block {
+            flow.run_period(&mut recorder)?;
+        }
+        let trajectory = recorder.finish(Arc::clone(&model.system));
+        if let Some(next) = Observables::of(model, &trajectory) {
+            observables =
+                Some(observables.map_or_else(|| next.clone(), |so_far| so_far.joined(&next)));
+        }
+        done += block;
+    }
+    observables.ok_or(SimulateError::NoPeriods)
+}
+
+/// Speed of the bare propagation and gap evaluations a period.
+fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), SimulateError> {
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(state, 0.0)?;
+    let clock = Instant::now();
+    for _ in 0..periods {
+        flow.run_period(&mut ())?;
+    }
+    let seconds = clock.elapsed().as_secs_f64().max(1e-9);
+    let evaluations = flow.statistics().evaluations as f64;
+    Ok((periods as f64 / seconds, evaluations / periods as f64))
+}
+
+/// The contacts of a recording, their times shifted by `offset`.
+pub fn contact_events(model: &Model, trajectory: &Trajectory, offset: f64) -> Vec<ContactEvent> {
+    trajectory
+        .events()
+        .iter()
+        .filter_map(|e| {
+            let kind = if begins_contact(model, e.from, e.to) {
+                if e.from == e.to {
+                    ContactEventKind::Impact
+                } else {
+                    ContactEventKind::ContactStart
+                }
+            } else if model.contact[e.from] && !model.contact[e.to] {
+                ContactEventKind::ContactEnd
+            } else {
+                return None;
+            };
+            // The guard's rate points into the regime left; the gap's has one sign.
+            let gap_rate = if model.contact[e.from] {
+                -e.rate
+            } else {
+                e.rate
+            };
+            Some(ContactEvent {
+                tau: offset + e.time,
+                kind,
+                gap_rate,
+            })
+        })
+        .collect()
+}
+
+/// The largest exponent in words.
+pub(crate) fn largest_exponent(spectrum: &LyapunovSpectrum) -> String {
+    let (value, error) = spectrum.largest();
+    // Near zero the digits after the point would say nothing.
+    let shown = if value.abs() < 1e-3 {
+        format!("{value:.1e} ± {error:.0e}")
+    } else {
+        format!("{value:.4} ± {error:.4}")
+    };
+    format!(
+        "largest exponent {shown} per period over {} periods",
+        spectrum.periods
+    )
+}
+
+/// A verdict in the words of the output.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// The class.
+    pub classification: Classification,
+    /// The orbit, if it is periodic.
+    pub orbit: Option<PeriodicOrbit>,
+    /// Exponents, if they were measured.
+    pub spectrum: Option<LyapunovSpectrum>,
+    /// Why, in words.
+    pub evidence: String,
+}
+
+impl Named {
+    /// Names a verdict.
+    pub fn of(verdict: &Verdict) -> Self {
+        let exponent = largest_exponent;
+        let periodic = |orbit: &PeriodicOrbit| {
+            format!(
+                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
+                orbit.period,
+                orbit.residual,
+                orbit.spectral_radius()
+            )
+        };
+        let (classification, orbit, spectrum, evidence) = match verdict {
+            Verdict::Periodic(orbit) => {
+                (Classification::Periodic, Some(orbit), None, periodic(orbit))
+            }
+            Verdict::TransientChaos {
+                orbit,
+                spectrum,
+                lasted,
+            } => (
+                Classification::Periodic,
+                Some(orbit),
+                Some(spectrum),
+                format!(
+                    "chaotic for about {lasted} periods ({}), then: {}",
+                    exponent(spectrum),
+                    periodic(orbit)
+                ),
+            ),
+            Verdict::QuasiPeriodic(torus) => (
+                Classification::QuasiPeriodic,
+                None,
+                Some(&torus.spectrum),
+                format!(
+                    "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
+                    exponent(&torus.spectrum),
+                    torus.birkhoff_digits,
+                    torus.nearest_return
+                ),
+            ),
+            Verdict::Chaotic(chaos) => (
+                Classification::Chaotic,
+                None,
+                Some(&chaos.spectrum),
+                format!(
+                    "{}; no escape in {} periods of this one run (mean lifetime above {:.0} at 95 %)",
+                    exponent(&chaos.spectrum),
+                    chaos.observed,
+                    chaos.lifetime_above
+                ),
+            ),
+            Verdict::Unbounded => (
+                Classification::Unbounded,
+                None,
+                None,
+                "the motion left every bound".to_owned(),
+            ),
+            Verdict::Undecided { reason, spectrum } => (
+                Classification::Undecided,
+                None,
+                spectrum.as_ref(),
+                reason.to_string(),
+            ),
+        };
+        Self {
+            classification,
+            orbit: orbit.cloned(),
+            spectrum: spectrum.cloned(),
+            evidence,
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! The box of initial states that a census or a basin looks at when nobody says another.
+//!
+//! It is derived from the linear response, so that it fits motions of any size, from the
+//! paper's (of order 1) to an experiment's (1e-6 of the beam's height). With
+//! r_j the linear response of displacement j to the drive, the half width is, the larger
+//! of free flight and contact,
+//!
+//! `a_j: g r_j`, `v_j: max(Ω, ω_j) g r_j`, `g = 2 √R` within 4 … 40,
+//!
+//! where ω_j is the frequency at which displacement j would swing by itself and R how much
+//! larger its response would be at resonance than at Ω. Every motion that
+//! the drive can keep up lies below the resonant amplitude (g = R); the
+//! response off resonance is the least (g = 1). The mean of the two holds the
+//! subharmonic motions known of this model, and its larger starts decay through all sizes
+//! below. Constant parts of the response add to it, and the tip must be able to start
+//! twice as far off as the sample is.
+//!
+//! Of a rigid stop the part beyond the stop is cut off. A sample with a memory starts
+//! relaxed: it would forget within a contact or two.
+
+use nanotap_dynamics::{StartBox, StartBoxError};
+use nanotap_flow::Regime;
+
+use crate::model::Model;
+use crate::observe::time_series::state_names;
+
+/// Least and greatest widening of the linear response.
+const WIDENING: (f64, f64) = (4.0, 40.0);
+
+/// The default box of `model`.
+///
+/// # Errors
+/// [`StartBoxError`] if the response is beyond the range of floats.
+pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
+    let n = (model.dimension() - model.memory) / 2;
+    let omega = model
+        .system
+        .drive()
+        .frequencies()
+        .first()
+        .copied()
+        .unwrap_or(1.0);
+    let moving = || {
+        model
+            .system
+            .regimes()
+            .iter()
+            .filter(|r| r.matrix().amax() > 0.0)
+    };
+    let mut lower = vec![0.0; model.dimension()];
+    let mut upper = lower.clone();
+    for j in 0..n {
+        let swing = |r: &Regime| (-r.matrix()[(n + j, j)]).max(0.0).sqrt();
+        let half = moving()
+            .map(|r| {
+                let response: f64 = r.response().tones.iter().map(|tone| tone[j].norm()).sum();
+                let damping = -r.matrix()[(n + j, n + j)];
+                widening(swing(r), damping, omega) * response + r.response().constant[j].abs()
+            })
+            .fold(reach(model, j), f64::max);
+        let speed = half * moving().map(swing).fold(omega, f64::max);
+        (lower[j], upper[j]) = (-half, half);
+        (lower[n + j], upper[n + j]) = (-speed, speed);
+    }
+    if let Some(stop) = rigid_stop(model) {
+        let width = upper[0] - lower[0];
+        upper[0] = upper[0].min(stop);
+        if lower[0] >= upper[0] {
+            lower[0] = upper[0] - width.max(f64::MIN_POSITIVE);
+        }
+    }
+    StartBox::new(lower, upper)
+}
+
+/// Twice the displacement `j` that brings the tip to the sample by itself; of the first
+/// mode of a beam, which bends most.
+fn reach(model: &Model, j: usize) -> f64 {
+    let slope = model.height.row[j].abs();
+    if j == 0 && slope > 0.0 {
+        2.0 * model.height.constant.abs() / slope
+    } else {
+        0.0
+    }
+}
+
+/// Twice the root of what resonance would gain on a degree of freedom that swings at
+/// `swing` and loses speed at the rate `damping`, over what a drive at `omega` gives it.
+fn widening(swing: f64, damping: f64, omega: f64) -> f64 {
+    let here = (swing * swing - omega * omega).hypot(damping * omega);
+    let resonant = damping * swing;
+    let gain = if resonant > 0.0 {
+        here / resonant
+    } else {
+        f64::INFINITY
+    };
+    (2.0 * gain.sqrt()).clamp(WIDENING.0, WIDENING.1)
+}
+
+/// Where a rigid stop stands; starts beyond it make no sense.
+fn rigid_stop(model: &Model) -> Option<f64> {
+    let rigid = model
+        .system
+        .exits()
+        .iter()
+        .flatten()
+        .any(|e| e.reset.is_some());
+    // gap = stop − x
+    (rigid && model.beam.is_none()).then_some(model.gap.constant)
+}
+
+/// A side of the box that somebody gave makes no sense.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SideError {
+    /// No coordinate of that name.
+    #[error("no coordinate `{given}` here; there are {known}")]
+    Unknown {
+        /// What was given.
+        given: String,
+        /// What there is.
+        known: String,
+    },
+    /// It makes no box.
+    #[error(transparent)]
+    Box(#[from] StartBoxError),
+}
+
+/// The default box with some sides replaced: coordinate (`a1`, `v2`, `x` …), lower and
+/// upper end. A side of no length holds its coordinate fixed.
+///
+/// # Errors
+/// [`SideError`] for an unknown coordinate or an interval that runs downwards.
+pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox, SideError> {
+    let default = default_box(model)?;
+    let (mut lower, mut upper) = (default.lower().to_vec(), default.upper().to_vec());
+    let names = state_names(model);
+    for (name, low, high) in sides {
+        let Some(index) = names.iter().position(|n| n == name) else {
+            return Err(SideError::Unknown {
+                given: name.clone(),
+                known: names.join(", "),
+            });
+        };
+        (lower[index], upper[index]) = (*low, *high);
+    }
+    Ok(StartBox::new(lower, upper)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::cantilever::Case;
+    use crate::model::oscillator::{Oscillator, Stop};
+    use crate::model::parameter::Parameter;
+
+    /// With α5 = 0 the model is homogeneous of degree one, and so must the box be.
+    #[test]
+    fn it_scales_with_the_drive() {
+        let of = |alpha2| {
+            default_box(&Model::cantilever(&Case::paper().with(Parameter::Alpha2, alpha2)).unwrap())
+                .unwrap()
+        };
+        let (large, small) = (of(0.1), of(1e-7));
+        for (a, b) in large.upper().iter().zip(small.upper()) {
+            assert!((b / a / 1e-6 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn starts_of_a_rigid_stop_lie_before_it() {
+        let mut oscillator = Oscillator {
+            mass: 1.0,
+            stiffness: 1.0,
+            damping: 0.0,
+            forcing: 1.0,
+            omega: 2.5,
+            gap: 0.0,
+            stop: Stop::Rigid { restitution: 0.8 },
+        };
+        for gap in [0.0, 0.3, -50.0, 50.0] {
+            oscillator.gap = gap;
+            let sides = default_box(&oscillator.model().unwrap()).unwrap();
+            assert!(sides.upper()[0] <= gap && sides.lower()[0] < sides.upper()[0]);
+        }
+    }
+
+    #[test]
+    fn sides_are_replaced_by_name() {
+        let model = Model::cantilever(&Case::paper()).unwrap();
+        let sides = box_with(
+            &model,
+            &[("v2".into(), -0.5, 0.25), ("a1".into(), 0.1, 0.1)],
+        )
+        .unwrap();
+        assert_eq!((sides.lower()[4], sides.upper()[4]), (-0.5, 0.25));
+        assert_eq!((sides.lower()[0], sides.upper()[0]), (0.1, 0.1));
+        assert!(matches!(
+            box_with(&model, &[("a4".into(), 0.0, 1.0)]),
+            Err(SideError::Unknown { .. })
+        ));
+        assert!(matches!(
+            box_with(&model, &[("a1".into(), 1.0, 0.0)]),
+            Err(SideError::Box(_))
+        ));
+    }
+}

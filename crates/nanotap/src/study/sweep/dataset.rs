@@ -1,0 +1,363 @@
+//! What the dataset of a sweep holds, and how its chunks are cut.
+
+use serde_json::{Value, json};
+
+use super::SweepOptions;
+use super::error::{SweepError, check_size};
+use super::follow::Follow;
+use super::over::Over;
+use super::run::{Outcome, Starts};
+use crate::case::physical::Kind as QuantityKind;
+use crate::case::subject::Subject;
+use crate::dataset::schema::Kind;
+use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
+use crate::study::simulate::Classification;
+
+/// Chunks that a large sweep is cut into at least: enough for a job array, few enough
+/// for a file system.
+const CHUNKS: usize = 64;
+/// Most runs of a chunk: what a kill loses at most.
+const MOST_RUNS: usize = 4096;
+/// Bytes that a chunk should not exceed.
+const CHUNK_BYTES: usize = 16 << 20;
+
+/// The classifications in the order of their codes; code 0 is a chunk that is missing.
+pub(super) const CLASSES: [Classification; 5] = [
+    Classification::Periodic,
+    Classification::QuasiPeriodic,
+    Classification::Chaotic,
+    Classification::Unbounded,
+    Classification::Undecided,
+];
+
+/// The code of a classification.
+fn code(classification: Classification) -> u8 {
+    CLASSES
+        .iter()
+        .position(|c| *c == classification)
+        .map_or(0, |k| k as u8 + 1)
+}
+
+/// Names of what the recordings are over.
+pub(super) const PERIODS: &str = "drive_period";
+const STROBE: &str = "strobe_period";
+const STATE: &str = "state";
+/// Name of the last axis of the grid.
+pub(super) const START: &str = "start";
+
+/// What the dataset of a sweep holds.
+pub(super) fn schema(subject: &Subject, options: &SweepOptions) -> Result<Schema, SweepError> {
+    let lanes = options.starts.count() * options.follow.directions().len().max(1);
+    let states = state_names(subject, options)?;
+    let si = subject.resolved().is_some();
+    let variables = variables(options, states.len(), si);
+    let bytes: usize = variables.iter().map(|v| v.stride() * v.kind.size()).sum();
+    let x = &options.over[0];
+    let (along_x, along_starts) = cut(options, lanes, bytes);
+    let mut axes: Vec<Axis> = options
+        .over
+        .iter()
+        .skip(1)
+        .map(|over| Axis::new(over.key.name(), over.count, 1))
+        .collect();
+    axes.push(Axis::new(x.key.name(), x.count, along_x));
+    axes.push(Axis::new(START, lanes, along_starts));
+    let grid = Grid { axes };
+    check_size(grid.chunk_entries().saturating_mul(bytes), options.follow)?;
+    Ok(Schema {
+        grid,
+        variables,
+        coordinates: coordinates(options, lanes, states),
+        attributes: attributes(subject, options),
+    })
+}
+
+/// Values of the first parameter, and starts, in one chunk.
+fn cut(options: &SweepOptions, lanes: usize, bytes: usize) -> (usize, usize) {
+    if options.follow != Follow::Off {
+        return (options.over[0].count, 1);
+    }
+    let runs = options
+        .over
+        .iter()
+        .map(|over| over.count)
+        .product::<usize>()
+        * lanes;
+    let most = (CHUNK_BYTES / bytes.max(1)).clamp(1, MOST_RUNS);
+    let target = runs.div_ceil(CHUNKS).clamp(1, most);
+    let starts = lanes.min(target);
+    ((target / starts).max(1), starts)
+}
+
+/// The names of the entries of a state, of the longest one that occurs.
+fn state_names(subject: &Subject, options: &SweepOptions) -> Result<Vec<String>, SweepError> {
+    let last = options
+        .over
+        .iter()
+        .fold(subject.clone(), |s, over| over.apply(&s, over.count - 1));
+    let model = last.model().map_err(|source| SweepError::Model {
+        place: "the last values".into(),
+        source,
+    })?;
+    Ok(crate::observe::time_series::state_names(&model))
+}
+
+/// The variables; in SI where physical quantities vary, else in the model's units.
+fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
+    let [length, force, speed, energy] = if si {
+        ["m", "N", "m/s", "J"]
+    } else {
+        ["g0", "EI g0/L^3", "g0 sqrt(EI/(m L^4))", "EI g0^2/L^3"]
+    };
+    let real = |name, long_name, units| Variable::new(name, Kind::Real, long_name, units);
+    let names: Vec<&str> = CLASSES.iter().map(|c| c.name()).collect();
+    let flags: Vec<usize> = (0..=CLASSES.len()).collect();
+    let strobe = options.strobe.min(options.periods);
+    let mut variables = vec![
+        Variable::new("classification", Kind::Code, "what the motion is", "1")
+            .attribute("flag_values", json!(flags))
+            .attribute("flag_meanings", format!("missing {}", names.join(" "))),
+        Variable::new(
+            "period",
+            Kind::Whole,
+            "minimal period, 0 if not periodic",
+            "drive periods",
+        ),
+        Variable::new(
+            "transient",
+            Kind::Whole,
+            "periods before the recording",
+            "drive periods",
+        ),
+        real("tip_max", "greatest tip deflection W", length),
+        real("tip_min", "least tip deflection W", length),
+        real(
+            "amplitude",
+            "half of peak to peak of the tip deflection",
+            length,
+        ),
+        real("mean_deflection", "mean tip deflection", length),
+        real(
+            "first_harmonic",
+            "amplitude of the tip deflection at the drive frequency",
+            length,
+        ),
+        real("phase", "its lag behind the drive", "degree"),
+        real(
+            "indentation",
+            "greatest depth below the resting surface",
+            length,
+        ),
+        real("mean_force", "mean force of the sample on the tip", force),
+        real(
+            "dissipation",
+            "energy that the sample takes in a drive period",
+            energy,
+        ),
+        real("virial", "mean of force times tip deflection", energy),
+        real("contact_fraction", "part of the time in contact", "1"),
+        real("contacts_per_period", "contacts begun a drive period", "1"),
+        real(
+            "peak_force",
+            "greatest force of the sample on the tip",
+            force,
+        ),
+        real(
+            "impact_speed",
+            "greatest speed at which a contact begins",
+            speed,
+        ),
+        real(
+            "multiplier",
+            "largest modulus of a Floquet multiplier of the orbit",
+            "1",
+        ),
+        real("lyapunov", "largest Lyapunov exponent", "1/drive period"),
+        real(
+            "lyapunov_error",
+            "its standard error; none for an orbit, where it is exact",
+            "1/drive period",
+        ),
+        real(
+            "period_max",
+            "greatest tip deflection of each recorded drive period",
+            length,
+        )
+        .along(PERIODS, options.periods),
+        real(
+            "period_min",
+            "least tip deflection of each recorded drive period",
+            length,
+        )
+        .along(PERIODS, options.periods),
+    ];
+    if strobe > 0 {
+        variables.push(
+            real(
+                "strobe",
+                "state at the end of each of the last recorded drive periods",
+                "model units",
+            )
+            .along(STROBE, strobe)
+            .along(STATE, states),
+        );
+    }
+    variables
+}
+
+fn coordinates(options: &SweepOptions, lanes: usize, states: Vec<String>) -> Vec<Coordinate> {
+    let mut coordinates: Vec<Coordinate> = options.over.iter().map(parameter).collect();
+    let whole = |from: usize, to: usize| Values::Whole((from..=to).map(|k| k as i32).collect());
+    coordinates.push(Coordinate::of(
+        START,
+        whole(0, lanes - 1),
+        "number of the start",
+        "1",
+    ));
+    if options.follow != Follow::Off {
+        let words =
+            (0..lanes).map(|lane| if options.lane(lane).1 { "up" } else { "down" }.to_owned());
+        let mut direction = Coordinate::of(
+            START,
+            Values::Text(words.collect()),
+            "which way the motion is followed",
+            "1",
+        );
+        direction.name = "direction".into();
+        coordinates.push(direction);
+    }
+    coordinates.push(Coordinate::of(
+        PERIODS,
+        whole(1, options.periods),
+        "recorded drive period",
+        "1",
+    ));
+    let strobe = options.strobe.min(options.periods);
+    if strobe > 0 {
+        let ends = whole(options.periods - strobe + 1, options.periods);
+        coordinates.push(Coordinate::of(
+            STROBE,
+            ends,
+            "recorded drive period that has ended",
+            "1",
+        ));
+        coordinates.push(Coordinate::of(
+            STATE,
+            Values::Text(states),
+            "entry of the state",
+            "1",
+        ));
+    }
+    coordinates
+}
+
+fn parameter(over: &Over) -> Coordinate {
+    let values = Values::Real(over.values());
+    let unit = match over.key.kind() {
+        QuantityKind::Number => "1",
+        kind => kind.si_unit(),
+    };
+    let mut coordinate = Coordinate::of(over.key.name(), values, over.key.meaning(), unit);
+    coordinate
+        .attributes
+        .insert("symbol".into(), over.key.symbol().into());
+    coordinate
+        .attributes
+        .insert("spacing".into(), json!(over.spacing));
+    coordinate
+}
+
+fn attributes(subject: &Subject, options: &SweepOptions) -> crate::dataset::schema::Attributes {
+    let names: Vec<&str> = options.over.iter().map(|over| over.key.name()).collect();
+    let title = format!("sweep over {}", names.join(" and "));
+    let mut all = attributes::of_case(&title, "sweep", subject);
+    let starts = match &options.starts {
+        Starts::Rest => json!("rest"),
+        Starts::Given(state) => json!({ "state": state }),
+        Starts::Seeded { count, seed, sides } => {
+            all.insert("seed".into(), json!(seed));
+            json!({ "count": count, "seed": seed, "box": sides })
+        }
+    };
+    let recipe: Value = json!({
+        "over": options.over,
+        "starts": starts,
+        "follow": options.follow,
+        "periods": options.periods,
+        "strobe": options.strobe.min(options.periods),
+        "transient": options.transient,
+        "max_period": options.max_period,
+    });
+    all.insert("sweep".into(), attributes::text(&recipe));
+    all
+}
+
+/// The columns of a chunk, in the order of the schema's variables.
+pub(super) fn columns(schema: &Schema, outcomes: &[Outcome]) -> Vec<Values> {
+    let real = |value: fn(&Outcome) -> f64| Values::Real(outcomes.iter().map(value).collect());
+    let whole = |value: fn(&Outcome) -> usize| {
+        let fits = |o| i32::try_from(value(o)).unwrap_or(i32::MAX);
+        Values::Whole(outcomes.iter().map(fits).collect())
+    };
+    let rows = |variable: &Variable, row: &dyn Fn(&Outcome) -> Vec<f64>| {
+        let stride = variable.stride();
+        let mut all = Vec::with_capacity(outcomes.len() * stride);
+        for outcome in outcomes {
+            let mut row = row(outcome);
+            row.resize(stride, f64::NAN);
+            all.extend(row);
+        }
+        Values::Real(all)
+    };
+    let states = schema.coordinate(STATE).map_or(0, |c| c.values.len());
+    let strobe = |outcome: &Outcome| {
+        let mut flat = Vec::new();
+        for state in &outcome.strobe {
+            flat.extend(in_columns(state, states));
+        }
+        flat
+    };
+    schema
+        .variables
+        .iter()
+        .map(|variable| match variable.name.as_str() {
+            "classification" => {
+                Values::Code(outcomes.iter().map(|o| code(o.classification)).collect())
+            }
+            "period" => whole(|o| o.period),
+            "transient" => whole(|o| o.transient),
+            "tip_max" => real(|o| o.observables.tip_max),
+            "tip_min" => real(|o| o.observables.tip_min),
+            "amplitude" => real(|o| o.observables.amplitude),
+            "mean_deflection" => real(|o| o.observables.mean_deflection),
+            "first_harmonic" => real(|o| o.observables.first_harmonic),
+            "phase" => real(|o| o.observables.phase),
+            "indentation" => real(|o| o.observables.indentation),
+            "mean_force" => real(|o| o.observables.mean_force),
+            "dissipation" => real(|o| o.observables.dissipation),
+            "virial" => real(|o| o.observables.virial),
+            "contact_fraction" => real(|o| o.observables.contact_fraction),
+            "contacts_per_period" => real(|o| o.observables.contacts_per_period),
+            "peak_force" => real(|o| o.observables.peak_force),
+            "impact_speed" => real(|o| o.observables.impact_speed),
+            "multiplier" => real(|o| o.multiplier),
+            "lyapunov" => real(|o| o.lyapunov),
+            "lyapunov_error" => real(|o| o.lyapunov_error),
+            "period_max" => rows(variable, &|o| o.highs.clone()),
+            "period_min" => rows(variable, &|o| o.lows.clone()),
+            _ => rows(variable, &strobe),
+        })
+        .collect()
+}
+
+/// A state in as many columns as the longest state has; what it lacks is missing.
+fn in_columns(state: &[f64], columns: usize) -> Vec<f64> {
+    let mut all = vec![f64::NAN; columns];
+    // A sample's memory is one number at the end, or none.
+    let (beam, memory) = state.split_at(state.len() - state.len() % 2);
+    let (n, most) = (beam.len() / 2, columns / 2);
+    all[..n].copy_from_slice(&beam[..n]);
+    all[most..most + n].copy_from_slice(&beam[n..]);
+    all[columns - memory.len()..].copy_from_slice(memory);
+    all
+}

@@ -1,0 +1,362 @@
+//! A parameter and the values that it takes: `omega=2:4:400`.
+
+use serde::{Serialize, Serializer};
+
+use crate::case::physical::{Kind, QuantityError};
+use crate::case::subject::{Key, Subject, UnknownKey};
+use crate::model::beam::MAX_MODES;
+
+/// Most values of one parameter.
+const MOST: usize = 1_000_000;
+
+/// What can be varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SweepKey {
+    /// A parameter of the equations.
+    Parameter(Key),
+    /// The number of beam modes.
+    Modes,
+}
+
+impl SweepKey {
+    /// Its key in a case file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Parameter(key) => key.name(),
+            Self::Modes => "modes",
+        }
+    }
+
+    /// How a figure's axis writes it.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Parameter(key) => key.symbol(),
+            Self::Modes => "N",
+        }
+    }
+
+    /// What it is, in a few words.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Parameter(Key::Cantilever(parameter)) => parameter.meaning(),
+            Self::Parameter(Key::Oscillator(parameter)) => parameter.name(),
+            Self::Parameter(Key::Physical(key)) => key.path(),
+            Self::Modes => "number of beam modes",
+        }
+    }
+
+    /// What its values measure.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Parameter(key) => key.kind(),
+            Self::Modes => Kind::Number,
+        }
+    }
+}
+
+impl Serialize for SweepKey {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// How values are spaced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Spacing {
+    /// Equal steps.
+    #[default]
+    Linear,
+    /// Equal ratios.
+    Log,
+}
+
+/// A parameter and the values that it takes, both ends included.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Over {
+    /// The parameter.
+    pub key: SweepKey,
+    /// First and least value.
+    pub from: f64,
+    /// Last and greatest value.
+    pub to: f64,
+    /// How many values.
+    pub count: usize,
+    /// How they are spaced.
+    pub spacing: Spacing,
+}
+
+/// Words that name no parameter with values.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OverError {
+    /// Not of the form.
+    #[error("`{given}`: {what}; write it as in omega=2:4:400, or omega=2:200:50:log")]
+    Form {
+        /// What was given.
+        given: String,
+        /// What is missing or too much.
+        what: &'static str,
+    },
+    /// An unknown parameter.
+    #[error("`{given}`: {source}")]
+    Key {
+        /// What was given.
+        given: String,
+        /// The name that is none.
+        source: UnknownKey,
+    },
+    /// Something that is no number.
+    #[error("`{given}`: {which} `{value}` is no {wanted}")]
+    Number {
+        /// What was given.
+        given: String,
+        /// Which of the numbers.
+        which: &'static str,
+        /// Its text.
+        value: String,
+        /// What it should be.
+        wanted: &'static str,
+    },
+    /// Something that is no quantity.
+    #[error("`{given}`: {which}: {source}")]
+    Quantity {
+        /// What was given.
+        given: String,
+        /// Which of the values.
+        which: &'static str,
+        /// Why not.
+        source: Box<QuantityError>,
+    },
+    /// Numbers that make no range.
+    #[error("`{given}`: {what}")]
+    Range {
+        /// What was given.
+        given: String,
+        /// What is wrong, and what would be right.
+        what: String,
+    },
+}
+
+impl Over {
+    /// Reads `key=from:to:count` or `key=from:to:count:log` for `subject`; `model.` before
+    /// the key may be left away.
+    ///
+    /// # Errors
+    /// [`OverError`] with what was given and what would be right.
+    pub fn parse(given: &str, subject: &Subject) -> Result<Self, OverError> {
+        let form = |what| OverError::Form {
+            given: given.into(),
+            what,
+        };
+        let (name, range) = given
+            .split_once('=')
+            .ok_or_else(|| form("there is no `=`"))?;
+        let parts: Vec<&str> = range.split(':').map(str::trim).collect();
+        let (from, to, count, spacing) = match parts.as_slice() {
+            [from, to, count] => (*from, *to, *count, "linear"),
+            [from, to, count, spacing] => (*from, *to, *count, *spacing),
+            [..] if parts.len() < 3 => {
+                return Err(form("first value, last value and count are needed"));
+            }
+            [..] => return Err(form("there are too many `:`")),
+        };
+        let spacing = match spacing {
+            "linear" | "lin" => Spacing::Linear,
+            "log" => Spacing::Log,
+            _ => return Err(form("the spacing is `linear` or `log`")),
+        };
+        let key = key(given, name.trim(), subject)?;
+        let number = |which, value: &str| {
+            value
+                .parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .ok_or_else(|| OverError::Number {
+                    given: given.into(),
+                    which,
+                    value: value.into(),
+                    wanted: "finite number",
+                })
+        };
+        let quantity = |which, value: &str| match key {
+            SweepKey::Parameter(Key::Physical(physical)) => physical
+                .read(value)
+                .map(|(key, value)| (SweepKey::Parameter(Key::Physical(key)), value))
+                .map_err(|source| OverError::Quantity {
+                    given: given.into(),
+                    which,
+                    source: Box::new(source),
+                }),
+            _ => number(which, value).map(|value| (key, value)),
+        };
+        let (key, from) = quantity("the first value", from)?;
+        let (other, to) = quantity("the last value", to)?;
+        if key != other {
+            return Err(OverError::Range {
+                given: given.into(),
+                what: "the first and the last value measure different things".into(),
+            });
+        }
+        let over = Self {
+            key,
+            from,
+            to,
+            count: count.parse().map_err(|_| OverError::Number {
+                given: given.into(),
+                which: "the count",
+                value: count.into(),
+                wanted: "whole number",
+            })?,
+            spacing,
+        };
+        over.check().map_err(|what| OverError::Range {
+            given: given.into(),
+            what,
+        })?;
+        Ok(over)
+    }
+
+    /// Whether the numbers make a range; the reason if not.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let Self {
+            from, to, count, ..
+        } = *self;
+        if !(1..=MOST).contains(&count) {
+            return Err(format!("{count} values; from 1 to {MOST} can be had"));
+        }
+        if count == 1 && from != to {
+            return Err("one value makes no range; give 2 or more, or first = last".into());
+        }
+        if count > 1 && from >= to {
+            return Err(format!(
+                "from {from} to {to}; the last value must be greater than the first \
+                 (--follow down goes down)"
+            ));
+        }
+        if self.spacing == Spacing::Log && from <= 0.0 {
+            return Err(format!(
+                "from {from} in equal ratios; both ends must be above 0"
+            ));
+        }
+        if self.key == SweepKey::Modes {
+            let whole = |v: f64| v.fract() == 0.0 && (1.0..=MAX_MODES as f64).contains(&v);
+            if !(0..count).all(|k| whole(self.value(k))) {
+                return Err(format!(
+                    "every number of modes must be whole, from 1 to {MAX_MODES}, as in modes=1:5:5"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The `index`-th value, from 0.
+    pub fn value(&self, index: usize) -> f64 {
+        if index == 0 || self.count <= 1 {
+            return self.from;
+        }
+        if index + 1 >= self.count {
+            return self.to;
+        }
+        let share = index as f64 / (self.count - 1) as f64;
+        match self.spacing {
+            Spacing::Linear => self.from + (self.to - self.from) * share,
+            Spacing::Log => self.from * (self.to / self.from).powf(share),
+        }
+    }
+
+    /// All values.
+    pub fn values(&self) -> Vec<f64> {
+        (0..self.count).map(|k| self.value(k)).collect()
+    }
+
+    /// `subject` with the `index`-th value.
+    pub fn apply(&self, subject: &Subject, index: usize) -> Subject {
+        match (self.key, subject) {
+            (SweepKey::Parameter(key), _) => subject.with(key, self.value(index)),
+            (SweepKey::Modes, Subject::Cantilever(case)) => {
+                Subject::Cantilever(case.clone().with_modes(self.value(index) as usize))
+            }
+            (SweepKey::Modes, Subject::Oscillator(_)) => subject.clone(),
+            (SweepKey::Modes, Subject::Physical(physical)) => {
+                Subject::Physical(Box::new(physical.with_modes(self.value(index) as usize)))
+            }
+        }
+    }
+}
+
+fn key(given: &str, name: &str, subject: &Subject) -> Result<SweepKey, OverError> {
+    let name = name.strip_prefix("model.").unwrap_or(name);
+    if name == "modes" && matches!(subject, Subject::Cantilever(_) | Subject::Physical(_)) {
+        return Ok(SweepKey::Modes);
+    }
+    subject
+        .key(name)
+        .map(SweepKey::Parameter)
+        .map_err(|source| OverError::Key {
+            given: given.into(),
+            source,
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::cantilever::Case;
+    use crate::model::parameter::Parameter;
+
+    fn paper() -> Subject {
+        Subject::Cantilever(Case::paper())
+    }
+
+    #[test]
+    fn values_reach_both_ends() {
+        let over = Over::parse("omega=2:4:400", &paper()).unwrap();
+        let values = over.values();
+        assert_eq!((values.len(), values[0], values[399]), (400, 2.0, 4.0));
+        assert!((values[1] - values[0] - 2.0 / 399.0).abs() < 1e-15);
+        let over = Over::parse("model.contact_stiffness = 1:100:3:log", &paper()).unwrap();
+        let values = over.values();
+        assert!(values[0] == 1.0 && (values[1] - 10.0).abs() < 1e-14 && values[2] == 100.0);
+        let Subject::Cantilever(case) = over.apply(&paper(), 2) else {
+            panic!()
+        };
+        assert_eq!(case.get(Parameter::Alpha4), 100.0);
+        let over = Over::parse("modes=1:5:5", &paper()).unwrap();
+        let Subject::Cantilever(case) = over.apply(&paper(), 3) else {
+            panic!()
+        };
+        assert_eq!(case.modes, 4);
+    }
+
+    #[test]
+    fn what_is_no_range_is_refused_with_what_would_be_right() {
+        for (given, words) in [
+            ("omega", "no `=`"),
+            ("omega=", "are needed"),
+            ("omega=2", "are needed"),
+            ("omega=2:4", "are needed"),
+            ("omega=2:4:400:log:5", "too many"),
+            ("omega=2:4:400:cubic", "`linear` or `log`"),
+            ("omga=2:4:400", "did you mean `omega`"),
+            ("=2:4:400", "no parameter"),
+            ("omega=x:4:400", "first value `x`"),
+            ("omega=2:nan:400", "last value `nan`"),
+            ("omega=2:inf:400", "finite"),
+            ("omega=2:4:0", "from 1 to"),
+            ("omega=2:4:-3", "whole number"),
+            ("omega=2:4:2.5", "whole number"),
+            ("omega=2:4:99999999", "from 1 to"),
+            ("omega=4:2:400", "--follow down"),
+            ("omega=2:2:400", "greater"),
+            ("omega=2:4:1", "one value"),
+            ("alpha5=-1:1:50:log", "above 0"),
+            ("modes=1:5:4", "whole"),
+            ("modes=0:5:6", "whole"),
+            ("modes=1:99:99", "50"),
+        ] {
+            let message = Over::parse(given, &paper()).unwrap_err().to_string();
+            assert!(message.contains(words), "{given}: {message}");
+            assert!(message.contains(given), "{given}: {message}");
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! One run of a sweep, and the runs of one piece of work.
+
+use nanotap_dynamics::{PeriodicOrbit, SettleOptions, StroboscopicMap, settle};
+use nanotap_flow::{Flow, FlowError};
+
+use super::record::{Observables, Record};
+use super::{Sweep, SweepOptions};
+use crate::case::physical::Scales;
+use crate::case::subject::Subject;
+use crate::dataset::Block;
+use crate::model::Model;
+use crate::model::strobe::Strobe;
+use crate::observe::time_series::with_modes;
+use crate::study::simulate::{Classification, Named};
+use crate::study::start_box::box_with;
+
+/// Where motions start.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Starts {
+    /// At rest.
+    Rest,
+    /// In one state.
+    Given(Vec<f64>),
+    /// In seeded quasi-random states.
+    Seeded {
+        /// How many.
+        count: usize,
+        /// Their seed.
+        seed: u64,
+        /// Sides of the box they are in, by the name of the entry of the state; the others
+        /// [fit the case](crate::study::start_box) at each value.
+        sides: Vec<(String, f64, f64)>,
+    },
+}
+
+impl Starts {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Rest | Self::Given(_) => 1,
+            Self::Seeded { count, .. } => *count,
+        }
+    }
+
+    /// The `index`-th one, for `model`.
+    fn state(&self, index: usize, model: &Model) -> Vec<f64> {
+        match self {
+            Self::Rest => vec![0.0; model.dimension()],
+            Self::Given(state) => state.clone(),
+            // A box that cannot be had was refused when the sweep was made.
+            Self::Seeded { seed, sides, .. } => box_with(model, sides).map_or_else(
+                |_| vec![0.0; model.dimension()],
+                |sides| sides.start(*seed, index as u64),
+            ),
+        }
+    }
+}
+
+/// What one run came to.
+#[derive(Clone, Debug)]
+pub(super) struct Outcome {
+    pub(super) classification: Classification,
+    /// Minimal period, 0 if it is not periodic.
+    pub(super) period: usize,
+    /// Periods thrown away.
+    pub(super) transient: usize,
+    pub(super) observables: Observables,
+    /// Largest modulus of a multiplier of the orbit.
+    pub(super) multiplier: f64,
+    /// Largest exponent a drive period, and its standard error.
+    pub(super) lyapunov: f64,
+    pub(super) lyapunov_error: f64,
+    /// Greatest and least tip deflection of each recorded period; shorter, or empty, if
+    /// the motion could not be recorded.
+    pub(super) highs: Vec<f64>,
+    pub(super) lows: Vec<f64>,
+    /// States at the ends of the last recorded periods.
+    pub(super) strobe: Vec<Vec<f64>>,
+}
+
+impl Outcome {
+    fn unknown(classification: Classification, transient: usize) -> Self {
+        Self {
+            classification,
+            period: 0,
+            transient,
+            observables: Observables::UNKNOWN,
+            multiplier: f64::NAN,
+            lyapunov: f64::NAN,
+            lyapunov_error: f64::NAN,
+            highs: Vec::new(),
+            lows: Vec::new(),
+            strobe: Vec::new(),
+        }
+    }
+
+    fn named(named: &Named, transient: usize) -> Self {
+        let mut outcome = Self::unknown(named.classification, transient);
+        if let Some(orbit) = &named.orbit {
+            outcome.period = orbit.period;
+            outcome.multiplier = orbit.spectral_radius();
+            // Exact for an orbit; the chaos it may have been before does not count.
+            outcome.lyapunov = outcome.multiplier.ln() / orbit.period as f64;
+        } else if let Some(spectrum) = &named.spectrum {
+            (outcome.lyapunov, outcome.lyapunov_error) = spectrum.largest();
+        }
+        outcome
+    }
+}
+
+/// The runs from every start of `block` at its `item`-th value of the first parameter;
+/// `None` when it was stopped.
+pub(super) fn at_value(
+    sweep: &Sweep,
+    block: &Block,
+    item: usize,
+    cancelled: &impl Fn() -> bool,
+) -> Option<Vec<Outcome>> {
+    let axis = sweep.axis();
+    let mut entry: Vec<usize> = block.ranges.iter().map(|r| r.start).collect();
+    entry[axis] += item;
+    let starts = block.ranges[axis + 1].clone();
+    let subject = sweep.subject_at(&entry);
+    let Ok(model) = subject.model() else {
+        // Driven at an undamped resonance: there is no bounded motion to name.
+        return Some(vec![
+            Outcome::unknown(Classification::Undecided, 0);
+            starts.len()
+        ]);
+    };
+    let mut runner = Runner::new(&subject, &model, &sweep.options);
+    let mut outcomes = Vec::with_capacity(starts.len());
+    for start in starts {
+        if cancelled() {
+            return None;
+        }
+        let state = sweep.options.starts.state(start, &model);
+        outcomes.push(runner.run(&state).0);
+    }
+    Some(outcomes)
+}
+
+/// The runs along a line of the first parameter, each from the last state of the one
+/// before; `None` when it was stopped.
+pub(super) fn along_line(
+    sweep: &Sweep,
+    block: &Block,
+    cancelled: &impl Fn() -> bool,
+) -> Option<Vec<Outcome>> {
+    let axis = sweep.axis();
+    let mut entry: Vec<usize> = block.ranges.iter().map(|r| r.start).collect();
+    let line = block.ranges[axis].clone();
+    let lane = block.ranges[axis + 1].start;
+    let (start, up) = sweep.options.lane(lane);
+    let order: Vec<usize> = if up {
+        line.clone().collect()
+    } else {
+        line.clone().rev().collect()
+    };
+    let mut outcomes: Vec<Option<Outcome>> = vec![None; line.len()];
+    let mut last: Option<Vec<f64>> = None;
+    for index in order {
+        if cancelled() {
+            return None;
+        }
+        entry[axis] = index;
+        let subject = sweep.subject_at(&entry);
+        let Ok(model) = subject.model() else {
+            outcomes[index] = Some(Outcome::unknown(Classification::Undecided, 0));
+            continue;
+        };
+        let state = last.take().map_or_else(
+            || sweep.options.starts.state(start, &model),
+            |state| {
+                let modes = (model.dimension() - model.memory) / 2;
+                with_modes(&state, model.memory, modes)
+            },
+        );
+        let (outcome, end) = Runner::new(&subject, &model, &sweep.options).run(&state);
+        outcomes[index] = Some(outcome);
+        // A motion that ran off is not followed; the next value starts anew.
+        last = end;
+    }
+    outcomes.into_iter().collect()
+}
+
+impl SweepOptions {
+    /// The start and the direction (true is up) of a lane.
+    pub(super) fn lane(&self, lane: usize) -> (usize, bool) {
+        let starts = self.starts.count();
+        let directions = self.follow.directions();
+        (
+            lane % starts,
+            directions.get(lane / starts).copied().unwrap_or(true),
+        )
+    }
+}
+
+/// Runs one model again and again.
+struct Runner<'a> {
+    model: &'a Model,
+    options: &'a SweepOptions,
+    settle: SettleOptions,
+    map: Strobe,
+    /// Units to tell observables in, where physical quantities vary.
+    scales: Option<Scales>,
+}
+
+impl<'a> Runner<'a> {
+    fn new(subject: &Subject, model: &'a Model, options: &'a SweepOptions) -> Self {
+        Self {
+            scales: subject.resolved().map(|resolved| resolved.scales),
+            model,
+            options,
+            settle: options.settle(),
+            map: Strobe::new(model),
+        }
+    }
+
+    /// Runs from `start`; the state at the end, unless the motion ran off.
+    fn run(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
+        match self.options.transient {
+            None => self.settled(start),
+            Some(transient) => self.after(start, transient),
+        }
+    }
+
+    /// The motion that the run was found to go to.
+    fn settled(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
+        let settled = settle(&mut self.map, start, &self.settle);
+        let named = Named::of(&settled.verdict);
+        let outcome = Outcome::named(&named, settled.periods);
+        match &named.orbit {
+            Some(orbit) => {
+                let from = nearest(orbit, &settled.state);
+                self.recorded(outcome, from, Some(orbit.period))
+            }
+            None if named.classification == Classification::Unbounded => (outcome, None),
+            None => self.recorded(outcome, &settled.state, None),
+        }
+    }
+
+    /// The motion after a number of periods.
+    fn after(&mut self, start: &[f64], transient: usize) -> (Outcome, Option<Vec<f64>>) {
+        let mut state = start.to_vec();
+        if let Err(error) = self.map.advance_by(&mut state, transient) {
+            return (Outcome::unknown(class_of(&error), transient), None);
+        }
+        let named = Named::of(&settle(&mut self.map, &state, &self.settle).verdict);
+        self.recorded(Outcome::named(&named, transient), &state, None)
+    }
+
+    /// Records the motion from `from`; with `period`, one turn of that orbit stands for
+    /// all.
+    fn recorded(
+        &self,
+        mut outcome: Outcome,
+        from: &[f64],
+        period: Option<usize>,
+    ) -> (Outcome, Option<Vec<f64>>) {
+        let periods = self.options.periods;
+        let turn = period.unwrap_or(periods);
+        let mut record = Record::new(self.model);
+        let states = match self.watch(from, turn, &mut record) {
+            Ok(states) => states,
+            Err(error) => return (Outcome::unknown(class_of(&error), outcome.transient), None),
+        };
+        outcome.observables = record.observables();
+        if let Some(scales) = &self.scales {
+            outcome.observables = outcome.observables.in_si(scales);
+            for extremum in record.highs.iter_mut().chain(&mut record.lows) {
+                *extremum *= scales.length;
+            }
+        }
+        outcome.highs = (0..periods).map(|k| record.highs[k % turn]).collect();
+        outcome.lows = (0..periods).map(|k| record.lows[k % turn]).collect();
+        let first = periods - self.options.strobe.min(periods);
+        outcome.strobe = (first..periods).map(|k| states[k % turn].clone()).collect();
+        let end = states[(periods - 1) % turn].clone();
+        (outcome, Some(end))
+    }
+
+    /// Runs `periods` periods; the states at their ends.
+    fn watch(
+        &self,
+        from: &[f64],
+        periods: usize,
+        record: &mut Record<'_>,
+    ) -> Result<Vec<Vec<f64>>, FlowError> {
+        let mut flow = Flow::new(std::sync::Arc::clone(&self.model.system));
+        flow.start(from, 0.0)?;
+        let mut states = Vec::with_capacity(periods);
+        for _ in 0..periods {
+            flow.run_period(record)?;
+            let mut state = vec![0.0; from.len()];
+            flow.state(&mut state);
+            states.push(state);
+        }
+        Ok(states)
+    }
+}
+
+/// The state of the orbit that is nearest to `state`.
+pub(crate) fn nearest<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> &'a [f64] {
+    let distance = |x: &Vec<f64>| {
+        x.iter()
+            .zip(state)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+    };
+    orbit
+        .states
+        .iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .map_or(&[], Vec::as_slice)
+}
+
+/// What a motion is that the flow could not follow.
+fn class_of(error: &FlowError) -> Classification {
+    match error {
+        FlowError::Diverged { .. } | FlowError::NotFinite { .. } => Classification::Unbounded,
+        _ => Classification::Undecided,
+    }
+}

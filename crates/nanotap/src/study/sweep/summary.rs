@@ -1,0 +1,75 @@
+//! How many runs of a sweep came to what.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::dataset::CLASSES;
+use crate::dataset::{Store, StoreError, Values};
+
+/// How many runs came to what.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Summary {
+    /// All of them.
+    pub runs: usize,
+    /// By classification; every one is there, also with 0.
+    pub counts: BTreeMap<&'static str, usize>,
+    /// Periodic ones by period.
+    pub periods: BTreeMap<i32, usize>,
+}
+
+impl Summary {
+    /// Counts the runs of a finished dataset.
+    pub(super) fn of(store: &Store) -> Result<Self, StoreError> {
+        store.require_all()?;
+        let mut summary = Self::default();
+        summary.counts.extend(CLASSES.iter().map(|c| (c.name(), 0)));
+        for chunk in 0..store.chunks() {
+            let Motions { codes, periods } = Motions::read(store, chunk)?;
+            summary.runs += codes.len();
+            for (code, period) in codes.into_iter().zip(periods) {
+                if let Some(class) = class_of(code) {
+                    *summary.counts.entry(class.name()).or_default() += 1;
+                }
+                if period > 0 {
+                    *summary.periods.entry(period).or_default() += 1;
+                }
+            }
+        }
+        Ok(summary)
+    }
+}
+
+/// The classification that a code means.
+pub(crate) fn class_of(code: u8) -> Option<crate::study::simulate::Classification> {
+    usize::from(code)
+        .checked_sub(1)
+        .and_then(|k| CLASSES.get(k))
+        .copied()
+}
+
+/// What the motions of a chunk are.
+pub(super) struct Motions {
+    pub(super) codes: Vec<u8>,
+    pub(super) periods: Vec<i32>,
+}
+
+impl Motions {
+    pub(super) fn read(store: &Store, chunk: usize) -> Result<Self, StoreError> {
+        let block = store.schema().grid.block(chunk);
+        let of = |name| match store.schema().index_of(name) {
+            Some(variable) => store.read_chunk(&block, variable),
+            None => Err(StoreError::NotAStore {
+                path: store.path().into(),
+                what: format!("it is no sweep: it has no variable `{name}`"),
+            }),
+        };
+        match (of("classification")?, of("period")?) {
+            (Values::Code(codes), Values::Whole(periods)) => Ok(Self { codes, periods }),
+            _ => Err(StoreError::NotAStore {
+                path: store.path().into(),
+                what: "it is no sweep: its variables have other types".into(),
+            }),
+        }
+    }
+}

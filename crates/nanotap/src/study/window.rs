@@ -1,0 +1,303 @@
+//! The operating window: where, over two parameters, the lever taps with one motion and no
+//! other, and where a second state, subharmonics or chaos threaten.
+//!
+//! Every point is a census of its own: motions from seeded starts all over the box of states,
+//! each named as in a [sweep](crate::study::sweep), whose datasets, chunks and resumption serve here
+//! too. What is found is certain, what is not found is only not found: more starts see more.
+
+use std::collections::BTreeMap;
+
+use nanotap_figures::{CategoryMap, Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
+use serde::Serialize;
+
+use crate::dataset::{Store, StoreError, Values};
+use crate::study::simulate::Classification;
+use crate::study::sweep::{GridScale, class_of};
+
+/// What there is at one point, from the safest to the least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Condition {
+    /// Only one motion, that repeats each drive period and does not touch.
+    NoContact,
+    /// Only one motion, that taps and repeats each drive period.
+    OnePeriod1,
+    /// Two or more motions that repeat each drive period.
+    SecondState,
+    /// A motion that repeats only after two or more drive periods.
+    Subharmonic,
+    /// A motion that does not repeat: chaotic or quasi-periodic.
+    Irregular,
+    /// Nothing of these, but a start whose motion could not be named.
+    Undecided,
+}
+
+impl Condition {
+    /// All of them, the safest first.
+    pub const ALL: [Self; 6] = [
+        Self::NoContact,
+        Self::OnePeriod1,
+        Self::SecondState,
+        Self::Subharmonic,
+        Self::Irregular,
+        Self::Undecided,
+    ];
+
+    /// The key in data.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoContact => "no-contact",
+            Self::OnePeriod1 => "one-period-1",
+            Self::SecondState => "second-state",
+            Self::Subharmonic => "subharmonic",
+            Self::Irregular => "irregular",
+            Self::Undecided => "undecided",
+        }
+    }
+
+    /// Words for a legend.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::NoContact => "no contact",
+            Self::OnePeriod1 => "one period-1 motion",
+            Self::SecondState => "a second state",
+            Self::Subharmonic => "subharmonic",
+            Self::Irregular => "chaos or torus",
+            Self::Undecided => "undecided",
+        }
+    }
+
+    const fn colour(self) -> Colour {
+        match self {
+            Self::NoContact => Colour::rgb(222, 222, 222),
+            Self::OnePeriod1 => Colour::GREEN,
+            Self::SecondState => Colour::ORANGE,
+            Self::Subharmonic => Colour::BLUE,
+            Self::Irregular => Colour::VERMILLION,
+            Self::Undecided => Colour::GREY,
+        }
+    }
+}
+
+impl Serialize for Condition {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// The operating window over two parameters.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Window {
+    /// The parameters' keys, the first varies along a row.
+    pub parameters: [String; 2],
+    /// Values of the first, in the units of its key.
+    pub x: Vec<f64>,
+    /// Values of the second.
+    pub y: Vec<f64>,
+    /// What there is, row by row, a row a value of the second.
+    pub conditions: Vec<Vec<Condition>>,
+    /// Part of all points, by condition; every one is there.
+    pub shares: BTreeMap<&'static str, f64>,
+}
+
+/// One motion found from one start.
+struct Seen {
+    class: Option<Classification>,
+    period: i32,
+    amplitude: f64,
+    maximum: f64,
+    contact: f64,
+}
+
+impl Window {
+    /// Of the finished dataset of a sweep over two parameters.
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged, or the dataset is no such sweep.
+    pub fn of(store: &Store) -> Result<Self, StoreError> {
+        store.require_all()?;
+        let schema = store.schema();
+        let wrong = || StoreError::NotAStore {
+            path: store.path().into(),
+            what: "it is no sweep over two parameters".into(),
+        };
+        if schema.grid.axes.len() != 3 {
+            return Err(wrong());
+        }
+        let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
+        let index = |name| schema.index_of(name).ok_or_else(wrong);
+        let variables = [
+            index("classification")?,
+            index("period")?,
+            index("first_harmonic")?,
+            index("tip_max")?,
+            index("contact_fraction")?,
+        ];
+        let mut seen: Vec<Vec<Seen>> = (0..rows * columns).map(|_| Vec::new()).collect();
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            let read = |k: usize| store.read_chunk(&block, variables[k]);
+            let (
+                Values::Code(classes),
+                Values::Whole(periods),
+                Values::Real(amplitudes),
+                Values::Real(maxima),
+                Values::Real(contacts),
+            ) = (read(0)?, read(1)?, read(2)?, read(3)?, read(4)?)
+            else {
+                return Err(wrong());
+            };
+            for (flat, entry) in block.entries().enumerate() {
+                seen[entry[0] * columns + entry[1]].push(Seen {
+                    class: class_of(classes[flat]),
+                    period: periods[flat],
+                    amplitude: amplitudes[flat],
+                    maximum: maxima[flat],
+                    contact: contacts[flat],
+                });
+            }
+        }
+        let conditions: Vec<Vec<Condition>> = seen
+            .chunks(columns.max(1))
+            .map(|row| row.iter().map(|motions| condition(motions)).collect())
+            .collect();
+        let shares = Condition::ALL
+            .into_iter()
+            .map(|wanted| {
+                let count = conditions
+                    .iter()
+                    .flatten()
+                    .filter(|c| **c == wanted)
+                    .count();
+                (wanted.name(), count as f64 / (rows * columns) as f64)
+            })
+            .collect();
+        let scale = |axis| GridScale::of(store, axis);
+        Ok(Self {
+            parameters: [1, 0].map(|axis| schema.grid.axes[axis].name.clone()),
+            x: scale(1).raw,
+            y: scale(0).raw,
+            conditions,
+            shares,
+        })
+    }
+
+    /// The map, with the share of each condition in its legend.
+    ///
+    /// # Errors
+    /// As [`Window::of`].
+    pub fn figure(&self, store: &Store) -> Result<Figure, StoreError> {
+        store.require_all()?;
+        let (y, x) = (GridScale::of(store, 0), GridScale::of(store, 1));
+        let present: Vec<Condition> = Condition::ALL
+            .into_iter()
+            .filter(|c| self.shares.get(c.name()).is_some_and(|share| *share > 0.0))
+            .collect();
+        let cells: Vec<Option<usize>> = self
+            .conditions
+            .iter()
+            .flatten()
+            .map(|c| present.iter().position(|p| p == c))
+            .collect();
+        let mut layer = CategoryMap::new(self.x.len(), self.y.len(), cells, x.edges(), y.edges());
+        for condition in present {
+            let share = self.shares.get(condition.name()).copied().unwrap_or(0.0);
+            let percent = 100.0 * share;
+            let part = if percent < 0.5 {
+                "below 1".to_owned()
+            } else {
+                format!("{percent:.0}")
+            };
+            let name = format!("{} ({part} %)", condition.words());
+            layer = layer.category_in(name, condition.colour());
+        }
+        let panel = Panel::new(x.axis(), y.axis())
+            .with(layer)
+            .legend(Legend::Right);
+        Ok(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
+    }
+}
+
+/// Relative difference beyond which two orbits are two.
+const DIFFERENT: f64 = 1e-6;
+
+/// What the motions of one point come to. What is there counts before what could not be named.
+fn condition(motions: &[Seen]) -> Condition {
+    let any = |wanted: &[Classification]| {
+        motions
+            .iter()
+            .any(|m| m.class.is_some_and(|class| wanted.contains(&class)))
+    };
+    if any(&[Classification::Chaotic, Classification::QuasiPeriodic]) {
+        return Condition::Irregular;
+    }
+    if motions.iter().any(|m| m.period > 1) {
+        return Condition::Subharmonic;
+    }
+    let orbits: Vec<&Seen> = motions.iter().filter(|m| m.period == 1).collect();
+    let differ = |a: &Seen, b: &Seen| {
+        let apart = |x: f64, y: f64| (x - y).abs() > DIFFERENT * x.abs().max(y.abs());
+        apart(a.amplitude, b.amplitude) || apart(a.maximum, b.maximum)
+    };
+    if orbits
+        .first()
+        .is_some_and(|first| orbits.iter().any(|other| differ(first, other)))
+    {
+        return Condition::SecondState;
+    }
+    match orbits.first() {
+        Some(_) if orbits.len() < motions.len() => Condition::Undecided,
+        None => Condition::Undecided,
+        Some(orbit) if orbit.contact > 0.0 => Condition::OnePeriod1,
+        Some(_) => Condition::NoContact,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(class: Classification, period: i32, amplitude: f64, contact: f64) -> Seen {
+        Seen {
+            class: Some(class),
+            period,
+            amplitude,
+            maximum: amplitude,
+            contact,
+        }
+    }
+
+    #[test]
+    fn what_threatens_most_is_named() {
+        use Classification::{Chaotic, Periodic, QuasiPeriodic, Undecided};
+        let free = || seen(Periodic, 1, 1.0, 0.0);
+        let taps = || seen(Periodic, 1, 0.8, 0.1);
+        for (motions, expected) in [
+            (vec![free(), free()], Condition::NoContact),
+            (vec![taps(), taps()], Condition::OnePeriod1),
+            (vec![taps(), free()], Condition::SecondState),
+            (
+                vec![taps(), seen(Periodic, 2, 0.8, 0.1)],
+                Condition::Subharmonic,
+            ),
+            (
+                vec![free(), seen(Chaotic, 0, 0.8, 0.1)],
+                Condition::Irregular,
+            ),
+            (
+                vec![free(), seen(QuasiPeriodic, 0, 0.8, 0.1)],
+                Condition::Irregular,
+            ),
+            (
+                vec![taps(), seen(Undecided, 0, 0.0, 0.0)],
+                Condition::Undecided,
+            ),
+            (
+                vec![taps(), free(), seen(Undecided, 0, 0.0, 0.0)],
+                Condition::SecondState,
+            ),
+            (vec![], Condition::Undecided),
+        ] {
+            assert_eq!(condition(&motions), expected);
+        }
+    }
+}

@@ -2,7 +2,7 @@
 //! wants to see.
 //!
 //! State: `(a_1 … a_N, ȧ_1 … ȧ_N)` for the cantilever, after which comes the memory of a
-//! sample that recovers (see [`contact`](crate::model::contact)), zero at rest; `(x, ẋ)` for an
+//! sample that recovers (see [`contact`]), zero at rest; `(x, ẋ)` for an
 //! oscillator. Regime 0 is free flight. Everything that analyses or shows a motion works on a
 //! [`Model`] and asks no more where it came from.
 

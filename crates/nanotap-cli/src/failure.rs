@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use nanotap::case::file::{CaseFileError, Place, Problem, Source};
 use nanotap::case::physical::CatalogueError;
-use nanotap::model::cantilever::CaseError;
+use nanotap::model::cantilever::CantileverError;
 use nanotap::model::{FlowError, ModelError};
 use nanotap::study::attractors::AttractorsError;
 use nanotap::study::branch::BranchError;
@@ -56,8 +56,8 @@ impl From<CaseFileError> for Failure {
     }
 }
 
-impl From<CaseError> for Failure {
-    fn from(error: CaseError) -> Self {
+impl From<CantileverError> for Failure {
+    fn from(error: CantileverError) -> Self {
         Self::request(
             error.to_string(),
             "change it in the case file or with --set",

@@ -5,7 +5,7 @@ use super::PaperError;
 use super::check::{Check, Verdict, digits};
 use super::laboratory::{Counted, Laboratory};
 use super::section::{Section, Table};
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
 /// Most modes of the census.
@@ -94,7 +94,7 @@ pub(super) fn section(
         let mut evidence = String::new();
         let mut again = String::new();
         for modes in 1..=laboratory.either(MOST_MODES, 3) {
-            let case = Case::paper()
+            let case = Cantilever::paper()
                 .with_modes(modes)
                 .with(Parameter::Omega, claim.omega)
                 .with(Parameter::Alpha1, claim.alpha1);
@@ -104,7 +104,7 @@ pub(super) fn section(
             if claim.holds(&counted) {
                 agreeing.push(modes.to_string());
             }
-            if modes == case.modes && modes == Case::paper().modes {
+            if modes == case.modes && modes == Cantilever::paper().modes {
                 evidence = format!("N = 3, {}; {}", counted.summary(), counted.missed());
                 again = counted.rerun();
             }

@@ -10,7 +10,7 @@ use super::check::{Check, Verdict, digits};
 use super::laboratory::{Counted, Laboratory, how_many};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::section::{Picture, Section};
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
 /// Longest period of the orbits looked for.
@@ -30,7 +30,7 @@ struct Reading {
 
 impl Reading {
     fn new(laboratory: &Laboratory<'_>, omega: f64) -> Result<Self, PaperError> {
-        let case = Case::paper()
+        let case = Cantilever::paper()
             .with(Parameter::Alpha1, 0.0)
             .with(Parameter::Omega, omega);
         let counted = laboratory.count(&case)?;
@@ -302,7 +302,7 @@ pub(super) fn fig17(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
     if rows.is_empty() {
         rows.push(None);
     }
-    let tip = laboratory.count(&Case::paper())?;
+    let tip = laboratory.count(&Cantilever::paper())?;
     let with_tip = tip.stable(4).is_empty();
     Ok(section
         .picture(picture(

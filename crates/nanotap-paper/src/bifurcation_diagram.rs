@@ -12,7 +12,7 @@ use super::laboratory::{Laboratory, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::subject::Subject;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
 /// Range of Ω drawn. The paper's axis cannot be read from its text, which names 2.0 to
@@ -35,7 +35,7 @@ pub(super) fn section(
     section: Section,
 ) -> Result<Section, PaperError> {
     let (count, starts) = (laboratory.either(400, 40), laboratory.either(8, 2));
-    let case = Case::paper();
+    let case = Cantilever::paper();
     let subject = Subject::Cantilever(case.clone());
     let wide = sweep(
         laboratory,

@@ -7,7 +7,7 @@ use super::laboratory::Laboratory;
 use super::section::{Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::Clearance;
 use nanotap_flow::Trajectory;
@@ -18,7 +18,7 @@ const WATCHED: usize = 400;
 struct Row {
     figure: &'static str,
     motion: String,
-    case: Case,
+    case: Cantilever,
     state: Vec<f64>,
     periods: usize,
     clearance: Clearance,
@@ -30,7 +30,7 @@ pub(super) fn section(
     section: Section,
 ) -> Result<Section, PaperError> {
     let mut rows = Vec::new();
-    let undamped = Case::paper_eq24();
+    let undamped = Cantilever::paper_eq24();
     let (model, orbit) = response(&undamped)?;
     rows.extend(row(
         "Fig. 4",
@@ -46,7 +46,7 @@ pub(super) fn section(
         ("Figs. 15–17", 20.0, 0.0),
         ("Figs. 15–17, text", 2.6, 0.0),
     ] {
-        let case = Case::paper()
+        let case = Cantilever::paper()
             .with(Parameter::Omega, omega)
             .with(Parameter::Alpha1, alpha1);
         let counted = laboratory.count(&case)?;
@@ -157,7 +157,7 @@ pub(super) fn section(
 fn row(
     figure: &'static str,
     motion: String,
-    case: &Case,
+    case: &Cantilever,
     model: &Model,
     state: &[f64],
     periods: usize,

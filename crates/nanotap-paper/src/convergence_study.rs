@@ -11,7 +11,7 @@ use super::motion_view::View;
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::orbit::OrbitReport;
 
 /// Modes up to which the study goes on.
@@ -40,7 +40,7 @@ pub(super) fn section(
     let responses: Vec<Response> = (1..=most)
         .into_par_iter()
         .map(|modes| {
-            let (model, orbit) = response(&Case::paper_eq24().with_modes(modes))?;
+            let (model, orbit) = response(&Cantilever::paper_eq24().with_modes(modes))?;
             Ok(Response {
                 modes,
                 series: tip_series(&model, &orbit),
@@ -92,7 +92,7 @@ pub(super) fn section(
     let rerun_orbit = |r: &Response| {
         rerun::on_case(
             "orbit",
-            &Case::paper_eq24().with_modes(r.modes),
+            &Cantilever::paper_eq24().with_modes(r.modes),
             &format!("--period 1 {}", rerun::state(&r.orbit.state)),
         )
     };
@@ -206,7 +206,7 @@ fn overlay(responses: &[Response], laboratory: &Laboratory<'_>) -> Result<Pictur
     ];
     let shown = PAPER_MODES.min(responses.len());
     for (i, r) in responses.iter().take(shown).enumerate() {
-        let model = Model::cantilever(&Case::paper_eq24().with_modes(r.modes))?;
+        let model = Model::cantilever(&Cantilever::paper_eq24().with_modes(r.modes))?;
         let view = View::new(&model, &r.orbit.state, 2)?;
         if i + 1 == shown {
             periodic =

@@ -5,7 +5,7 @@ use nanotap_dynamics::{SettleOptions, ShootingOptions, Verdict, close_orbit, set
 
 use super::PaperError;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::orbit::{OrbitReport, report};
@@ -17,7 +17,7 @@ const START: (f64, f64) = (0.1, 0.2);
 
 /// The orbit that the steady state of the damped case becomes without damping, and its
 /// model.
-pub(super) fn response(undamped: &Case) -> Result<(Model, OrbitReport), PaperError> {
+pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), PaperError> {
     let failed = |why: String| PaperError::Failed {
         what: format!(
             "the periodic response at Ω = {}, N = {}",
@@ -66,7 +66,7 @@ mod tests {
     /// energy is neither fed nor drained over a period.
     #[test]
     fn the_response_is_on_the_unit_circle_and_does_no_work() {
-        let (_, orbit) = response(&Case::paper_eq24()).unwrap();
+        let (_, orbit) = response(&Cantilever::paper_eq24()).unwrap();
         assert_eq!(orbit.period, 1);
         for [re, im] in &orbit.multipliers {
             assert!((re.hypot(*im) - 1.0).abs() < 1e-6);

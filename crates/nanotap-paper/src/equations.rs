@@ -5,7 +5,7 @@ use super::laboratory::Laboratory;
 use super::section::{Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::physical::sample::{Elastic, reduced_modulus};
-use nanotap::model::cantilever::{Case, CosineTerm};
+use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::exact_beam;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::ModeTable;
@@ -85,11 +85,11 @@ pub(super) fn cosine_term(
     );
     let mut same = true;
     for (omega, alpha1) in [(2.6, 0.1), (20.0, 0.1), (20.0, 0.0)] {
-        let case = Case::paper()
+        let case = Cantilever::paper()
             .with(Parameter::Omega, omega)
             .with(Parameter::Alpha1, alpha1);
         let corrected = laboratory.count(&case)?;
-        let printed = laboratory.count(&Case {
+        let printed = laboratory.count(&Cantilever {
             cosine_term: CosineTerm::Printed,
             ..case.clone()
         })?;
@@ -109,9 +109,9 @@ pub(super) fn cosine_term(
         "−α₂ α₃ Ω ∫φ_i cos Ωτ, as the Galerkin projection of Eq. (6) gives it; with the printed form other kinds \
          of motion attract"
     };
-    let printed_case = Case {
+    let printed_case = Cantilever {
         cosine_term: CosineTerm::Printed,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     Ok(section
         .text(
@@ -138,7 +138,7 @@ pub(super) fn bare_frequencies(
     let exact = exact_beam::frequencies(0.0, 0.0, 3).map_err(nanotap::model::ModelError::from)?;
     let printed = [(3.52, 2), (22.03, 2), (61.7, 1)];
     let holds = agree(&exact, &printed);
-    let bare = Case::paper()
+    let bare = Cantilever::paper()
         .with(Parameter::Alpha1, 0.0)
         .with(Parameter::Alpha4, 0.0);
     Ok(section.check(
@@ -164,9 +164,11 @@ pub(super) fn contact_frequencies(
     section: Section,
 ) -> Result<Section, PaperError> {
     let table_of = |modes: usize| {
-        ModeTable::new(&Case::paper_eq24().with_modes(modes)).map_err(|error| PaperError::Failed {
-            what: "the frequencies in contact".into(),
-            why: error.to_string(),
+        ModeTable::new(&Cantilever::paper_eq24().with_modes(modes)).map_err(|error| {
+            PaperError::Failed {
+                what: "the frequencies in contact".into(),
+                why: error.to_string(),
+            }
         })
     };
     let mut table = Table::new(
@@ -214,7 +216,7 @@ pub(super) fn contact_frequencies(
     let bare = exact_beam::frequencies(0.0, 0.0, 3).map_err(nanotap::model::ModelError::from)?;
     let with_tip = &last.exact_free;
     let trend = exact[0] > 1.5 * bare[0] && exact[1] < bare[1] && exact[2] < bare[2];
-    let five = Case::paper_eq24().with_modes(5);
+    let five = Cantilever::paper_eq24().with_modes(5);
     let names: Vec<String> = agreeing.iter().map(ToString::to_string).collect();
     Ok(section
         .text(
@@ -247,7 +249,7 @@ pub(super) fn contact_frequencies(
                 100.0 * (three[2] / exact[2] - 1.0),
                 100.0 * (EQ25[2].0 / exact[2] - 1.0)
             ))
-            .rerun(rerun::on_case("modes", &Case::paper_eq24(), "")),
+            .rerun(rerun::on_case("modes", &Cantilever::paper_eq24(), "")),
         )
         .check(
             Check::new(
@@ -269,7 +271,7 @@ pub(super) fn contact_frequencies(
                  value in contact",
                 list(with_tip, 4)
             ))
-            .rerun(rerun::on_case("modes", &Case::paper_eq24(), "")),
+            .rerun(rerun::on_case("modes", &Cantilever::paper_eq24(), "")),
         )
         .table(table))
 }
@@ -399,7 +401,7 @@ fn slopes(modulus_of: impl Fn(f64) -> f64) -> (f64, f64) {
 pub(super) fn scaling(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
     use nanotap_dynamics::StroboscopicMap as _;
     let map_of = |alpha2: f64| -> Result<_, PaperError> {
-        let case = Case::paper().with(Parameter::Alpha2, alpha2);
+        let case = Cantilever::paper().with(Parameter::Alpha2, alpha2);
         Ok(nanotap::model::strobe::Strobe::new(
             &nanotap::model::Model::cantilever(&case)?,
         ))

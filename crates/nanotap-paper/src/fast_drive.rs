@@ -13,7 +13,7 @@ use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
 use super::section::{Picture, Section};
 use super::time_step::{GridMotion, Scan, fast_case};
-use nanotap::model::cantilever::{Case, CaseError};
+use nanotap::model::cantilever::{Cantilever, CantileverError};
 use nanotap::model::exact_beam;
 use nanotap::model::{Model, ModelError};
 
@@ -148,7 +148,7 @@ pub(super) fn fig8(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     let found = fast.counted.stable(1).len();
     let one_mode = fast.scan.exact_amplitude(1).unwrap_or(f64::NAN);
     let matches = rounds_to(one_mode, 0.145, 3);
-    let failed = |error: CaseError| PaperError::from(ModelError::from(error));
+    let failed = |error: CantileverError| PaperError::from(ModelError::from(error));
     let second = [0.0, fast.counted.case.alpha4]
         .map(|alpha4| exact_beam::frequencies(fast.counted.case.alpha1, alpha4, 2).map(|f| f[1]));
     let [flight, contact] = second;
@@ -233,7 +233,7 @@ pub(super) fn fig8(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
 
 /// "Compared with Ω = 2.6, the period-1 motions at Ω = 20 are much less distorted."
 fn less_distorted(laboratory: &Laboratory<'_>, fast: &Fast) -> Result<Check, PaperError> {
-    let slow = laboratory.count(&Case::paper())?;
+    let slow = laboratory.count(&Cantilever::paper())?;
     let orbits = laboratory.orbits(&slow, 1, 64)?;
     let at_slow = orbits.iter().find(|o| o.period == 1);
     let at_slow = at_slow.map(|o| slow.look(o)).transpose()?;

@@ -7,7 +7,7 @@ use super::laboratory::Laboratory;
 use super::section::{Picture, Section};
 use super::{PaperError, rerun};
 use nanotap::model::beam::Modes;
-use nanotap::model::cantilever::{Case, CaseError};
+use nanotap::model::cantilever::{Cantilever, CantileverError};
 use nanotap::model::exact_beam;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::ModeTable;
@@ -15,7 +15,8 @@ use nanotap::study::modes::ModeTable;
 /// Fig. 2e.
 pub(super) fn mode_shapes(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
     const POINTS: usize = 401;
-    let beam = Modes::new(3).map_err(|e| nanotap::model::ModelError::from(CaseError::from(e)))?;
+    let beam =
+        Modes::new(3).map_err(|e| nanotap::model::ModelError::from(CantileverError::from(e)))?;
     let mut panel = Panel::new(
         Axis::linear("position along the beam $ξ = x/L$").range(0.0, 1.0),
         Axis::linear("mode shape $φ_j(ξ)$"),
@@ -55,7 +56,7 @@ pub(super) fn mode_shapes(_: &Laboratory<'_>, section: Section) -> Result<Sectio
                 Verdict::of(holds),
             )
             .evidence("mode j of a clamped-free beam has j − 1 nodes, and ∫φ_iφ_j = δ_ij")
-            .rerun(rerun::on_case("modes", &Case::paper(), "--plot modes.svg")),
+            .rerun(rerun::on_case("modes", &Cantilever::paper(), "--plot modes.svg")),
         ))
 }
 
@@ -68,7 +69,7 @@ const POINTS: usize = 241;
 
 /// Fig. 3.
 pub(super) fn maps(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let failed = |error: CaseError| PaperError::from(nanotap::model::ModelError::from(error));
+    let failed = |error: CantileverError| PaperError::from(nanotap::model::ModelError::from(error));
     let bare = exact_beam::frequencies(0.0, 0.0, 2).map_err(failed)?;
     let at = |alpha1: f64, alpha4: f64| exact_beam::frequencies(alpha1, alpha4, 2).map_err(failed);
     let mut panels = [1, 2].map(|j| {
@@ -103,7 +104,7 @@ pub(super) fn maps(_: &Laboratory<'_>, section: Section) -> Result<Section, Pape
     }
     let spread = ranges.map(|(low, high)| high / low);
     let holds = spread[0] > spread[1];
-    let three = ModeTable::new(&Case::paper()).map_err(|error| PaperError::Failed {
+    let three = ModeTable::new(&Cantilever::paper()).map_err(|error| PaperError::Failed {
         what: "the frequencies in contact".into(),
         why: error.to_string(),
     })?;
@@ -145,6 +146,6 @@ pub(super) fn maps(_: &Laboratory<'_>, section: Section) -> Result<Section, Pape
                 digits(three.contact[0] / bare[0], 5),
                 digits(three.contact[1] / bare[1], 5)
             ))
-            .rerun(rerun::on_case("modes", &Case::paper().with(Parameter::Alpha4, 20.0), "")),
+            .rerun(rerun::on_case("modes", &Cantilever::paper().with(Parameter::Alpha4, 20.0), "")),
         ))
 }

@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn maxima_are_one_a_drive_period() {
         let model = Model::cantilever(
-            &nanotap::model::cantilever::Case::paper()
+            &nanotap::model::cantilever::Cantilever::paper()
                 .with(nanotap::model::parameter::Parameter::Omega, 2.8),
         )
         .unwrap();

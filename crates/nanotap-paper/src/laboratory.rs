@@ -14,7 +14,7 @@ use nanotap_flow::Trajectory;
 use super::check::digits;
 use super::{PaperError, rerun};
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap::observe::Observables;
 use nanotap::study::orbit::{OrbitReport, report};
@@ -84,7 +84,7 @@ impl<'a> Laboratory<'a> {
     }
 
     /// The census of `case`, taken when it is first asked for.
-    pub(super) fn count(&self, case: &Case) -> Result<Rc<Counted>, PaperError> {
+    pub(super) fn count(&self, case: &Cantilever) -> Result<Rc<Counted>, PaperError> {
         if let Some(known) = self.counts.borrow().iter().find(|c| c.case == *case) {
             return Ok(Rc::clone(known));
         }
@@ -185,7 +185,7 @@ pub(super) struct Chaos<'a> {
 
 /// A case with its census.
 pub(super) struct Counted {
-    pub(super) case: Case,
+    pub(super) case: Cantilever,
     pub(super) model: Model,
     pub(super) census: Census,
     /// Starts it was taken from.

@@ -3,13 +3,13 @@
 
 use std::fmt::Write as _;
 
-use nanotap::model::cantilever::{Case, CosineTerm};
+use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 
 /// `nanotap` with `command` on `case`, with `options` behind it.
-pub(super) fn on_case(command: &str, case: &Case, options: &str) -> String {
+pub(super) fn on_case(command: &str, case: &Cantilever, options: &str) -> String {
     let mut line = format!("nanotap {command} --set modes={}", case.modes);
     for parameter in case.parameters() {
         let _ = write!(line, " --set {}={}", parameter.name(), case.get(parameter));
@@ -83,7 +83,9 @@ mod tests {
 
     #[test]
     fn a_command_line_says_its_whole_case() {
-        let mut case = Case::paper().with_modes(5).with(Parameter::Omega, 20.0);
+        let mut case = Cantilever::paper()
+            .with_modes(5)
+            .with(Parameter::Omega, 20.0);
         case.cosine_term = CosineTerm::Printed;
         case.contact = ContactLaw::KelvinVoigt;
         case.tone2_ratio = Some("25/4".parse().unwrap());

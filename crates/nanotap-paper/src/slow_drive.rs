@@ -16,7 +16,7 @@ use super::rerun;
 use super::section::{Picture, Section, Table};
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
@@ -35,11 +35,11 @@ struct Slow {
 
 impl Slow {
     fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
-        Self::with_modes(laboratory, Case::paper().modes)
+        Self::with_modes(laboratory, Cantilever::paper().modes)
     }
 
     fn with_modes(laboratory: &Laboratory<'_>, modes: usize) -> Result<Self, PaperError> {
-        let counted = laboratory.count(&Case::paper().with_modes(modes))?;
+        let counted = laboratory.count(&Cantilever::paper().with_modes(modes))?;
         let orbits = laboratory.orbits(&counted, LONGEST, laboratory.either(3000, 600))?;
         Ok(Self { counted, orbits })
     }

@@ -12,7 +12,7 @@ use super::laboratory::Laboratory;
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
 
@@ -69,8 +69,10 @@ pub(super) struct Scan {
 }
 
 /// The case of Figs. 8–14.
-pub(super) fn fast_case(modes: usize) -> Case {
-    Case::paper().with_modes(modes).with(Parameter::Omega, 20.0)
+pub(super) fn fast_case(modes: usize) -> Cantilever {
+    Cantilever::paper()
+        .with_modes(modes)
+        .with(Parameter::Omega, 20.0)
 }
 
 /// The grids that are tried. The paper takes different steps in flight and in contact and

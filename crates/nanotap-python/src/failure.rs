@@ -7,7 +7,7 @@ use nanotap::case::physical::CatalogueError;
 use nanotap::case::physical_subject::VaryError;
 use nanotap::case::subject::UnknownKey;
 use nanotap::dataset::{StoreError, WorkError};
-use nanotap::model::cantilever::CaseError;
+use nanotap::model::cantilever::CantileverError;
 use nanotap::model::{FlowError, ModelError};
 use nanotap::study::approach::ApproachError;
 use nanotap::study::attractors::AttractorsError;
@@ -59,7 +59,7 @@ macro_rules! input {
 }
 
 input!(
-    CaseError,
+    CantileverError,
     CatalogueError,
     OverError,
     ParameterValueError,

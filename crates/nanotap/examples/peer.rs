@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::{Ensemble, Flow, System};
 
 /// Modes, and the dimension of a state.
@@ -74,10 +74,10 @@ fn main() -> Result<(), Failure> {
 
 /// The model at one drive frequency.
 fn model(omega: f64) -> Result<Model, Failure> {
-    let case = Case {
+    let case = Cantilever {
         modes: MODES,
         omega,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     Ok(Model::cantilever(&case)?)
 }
@@ -134,7 +134,7 @@ fn best_from_rest(
     options: &Options,
     mut run: impl FnMut(&mut Motions) -> Result<(), Failure>,
 ) -> Result<f64, Failure> {
-    let model = model(Case::paper().omega)?;
+    let model = model(Cantilever::paper().omega)?;
     let mut motions = Motions::new(&model, options.lanes);
     let (begin, mut best, mut repeats) = (Instant::now(), f64::INFINITY, 0);
     while repeats < 3 || (repeats < 1000 && begin.elapsed().as_secs_f64() < options.seconds) {
@@ -212,7 +212,7 @@ fn sweep(options: &Options) -> Result<(), Failure> {
 /// The grid of starts, in packets of 64.
 fn basin(options: &Options) -> Result<(), Failure> {
     const PACKET: usize = 64;
-    let model = model(Case::paper().omega)?;
+    let model = model(Cantilever::paper().omega)?;
     let count = BASIN_SIDE * BASIN_SIDE;
     let along = |k: usize| k as f64 / (BASIN_SIDE - 1) as f64;
     let packets = as_many_as_fit(options, count / PACKET, |packet| {

@@ -6,7 +6,7 @@ use nanotap::case::file as case_file;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::physical::{Kind, Resolved, Severity};
 use nanotap::case::subject::Subject;
-use nanotap::model::cantilever::{Case, CosineTerm};
+use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::study::setpoint::SetpointReport;
 
@@ -68,13 +68,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 /// Writes the dimensionless case where `--out` says.
-fn write_out(out: &OutArgument, case: &Case) -> Result<(), Failure> {
+fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
     let Some(path) = &out.out else { return Ok(()) };
     file::ending(path, &["toml"])?;
     file::write(path, case_file::to_toml(case).as_bytes())
 }
 
-fn remark(case: &Case, output: &Output) {
+fn remark(case: &Cantilever, output: &Output) {
     if case.cosine_term == CosineTerm::Printed {
         output.note("the cosine term of Eq. (14) is taken as printed, without its Ω");
     }
@@ -83,7 +83,7 @@ fn remark(case: &Case, output: &Output) {
     }
 }
 
-fn cantilever(title: &str, case: &Case) -> String {
+fn cantilever(title: &str, case: &Cantilever) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("key", Align::Left),

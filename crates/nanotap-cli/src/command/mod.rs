@@ -19,7 +19,7 @@ mod window;
 use clap::Subcommand;
 use nanotap::case::file::CaseFile;
 use nanotap::case::physical::Catalogue;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::studied::Studied;
 
 use crate::arguments::CaseArguments;
@@ -102,13 +102,17 @@ pub(crate) fn studied(arguments: &CaseArguments) -> Result<Studied, Failure> {
 
 /// The dimensionless cantilever that the arguments describe, for `command`. What puts a
 /// physical case in doubt is said; its notes are `nanotap case`'s.
-fn cantilever(arguments: &CaseArguments, command: &str, output: &Output) -> Result<Case, Failure> {
+fn cantilever(
+    arguments: &CaseArguments,
+    command: &str,
+    output: &Output,
+) -> Result<Cantilever, Failure> {
     let studied = crate::studied::Studied::of(arguments, output)?;
     cantilever_of(&studied, command)
 }
 
 /// The dimensionless cantilever that is studied, for `command`.
-fn cantilever_of(studied: &Studied, command: &str) -> Result<Case, Failure> {
+fn cantilever_of(studied: &Studied, command: &str) -> Result<Cantilever, Failure> {
     studied.subject.case().ok_or_else(|| {
         Failure::request(
             format!(

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use nanotap::model::beam::Modes;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::modes::{ModeTable, ModeTableError, damping_ratio, shapes_figure};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -63,7 +63,7 @@ fn shapes(beam: &Modes) -> String {
     csv
 }
 
-fn text(title: &str, case: &Case, table: &ModeTable) -> String {
+fn text(title: &str, case: &Cantilever, table: &ModeTable) -> String {
     let mut text = style::bold(&format!(
         "{title}: {} of the cantilever, tip mass α₁ = {}",
         number::counted(case.modes, "mode", "modes"),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::Flow;
 
 /// Numbers of modes N.
@@ -15,16 +15,16 @@ pub(crate) const DAMPINGS: [f64; 3] = [0.01, 0.1, 1.0];
 const TRANSIENT: usize = 400;
 
 /// The paper's case, at Ω = 2.6 (chaotic: 2.3 switches a period at N = 3).
-pub(crate) fn paper(modes: usize) -> Case {
-    Case {
+pub(crate) fn paper(modes: usize) -> Cantilever {
+    Cantilever {
         modes,
-        ..Case::paper()
+        ..Cantilever::paper()
     }
 }
 
 /// At Ω = 20 without a tip mass, where a period-1 and a period-4 motion coexist (N ≥ 2).
-pub(crate) fn coexisting(modes: usize) -> Case {
-    Case {
+pub(crate) fn coexisting(modes: usize) -> Cantilever {
+    Cantilever {
         alpha1: 0.0,
         omega: 20.0,
         ..paper(modes)
@@ -32,12 +32,12 @@ pub(crate) fn coexisting(modes: usize) -> Case {
 }
 
 /// The model of a case that makes sense.
-pub(crate) fn model(case: &Case) -> Model {
+pub(crate) fn model(case: &Cantilever) -> Model {
     Model::cantilever(case).expect("a valid case")
 }
 
 /// What sweeps and basins take.
-pub(crate) fn subject(case: &Case) -> Subject {
+pub(crate) fn subject(case: &Cantilever) -> Subject {
     Subject::Cantilever(case.clone())
 }
 
@@ -50,7 +50,7 @@ pub(crate) fn at_rest(model: &Model) -> Flow {
 }
 
 /// A flow on its attractor, at phase 0.
-pub(crate) fn settled(case: &Case) -> Flow {
+pub(crate) fn settled(case: &Cantilever) -> Flow {
     let mut flow = at_rest(&model(case));
     run(&mut flow, TRANSIENT);
     flow
@@ -66,13 +66,13 @@ pub(crate) fn run(flow: &mut Flow, periods: usize) {
 /// The case N = 3, Ω = 2.6 with the sample so far away that the tip, swinging freely, comes
 /// within `gap` times its amplitude of it (negative: presses into it), and the state of the
 /// free motion at phase 0: an orbit of the impacting system too where `gap` ≥ 0.
-pub(crate) fn grazing(gap: f64) -> (Case, Vec<f64>) {
+pub(crate) fn grazing(gap: f64) -> (Cantilever, Vec<f64>) {
     let case = paper(3);
     let model = model(&case);
     let free = &model.system.regimes()[0];
     let swing = free.project(&model.gap).tones[0].norm();
     let state = free.response().at(model.system.drive(), 0.0);
-    let case = Case {
+    let case = Cantilever {
         alpha5: swing * (1.0 + gap),
         ..case
     };

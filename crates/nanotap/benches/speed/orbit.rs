@@ -1,7 +1,7 @@
 //! A periodic orbit by Newton's method.
 
 use divan::Bencher;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::{ShootingOptions, close_orbit};
 
@@ -10,7 +10,7 @@ use crate::cases::{self, MODES};
 /// The period-1 orbit at Ω = 3.5 with its multipliers, from a hundredth beside it.
 #[divan::bench(args = MODES)]
 fn newton(bencher: Bencher<'_, '_>, modes: usize) {
-    let case = Case {
+    let case = Cantilever {
         omega: 3.5,
         ..cases::paper(modes)
     };

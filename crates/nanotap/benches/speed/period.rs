@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::{Ensemble, Flow};
 
 use crate::cases::{self, DAMPINGS, MODES};
@@ -81,7 +81,7 @@ fn grazing(bencher: Bencher<'_, '_>, gap: f64) {
 }
 
 fn damped(modes: usize, alpha3: f64) -> Flow {
-    cases::settled(&Case {
+    cases::settled(&Cantilever {
         alpha3,
         ..cases::paper(modes)
     })

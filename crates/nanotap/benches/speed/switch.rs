@@ -1,7 +1,7 @@
 //! One switch between free flight and contact.
 
 use divan::Bencher;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::{Flow, Trajectory};
 
 use crate::cases::{self, MODES};
@@ -31,7 +31,7 @@ fn switch(bencher: Bencher<'_, '_>, modes: usize, into: usize) {
 
 /// A flow shortly before the first switch of its attractor that enters regime `into`, and
 /// the time to run to, which is after that switch and before the next.
-fn before_switch(case: &Case, into: usize) -> (Flow, f64) {
+fn before_switch(case: &Cantilever, into: usize) -> (Flow, f64) {
     let model = cases::model(case);
     let mut flow = cases::settled(case);
     let mut state = vec![0.0; model.dimension()];

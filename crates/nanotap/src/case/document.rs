@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::case::physical::{MappingRow, Resolved};
 use crate::case::subject::Subject;
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::study::setpoint::SetpointReport;
 use crate::study::studied::Studied;
@@ -29,7 +29,7 @@ pub struct CantileverDocument {
     pub kind: &'static str,
     /// Its parameters.
     #[serde(flatten)]
-    pub case: Case,
+    pub case: Cantilever,
     /// Drive period 2π/Ω.
     pub period: f64,
     /// What is known of it in SI.
@@ -174,12 +174,12 @@ impl CaseDocument {
             Subject::Physical(_) => {
                 let read = || studied.resolved.as_ref().map(|r| r.case.clone());
                 let case = studied.subject.case().or_else(read);
-                Self::cantilever(case.unwrap_or_else(Case::paper), studied)
+                Self::cantilever(case.unwrap_or_else(Cantilever::paper), studied)
             }
         }
     }
 
-    fn cantilever(case: Case, studied: &Studied) -> Self {
+    fn cantilever(case: Cantilever, studied: &Studied) -> Self {
         let resolved = studied.subject.resolved().or(studied.resolved.as_ref());
         Self::Cantilever(Box::new(CantileverDocument {
             kind: "cantilever",

@@ -15,7 +15,7 @@ use serde::{Serialize, Serializer};
 use crate::case::file::{CaseFileError, PHYSICAL_KEYS, PhysicalTables};
 use crate::case::near_name::near_name;
 use crate::case::physical::{Catalogue, Kind, Quantity, QuantityError, Resolved};
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::parameter::Parameter;
 
 /// A quantity of a physical case, `section.key`, and what it measures.
@@ -382,7 +382,7 @@ impl PhysicalSubject {
             value.abs()
         };
         let step = 1e-5 * size;
-        let at = |value: f64| -> Result<Case, CaseFileError> {
+        let at = |value: f64| -> Result<Cantilever, CaseFileError> {
             Ok(self.with(key, value).resolved()?.case.clone())
         };
         let (low, high, width) = match (at(value - step), at(value + step)) {

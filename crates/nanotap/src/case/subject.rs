@@ -10,7 +10,7 @@ use nanotap_flow::sensitivity::SystemTangent;
 use crate::case::near_name::near_name;
 use crate::case::physical::Resolved;
 use crate::case::physical_subject::{PhysicalKey, PhysicalSubject};
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 use crate::model::strobe::Strobe;
@@ -22,7 +22,7 @@ use nalgebra::DMatrix;
 #[serde(untagged)]
 pub enum Subject {
     /// The cantilever.
-    Cantilever(Case),
+    Cantilever(Cantilever),
     /// An oscillator with a stop.
     Oscillator(Oscillator),
     /// A cantilever of which physical quantities vary.
@@ -198,7 +198,7 @@ impl Subject {
 
     /// The dimensionless cantilever that it is; `None` of an oscillator, and where physical
     /// quantities have no meaning.
-    pub fn case(&self) -> Option<Case> {
+    pub fn case(&self) -> Option<Cantilever> {
         match self {
             Self::Cantilever(case) => Some(case.clone()),
             Self::Oscillator(_) => None,

@@ -23,7 +23,7 @@ pub enum CosineTerm {
 /// A dimensionless case. Fields are as given: [`validate`](Self::validate) says
 /// whether they make sense, and whatever is built from a case calls it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Case {
+pub struct Cantilever {
     /// Number of beam modes N, 1 to 50.
     pub modes: usize,
     /// Tip mass over beam mass, ≥ 0.
@@ -67,7 +67,7 @@ const LARGEST_ALPHA: f64 = 1e9;
 /// Range of Ω. The 50th mode is at 24,350 and the first at 3.5.
 const OMEGA_RANGE: (f64, f64) = (1e-6, 1e6);
 
-impl Case {
+impl Cantilever {
     /// The paper's parameters for Figs. 5–17, Eq. (26), with α1 = 0.1, Ω = 2.6 and N = 3.
     pub const fn paper() -> Self {
         Self {
@@ -193,7 +193,7 @@ impl Case {
     /// # Errors
     /// [`CaseError`] for the first field that makes no sense, with its value and
     /// what would be right.
-    pub fn validate(&self) -> Result<(), CaseError> {
+    pub fn validate(&self) -> Result<(), CantileverError> {
         if !(1..=MAX_MODES).contains(&self.modes) {
             return Err(ModeCountError { given: self.modes }.into());
         }
@@ -201,7 +201,7 @@ impl Case {
             let value = self.get(parameter);
             check(parameter, value)?;
             if let Some(reason) = self.misplaced(parameter) {
-                return Err(CaseError {
+                return Err(CantileverError {
                     key: parameter.name(),
                     value,
                     reason,
@@ -216,10 +216,10 @@ impl Case {
 ///
 /// # Errors
 /// [`CaseError`] if `value` makes no sense for `parameter`.
-pub fn check(parameter: Parameter, value: f64) -> Result<(), CaseError> {
+pub fn check(parameter: Parameter, value: f64) -> Result<(), CantileverError> {
     match objection(parameter, value) {
         None => Ok(()),
-        Some(reason) => Err(CaseError {
+        Some(reason) => Err(CantileverError {
             key: parameter.name(),
             value,
             reason,
@@ -246,10 +246,10 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
     }
 }
 
-/// A field of a [`Case`] that makes no sense.
+/// A field of a [`Cantilever`] that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{key}` = {value}: {reason}")]
-pub struct CaseError {
+pub struct CantileverError {
     /// The field's name in a case file.
     pub key: &'static str,
     /// The value given.
@@ -258,7 +258,7 @@ pub struct CaseError {
     pub reason: Reason,
 }
 
-impl From<ModeCountError> for CaseError {
+impl From<ModeCountError> for CantileverError {
     fn from(error: ModeCountError) -> Self {
         Self {
             key: "modes",
@@ -339,11 +339,11 @@ mod tests {
     #[test]
     fn the_papers_cases_are_valid_and_as_printed() {
         // Eq. (26) of the paper, with the α1, Ω and N of its Figs. 6–9.
-        let paper = Case::paper();
+        let paper = Cantilever::paper();
         let expected = [0.1, 0.1, 0.1, 20.0, 0.0, 0.2, 2.6];
         assert_eq!(Parameter::ALL.map(|p| paper.get(p)), expected);
         // Eq. (24) of the paper, with the Ω of its Fig. 4.
-        let undamped = Case::paper_eq24();
+        let undamped = Cantilever::paper_eq24();
         let expected = [0.1, 0.1, 0.0, 20.0, 0.0, 0.0, 4.1];
         assert_eq!(Parameter::ALL.map(|p| undamped.get(p)), expected);
         assert_eq!(paper.validate(), Ok(()));
@@ -353,12 +353,12 @@ mod tests {
     #[test]
     fn with_changes_one_parameter_and_no_other() {
         for changed in Parameter::ALL {
-            let case = Case::paper().with(changed, 0.625);
+            let case = Cantilever::paper().with(changed, 0.625);
             for parameter in Parameter::ALL {
                 let expected = if parameter == changed {
                     0.625
                 } else {
-                    Case::paper().get(parameter)
+                    Cantilever::paper().get(parameter)
                 };
                 assert_eq!(case.get(parameter), expected);
             }
@@ -367,7 +367,7 @@ mod tests {
 
     #[test]
     fn every_refusal_names_key_and_value() {
-        let paper = Case::paper;
+        let paper = Cantilever::paper;
         let mut bad = vec![
             (paper().with_modes(0), "modes", Reason::Modes),
             (paper().with_modes(51), "modes", Reason::Modes),
@@ -449,10 +449,13 @@ mod tests {
             (Parameter::Alpha6, 0.0),
             (Parameter::Omega, 1e6),
         ] {
-            assert_eq!(Case::paper().with(parameter, value).validate(), Ok(()));
+            assert_eq!(
+                Cantilever::paper().with(parameter, value).validate(),
+                Ok(())
+            );
         }
         for modes in [1, 50] {
-            assert_eq!(Case::paper().with_modes(modes).validate(), Ok(()));
+            assert_eq!(Cantilever::paper().with_modes(modes).validate(), Ok(()));
         }
     }
 }

@@ -7,7 +7,7 @@
 use std::f64::consts::PI;
 
 use crate::model::beam::{Mode, ModeCountError};
-use crate::model::cantilever::{CaseError, check};
+use crate::model::cantilever::{CantileverError, check};
 use crate::model::parameter::Parameter;
 
 /// The first `count` natural frequencies ω of the undamped beam with tip mass ratio
@@ -15,7 +15,7 @@ use crate::model::parameter::Parameter;
 ///
 /// # Errors
 /// [`CaseError`] unless 1 ≤ `count` ≤ 50 and both parameters are finite and ≥ 0.
-pub fn frequencies(alpha1: f64, alpha4: f64, count: usize) -> Result<Vec<f64>, CaseError> {
+pub fn frequencies(alpha1: f64, alpha4: f64, count: usize) -> Result<Vec<f64>, CantileverError> {
     check(Parameter::Alpha1, alpha1)?;
     check(Parameter::Alpha4, alpha4)?;
     if count == 0 {
@@ -107,7 +107,7 @@ fn bisect(before: impl Fn(f64) -> bool, mut low: f64, mut high: f64) -> f64 {
 ///
 /// # Errors
 /// [`CaseError`] if `omega` is no valid drive frequency.
-pub fn base_excitation_gain(omega: f64) -> Result<f64, CaseError> {
+pub fn base_excitation_gain(omega: f64) -> Result<f64, CantileverError> {
     check(Parameter::Omega, omega)?;
     let beta = omega.sqrt();
     let sech = beta.cosh().recip();

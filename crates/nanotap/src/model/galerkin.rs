@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::beam::Modes;
-use crate::model::cantilever::{Case, CaseError, CosineTerm};
+use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm};
 use crate::model::contact::dual::Dual;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::parameter::Parameter;
@@ -67,7 +67,7 @@ pub struct Gap {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Galerkin {
     /// The case.
-    pub case: Case,
+    pub case: Cantilever,
     /// The beam's modes.
     pub modes: Arc<Modes>,
     /// M, N×N, the same in both regimes: Eqs. (11), (15).
@@ -103,7 +103,7 @@ impl Galerkin {
     ///
     /// # Errors
     /// [`CaseError`] if the case is not valid.
-    pub fn new(case: &Case) -> Result<Self, CaseError> {
+    pub fn new(case: &Cantilever) -> Result<Self, CantileverError> {
         case.validate()?;
         let modes = Modes::shared(case.modes)?;
         let GalerkinDerivative {
@@ -146,7 +146,7 @@ struct Tone<N> {
 impl Tone<Dual> {
     /// A sin(wτ + θ). Through the base its force is A w² (α1 p + I) sin(wτ + θ) −
     /// A α3 w I cos(wτ + θ), as Eqs. (14) and (6) have it.
-    fn new(case: &Case, dual: &impl Fn(Parameter) -> Dual, which: Which) -> Self {
+    fn new(case: &Cantilever, dual: &impl Fn(Parameter) -> Dual, which: Which) -> Self {
         let zero = Dual::constant(0.0);
         let omega = dual(Parameter::Omega);
         let (amplitude, rate, phase) = match which {
@@ -225,16 +225,16 @@ struct Coefficients {
 
 impl Coefficients {
     /// Eqs. (8) and (11)–(18).
-    fn of(case: &Case) -> Self {
+    fn of(case: &Cantilever) -> Self {
         Self::numbers(case, None, |dual| dual.value)
     }
 
     /// The derivatives of [`of`](Self::of).
-    fn derivative(case: &Case, parameter: Parameter) -> Self {
+    fn derivative(case: &Cantilever, parameter: Parameter) -> Self {
         Self::numbers(case, Some(parameter), |dual| dual.derivative)
     }
 
-    fn numbers(case: &Case, parameter: Option<Parameter>, number: fn(Dual) -> f64) -> Self {
+    fn numbers(case: &Cantilever, parameter: Option<Parameter>, number: fn(Dual) -> f64) -> Self {
         let dual = |p| Dual::new(case.get(p), f64::from(u8::from(Some(p) == parameter)));
         let second = case.tone2_ratio.map(Which::Second);
         let one = Dual::constant(1.0);
@@ -309,8 +309,8 @@ mod tests {
     use super::*;
 
     /// A case with nothing equal to zero or one, so that every term shows.
-    fn case() -> Case {
-        Case {
+    fn case() -> Cantilever {
+        Cantilever {
             modes: 4,
             alpha1: 0.13,
             alpha2: 0.7,
@@ -320,7 +320,7 @@ mod tests {
             alpha6: 0.41,
             omega: 3.7,
             cosine_term: CosineTerm::Corrected,
-            ..Case::paper()
+            ..Cantilever::paper()
         }
     }
 
@@ -346,7 +346,7 @@ mod tests {
         all
     }
 
-    fn values(case: &Case) -> Vec<f64> {
+    fn values(case: &Cantilever) -> Vec<f64> {
         let g = Galerkin::new(case).unwrap();
         entries(&GalerkinDerivative {
             mass: g.mass,
@@ -401,7 +401,7 @@ mod tests {
 
     #[test]
     fn printed_form_differs_by_omega_in_the_beams_cosine_term_only() {
-        let printed = Case {
+        let printed = Cantilever {
             cosine_term: CosineTerm::Printed,
             ..case()
         };
@@ -427,7 +427,7 @@ mod tests {
     #[test]
     fn derivatives_agree_with_central_differences() {
         for cosine_term in [CosineTerm::Corrected, CosineTerm::Printed] {
-            let case = Case {
+            let case = Cantilever {
                 cosine_term,
                 ..case()
             };

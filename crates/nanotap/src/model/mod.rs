@@ -27,7 +27,7 @@ use nanotap_flow::{Drive, Output, System};
 use crate::case::file::CaseFileError;
 use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
-use crate::model::cantilever::{Case, CaseError};
+use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::contact::ContactLaw;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::parameter::Parameter;
@@ -37,7 +37,7 @@ use crate::model::parameter::Parameter;
 pub enum ModelError {
     /// The case itself makes no sense.
     #[error(transparent)]
-    Case(#[from] CaseError),
+    Case(#[from] CantileverError),
     /// The oscillator makes no sense.
     #[error(transparent)]
     Oscillator(#[from] crate::model::oscillator::OscillatorError),
@@ -182,7 +182,7 @@ impl Model {
     ///
     /// # Errors
     /// When the case is not valid, or a regime is driven at an undamped resonance.
-    pub fn cantilever(case: &Case) -> Result<Self, ModelError> {
+    pub fn cantilever(case: &Cantilever) -> Result<Self, ModelError> {
         let galerkin = Galerkin::new(case)?;
         let drive = drive_of(case)?;
         let law = ContactLaw::law(case, None);
@@ -263,7 +263,7 @@ impl Model {
 }
 
 /// The drive's tones: the first, and the second if there is one.
-fn drive_of(case: &Case) -> Result<Drive, FlowError> {
+fn drive_of(case: &Cantilever) -> Result<Drive, FlowError> {
     match case.tone2_ratio {
         None => Drive::single(case.omega),
         Some(ratio) => Drive::new(case.period(), &[ratio.denominator(), ratio.numerator()]),
@@ -275,7 +275,7 @@ fn drive_of(case: &Case) -> Result<Drive, FlowError> {
 /// # Errors
 /// As [`Model::cantilever`].
 pub fn cantilever_tangent(
-    case: &Case,
+    case: &Cantilever,
     model: &Model,
     parameter: Parameter,
 ) -> Result<SystemTangent, ModelError> {

@@ -10,7 +10,7 @@ use nanotap_flow::trajectory::PiecewiseSignal;
 use serde::Serialize;
 
 use crate::case::subject::{Key, Subject};
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
 use crate::model::parameter::Parameter;
 use crate::model::strobe::Strobe;
@@ -67,7 +67,7 @@ pub struct SampleMotion {
     /// The law.
     pub contact: ContactLaw,
     /// The case with this law.
-    pub case: Case,
+    pub case: Cantilever,
     /// What a run from rest goes to.
     pub from_rest: Classification,
     /// Its period, if periodic.
@@ -117,7 +117,7 @@ pub struct Comparison {
 ///
 /// # Errors
 /// [`ComparisonError::Arm`] when the arm's stiffness is not positive.
-pub fn cases(case: &Case, arm: Option<f64>) -> Result<Vec<Case>, ComparisonError> {
+pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, ComparisonError> {
     let is_solid = case.contact == ContactLaw::StandardLinearSolid;
     let own = is_solid.then_some(case.relaxation_stiffness);
     let arm = arm.or(own).unwrap_or(2.0 * case.alpha4);
@@ -133,7 +133,7 @@ pub fn cases(case: &Case, arm: Option<f64>) -> Result<Vec<Case>, ComparisonError
         .into_iter()
         .map(|contact| {
             let solid = contact == ContactLaw::StandardLinearSolid;
-            Case {
+            Cantilever {
                 contact,
                 alpha6: if solid { 0.0 } else { damper },
                 relaxation_stiffness: if solid { arm } else { 0.0 },
@@ -150,7 +150,7 @@ pub fn cases(case: &Case, arm: Option<f64>) -> Result<Vec<Case>, ComparisonError
 /// [`ComparisonError`] when the case or the options make no sense; a law under which there
 /// is no such orbit is no error.
 pub fn compare(
-    case: &Case,
+    case: &Cantilever,
     options: &ComparisonOptions,
     control: &Control<'_>,
 ) -> Result<Comparison, ComparisonError> {
@@ -169,7 +169,7 @@ pub fn compare(
 }
 
 fn motion(
-    case: Case,
+    case: Cantilever,
     options: &ComparisonOptions,
     control: &Control<'_>,
 ) -> Result<SampleMotion, ComparisonError> {
@@ -203,7 +203,7 @@ fn motion(
 
 /// The branch of an orbit in the drive frequency.
 fn followed(
-    case: &Case,
+    case: &Cantilever,
     map: &mut Strobe,
     found: &OrbitReport,
     (from, to): (f64, f64),
@@ -265,7 +265,7 @@ mod tests {
     /// it recovers.
     #[test]
     fn loops_enclose_what_the_sample_takes_in_contact() {
-        let case = Case::paper().with(Parameter::Omega, 20.0);
+        let case = Cantilever::paper().with(Parameter::Omega, 20.0);
         let options = ComparisonOptions::default();
         let found = compare(&case, &options, &Control::default()).unwrap();
         let mut loss = Vec::new();
@@ -296,14 +296,14 @@ mod tests {
 
     #[test]
     fn samples_share_spring_and_damper() {
-        let all = cases(&Case::paper(), None).unwrap();
+        let all = cases(&Cantilever::paper(), None).unwrap();
         assert_eq!(all[2].relaxation_stiffness, 40.0);
         assert!((all[2].relaxation_stiffness * all[2].relaxation_time - 0.2).abs() < 1e-15);
         // And from a solid back to the same three.
         assert_eq!(cases(&all[2], None).unwrap()[1].alpha6, all[1].alpha6);
         assert!(all.iter().all(|case| case.validate().is_ok()));
         for arm in [0.0, -1.0, f64::NAN] {
-            assert!(cases(&Case::paper(), Some(arm)).is_err());
+            assert!(cases(&Cantilever::paper(), Some(arm)).is_err());
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::mode_share::ReadingsReport;
 use crate::observe::time_series::with_modes;
@@ -69,7 +69,7 @@ const COMPARED_POINTS: usize = 400;
 /// # Errors
 /// When the case makes no sense.
 pub fn convergence(
-    case: &Case,
+    case: &Cantilever,
     largest: usize,
     tolerance: f64,
     options: &OrbitOptions,

@@ -318,13 +318,13 @@ fn apparent_period(strobes: &[Vec<f64>]) -> (Option<usize>, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::cantilever::Case;
+    use crate::model::cantilever::Cantilever;
     use crate::model::parameter::Parameter;
 
     /// Without contact the method is of fourth order and finds the forced response.
     #[test]
     fn without_contact_it_converges_to_the_exact_flow() {
-        let case = Case::paper()
+        let case = Cantilever::paper()
             .with_modes(1)
             .with(Parameter::Alpha5, 10.0)
             .with(Parameter::Alpha3, 1.0);
@@ -355,7 +355,7 @@ mod tests {
     /// step late.
     #[test]
     fn contacts_are_noticed_late() {
-        let case = Case::paper().with(Parameter::Omega, 3.0);
+        let case = Cantilever::paper().with(Parameter::Omega, 3.0);
         let model = Model::cantilever(&case).unwrap();
         let exact =
             crate::study::orbit::orbit(&model, &crate::study::orbit::OrbitOptions::default())
@@ -377,7 +377,7 @@ mod tests {
 
     #[test]
     fn what_it_cannot_do_is_refused() {
-        let model = Model::cantilever(&Case::paper()).unwrap();
+        let model = Model::cantilever(&Cantilever::paper()).unwrap();
         let few = FixedStepOptions {
             steps: [3, 3],
             transient: 2000,

@@ -45,15 +45,15 @@ impl FreeMotion {
 mod tests {
     use super::*;
     use crate::case::physical::free_response::free_response;
-    use crate::model::cantilever::Case;
+    use crate::model::cantilever::Cantilever;
 
     /// The closed form for the cantilever, solved otherwise.
     #[test]
     fn agrees_with_the_closed_form() {
         for omega in [1.0, 2.6, 3.4, 20.0] {
-            let case = Case {
+            let case = Cantilever {
                 omega,
-                ..Case::paper()
+                ..Cantilever::paper()
             };
             let z = free_response(&case).unwrap();
             let free = FreeMotion::of(&Model::cantilever(&case).unwrap());

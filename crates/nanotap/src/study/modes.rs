@@ -6,7 +6,7 @@ use nanotap_figures::{Axis, Figure, Line, Panel, Rule};
 use serde::Serialize;
 
 use crate::model::beam::Modes;
-use crate::model::cantilever::{Case, CaseError};
+use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
 use crate::model::galerkin::Regime;
 use crate::model::spectrum::{self, Spectrum, SpectrumError, TipLoad};
@@ -36,7 +36,7 @@ pub struct ModeTable {
 pub enum ModeTableError {
     /// The case is not valid.
     #[error(transparent)]
-    Case(#[from] CaseError),
+    Case(#[from] CantileverError),
     /// The frequencies could not be computed.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
@@ -47,9 +47,9 @@ impl ModeTable {
     ///
     /// # Errors
     /// [`ModeTableError::Case`] if the case is not valid.
-    pub fn new(case: &Case) -> Result<Self, ModeTableError> {
+    pub fn new(case: &Cantilever) -> Result<Self, ModeTableError> {
         case.validate()?;
-        let beam = Modes::new(case.modes).map_err(CaseError::from)?;
+        let beam = Modes::new(case.modes).map_err(CantileverError::from)?;
         let galerkin = |regime| spectrum::frequencies(&beam, TipLoad::of(case, regime));
         let eigenvalues = |regime| {
             let spectrum = Spectrum::of_beam(&beam, case.alpha3, TipLoad::of(case, regime));
@@ -115,7 +115,7 @@ mod tests {
         // Eq. (25) of the paper prints 7.79, 20.33, 55.81 for the contact frequencies at
         // α1 = 0.1, α4 = 20: its digits are those of five modes. The exact ones are roots
         // of the transcendental equation.
-        let table = ModeTable::new(&Case::paper().with_modes(5)).unwrap();
+        let table = ModeTable::new(&Cantilever::paper().with_modes(5)).unwrap();
         for (computed, printed) in table.contact.iter().zip([7.79, 20.33, 55.81]) {
             assert!(
                 (computed - printed).abs() <= 0.005 + 1e-9,
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn galerkin_lies_above_the_exact_beam_and_contact_above_free() {
         // Rayleigh–Ritz: a truncated basis can only stiffen; so can a spring.
-        let table = ModeTable::new(&Case::paper().with_modes(8)).unwrap();
+        let table = ModeTable::new(&Cantilever::paper().with_modes(8)).unwrap();
         for k in 0..8 {
             assert!(table.free[k] >= table.exact_free[k] * (1.0 - 1e-12));
             assert!(table.contact[k] >= table.exact_contact[k] * (1.0 - 1e-12));
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn without_tip_and_spring_every_frequency_is_the_bare_beams() {
-        let bare = Case::paper()
+        let bare = Cantilever::paper()
             .with(Parameter::Alpha1, 0.0)
             .with(Parameter::Alpha4, 0.0)
             .with_modes(4);
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn bad_cases_are_refused() {
-        let bad = Case::paper().with(Parameter::Alpha1, -1.0);
+        let bad = Cantilever::paper().with(Parameter::Alpha1, -1.0);
         assert!(matches!(ModeTable::new(&bad), Err(ModeTableError::Case(_))));
     }
 }

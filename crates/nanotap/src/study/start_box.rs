@@ -148,7 +148,7 @@ pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::cantilever::Case;
+    use crate::model::cantilever::Cantilever;
     use crate::model::oscillator::{Oscillator, Stop};
     use crate::model::parameter::Parameter;
 
@@ -156,8 +156,10 @@ mod tests {
     #[test]
     fn it_scales_with_the_drive() {
         let of = |alpha2| {
-            default_box(&Model::cantilever(&Case::paper().with(Parameter::Alpha2, alpha2)).unwrap())
-                .unwrap()
+            default_box(
+                &Model::cantilever(&Cantilever::paper().with(Parameter::Alpha2, alpha2)).unwrap(),
+            )
+            .unwrap()
         };
         let (large, small) = (of(0.1), of(1e-7));
         for (a, b) in large.upper().iter().zip(small.upper()) {
@@ -185,7 +187,7 @@ mod tests {
 
     #[test]
     fn sides_are_replaced_by_name() {
-        let model = Model::cantilever(&Case::paper()).unwrap();
+        let model = Model::cantilever(&Cantilever::paper()).unwrap();
         let sides = box_with(
             &model,
             &[("v2".into(), -0.5, 0.25), ("a1".into(), 0.1, 0.1)],

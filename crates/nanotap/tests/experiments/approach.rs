@@ -3,7 +3,7 @@
 use nanotap::case::file::{CaseFile, Source};
 use nanotap::case::physical::Catalogue;
 use nanotap::control::Control;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::approach::{ApproachOptions, ApproachReport, Way, approach};
 use nanotap::study::simulate::Classification;
 use nanotap::study::studied::Studied;
@@ -125,7 +125,7 @@ fn a_physical_curve_is_told_in_si() {
 fn what_is_chaotic_is_called_so() {
     let paper = Studied::resolve(
         "paper".into(),
-        CaseFile::Dimensionless(Case::paper()),
+        CaseFile::Dimensionless(Cantilever::paper()),
         &Catalogue::builtin().unwrap(),
     )
     .unwrap();

@@ -1,6 +1,6 @@
 //! Which modes matter.
 
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::convergence::convergence;
 use nanotap::study::orbit::OrbitOptions;
 
@@ -8,11 +8,11 @@ use nanotap::study::orbit::OrbitOptions;
 /// the tip's motion, follow from a_j = (Ω² − iα3Ω) I_j α2/(β_j⁴ − Ω² + iα3Ω) (no tip mass).
 #[test]
 fn shares_of_a_free_lever_are_the_closed_form() {
-    let case = Case {
+    let case = Cantilever {
         alpha1: 0.0,
         alpha5: 100.0,
         omega: 20.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let found = convergence(&case, 4, 0.01, &OrbitOptions::default()).unwrap();
     let modes = nanotap::model::beam::Modes::new(4).unwrap();
@@ -47,10 +47,10 @@ fn shares_of_a_free_lever_are_the_closed_form() {
 /// Shares sum to one, and "enough" is what the differences say.
 #[test]
 fn enough_is_the_least_number_from_which_on_all_readings_stay() {
-    let case = Case {
+    let case = Cantilever {
         alpha1: 0.0,
         omega: 20.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let options = OrbitOptions {
         period: Some(1),
@@ -91,7 +91,7 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
 /// What is chaotic has no single reading: the verdict says so.
 #[test]
 fn a_motion_that_is_no_orbit_is_left_undecided() {
-    let found = convergence(&Case::paper(), 3, 0.01, &OrbitOptions::default()).unwrap();
+    let found = convergence(&Cantilever::paper(), 3, 0.01, &OrbitOptions::default()).unwrap();
     assert!(found.readings.reading_verdict.starts_with("undecided"));
     assert!(
         found.motions[2]

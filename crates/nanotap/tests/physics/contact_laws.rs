@@ -2,7 +2,7 @@
 
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::Observables;
@@ -14,14 +14,14 @@ use crate::derivatives::{advance, worst};
 use crate::located_runge_kutta::Independent;
 
 /// The paper's case on a sample of a law, with the paper's spring and damper.
-pub(crate) fn on(law: ContactLaw, omega: f64) -> Case {
-    let case = Case {
+pub(crate) fn on(law: ContactLaw, omega: f64) -> Cantilever {
+    let case = Cantilever {
         contact: law,
         omega,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     if law == ContactLaw::StandardLinearSolid {
-        Case {
+        Cantilever {
             alpha6: 0.0,
             relaxation_stiffness: 40.0,
             relaxation_time: 0.05,
@@ -38,7 +38,7 @@ pub(crate) fn on(law: ContactLaw, omega: f64) -> Case {
 fn every_law_agrees_with_located_runge_kutta() {
     for law in ContactLaw::ALL {
         for omega in [2.6, 20.0] {
-            let case = Case {
+            let case = Cantilever {
                 modes: 2,
                 alpha5: 0.05,
                 ..on(law, omega)
@@ -87,7 +87,7 @@ fn every_law_agrees_with_located_runge_kutta() {
 fn derivatives_of_every_law() {
     for law in ContactLaw::ALL {
         for modes in [1, 3] {
-            let case = Case {
+            let case = Cantilever {
                 alpha5: 0.02,
                 ..on(law, 2.6)
             };
@@ -147,7 +147,7 @@ proptest! {
         a in -0.3..0.3_f64, v in -3.0..3.0_f64, memory in -0.3..0.3_f64,
     ) {
         let law = ContactLaw::ALL[law];
-        let mut case = Case { modes, omega, alpha4: stiffness, alpha5: gap, ..Case::paper() };
+        let mut case = Cantilever { modes, omega, alpha4: stiffness, alpha5: gap, ..Cantilever::paper() };
         case.contact = law;
         if law == ContactLaw::StandardLinearSolid {
             case.alpha6 = 0.0;
@@ -188,15 +188,15 @@ proptest! {
 /// Without a damper, or with one that has no time to act, every law is the paper's spring.
 #[test]
 fn without_a_damper_every_law_is_the_papers_spring() {
-    let spring = Case {
+    let spring = Cantilever {
         alpha6: 0.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
-    let recovers = Case {
+    let recovers = Cantilever {
         contact: ContactLaw::KelvinVoigt,
         ..spring.clone()
     };
-    let solid = Case {
+    let solid = Cantilever {
         contact: ContactLaw::StandardLinearSolid,
         relaxation_stiffness: 30.0,
         ..spring.clone()
@@ -222,7 +222,7 @@ fn a_case_has_the_parameters_of_its_law() {
     let solid = names(ContactLaw::StandardLinearSolid);
     assert!(solid.contains(&"relaxation_time") && !solid.contains(&"alpha6"));
     assert!(of(ContactLaw::SpringDamper).key("relaxation_time").is_err());
-    let wrong = Case::paper().with(Parameter::RelaxationTime, 0.1);
+    let wrong = Cantilever::paper().with(Parameter::RelaxationTime, 0.1);
     let refused = Model::cantilever(&wrong).unwrap_err().to_string();
     assert!(refused.contains("standard-linear-solid"), "{refused}");
 }

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 use nanotap::case::subject::{Key, Subject};
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
@@ -68,9 +68,9 @@ pub(crate) fn worst(subject: &Subject, state: &[f64]) -> f64 {
 
 #[test]
 fn cantilever_with_contacts() {
-    let case = Case {
+    let case = Cantilever {
         alpha5: 0.02,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     for modes in [1, 3, 5] {
         let subject = Subject::Cantilever(case.clone().with_modes(modes));
@@ -138,11 +138,11 @@ fn critically_damped_contact() {
 fn grazing_is_of_the_three_halves_type() {
     // A lever that just misses: the gap's least value over the run is the knob, set by
     // α5; state and drive stay.
-    let free = Case {
+    let free = Cantilever {
         alpha5: 1.0,
-        ..Case {
+        ..Cantilever {
             omega: 3.1,
-            ..Case::paper()
+            ..Cantilever::paper()
         }
     };
     let start = [0.03, 0.0, 0.0, 0.1, 0.0, 0.0];
@@ -151,7 +151,7 @@ fn grazing_is_of_the_three_halves_type() {
     let (lowest, _) = run.signal(&model.gap).range().unwrap();
     let unhindered = run.state_at(run.end()).unwrap();
     let deviation = |depth: f64| -> f64 {
-        let case = Case {
+        let case = Cantilever {
             alpha5: 1.0 - lowest.value - depth,
             ..free.clone()
         };

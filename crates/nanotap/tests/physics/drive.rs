@@ -3,7 +3,7 @@
 use nanotap::case::physical::free_response::response_at;
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::parameter::Parameter;
@@ -15,8 +15,8 @@ use crate::contact_laws::on;
 use crate::derivatives::{advance, worst};
 
 /// Two tones, the second at 25/4 of the first, on the lever as said.
-fn two_tones(actuation: Actuation) -> Case {
-    Case {
+fn two_tones(actuation: Actuation) -> Cantilever {
+    Cantilever {
         actuation,
         alpha2: if actuation == Actuation::Base {
             0.1
@@ -31,7 +31,7 @@ fn two_tones(actuation: Actuation) -> Case {
         },
         tone2_phase: 35.0,
         omega: 3.1,
-        ..Case::paper()
+        ..Cantilever::paper()
     }
 }
 
@@ -40,7 +40,7 @@ fn two_tones(actuation: Actuation) -> Case {
 #[test]
 fn tones_superpose_in_free_flight() {
     for actuation in Actuation::ALL {
-        let case = Case {
+        let case = Cantilever {
             alpha5: 50.0,
             ..two_tones(actuation)
         };
@@ -88,9 +88,9 @@ fn tones_superpose_in_free_flight() {
 /// evenly; slowly moved, it follows its base.
 #[test]
 fn slow_drives_are_static() {
-    let slow = |actuation| Case {
+    let slow = |actuation| Cantilever {
         actuation,
-        ..Case::paper().with_modes(50)
+        ..Cantilever::paper().with_modes(50)
     };
     let response = |actuation| response_at(&slow(actuation), 1e-3).unwrap();
     for (actuation, expected) in [
@@ -113,7 +113,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
     for actuation in Actuation::ALL {
         for law in ContactLaw::ALL {
             let sample = on(law, 3.1);
-            let case = Case {
+            let case = Cantilever {
                 modes: 2,
                 contact: law,
                 alpha5: 0.03,
@@ -148,12 +148,12 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
 /// turn further: the same motion as with its phase half a turn on.
 #[test]
 fn phases_and_times_agree() {
-    let case = Case {
+    let case = Cantilever {
         tone2_ratio: Some("3/2".parse().unwrap()),
         ..two_tones(Actuation::Base)
     };
     let first = std::f64::consts::TAU / case.omega;
-    let run = |case: &Case, state: &[f64], from: f64| {
+    let run = |case: &Cantilever, state: &[f64], from: f64| {
         let model = Model::cantilever(case).unwrap();
         let mut flow = Flow::new(model.system.clone());
         flow.start(state, from).unwrap();
@@ -174,7 +174,7 @@ fn phases_and_times_agree() {
     }
     // A second tone of no strength is none, but for the length of the period.
     let silent = case.clone().with(Parameter::Tone2Amplitude, 0.0);
-    let single = Case {
+    let single = Cantilever {
         tone2_ratio: None,
         tone2_phase: 0.0,
         ..silent.clone()

@@ -2,19 +2,19 @@
 //! project's model notes, found there by an independent program.
 
 use nanotap::model::Model;
-use nanotap::model::cantilever::{Case, CosineTerm};
+use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
 
-fn at(omega: f64) -> Case {
-    Case {
+fn at(omega: f64) -> Cantilever {
+    Cantilever {
         omega,
-        ..Case::paper()
+        ..Cantilever::paper()
     }
 }
 
-fn settled(case: &Case) -> OrbitReport {
+fn settled(case: &Cantilever) -> OrbitReport {
     orbit(&Model::cantilever(case).unwrap(), &OrbitOptions::default()).unwrap()
 }
 
@@ -121,11 +121,11 @@ fn unstable_period_one_at_omega_2_6() {
 /// α1 = 0.1, α4 = 20. A drive of amplitude 1e-9 leaves a free oscillation of it.
 #[test]
 fn bilinear_frequency_of_one_mode() {
-    let case = Case {
+    let case = Cantilever {
         modes: 1,
         alpha2: 1e-9,
         omega: 0.05,
-        ..Case::paper_eq24()
+        ..Cantilever::paper_eq24()
     };
     let model = Model::cantilever(&case).unwrap();
     let trajectory = Trajectory::record(&model.system, &[0.0, 1.0], 1).unwrap();
@@ -144,12 +144,12 @@ fn bilinear_frequency_of_one_mode() {
 /// base amplitude 2.878087 at Ω = 2.6 without tip mass, up to the modes left out.
 #[test]
 fn free_lever_moves_as_the_exact_beam() {
-    let case = Case {
+    let case = Cantilever {
         modes: 20,
         alpha1: 0.0,
         alpha3: 1e-9,
         alpha5: 5.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let model = Model::cantilever(&case).unwrap();
     let report = orbit(
@@ -170,7 +170,7 @@ fn free_lever_moves_as_the_exact_beam() {
 /// The printed Eq. (14) is another drive: the motion differs, its balance closes.
 #[test]
 fn printed_cosine_term_balances_its_energy_too() {
-    let case = Case {
+    let case = Cantilever {
         cosine_term: CosineTerm::Printed,
         ..at(3.0)
     };
@@ -194,14 +194,14 @@ proptest! {
         alpha6 in 0.0..3.0_f64,
         omega in 0.5..25.0_f64,
     ) {
-        let case = Case { modes, alpha1, alpha3, alpha4, alpha6, omega, ..Case::paper() };
+        let case = Cantilever { modes, alpha1, alpha3, alpha4, alpha6, omega, ..Cantilever::paper() };
         let model = Model::cantilever(&case).unwrap();
         let start = vec![0.0; 2 * modes];
         let run = Trajectory::record(&model.system, &start, 12).unwrap();
         let seen = nanotap::observe::Observables::of(&model, &run).unwrap();
         prop_assert!(seen.energy_balance.residual.abs() < 1e-11, "{:?}", seen.energy_balance);
 
-        let doubled = Model::cantilever(&Case { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
+        let doubled = Model::cantilever(&Cantilever { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
         let twice = Trajectory::record(&doubled.system, &start, 4).unwrap();
         for (a, b) in run.events().iter().zip(twice.events()) {
             prop_assert!((a.time - b.time).abs() < 1e-9);
@@ -230,9 +230,9 @@ proptest! {
 #[test]
 fn clearance_of_a_long_run_is_the_least_of_its_periods() {
     for (omega, modes) in [(2.6, 3), (20.0, 5)] {
-        let case = Case {
+        let case = Cantilever {
             omega,
-            ..Case::paper()
+            ..Cantilever::paper()
         }
         .with_modes(modes);
         let model = Model::cantilever(&case).unwrap();

@@ -1,7 +1,7 @@
 //! The surface of spring and damper that recovers by itself.
 
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::begins_contact;
@@ -9,7 +9,7 @@ use nanotap_flow::{Flow, Trajectory};
 
 use crate::contact_laws::on;
 
-fn run(case: &Case, periods: usize) -> (Model, Trajectory) {
+fn run(case: &Cantilever, periods: usize) -> (Model, Trajectory) {
     let model = Model::cantilever(case).unwrap();
     let mut state = vec![0.0; model.dimension()];
     let mut flow = Flow::new(model.system.clone());
@@ -26,7 +26,7 @@ fn run(case: &Case, periods: usize) -> (Model, Trajectory) {
 /// zero; from there the surface recovers as e^{−α4 t/α6} until the tip meets it again.
 #[test]
 fn contact_begins_with_the_damper_and_ends_without_force() {
-    let case = Case {
+    let case = Cantilever {
         // Slow enough that the tip comes back before the surface has.
         alpha6: 8.0,
         ..on(ContactLaw::KelvinVoigt, 20.0)
@@ -92,7 +92,7 @@ fn the_gap_opens_quadratically() {
 #[test]
 fn a_vanishing_damper_leaves_the_spring() {
     let elastic = on(ContactLaw::SpringDamper, 20.0).with(Parameter::Alpha6, 0.0);
-    let end = |case: &Case| {
+    let end = |case: &Cantilever| {
         let model = Model::cantilever(case).unwrap();
         let rest = vec![0.0; model.dimension()];
         let run = Trajectory::record(&model.system, &rest, 30).unwrap();

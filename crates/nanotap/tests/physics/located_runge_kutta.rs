@@ -3,7 +3,7 @@
 //! from the samples' mechanics and not from the product's regimes.
 
 use nalgebra::DVector;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::galerkin::Galerkin;
 
@@ -23,7 +23,7 @@ pub(crate) struct Motion {
 }
 
 pub(crate) struct Independent {
-    case: Case,
+    case: Cantilever,
     galerkin: Galerkin,
     inverse_mass: nalgebra::DMatrix<f64>,
 }
@@ -32,7 +32,7 @@ pub(crate) struct Independent {
 type Rates = (DVector<f64>, [f64; 3]);
 
 impl Independent {
-    pub(crate) fn new(case: &Case) -> Self {
+    pub(crate) fn new(case: &Cantilever) -> Self {
         let galerkin = Galerkin::new(case).unwrap();
         Self {
             case: case.clone(),

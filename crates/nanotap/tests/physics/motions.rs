@@ -3,7 +3,7 @@
 use nanotap::case::subject::{Key, PlaneFamily, Subject};
 use nanotap::control::Control;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::model::parameter::Parameter;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
@@ -15,8 +15,8 @@ use nanotap::study::start_box::default_box;
 use nanotap_dynamics::TwoParameterFamily as _;
 use nanotap_dynamics::{DMatrix, StroboscopicMap as _};
 
-fn at(omega: f64) -> Case {
-    Case::paper().with(Parameter::Omega, omega)
+fn at(omega: f64) -> Cantilever {
+    Cantilever::paper().with(Parameter::Omega, omega)
 }
 
 fn over(key: Key, from: f64, to: f64) -> BranchOptions {

@@ -4,12 +4,12 @@ use std::f64::consts::TAU;
 
 use nanotap::case::physical::free_response::free_response;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_dynamics::Complex;
 
 /// The period-1 orbit of a case, and its model.
-fn period_1(case: &Case) -> (Model, OrbitReport) {
+fn period_1(case: &Cantilever) -> (Model, OrbitReport) {
     let model = Model::cantilever(case).unwrap();
     let options = OrbitOptions {
         period: Some(1),
@@ -32,12 +32,12 @@ fn near(found: f64, expected: f64, relative: f64) {
 fn free_amplitude_and_phase_are_the_closed_form() {
     for alpha1 in [0.0, 0.1] {
         for omega in [1.0, 2.9, 3.0, 3.516, 4.0, 20.0, 23.0] {
-            let case = Case {
+            let case = Cantilever {
                 alpha1,
                 alpha3: 0.02,
                 alpha5: 100.0,
                 omega,
-                ..Case::paper()
+                ..Cantilever::paper()
             };
             let z = free_response(&case).unwrap();
             let (_, found) = period_1(&case);
@@ -60,12 +60,12 @@ fn the_phase_is_90_degrees_at_the_free_resonance() {
     for q in [50.0, 200.0, 1000.0] {
         // β₁² of the bare beam.
         let omega = 3.516_015_268_5;
-        let case = Case {
+        let case = Cantilever {
             alpha1: 0.0,
             alpha3: omega / q,
             alpha5: 1000.0,
             omega,
-            ..Case::paper()
+            ..Cantilever::paper()
         };
         let (_, found) = period_1(&case);
         assert!(
@@ -80,11 +80,11 @@ fn the_phase_is_90_degrees_at_the_free_resonance() {
 /// amplitudes, F = −(α4 V + α6 V̇) with V = W + α2 sin Ωτ + α5.
 #[test]
 fn virial_and_dissipation_of_a_permanent_contact() {
-    let case = Case {
+    let case = Cantilever {
         alpha2: 0.01,
         alpha5: -1.0,
         omega: 5.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let (model, found) = period_1(&case);
     let o = &found.observables;
@@ -120,14 +120,14 @@ fn virial_and_dissipation_of_a_permanent_contact() {
 /// deflection. Here the base moves so slowly that only the sample's force bends the beam.
 #[test]
 fn an_optical_lever_reads_a_static_deflection_as_it_is() {
-    let case = Case {
+    let case = Cantilever {
         modes: 40,
         alpha1: 0.0,
         alpha2: 0.01,
         alpha3: 0.001,
         alpha5: -1.0,
         omega: 0.01,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let (_, found) = period_1(&case);
     let o = &found.observables;
@@ -142,10 +142,10 @@ fn an_optical_lever_reads_a_static_deflection_as_it_is() {
 #[test]
 fn a_long_run_reads_what_its_orbit_reads() {
     use nanotap::study::simulate::{SimulateOptions, simulate};
-    let case = Case {
+    let case = Cantilever {
         omega: 20.0,
         alpha1: 0.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let model = Model::cantilever(&case).unwrap();
     let run = simulate(

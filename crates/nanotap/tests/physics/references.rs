@@ -2,7 +2,7 @@
 //! with mpmath at 60 digits by two independent methods (eigenbasis and Taylor series).
 
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 use nanotap_flow::Trajectory;
@@ -21,9 +21,9 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(number).collect()
 }
 
-fn case_of(reference: &Value) -> Case {
+fn case_of(reference: &Value) -> Cantilever {
     let alpha = |k: &str| number(&reference["alpha"][k]);
-    Case {
+    Cantilever {
         modes: reference["N"].as_u64().unwrap() as usize,
         alpha1: alpha("1"),
         alpha2: alpha("2"),
@@ -32,7 +32,7 @@ fn case_of(reference: &Value) -> Case {
         alpha5: alpha("5"),
         alpha6: alpha("6"),
         omega: number(&reference["Omega"]),
-        ..Case::paper()
+        ..Cantilever::paper()
     }
 }
 
@@ -95,9 +95,9 @@ fn undamped_runs_of_eq_24() {
 #[test]
 fn regular_run_of_200_periods() {
     let reference = reference("regular_Om3.5_long200");
-    let case = Case {
+    let case = Cantilever {
         omega: 3.5,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let model = Model::cantilever(&case).unwrap();
     let trajectory = Trajectory::record(&model.system, &[0.0; 6], 200).unwrap();

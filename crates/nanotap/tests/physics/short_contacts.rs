@@ -1,7 +1,7 @@
 //! No contact is missed, however brief.
 
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, Trajectory};
 
@@ -19,11 +19,11 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
     for i in 0..1500_u32 {
         let u = |k: usize| (f64::from(i) * [0.754_877_67, 0.569_840_29, 0.430_159_71][k]).fract();
         let modes = 1 + (i % 5) as usize;
-        let far = Case {
+        let far = Cantilever {
             omega: 1.0 + 20.0 * u(0),
             modes,
             alpha5: 3.0,
-            ..Case::paper()
+            ..Cantilever::paper()
         };
         let mut start = vec![0.0; 2 * modes];
         start[0] = 0.4 * u(1) - 0.2;
@@ -44,7 +44,7 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
         for exponent in 0..13 {
             let part = 10.0_f64.powf(-2.0 - 0.5 * f64::from(exponent));
             let depth = curvature * (part * period).powi(2) / 8.0;
-            let case = Case {
+            let case = Cantilever {
                 alpha5: far.alpha5 - lowest.value - depth,
                 ..far.clone()
             };
@@ -107,10 +107,10 @@ fn the_shortest_contacts_that_doubles_can_tell_are_found() {
     let mut shortest: f64 = 1.0;
     for i in 0..40_u32 {
         let omega = 2.0 + 0.37 * f64::from(i);
-        let model = Model::cantilever(&Case {
+        let model = Model::cantilever(&Cantilever {
             omega,
             alpha5: 0.6,
-            ..Case::paper()
+            ..Cantilever::paper()
         })
         .unwrap();
         let contacts = |v: f64| -> Vec<f64> {

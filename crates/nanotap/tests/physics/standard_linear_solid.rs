@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::Observables;
@@ -14,11 +14,11 @@ use nanotap_flow::Trajectory;
 use crate::contact_laws::on;
 use crate::derivatives::advance;
 
-fn solid() -> Case {
+fn solid() -> Cantilever {
     on(ContactLaw::StandardLinearSolid, 20.0)
 }
 
-fn after(case: &Case, periods: usize) -> Vec<f64> {
+fn after(case: &Cantilever, periods: usize) -> Vec<f64> {
     let subject = Subject::Cantilever(case.clone());
     let mut state = vec![0.0; subject.model().unwrap().dimension()];
     (0..periods).for_each(|_| state = advance(&subject, &state));
@@ -32,7 +32,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 /// An arm that relaxes at once leaves the spring α4, one that never does adds its own.
 #[test]
 fn limits_of_the_relaxation_time_are_springs() {
-    let spring = |stiffness| Case {
+    let spring = |stiffness| Cantilever {
         alpha4: stiffness,
         ..on(ContactLaw::SpringDamper, 20.0).with(Parameter::Alpha6, 0.0)
     };
@@ -55,9 +55,9 @@ fn a_stiff_arm_is_a_kelvin_voigt_surface() {
     let expected = after(&on(ContactLaw::KelvinVoigt, 20.0), 30);
     let mut last = f64::INFINITY;
     for stiffness in [1e3, 1e4, 1e5, 1e6] {
-        let case = Case {
+        let case = Cantilever {
             relaxation_stiffness: stiffness,
-            relaxation_time: Case::paper().alpha6 / stiffness,
+            relaxation_time: Cantilever::paper().alpha6 / stiffness,
             ..solid()
         };
         let found = distance(&after(&case, 30)[..6], &expected[..6]);
@@ -73,7 +73,7 @@ fn a_stiff_arm_is_a_kelvin_voigt_surface() {
 #[test]
 fn harmonic_indentation_loses_what_the_loss_modulus_says() {
     for (omega, time) in [(2.6, 0.01), (2.6, 0.4), (20.0, 0.05), (20.0, 3.0)] {
-        let case = Case {
+        let case = Cantilever {
             alpha2: 1e-3,
             alpha5: -0.4,
             relaxation_time: time,

@@ -2,7 +2,7 @@
 
 use nanotap::case::subject::Subject;
 use nanotap::dataset::{Share, Store, Values, Work};
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, figure, shares};
 use nanotap_dynamics::{Control, SettleOptions, Verdict, settle};
@@ -11,10 +11,10 @@ use std::sync::atomic::AtomicBool;
 use crate::folder::{Folder, assert_same};
 
 fn bistable() -> Subject {
-    Subject::Cantilever(Case {
+    Subject::Cantilever(Cantilever {
         omega: 20.0,
         alpha1: 0.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     })
 }
 

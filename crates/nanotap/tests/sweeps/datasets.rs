@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use nanotap::case::subject::Subject;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
 use nanotap_dynamics::Control;
 
@@ -13,7 +13,7 @@ use crate::folder::{Folder, assert_same, bytes};
 
 /// 24 values of Ω × 3 starts, cut into 24 chunks.
 fn sweep(follow: Follow) -> Sweep {
-    let subject = Subject::Cantilever(Case::paper());
+    let subject = Subject::Cantilever(Cantilever::paper());
     let over = vec![Over::parse("omega=2.8:3.2:24", &subject).unwrap()];
     let options = SweepOptions {
         starts: Starts::Seeded {
@@ -200,7 +200,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
     let path = folder.join("store");
     let sweep = sweep(Follow::Off);
     Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
-    let other = |case: Case, starts: Starts| {
+    let other = |case: Cantilever, starts: Starts| {
         let options = SweepOptions {
             starts,
             ..sweep.options().clone()
@@ -216,9 +216,9 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         sides: Vec::new(),
     };
     let message = other(
-        Case {
+        Cantilever {
             alpha4: 25.0,
-            ..Case::paper()
+            ..Cantilever::paper()
         },
         seeded(7),
     );
@@ -230,10 +230,10 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         !message.contains("alpha6") && !message.contains("seed"),
         "{message}"
     );
-    let message = other(Case::paper(), seeded(8));
+    let message = other(Cantilever::paper(), seeded(8));
     assert!(message.contains("seed: 7 there, 8 here"), "{message}");
     let message = other(
-        Case::paper(),
+        Cantilever::paper(),
         Starts::Seeded {
             count: 4,
             seed: 7,
@@ -247,9 +247,9 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
 
     // The case's own value of the parameter that varies does not matter.
     let same = Sweep::new(
-        Subject::Cantilever(Case {
+        Subject::Cantilever(Cantilever {
             omega: 9.0,
-            ..Case::paper()
+            ..Cantilever::paper()
         }),
         sweep.options().clone(),
     );
@@ -261,7 +261,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         periods: 9,
         ..sweep.options().clone()
     };
-    let longer = Sweep::new(Subject::Cantilever(Case::paper()), options).unwrap();
+    let longer = Sweep::new(Subject::Cantilever(Cantilever::paper()), options).unwrap();
     Store::create_or_resume(&second, longer.schema().clone()).unwrap();
     let message = merge(&[path.clone(), second], &folder.join("m"))
         .unwrap_err()

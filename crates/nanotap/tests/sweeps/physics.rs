@@ -2,7 +2,7 @@
 
 use nanotap::case::subject::Subject;
 use nanotap::dataset::{Share, Store, Values, Work};
-use nanotap::model::cantilever::Case;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::study::orbit::OrbitOptions;
 use nanotap::study::sweep::{
@@ -95,10 +95,10 @@ impl Swept {
 }
 
 fn paper(omega: f64, alpha1: f64) -> Subject {
-    Subject::Cantilever(Case {
+    Subject::Cantilever(Cantilever {
         omega,
         alpha1,
-        ..Case::paper()
+        ..Cantilever::paper()
     })
 }
 

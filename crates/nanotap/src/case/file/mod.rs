@@ -23,7 +23,7 @@ pub use physical_tables::{PHYSICAL_KEYS, PhysicalTables};
 pub use problem::{CaseFileError, Place, Problem, Source};
 
 use crate::case::near_name::near_name;
-use crate::model::cantilever::{Case, CosineTerm};
+use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
@@ -38,7 +38,7 @@ const LARGEST_FILE: u64 = 1 << 20;
 #[derive(Clone, Debug, PartialEq)]
 pub enum CaseFile {
     /// A dimensionless cantilever, every field checked.
-    Dimensionless(Case),
+    Dimensionless(Cantilever),
     /// A one-degree-of-freedom oscillator with a stop, every field checked.
     Oscillator(Oscillator),
     /// A cantilever in physical units: its keys are checked, its quantities not yet.
@@ -74,7 +74,7 @@ impl CaseFile {
 }
 
 /// A dimensionless case as a case file, every key written out.
-pub fn to_toml(case: &Case) -> String {
+pub fn to_toml(case: &Cantilever) -> String {
     use std::fmt::Write as _;
     let mut text = format!("[model]\nmodes = {}\n", case.modes);
     for parameter in case.parameters() {
@@ -584,7 +584,7 @@ fn example_of(kind: Kind, name: &str) -> String {
     let number = match (kind, name.parse::<Parameter>()) {
         (Kind::Cantilever, Ok(Parameter::RelaxationStiffness)) => 20.0,
         (Kind::Cantilever, Ok(Parameter::RelaxationTime)) => 0.1,
-        (Kind::Cantilever, Ok(parameter)) => Case::paper().get(parameter),
+        (Kind::Cantilever, Ok(parameter)) => Cantilever::paper().get(parameter),
         _ => match name {
             "damping" | "gap" => 0.0,
             "contact_damping" => 0.2,
@@ -634,7 +634,9 @@ fn modes(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem>) ->
     };
     let problem = match &entry.value {
         Value::Integer(integer) => match usize::try_from(*integer) {
-            Ok(modes) if Case::paper().with_modes(modes).validate().is_ok() => return Some(modes),
+            Ok(modes) if Cantilever::paper().with_modes(modes).validate().is_ok() => {
+                return Some(modes);
+            }
             _ => refuse("is outside 1 … 50"),
         },
         Value::Number(number) if number.is_finite() && number.fract() == 0.0 && *number > 50.0 => {
@@ -736,11 +738,14 @@ fn drive_form(
     }
 }
 
-fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem>) -> Option<Case> {
+fn cantilever(
+    known: &BTreeMap<&'static str, &Entry>,
+    problems: &mut Vec<Problem>,
+) -> Option<Cantilever> {
     let (modes, cosine_term) = (modes(known, problems), cosine_term(known, problems));
-    let mut case = Case {
+    let mut case = Cantilever {
         alpha5: 0.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let mut complete = true;
     let law = contact(known, problems);
@@ -774,7 +779,7 @@ fn cantilever(known: &BTreeMap<&'static str, &Entry>, problems: &mut Vec<Problem
     }
     complete.then_some(())?;
     form?;
-    Some(Case {
+    Some(Cantilever {
         modes: modes?,
         cosine_term: cosine_term?,
         contact: law?,

@@ -16,7 +16,7 @@ fn parse(text: &str, overrides: &[&str]) -> Result<CaseFile, CaseFileError> {
     CaseFile::parse(Some(source), &overrides)
 }
 
-fn dimensionless(text: &str, overrides: &[&str]) -> Case {
+fn dimensionless(text: &str, overrides: &[&str]) -> Cantilever {
     match parse(text, overrides) {
         Ok(CaseFile::Dimensionless(case)) => case,
         other => panic!("{other:?}"),
@@ -30,13 +30,13 @@ fn refusal(text: &str, overrides: &[&str]) -> String {
 
 #[test]
 fn the_papers_case_by_either_name_of_each_key() {
-    assert_eq!(dimensionless(PAPER, &[]), Case::paper());
+    assert_eq!(dimensionless(PAPER, &[]), Cantilever::paper());
     let mut readable = PAPER.to_owned();
     for parameter in Parameter::ALL {
         readable = readable.replace(parameter.name(), parameter.alias());
     }
     assert!(readable.contains("contact_stiffness = 20.0"));
-    assert_eq!(dimensionless(&readable, &[]), Case::paper());
+    assert_eq!(dimensionless(&readable, &[]), Cantilever::paper());
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn modes_and_gap_have_defaults_and_nothing_else_has() {
     let short = PAPER
         .replace("modes = 3\n", "")
         .replace("alpha5 = 0.0\n", "");
-    assert_eq!(dimensionless(&short, &[]), Case::paper());
+    assert_eq!(dimensionless(&short, &[]), Cantilever::paper());
     for parameter in Parameter::ALL
         .into_iter()
         .filter(|p| *p != Parameter::Alpha5)
@@ -63,9 +63,9 @@ fn modes_and_gap_have_defaults_and_nothing_else_has() {
 
 #[test]
 fn overrides_win_over_the_file_by_any_name() {
-    let expected = Case {
+    let expected = Cantilever {
         modes: 4,
-        ..Case::paper().with(Parameter::Omega, 20.0)
+        ..Cantilever::paper().with(Parameter::Omega, 20.0)
     };
     assert_eq!(dimensionless(PAPER, &["omega=20", "modes=4"]), expected);
     assert_eq!(
@@ -105,7 +105,7 @@ fn without_a_file_all_that_is_missing_is_told_at_once() {
     let all: Vec<String> = all.iter().map(|&word| word.into()).collect();
     assert_eq!(
         CaseFile::parse(None, &all),
-        Ok(CaseFile::Dimensionless(Case::paper()))
+        Ok(CaseFile::Dimensionless(Cantilever::paper()))
     );
 }
 
@@ -433,15 +433,15 @@ fn laws_and_drives_are_read_and_checked() {
 
 #[test]
 fn a_case_written_out_is_read_back() {
-    let case = Case {
+    let case = Cantilever {
         modes: 7,
         alpha5: -0.125,
         alpha4: 1e-9 / 3.0,
         cosine_term: CosineTerm::Printed,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     assert_eq!(dimensionless(&to_toml(&case), &[]), case);
-    let case = Case {
+    let case = Cantilever {
         contact: ContactLaw::StandardLinearSolid,
         alpha6: 0.0,
         relaxation_stiffness: 40.0,
@@ -450,7 +450,7 @@ fn a_case_written_out_is_read_back() {
         tone2_ratio: "25/4".parse().ok(),
         tone2_amplitude: 0.01,
         tone2_phase: -12.5,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     assert_eq!(dimensionless(&to_toml(&case), &[]), case);
 }

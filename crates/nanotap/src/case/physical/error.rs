@@ -2,7 +2,7 @@
 
 use super::catalogue::CatalogueError;
 use super::quantity::QuantityError;
-use crate::model::cantilever::CaseError;
+use crate::model::cantilever::CantileverError;
 
 /// A physical case that cannot be resolved. Keys are written `section.key`, as in a case file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -79,7 +79,7 @@ pub enum PhysicalError {
     Catalogue(#[from] CatalogueError),
     /// Dimensionless parameters beyond what the model takes.
     #[error("this physical case gives {0}")]
-    Case(#[from] CaseError),
+    Case(#[from] CantileverError),
 }
 
 impl PhysicalError {

@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 
 use crate::model::beam::Modes;
-use crate::model::cantilever::{Case, CaseError, CosineTerm, Reason};
+use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm, Reason};
 use crate::model::drive_form::Actuation;
 
 /// Complex amplitude of the tip's deflection per amplitude of the drive at its frequency Ω:
@@ -11,7 +11,7 @@ use crate::model::drive_form::Actuation;
 ///
 /// # Errors
 /// [`CaseError`] if the case is not valid.
-pub fn free_response(case: &Case) -> Result<Complex<f64>, CaseError> {
+pub fn free_response(case: &Cantilever) -> Result<Complex<f64>, CantileverError> {
     response_at(case, case.omega)
 }
 
@@ -32,9 +32,9 @@ pub fn free_response(case: &Case) -> Result<Complex<f64>, CaseError> {
 ///
 /// # Errors
 /// [`CaseError`] if the case is not valid.
-pub fn response_at(case: &Case, frequency: f64) -> Result<Complex<f64>, CaseError> {
+pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, CantileverError> {
     case.validate()?;
-    let modes = Modes::shared(case.modes).map_err(|error| CaseError {
+    let modes = Modes::shared(case.modes).map_err(|error| CantileverError {
         key: "modes",
         value: error.given as f64,
         reason: Reason::Modes,

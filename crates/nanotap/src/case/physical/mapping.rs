@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::lever::Lever;
 use super::quantity::Kind;
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
 use crate::model::parameter::Parameter;
 
@@ -109,7 +109,7 @@ pub struct PhysicalParameters {
 
 impl PhysicalParameters {
     /// What a dimensionless case means under these units.
-    pub fn from_case(case: &Case, scales: &Scales) -> Self {
+    pub fn from_case(case: &Cantilever, scales: &Scales) -> Self {
         let value = |parameter| case.get(parameter) * scales.of(parameter, case.actuation);
         Self {
             tip_mass: value(Parameter::Alpha1),
@@ -128,7 +128,7 @@ impl PhysicalParameters {
 
     /// The dimensionless case, not validated: `like` says what is no quantity (modes, contact
     /// law, way of driving, ratio of the tones).
-    pub fn to_case(&self, scales: &Scales, like: &Case) -> Case {
+    pub fn to_case(&self, scales: &Scales, like: &Cantilever) -> Cantilever {
         Parameter::every().fold(like.clone(), |case, parameter| {
             let unit = scales.of(parameter, like.actuation);
             case.with(parameter, self.get(parameter) / unit)
@@ -171,7 +171,7 @@ pub struct MappingRow {
 }
 
 /// All parameters that the case has with their physical quantities, α1 first.
-pub fn mapping_table(case: &Case, scales: &Scales) -> Vec<MappingRow> {
+pub fn mapping_table(case: &Cantilever, scales: &Scales) -> Vec<MappingRow> {
     let physical = PhysicalParameters::from_case(case, scales);
     case.parameters()
         .into_iter()

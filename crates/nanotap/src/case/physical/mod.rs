@@ -2,7 +2,7 @@
 //!
 //! A [`PhysicalCase`] is read from the sections of a case file, with levers and materials of
 //! the [`Catalogue`] by name, and [resolved](PhysicalCase::resolve) into a dimensionless
-//! [`Case`](crate::model::cantilever::Case), the [`Scales`] that turn its results back into SI units, and
+//! [`Cantilever`](crate::model::cantilever::Cantilever), the [`Scales`] that turn its results back into SI units, and
 //! [`Remark`]s on what had to be assumed.
 //!
 //! An FM-class lever whose tip weighs a tenth of the beam, on polystyrene: α4 is about 25,

@@ -16,7 +16,7 @@ use super::sample::{self, Sample};
 use super::section::{Reader, Sections};
 use super::tip::{self, Tip};
 use crate::case::near_name::suggestion;
-use crate::model::cantilever::{Case, CosineTerm};
+use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
 use crate::model::parameter::Parameter;
@@ -58,7 +58,7 @@ pub struct PhysicalCase {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resolved {
     /// The dimensionless case, valid.
-    pub case: Case,
+    pub case: Cantilever,
     /// SI values of the model's units.
     pub scales: Scales,
     /// The lever.
@@ -148,13 +148,13 @@ impl PhysicalCase {
             DriveFrequency::Ratio(ratio) => ratio * lever.f0,
         };
         let ratio = self.drive.second.map(|s| s.frequency.ratio(frequency));
-        let like = Case {
+        let like = Cantilever {
             modes: self.modes,
             cosine_term: self.cosine_term,
             contact: self.sample.law,
             actuation: self.drive.actuation,
             tone2_ratio: ratio.transpose()?,
-            ..Case::paper()
+            ..Cantilever::paper()
         };
         // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
         // in which a force is measured in k/3.
@@ -213,8 +213,8 @@ impl PhysicalCase {
     }
 
     /// The lever alone, driven with unit amplitude.
-    fn free_case(lever: &Lever, frequency: f64, like: &Case) -> Case {
-        Case {
+    fn free_case(lever: &Lever, frequency: f64, like: &Cantilever) -> Cantilever {
+        Cantilever {
             modes: like.modes,
             alpha1: lever.tip_mass_ratio,
             alpha2: 1.0,
@@ -225,7 +225,7 @@ impl PhysicalCase {
             omega: TAU * frequency * lever.time_unit(),
             cosine_term: like.cosine_term,
             actuation: like.actuation,
-            ..Case::paper()
+            ..Cantilever::paper()
         }
     }
 
@@ -396,7 +396,7 @@ impl Resolved {
 
 /// First natural frequency of the Galerkin equations with tip mass: the root below ω₀₁ of
 /// 1 = α1Ω² Σφ_j(1)²/(β_j⁴ − Ω²), whose right side rises from 0 to infinity.
-fn truncated_first_frequency(case: &Case) -> Result<f64, PhysicalError> {
+fn truncated_first_frequency(case: &Cantilever) -> Result<f64, PhysicalError> {
     let bare = exact_beam::frequencies(0.0, 0.0, case.modes)?;
     let excess = |omega: f64| {
         let square = omega * omega;

@@ -9,7 +9,7 @@ use super::sample::{Elastic, Hertz, reduced_modulus};
 use super::tip::{TipMass, TipShape};
 use super::*;
 use crate::model::beam::Modes;
-use crate::model::cantilever::{Case, CosineTerm};
+use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::exact_beam;
 
 fn sections(text: &[(&str, &str, &str)]) -> Sections {
@@ -225,9 +225,9 @@ fn impossible_levers_are_refused_with_the_possible_range() {
 
 /// Q as an experimenter reads it off the free resonance: peak frequency over the width at
 /// 1/√2 of the peak, of the simulated response.
-fn half_power_quality(case: &Case) -> f64 {
+fn half_power_quality(case: &Cantilever) -> f64 {
     let gain = |omega: f64| {
-        free_response(&Case {
+        free_response(&Cantilever {
             omega,
             ..case.clone()
         })
@@ -268,12 +268,12 @@ fn the_resonance_curve_has_the_quality_factor_asked_for() {
             quality_factor,
             ..data(TipMass::Ratio(ratio))
         });
-        let case = Case {
+        let case = Cantilever {
             modes: 20,
             alpha1: ratio,
             alpha3: lever.damping(),
             alpha4: 0.0,
-            ..Case::paper()
+            ..Cantilever::paper()
         };
         close(half_power_quality(&case), quality_factor, 2e-3);
     }
@@ -340,7 +340,7 @@ fn units_are_those_of_the_beam_equation() {
         tone2_amplitude: 0.0,
         tone2_phase: 0.0,
     };
-    let case = physical.to_case(&scales, &Case::paper());
+    let case = physical.to_case(&scales, &Cantilever::paper());
     // Eqs. (5) and (7) of the paper, with the mass per length put back under the root.
     let time = (m * length.powi(4) / ei).sqrt();
     let root = (length.powi(4) / (m * ei)).sqrt();
@@ -388,7 +388,7 @@ proptest! {
             ..data(TipMass::Ratio(ratio))
         }).unwrap();
         let scales = Scales::new(&lever, gap);
-        let case = Case {
+        let case = Cantilever {
             modes: 3,
             alpha1: alphas[0],
             alpha2: alphas[1],
@@ -397,10 +397,10 @@ proptest! {
             alpha5: -alphas[4],
             alpha6: alphas[5],
             omega,
-            ..Case::paper()
+            ..Cantilever::paper()
         };
         let physical = PhysicalParameters::from_case(&case, &scales);
-        let back = physical.to_case(&scales, &Case::paper());
+        let back = physical.to_case(&scales, &Cantilever::paper());
         for parameter in crate::model::parameter::Parameter::ALL {
             prop_assert!((back.get(parameter) / case.get(parameter) - 1.0).abs() < 1e-13);
         }
@@ -438,11 +438,11 @@ proptest! {
 fn free_response_is_the_exact_beams_without_damping_and_tip() {
     // MODEL: tip over base amplitude (cos β + cosh β)/(1 + cos β cosh β), β = √Ω; 2.878087 at
     // Ω = 2.6. The deflection is the tip's motion less the base's.
-    let case = Case {
+    let case = Cantilever {
         modes: 50,
         alpha1: 0.0,
         alpha3: 0.0,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let exact = exact_beam::base_excitation_gain(2.6).unwrap() - 1.0;
     close(exact, 1.878_087, 1e-6);
@@ -454,10 +454,10 @@ fn free_response_is_the_exact_beams_without_damping_and_tip() {
 fn free_response_solves_the_galerkin_equations() {
     // The matrices of the model solved for the harmonic response as they stand.
     use nalgebra::{Complex, DMatrix, DVector};
-    let case = Case {
+    let case = Cantilever {
         modes: 4,
         omega: 3.1,
-        ..Case::paper()
+        ..Cantilever::paper()
     };
     let galerkin = crate::model::galerkin::Galerkin::new(&case).unwrap();
     let complex = |matrix: &DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));

@@ -29,7 +29,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::parameter::Parameter;
 use dual::Dual;
 use law::Law;
@@ -75,7 +75,7 @@ impl ContactLaw {
     }
 
     /// The law of a case, with the derivative of its numbers with respect to `parameter`.
-    pub(crate) fn law(case: &Case, parameter: Option<Parameter>) -> Law {
+    pub(crate) fn law(case: &Cantilever, parameter: Option<Parameter>) -> Law {
         let dual = |p| Dual::new(case.get(p), f64::from(u8::from(Some(p) == parameter)));
         let stiffness = dual(Parameter::Alpha4);
         match case.contact {

@@ -15,7 +15,7 @@ pub use secular::TipLoad;
 use secular::{Factor, Roots, Secular};
 
 use crate::model::beam::Modes;
-use crate::model::cantilever::Case;
+use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::{Galerkin, Regime};
 
 /// Smallest [`Spectrum::separation`] that is accepted. What is put together from modal
@@ -28,7 +28,7 @@ const CANCELLING: f64 = 0.3;
 
 impl TipLoad {
     /// The load in one regime of a case: the mass always, spring and damper in contact.
-    pub const fn of(case: &Case, regime: Regime) -> Self {
+    pub const fn of(case: &Cantilever, regime: Regime) -> Self {
         let (damping, stiffness) = match regime {
             Regime::Free => (0.0, 0.0),
             Regime::Contact => (case.alpha6, case.alpha4),
@@ -510,7 +510,7 @@ mod tests {
 
     #[test]
     fn both_regimes_of_the_papers_case() {
-        for case in [Case::paper(), Case::paper_eq24()] {
+        for case in [Cantilever::paper(), Cantilever::paper_eq24()] {
             let galerkin = Galerkin::new(&case).unwrap();
             for regime in Regime::ALL {
                 let r = regime.index();

@@ -301,11 +301,11 @@ fn key(given: &str, name: &str, subject: &Subject) -> Result<SweepKey, OverError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::cantilever::Case;
+    use crate::model::cantilever::Cantilever;
     use crate::model::parameter::Parameter;
 
     fn paper() -> Subject {
-        Subject::Cantilever(Case::paper())
+        Subject::Cantilever(Cantilever::paper())
     }
 
     #[test]

@@ -220,7 +220,7 @@ impl Observer for Record<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::cantilever::Case;
+    use crate::model::cantilever::Cantilever;
     use crate::observe::Observables as Full;
     use nanotap_flow::{Flow, Trajectory};
 
@@ -229,9 +229,9 @@ mod tests {
     #[test]
     fn agrees_with_the_observables_of_a_trajectory() {
         for omega in [2.6, 20.0] {
-            let model = Model::cantilever(&Case {
+            let model = Model::cantilever(&Cantilever {
                 omega,
-                ..Case::paper()
+                ..Cantilever::paper()
             })
             .unwrap();
             let mut flow = Flow::new(model.system.clone());

@@ -1,5 +1,7 @@
 //! Axes: labels, scales and ranges.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::FigureError;
 use crate::ticks::{self, Ticks};
 
@@ -8,16 +10,30 @@ const LARGEST: f64 = 1e300;
 /// Share of the range left free on either side of the data.
 const PADDING: f64 = 0.04;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Scale {
+/// Data of less than this part of an axis's natural size are rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// How values are spaced along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scale {
+    /// Evenly.
+    #[default]
     Linear,
+    /// Evenly by their logarithms.
     Log,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Range {
+/// Which part of an axis is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Range {
+    /// All data with a little room around them.
+    #[default]
     Auto,
+    /// All data, and no more.
     Tight,
+    /// From the first to the second value, whatever the data; backwards if the first is larger.
     Fixed(f64, f64),
 }
 
@@ -26,13 +42,22 @@ pub(crate) enum Range {
 /// Labels are plain text ("Ω", "τ / T", "a₁") with a little markup: `_{…}` lowers and `^{…}` raises;
 /// between dollar signs letters are italic as variables are, and `_x` and `^x` need no braces
 /// (`"$a_1$ (nm)"`); a backslash takes the next character as it is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 #[must_use]
 pub struct Axis {
-    pub(crate) label: String,
-    pub(crate) scale: Scale,
-    pub(crate) range: Range,
-    pub(crate) marks: Option<Vec<(f64, String)>>,
+    /// Words and symbol.
+    pub label: String,
+    /// The unit, shown in brackets behind the label; empty where there is none.
+    pub unit: String,
+    /// How values are spaced.
+    pub scale: Scale,
+    /// Which part is drawn.
+    pub range: Range,
+    /// Marked values and their words; none: round numbers.
+    pub marks: Option<Vec<(f64, String)>>,
+    /// What size of a value matters: see [`Axis::natural`].
+    pub natural: Option<f64>,
 }
 
 impl Axis {
@@ -40,9 +65,7 @@ impl Axis {
     pub fn linear(label: impl Into<String>) -> Axis {
         Axis {
             label: label.into(),
-            scale: Scale::Linear,
-            range: Range::Auto,
-            marks: None,
+            ..Axis::default()
         }
     }
 
@@ -71,6 +94,33 @@ impl Axis {
     pub fn marks<S: Into<String>>(mut self, marks: impl IntoIterator<Item = (f64, S)>) -> Axis {
         self.marks = Some(marks.into_iter().map(|(v, s)| (v, s.into())).collect());
         self
+    }
+
+    /// The unit, which stands in brackets behind the label.
+    pub fn unit(mut self, unit: impl Into<String>) -> Axis {
+        self.unit = unit.into();
+        self
+    }
+
+    /// Says what size of a value matters: data that are all smaller than 10⁻⁹ of it, or differ by
+    /// less, are the rounding of a number, and the axis shows them as such.
+    pub fn natural(mut self, size: f64) -> Axis {
+        self.natural = Some(size);
+        self
+    }
+
+    /// The label with the unit.
+    pub(crate) fn words(&self) -> String {
+        match (self.label.as_str(), self.unit.as_str()) {
+            (label, "") => label.to_owned(),
+            ("", unit) => unit.to_owned(),
+            (label, unit) => format!("{label} ({unit})"),
+        }
+    }
+
+    /// Whether the axis has marks: not if there are no data and it was given no range.
+    pub(crate) fn marked(&self) -> bool {
+        matches!(self.range, Range::Fixed(..)) || self.marks.is_some()
     }
 
     /// Whether a value has a place on such an axis.
@@ -106,10 +156,11 @@ impl Axis {
     /// The range to draw for data of the given extent.
     pub(crate) fn view(&self, extent: Extent) -> View {
         let log = self.scale == Scale::Log;
+        let natural = self.natural.filter(|n| n.is_finite()).unwrap_or(0.0).abs();
         let (from, to) = match self.range {
             Range::Fixed(from, to) => (from, to),
-            Range::Auto => extent.range(log, PADDING),
-            Range::Tight => extent.range(log, 0.0),
+            Range::Auto => extent.range(log, PADDING, natural),
+            Range::Tight => extent.range(log, 0.0, natural),
         };
         View { from, to, log }
     }
@@ -168,7 +219,7 @@ impl Extent {
         }
     }
 
-    fn range(self, log: bool, padding: f64) -> (f64, f64) {
+    fn range(self, log: bool, padding: f64, natural: f64) -> (f64, f64) {
         if self.whole.0 < self.whole.1 {
             return self.whole;
         }
@@ -177,11 +228,15 @@ impl Extent {
         if low > high {
             return if log { (1.0, 10.0) } else { (0.0, 1.0) };
         }
-        if indistinct(low, high) {
-            return match (log, low == 0.0 || high.abs() < 1e-289) {
+        let size = low.abs().max(high.abs());
+        if !log && natural > 0.0 && size <= ROUNDING * natural {
+            return (-natural, natural);
+        }
+        if indistinct(low, high) || high - low <= ROUNDING * size.max(natural) {
+            return match (log, size < 1e-289) {
                 (true, _) => (low / 2.0, high * 2.0),
                 (false, true) => (-1.0, 1.0),
-                (false, false) => (low - 0.05 * low.abs(), high + 0.05 * high.abs()),
+                (false, false) => (low - 0.05 * size, high + 0.05 * size),
             };
         }
         let below = if low < self.hard.0 { padding } else { 0.0 };

@@ -1,7 +1,13 @@
 //! Colours that every reader can tell apart.
 
-/// A colour with opacity, in sRGB.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// A colour with opacity, in sRGB; in JSON `"#rrggbb"`, or `"#rrggbbaa"` where it is translucent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 #[must_use]
 pub struct Colour {
     /// Red, 0 to 255.
@@ -43,6 +49,12 @@ impl Colour {
         Colour { r, g, b, a: 255 }
     }
 
+    /// A colour from its red, green, blue and opacity, from the highest byte down.
+    const fn from_bytes(rgba: u32) -> Colour {
+        let [r, g, b, a] = rgba.to_be_bytes();
+        Colour { r, g, b, a }
+    }
+
     /// The same colour with the opacity `alpha`, 0 to 1 (clamped; NaN is opaque).
     pub fn alpha(self, alpha: f64) -> Colour {
         let alpha = if alpha.is_nan() {
@@ -71,19 +83,47 @@ impl Colour {
     pub(crate) fn opacity(self) -> f64 {
         f64::from(self.a) / 255.0
     }
+}
 
-    /// Relative luminance of WCAG 2, 0 (black) to 1 (white).
-    #[cfg(test)]
-    pub(crate) fn luminance(self) -> f64 {
-        let linear = |c: u8| {
-            let c = f64::from(c) / 255.0;
-            if c <= 0.04045 {
-                c / 12.92
-            } else {
-                ((c + 0.055) / 1.055).powf(2.4)
-            }
-        };
-        0.2126 * linear(self.r) + 0.7152 * linear(self.g) + 0.0722 * linear(self.b)
+impl fmt::Display for Colour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "#{:02x}{:02x}{:02x}", self.r, self.g, self.b)?;
+        if self.a < 255 {
+            write!(f, "{:02x}", self.a)?;
+        }
+        Ok(())
+    }
+}
+
+impl From<Colour> for String {
+    fn from(colour: Colour) -> String {
+        colour.to_string()
+    }
+}
+
+impl FromStr for Colour {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Colour, String> {
+        let refuse = || format!("\"{text}\" is no colour: write it as #rrggbb or #rrggbbaa");
+        let digits = text.strip_prefix('#').ok_or_else(refuse)?;
+        if !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err(refuse());
+        }
+        let number = u32::from_str_radix(digits, 16).map_err(|_| refuse())?;
+        match digits.len() {
+            6 => Ok(Colour::from_bytes((number << 8) | 0xff)),
+            8 => Ok(Colour::from_bytes(number)),
+            _ => Err(refuse()),
+        }
+    }
+}
+
+impl TryFrom<String> for Colour {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Colour, String> {
+        text.parse()
     }
 }
 
@@ -101,6 +141,60 @@ pub const LINES: [Colour; 7] = [
     Colour::BLACK,
 ];
 
+/// Motions that are periodic after 1, 2, … 16 drive periods: Okabe & Ito's colours that do not stand
+/// for a class of motions, then those of moderate chroma that are farthest from all others, from
+/// white, and from the classes' colours (exchange search over a grid of sRGB, distances in Oklab as
+/// seen with normal vision, protanopia, deuteranopia and tritanopia). Frequent periods have the
+/// stronger colours.
+const PERIODS: [Colour; 16] = [
+    Colour::BLUE,
+    Colour::ORANGE,
+    Colour::PURPLE,
+    Colour::SKY,
+    Colour::rgb(0x60, 0x00, 0x00),
+    Colour::rgb(0xfc, 0xd8, 0x00),
+    Colour::rgb(0x3c, 0x3c, 0xb4),
+    Colour::rgb(0x84, 0x18, 0x54),
+    Colour::rgb(0x84, 0xb4, 0x78),
+    Colour::rgb(0x60, 0x48, 0x00),
+    Colour::rgb(0x90, 0x78, 0xf0),
+    Colour::rgb(0x90, 0x54, 0x54),
+    Colour::rgb(0x00, 0x18, 0x84),
+    Colour::rgb(0x78, 0xe4, 0xfc),
+    Colour::rgb(0x48, 0x0c, 0x54),
+    Colour::rgb(0xb4, 0xf0, 0xa8),
+];
+
+/// What a motion is, as far as its colour goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[allow(missing_docs)]
+pub enum Motion {
+    /// Of so many drive periods.
+    Periodic(usize),
+    QuasiPeriodic,
+    Chaotic,
+    Unbounded,
+    Undecided,
+}
+
+impl Motion {
+    /// The colour of this motion, the same in every figure. Periods from 1 to 16 and the classes are
+    /// distinct to every reader; longer periods repeat the colours of the sixteen, mixed with white.
+    pub fn colour(self) -> Colour {
+        match self {
+            Motion::Periodic(period) => {
+                let place = period.max(1) - 1;
+                let round = (place / PERIODS.len()).min(2);
+                PERIODS[place % PERIODS.len()].tint([0.0, 0.45, 0.7][round])
+            }
+            Motion::QuasiPeriodic => Colour::GREEN,
+            Motion::Chaotic => Colour::VERMILLION,
+            Motion::Unbounded => Colour::BLACK,
+            Motion::Undecided => Colour::rgb(190, 190, 190),
+        }
+    }
+}
+
 /// The colour of the `index`-th filled category: Okabe & Ito's palette, then lighter tints of it.
 pub fn category(index: usize) -> Colour {
     const FILLS: [Colour; 7] = [
@@ -117,7 +211,8 @@ pub fn category(index: usize) -> Colour {
 }
 
 /// A continuous colour scale.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[must_use]
 pub enum Colourmap {
     /// Perceptually uniform, dark blue to yellow.
@@ -150,11 +245,118 @@ impl Colourmap {
 mod tests {
     use super::*;
 
+    /// Linear intensities of red, green and blue.
+    fn linear(colour: Colour) -> [f64; 3] {
+        [colour.r, colour.g, colour.b].map(|c| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            }
+        })
+    }
+
+    /// Relative luminance of WCAG 2, 0 (black) to 1 (white).
+    fn luminance(colour: Colour) -> f64 {
+        let [r, g, b] = linear(colour);
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    }
+
+    fn times(matrix: [[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
+        matrix.map(|row| row.iter().zip(v).map(|(m, x)| m * x).sum())
+    }
+
+    /// Oklab coordinates of linear intensities (B. Ottosson, "A perceptual color space for image
+    /// processing", 2020).
+    fn oklab(rgb: [f64; 3]) -> [f64; 3] {
+        let cones = times(
+            [
+                [0.412_221_470_8, 0.536_332_536_3, 0.051_445_992_9],
+                [0.211_903_498_2, 0.680_699_545_1, 0.107_396_956_6],
+                [0.088_302_461_9, 0.281_718_837_6, 0.629_978_700_5],
+            ],
+            rgb.map(|c| c.clamp(0.0, 1.0)),
+        );
+        times(
+            [
+                [0.210_454_255_3, 0.793_617_785_0, -0.004_072_046_8],
+                [1.977_998_495_1, -2.428_592_205_0, 0.450_593_709_9],
+                [0.025_904_037_1, 0.782_771_766_2, -0.808_675_766_0],
+            ],
+            cones.map(f64::cbrt),
+        )
+    }
+
+    /// What normal eyes and those with protanopia, deuteranopia and tritanopia make of linear
+    /// intensities (Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15, 1291 (2009),
+    /// severity 1).
+    const EYES: [[[f64; 3]; 3]; 4] = [
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ],
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ],
+        [
+            [1.255528, -0.076749, -0.178779],
+            [-0.078411, 0.930809, 0.147602],
+            [0.004733, 0.691367, 0.303900],
+        ],
+    ];
+
+    #[test]
+    fn every_reader_tells_periods_and_classes_apart() {
+        // A just noticeable difference is about 0.02 in Oklab.
+        let motions: Vec<Motion> = (1..=16)
+            .map(Motion::Periodic)
+            .chain([
+                Motion::QuasiPeriodic,
+                Motion::Chaotic,
+                Motion::Unbounded,
+                Motion::Undecided,
+            ])
+            .collect();
+        for (i, a) in motions.iter().enumerate() {
+            for b in &motions[..i] {
+                for eye in EYES {
+                    let [a, b] = [a, b].map(|m| oklab(times(eye, linear(m.colour()))));
+                    let apart = a
+                        .iter()
+                        .zip(b)
+                        .map(|(x, y)| (x - y).powi(2))
+                        .sum::<f64>()
+                        .sqrt();
+                    assert!(apart > 0.07, "{a:?} {b:?}: {apart}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn colours_are_written_and_read() {
+        for (colour, text) in [
+            (Colour::BLUE, "#0072b2"),
+            (Colour::BLACK.alpha(0.2), "#00000033"),
+        ] {
+            assert_eq!(colour.to_string(), text);
+            assert_eq!(text.parse::<Colour>(), Ok(colour));
+        }
+        for text in ["", "red", "#12345", "#+12345", "#12345é"] {
+            assert!(text.parse::<Colour>().unwrap_err().contains("#rrggbb"));
+        }
+    }
+
     #[test]
     fn sequential_maps_grow_lighter_all_the_way() {
         for map in [Colourmap::Viridis, Colourmap::Cividis, Colourmap::Inferno] {
             let light: Vec<f64> = (0..=32)
-                .map(|i| map.at(f64::from(i) / 32.0).luminance())
+                .map(|i| luminance(map.at(f64::from(i) / 32.0)))
                 .collect();
             assert!(light.windows(2).all(|w| w[1] > w[0]), "{map:?}: {light:?}");
         }
@@ -169,7 +371,7 @@ mod tests {
     #[test]
     fn line_colours_stand_out_from_paper() {
         for colour in LINES {
-            let contrast = 1.05 / (colour.luminance() + 0.05);
+            let contrast = 1.05 / (luminance(colour) + 0.05);
             assert!(contrast > 2.0, "{colour:?} has contrast {contrast}");
         }
     }

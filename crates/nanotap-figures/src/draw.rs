@@ -7,7 +7,7 @@ use crate::layout::{self, Spot};
 use crate::legend;
 use crate::marks::Marks;
 use crate::polyline;
-use crate::prepared::{ColourBar, Frame, Prepared, category_colour, points_of};
+use crate::prepared::{ColourBar, Frame, Prepared};
 use crate::raster::Raster;
 use crate::scene::{Point, Rect, Scene, Segment, Stroke};
 use crate::style::{EDGE, INK, Style};
@@ -20,7 +20,7 @@ const BEYOND: f64 = 1.0;
 
 pub(crate) fn panel(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
     let frame = prepared.frame(spot.rect);
-    scene.group("panel", &prepared.letter, |scene| {
+    scene.group("panel", prepared.letter, |scene| {
         let mut order: Vec<usize> = (0..prepared.panel.layers.len()).collect();
         order.sort_by_key(|i| prepared.panel.layers[*i].depth());
         if prepared.empty {
@@ -32,15 +32,7 @@ pub(crate) fn panel(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: 
             let bar = matches!(own, Layer::Heatmap(_))
                 .then(|| bars.next())
                 .flatten();
-            layer(
-                scene,
-                prepared,
-                &frame,
-                own,
-                prepared.colours[index],
-                bar,
-                style,
-            );
+            layer(scene, prepared, &frame, own, bar, style);
         }
         axes(scene, prepared, spot, style);
         let mut edge = spot.rect.right;
@@ -65,10 +57,10 @@ fn layer(
     prepared: &Prepared,
     frame: &Frame,
     layer: &Layer,
-    colour: Colour,
     bar: Option<&ColourBar>,
     style: &Style,
 ) {
+    let colour = layer.look().map_or(Colour::BLACK, |look| look.0);
     match layer {
         Layer::Line(line) => scene.group("line", &line.label, |s| {
             draw_line(s, frame, line, colour);
@@ -132,7 +124,8 @@ fn layer(
             let foot = frame
                 .upright(prepared.foot(layer))
                 .unwrap_or(frame.rect.bottom);
-            let tops: Vec<Point> = points_of(layer)
+            let tops: Vec<Point> = layer
+                .points()
                 .iter()
                 .filter_map(|p| frame.place(*p))
                 .collect();
@@ -359,16 +352,11 @@ fn draw_heatmap(scene: &mut Scene, frame: &Frame, map: &Heatmap, bar: &ColourBar
 }
 
 fn draw_categories(scene: &mut Scene, frame: &Frame, map: &CategoryMap) {
-    let palette: Vec<Colour> = (0..map.names.len())
-        .map(|i| category_colour(map, i))
-        .collect();
+    let colour = |cell: usize| map.categories.get(cell)?.colour;
     let cells: Vec<Colour> = map
         .cells
         .iter()
-        .map(|cell| {
-            cell.and_then(|c| palette.get(c).copied())
-                .unwrap_or(Colour::WHITE.alpha(0.0))
-        })
+        .map(|cell| cell.and_then(colour).unwrap_or(Colour::WHITE.alpha(0.0)))
         .collect();
     grid(scene, frame, map.columns, &cells, map.x, map.y);
 }
@@ -437,7 +425,7 @@ fn note_words(frame: &Frame, note: &Note, style: &Style) -> Option<PlacedWords> 
         Point::new(at.x + dx, at.y + dy),
         across,
         upright,
-        note.colour,
+        note.colour.unwrap_or(Colour::BLACK),
     );
     let room = frame.rect.grown(-gap);
     if frame.rect.contains(at) && placed.words.width <= room.width() {
@@ -469,7 +457,7 @@ fn draw_note(scene: &mut Scene, frame: &Frame, note: &Note, style: &Style) {
         note_point(frame, note.at),
         note.tip.and_then(|tip| note_point(frame, tip)),
     ) {
-        arrow(scene, from, to, note.colour);
+        arrow(scene, from, to, note.colour.unwrap_or(Colour::BLACK));
     }
     if let Some(placed) = note_words(frame, note, style) {
         if !placed.words.runs.is_empty() {
@@ -521,7 +509,7 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
     scene.stroke(rect.outline(), Stroke::solid(style.axis, INK), None);
     scene.group("axis-x", &prepared.panel.x.label, |scene| {
         let mut beside = 0.0;
-        if prepared.marked(&prepared.panel.x) {
+        if prepared.panel.x.marked() {
             let marks = Marks::new(&prepared.panel.x, prepared.x, rect.width(), false, style);
             let at = |share: f64| rect.left + share * rect.width();
             let mut lines = mark_lines(&marks, style, |share, length| {
@@ -559,7 +547,7 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
             }
         }
         if prepared.words_below {
-            let words = Words::set(&prepared.panel.x.label, style.label, false);
+            let words = Words::set(&prepared.panel.x.words(), style.label, false);
             let base =
                 rect.bottom + spot.sides.bottom_marks + spot.sides.bottom_label - words.descent();
             let room = if layout::shares_row(prepared, rect.width(), style) {
@@ -577,7 +565,7 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
         }
     });
     scene.group("axis-y", &prepared.panel.y.label, |scene| {
-        if prepared.marked(&prepared.panel.y) {
+        if prepared.panel.y.marked() {
             let marks = Marks::new(&prepared.panel.y, prepared.y, rect.height(), true, style);
             let at = |share: f64| rect.bottom - share * rect.height();
             let lines = mark_lines(&marks, style, |share, length| {
@@ -596,7 +584,7 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
                 scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
             }
         }
-        let words = Words::set(&prepared.panel.y.label, style.label, false);
+        let words = Words::set(&prepared.panel.y.words(), style.label, false);
         let base = rect.left - spot.sides.left_marks - style.pad - words.descent();
         let centre = f64::midpoint(rect.top, rect.bottom);
         scene.words(words.place_upwards(
@@ -637,7 +625,7 @@ fn colour_bar(scene: &mut Scene, bar: &ColourBar, panel: Rect, edge: f64, style:
         ..panel
     };
     let marks = Marks::new(bar.axis, bar.view, rect.height(), true, style);
-    let whole = layout::bar_width(&marks, &bar.axis.label, style);
+    let whole = layout::bar_width(&marks, &bar.axis.words(), style);
     scene.group("colour-bar", &bar.axis.label, |scene| {
         let pixels = (0..=STEPS)
             .rev()
@@ -675,7 +663,7 @@ fn colour_bar(scene: &mut Scene, bar: &ColourBar, panel: Rect, edge: f64, style:
             let corner = Point::new(rect.left, rect.top - style.pad);
             scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
         }
-        let words = Words::set(&bar.axis.label, style.label, false);
+        let words = Words::set(&bar.axis.words(), style.label, false);
         let base = edge + whole - words.descent();
         let centre = f64::midpoint(rect.top, rect.bottom);
         scene.words(words.place_upwards(
@@ -693,7 +681,7 @@ fn headings(scene: &mut Scene, prepared: &Prepared, spot: &Spot, edge: f64, styl
     let rect = spot.rect;
     let marks = Marks::new(&prepared.panel.y, prepared.y, rect.height(), true, style);
     let mut above = rect.top - style.pad;
-    if prepared.marked(&prepared.panel.y)
+    if prepared.panel.y.marked()
         && let Some(note) = marks.note
     {
         above -= note.cap_height() + note.descent() + style.pad;
@@ -720,7 +708,7 @@ fn headings(scene: &mut Scene, prepared: &Prepared, spot: &Spot, edge: f64, styl
         ));
     }
     if !prepared.letter.is_empty() {
-        let words = Words::set(&prepared.letter, style.title, true);
+        let words = Words::set(prepared.letter, style.title, true);
         let outer = rect.left - spot.sides.left_marks - spot.sides.left_label + EDGE / 2.0;
         // Left of the box, clear of the title, but on the page.
         let left = outer

@@ -21,6 +21,9 @@ pub enum FigureError {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A figure that could not be read from JSON, or not be written as such.
+    #[error("this is no figure in JSON: {0}")]
+    Json(serde_json::Error),
     /// The figure's width or height is not a sensible length.
     #[error(
         "a figure of {width_mm} mm × {height_mm} mm cannot be drawn: both sides must lie between 10 mm and 2000 mm"

@@ -4,12 +4,15 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::axis::Extent;
+use serde::{Deserialize, Serialize};
+
 use crate::draw;
 use crate::error::FigureError;
 use crate::layout::{self, Grid};
+use crate::map::{AxisMap, PanelMap};
 use crate::panel::Panel;
-use crate::prepared::{Prepared, extents};
+use crate::prepared::Prepared;
+use crate::resolve;
 use crate::scene::{Point, Rect, Scene};
 use crate::style::{EDGE, INK, Style};
 use crate::text::{Across, Upright, Words};
@@ -32,21 +35,40 @@ const MOST_PIXELS: f64 = 2e8;
 ///
 /// The same figure always gives the same bytes. Letters are shapes in every format, so that it looks
 /// the same on every machine.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 #[must_use]
 pub struct Figure {
-    rows: usize,
-    cols: usize,
-    width: f64,
-    height: Option<f64>,
-    widths: Vec<f64>,
-    heights: Vec<f64>,
-    title: String,
-    caption: String,
-    letters: bool,
-    share_x: bool,
-    text_scale: f64,
-    panels: Vec<Panel>,
+    /// Rows of the grid.
+    pub rows: usize,
+    /// Columns of the grid.
+    pub cols: usize,
+    /// Width in mm, as printed.
+    pub width: f64,
+    /// Height in mm; none: panels are about two thirds as high as wide.
+    pub height: Option<f64>,
+    /// Relative widths of the columns; empty: all alike.
+    pub column_widths: Vec<f64>,
+    /// Relative heights of the rows; empty: all alike.
+    pub row_heights: Vec<f64>,
+    /// Words above the whole figure, and the title of the file.
+    pub title: String,
+    /// Words below the whole figure.
+    pub caption: String,
+    /// Whether panels are lettered.
+    pub letters: bool,
+    /// Whether the panels of a column share their horizontal range.
+    pub share_x: bool,
+    /// How many times larger than usual letters and marks are.
+    pub text_scale: f64,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+}
+
+impl Default for Figure {
+    fn default() -> Figure {
+        Figure::new(1, 1)
+    }
 }
 
 impl Figure {
@@ -57,8 +79,8 @@ impl Figure {
             cols,
             width: SINGLE_COLUMN,
             height: None,
-            widths: Vec::new(),
-            heights: Vec::new(),
+            column_widths: Vec::new(),
+            row_heights: Vec::new(),
             title: String::new(),
             caption: String::new(),
             letters: rows.saturating_mul(cols) > 1,
@@ -93,13 +115,13 @@ impl Figure {
 
     /// Relative widths of the columns.
     pub fn column_widths(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
-        self.widths = shares.into_iter().collect();
+        self.column_widths = shares.into_iter().collect();
         self
     }
 
     /// Relative heights of the rows.
     pub fn row_heights(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
-        self.heights = shares.into_iter().collect();
+        self.row_heights = shares.into_iter().collect();
         self
     }
 
@@ -164,7 +186,36 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_svg(&self) -> Result<String, FigureError> {
-        Ok(svg::write(&self.scene()?))
+        Ok(svg::write(&self.scene()?.0))
+    }
+
+    /// The figure as SVG, and where its panels and their axes lie in it: what a page needs to say
+    /// which point of the data lies under the pointer, or to ask for another range.
+    ///
+    /// # Errors
+    /// If the figure cannot be drawn.
+    pub fn to_svg_with_map(&self) -> Result<(String, Vec<PanelMap>), FigureError> {
+        let (scene, map) = self.scene()?;
+        Ok((svg::write(&scene), map))
+    }
+
+    /// The figure as JSON with everything decided that does not depend on its size: the range of
+    /// each axis, the colour of each layer, the letter of each panel. Another program that draws
+    /// this draws the same figure; it can be read back as a [`Figure`].
+    ///
+    /// # Errors
+    /// If the figure cannot be drawn.
+    pub fn to_json(&self) -> Result<String, FigureError> {
+        self.check()?;
+        serde_json::to_string(&resolve::figure(self)).map_err(FigureError::Json)
+    }
+
+    /// A figure from JSON: that of [`Figure::to_json`], or shorter, since most keys may be left out.
+    ///
+    /// # Errors
+    /// If it is no JSON, or describes no figure.
+    pub fn from_json(text: &str) -> Result<Figure, FigureError> {
+        serde_json::from_str(text).map_err(FigureError::Json)
     }
 
     /// The figure as PNG of `dpi` dots per inch.
@@ -172,7 +223,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn, or not at this resolution.
     pub fn to_png(&self, dpi: f64) -> Result<Vec<u8>, FigureError> {
-        let scene = self.scene()?;
+        let (scene, _) = self.scene()?;
         let count = scene.width * scene.height * (dpi / 25.4).powi(2);
         if !(10.0..=2400.0).contains(&dpi) || count > MOST_PIXELS {
             return Err(FigureError::Resolution { dpi });
@@ -185,7 +236,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_pdf(&self) -> Result<Vec<u8>, FigureError> {
-        Ok(pdf::write(&self.scene()?))
+        Ok(pdf::write(&self.scene()?.0))
     }
 
     fn check(&self) -> Result<(), FigureError> {
@@ -211,8 +262,8 @@ impl Figure {
             });
         }
         for (what, given, expected) in [
-            ("widths", &self.widths, self.cols),
-            ("heights", &self.heights, self.rows),
+            ("widths", &self.column_widths, self.cols),
+            ("heights", &self.row_heights, self.rows),
         ] {
             let right = given.len() == expected && given.iter().all(|s| s.is_finite() && *s > 0.0);
             if !(given.is_empty() || right) {
@@ -233,10 +284,19 @@ impl Figure {
         })
     }
 
-    fn scene(&self) -> Result<Scene, FigureError> {
+    fn scene(&self) -> Result<(Scene, Vec<PanelMap>), FigureError> {
         self.check()?;
         let style = Style::scaled(self.text_scale);
-        let panels = self.prepared();
+        let figure = resolve::figure(self);
+        let panels: Vec<Prepared> = figure
+            .panels
+            .iter()
+            .enumerate()
+            .map(|(index, panel)| {
+                let below = index + self.cols < self.panels.len();
+                Prepared::new(panel, !(self.share_x && below))
+            })
+            .collect();
         let mut scene = Scene {
             width: self.width,
             height: self.full_height(),
@@ -274,54 +334,25 @@ impl Figure {
         let grid = Grid {
             rows: self.rows,
             cols: self.cols,
-            widths: &shares(&self.widths, self.cols),
-            heights: &shares(&self.heights, self.rows),
+            widths: &shares(&self.column_widths, self.cols),
+            heights: &shares(&self.row_heights, self.rows),
             area,
         };
         let spots = layout::spots(&panels, &grid, &style)?;
         for (panel, spot) in panels.iter().zip(&spots) {
             draw::panel(&mut scene, panel, spot, &style);
         }
-        Ok(scene)
-    }
-
-    fn prepared(&self) -> Vec<Prepared<'_>> {
-        let own: Vec<Extent> = self.panels.iter().map(|p| extents(p).0).collect();
-        self.panels
-            .iter()
-            .enumerate()
-            .map(|(index, panel)| {
-                let letter = panel.letter.clone().unwrap_or_else(|| {
-                    if self.letters {
-                        letter(index)
-                    } else {
-                        String::new()
-                    }
-                });
-                let mut x = own[index];
-                if self.share_x {
-                    own.iter()
-                        .skip(index % self.cols)
-                        .step_by(self.cols)
-                        .for_each(|e| x.join(*e));
-                }
-                let below = index + self.cols < self.panels.len();
-                Prepared::new(panel, letter, x, !(self.share_x && below))
-            })
-            .collect()
-    }
-}
-
-/// (a) … (z), (aa) …
-fn letter(index: usize) -> String {
-    let mut rest = index;
-    let mut name = String::new();
-    loop {
-        name.insert(0, char::from(b'a' + (rest % 26) as u8));
-        if rest < 26 {
-            return format!("({name})");
-        }
-        rest = rest / 26 - 1;
+        let map = panels.iter().zip(&spots).map(|(panel, spot)| PanelMap {
+            letter: panel.panel.letter.clone().unwrap_or_default(),
+            title: panel.panel.title.clone(),
+            left: spot.rect.left,
+            top: spot.rect.top,
+            width: spot.rect.width(),
+            height: spot.rect.height(),
+            x: AxisMap::new(&panel.panel.x, panel.x),
+            y: AxisMap::new(&panel.panel.y, panel.y),
+        });
+        Ok((scene, map.collect()))
     }
 }
 
@@ -362,14 +393,6 @@ fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn letters_go_on_after_z() {
-        assert_eq!(letter(0), "(a)");
-        assert_eq!(letter(25), "(z)");
-        assert_eq!(letter(26), "(aa)");
-        assert_eq!(letter(27), "(ab)");
-    }
 
     #[test]
     fn captions_are_broken_into_lines_that_fit() {

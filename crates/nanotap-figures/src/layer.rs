@@ -1,10 +1,14 @@
 //! What is drawn inside a panel.
 
+use serde::{Deserialize, Serialize};
+
 use crate::axis::Axis;
 use crate::colour::{Colour, Colourmap};
+use crate::numbers;
 
 /// How a line is broken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Dash {
     /// Unbroken.
     #[default]
@@ -32,7 +36,8 @@ impl Dash {
 }
 
 /// The shape of a marker.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum Shape {
     #[default]
@@ -46,14 +51,22 @@ pub enum Shape {
 
 /// A line through points. Points that are not finite (or not positive, on a logarithmic axis) leave
 /// a gap. Long lines are thinned without visible change.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Line {
-    pub(crate) points: Vec<(f64, f64)>,
-    pub(crate) dash: Dash,
-    pub(crate) width: f64,
-    pub(crate) colour: Option<Colour>,
-    pub(crate) label: String,
+    /// Corners, in the units of the axes.
+    #[serde(with = "numbers::points")]
+    pub points: Vec<(f64, f64)>,
+    /// How the line is broken.
+    #[serde(default)]
+    pub dash: Dash,
+    /// Width in points (1/72 inch).
+    pub width: f64,
+    /// None: the panel's next colour.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Line {
@@ -67,43 +80,25 @@ impl Line {
             label: String::new(),
         }
     }
-
-    /// Breaks the line.
-    pub fn dash(mut self, dash: Dash) -> Line {
-        self.dash = dash;
-        self
-    }
-
-    /// Width in points (1/72 inch).
-    pub fn width(mut self, points: f64) -> Line {
-        self.width = points;
-        self
-    }
-
-    /// Colour instead of the panel's next.
-    pub fn colour(mut self, colour: Colour) -> Line {
-        self.colour = Some(colour);
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Line {
-        self.label = label.into();
-        self
-    }
 }
 
 /// Very many equal dots: a hundred thousand and more stay crisp and small on disk, because vector
 /// formats hold them as pixels of 600 dots per inch (up to 3000 dots as vectors).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 // Every kind of layer calls its points so.
 #[allow(clippy::struct_field_names)]
 pub struct Points {
-    pub(crate) points: Vec<(f64, f64)>,
-    pub(crate) diameter: f64,
-    pub(crate) colour: Option<Colour>,
-    pub(crate) label: String,
+    /// Centres, in the units of the axes.
+    #[serde(with = "numbers::points")]
+    pub points: Vec<(f64, f64)>,
+    /// Diameter in mm.
+    pub diameter: f64,
+    /// None: the panel's next colour. Where it is translucent, density shows.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Points {
@@ -122,31 +117,31 @@ impl Points {
         self.diameter = mm;
         self
     }
-
-    /// Colour instead of the panel's next; where it is translucent, density shows.
-    pub fn colour(mut self, colour: Colour) -> Points {
-        self.colour = Some(colour);
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Points {
-        self.label = label.into();
-        self
-    }
 }
 
 /// A few large marks.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Markers {
-    pub(crate) points: Vec<(f64, f64)>,
-    pub(crate) shape: Shape,
-    pub(crate) size: f64,
-    pub(crate) open: bool,
-    pub(crate) edge: bool,
-    pub(crate) colour: Option<Colour>,
-    pub(crate) label: String,
+    /// Centres, in the units of the axes.
+    #[serde(with = "numbers::points")]
+    pub points: Vec<(f64, f64)>,
+    /// The shape of each.
+    #[serde(default)]
+    pub shape: Shape,
+    /// Size in mm.
+    pub size: f64,
+    /// White inside instead of filled.
+    #[serde(default)]
+    pub open: bool,
+    /// A white edge around each.
+    #[serde(default)]
+    pub edge: bool,
+    /// None: the panel's next colour.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Markers {
@@ -186,30 +181,25 @@ impl Markers {
         self.edge = true;
         self
     }
-
-    /// Colour instead of the panel's next.
-    pub fn colour(mut self, colour: Colour) -> Markers {
-        self.colour = Some(colour);
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Markers {
-        self.label = label.into();
-        self
-    }
 }
 
 /// A straight line across the whole panel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Rule {
-    pub(crate) at: f64,
-    pub(crate) upright: bool,
-    pub(crate) dash: Dash,
-    pub(crate) width: f64,
-    pub(crate) colour: Colour,
-    pub(crate) label: String,
+    /// The x of an upright line, the y of a level one.
+    pub at: f64,
+    /// Whether the line is upright.
+    pub upright: bool,
+    /// How the line is broken.
+    pub dash: Dash,
+    /// Width in points (1/72 inch).
+    pub width: f64,
+    /// None: grey.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Rule {
@@ -219,7 +209,7 @@ impl Rule {
             upright,
             dash: Dash::Dashed,
             width: 0.6,
-            colour: Colour::rgb(90, 90, 90),
+            colour: Some(Colour::rgb(90, 90, 90)),
             label: String::new(),
         }
     }
@@ -233,40 +223,22 @@ impl Rule {
     pub fn vertical(x: f64) -> Rule {
         Rule::new(x, true)
     }
-
-    /// Breaks the line otherwise.
-    pub fn dash(mut self, dash: Dash) -> Rule {
-        self.dash = dash;
-        self
-    }
-
-    /// Width in points.
-    pub fn width(mut self, points: f64) -> Rule {
-        self.width = points;
-        self
-    }
-
-    /// Another colour.
-    pub fn colour(mut self, colour: Colour) -> Rule {
-        self.colour = colour;
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Rule {
-        self.label = label.into();
-        self
-    }
 }
 
 /// Intervals of an axis shaded behind the data, such as the times in contact.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Band {
-    pub(crate) intervals: Vec<(f64, f64)>,
-    pub(crate) along_x: bool,
-    pub(crate) colour: Colour,
-    pub(crate) label: String,
+    /// Start and end of each interval; without a number, the panel's edge.
+    #[serde(with = "numbers::intervals")]
+    pub intervals: Vec<(f64, f64)>,
+    /// Whether the intervals are those of the horizontal axis.
+    pub along_x: bool,
+    /// None: light grey.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Band {
@@ -275,7 +247,7 @@ impl Band {
         Band {
             intervals: intervals.into_iter().collect(),
             along_x: true,
-            colour: Colour::LIGHT_GREY,
+            colour: Some(Colour::LIGHT_GREY),
             label: String::new(),
         }
     }
@@ -287,22 +259,11 @@ impl Band {
             ..Band::x(intervals)
         }
     }
-
-    /// Another colour.
-    pub fn colour(mut self, colour: Colour) -> Band {
-        self.colour = colour;
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Band {
-        self.label = label.into();
-        self
-    }
 }
 
 /// A place in a panel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Place {
     /// In the units of the axes.
     Data(f64, f64),
@@ -317,7 +278,8 @@ impl From<(f64, f64)> for Place {
 }
 
 /// Where words lie as seen from their place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum Side {
     #[default]
@@ -329,14 +291,20 @@ pub enum Side {
 }
 
 /// Words in a panel, with or without an arrow.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Note {
-    pub(crate) at: Place,
-    pub(crate) text: String,
-    pub(crate) side: Side,
-    pub(crate) tip: Option<Place>,
-    pub(crate) colour: Colour,
+    /// Where the words are, and where an arrow starts.
+    pub at: Place,
+    /// The words.
+    pub text: String,
+    /// Where the words lie as seen from their place.
+    #[serde(default)]
+    pub side: Side,
+    /// Where the arrow ends; none: no arrow.
+    pub tip: Option<Place>,
+    /// None: black.
+    pub colour: Option<Colour>,
 }
 
 impl Note {
@@ -347,7 +315,7 @@ impl Note {
             text: text.into(),
             side: Side::Right,
             tip: None,
-            colour: Colour::BLACK,
+            colour: Some(Colour::BLACK),
         }
     }
 
@@ -370,27 +338,30 @@ impl Note {
         self.side = side;
         self
     }
-
-    /// Another colour than black.
-    pub fn colour(mut self, colour: Colour) -> Note {
-        self.colour = colour;
-        self
-    }
 }
 
 /// A grid of numbers as colours, with a colour bar. NaN stays white.
 ///
 /// Cells are of equal size as drawn, also on logarithmic axes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Heatmap {
-    pub(crate) columns: usize,
-    pub(crate) rows: usize,
-    pub(crate) values: Vec<f64>,
-    pub(crate) x: (f64, f64),
-    pub(crate) y: (f64, f64),
-    pub(crate) scale: Axis,
-    pub(crate) map: Colourmap,
+    /// Cells along x.
+    pub columns: usize,
+    /// Cells along y.
+    pub rows: usize,
+    /// Row by row, that of the smallest y first.
+    #[serde(with = "numbers::gaps")]
+    pub values: Vec<f64>,
+    /// Outer edges of the grid along x.
+    pub x: (f64, f64),
+    /// Outer edges of the grid along y.
+    pub y: (f64, f64),
+    /// The axis of the colour bar.
+    pub scale: Axis,
+    /// Which colours.
+    #[serde(default)]
+    pub map: Colourmap,
 }
 
 impl Heatmap {
@@ -422,16 +393,31 @@ impl Heatmap {
     }
 }
 
+/// A category of a [`CategoryMap`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Category {
+    /// Words in the legend.
+    pub label: String,
+    /// None: the palette's next colour.
+    pub colour: Option<Colour>,
+}
+
 /// A grid of categories as colours, such as basins of attraction, with a legend.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct CategoryMap {
-    pub(crate) columns: usize,
-    pub(crate) rows: usize,
-    pub(crate) cells: Vec<Option<usize>>,
-    pub(crate) x: (f64, f64),
-    pub(crate) y: (f64, f64),
-    pub(crate) names: Vec<(String, Option<Colour>)>,
+    /// Cells along x.
+    pub columns: usize,
+    /// Cells along y.
+    pub rows: usize,
+    /// Numbers of categories, from 0, row by row, that of the smallest y first; none stays white.
+    pub cells: Vec<Option<usize>>,
+    /// Outer edges of the grid along x.
+    pub x: (f64, f64),
+    /// Outer edges of the grid along y.
+    pub y: (f64, f64),
+    /// The categories in the order of their numbers.
+    pub categories: Vec<Category>,
 }
 
 impl CategoryMap {
@@ -451,31 +437,43 @@ impl CategoryMap {
             cells: cells.into_iter().collect(),
             x,
             y,
-            names: Vec::new(),
+            categories: Vec::new(),
         }
     }
 
     /// Names the next category, in the next colour of the palette.
-    pub fn category(mut self, name: impl Into<String>) -> CategoryMap {
-        self.names.push((name.into(), None));
+    pub fn category(mut self, label: impl Into<String>) -> CategoryMap {
+        self.categories.push(Category {
+            label: label.into(),
+            colour: None,
+        });
         self
     }
 
     /// Names the next category, in a colour of its own (grey for "undecided", say).
-    pub fn category_in(mut self, name: impl Into<String>, colour: Colour) -> CategoryMap {
-        self.names.push((name.into(), Some(colour)));
+    pub fn category_in(mut self, label: impl Into<String>, colour: Colour) -> CategoryMap {
+        self.categories.push(Category {
+            label: label.into(),
+            colour: Some(colour),
+        });
         self
     }
 }
 
 /// Thin upright lines with a dot on top, as spectra are drawn.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Stems {
-    pub(crate) points: Vec<(f64, f64)>,
-    pub(crate) foot: Option<f64>,
-    pub(crate) colour: Option<Colour>,
-    pub(crate) label: String,
+    /// The dots, in the units of the axes.
+    #[serde(with = "numbers::points")]
+    pub points: Vec<(f64, f64)>,
+    /// The y that the stems stand on; none: 0, or the bottom of a logarithmic axis.
+    pub foot: Option<f64>,
+    /// None: the panel's next colour.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Stems {
@@ -494,28 +492,22 @@ impl Stems {
         self.foot = Some(y);
         self
     }
-
-    /// Colour instead of the panel's next.
-    pub fn colour(mut self, colour: Colour) -> Stems {
-        self.colour = Some(colour);
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Stems {
-        self.label = label.into();
-        self
-    }
 }
 
 /// Upright bars.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Bars {
-    pub(crate) points: Vec<(f64, f64)>,
-    pub(crate) width: f64,
-    pub(crate) colour: Option<Colour>,
-    pub(crate) label: String,
+    /// Middle and end of each bar.
+    #[serde(with = "numbers::points")]
+    pub points: Vec<(f64, f64)>,
+    /// Width in units of the horizontal axis.
+    pub width: f64,
+    /// None: the panel's next colour.
+    pub colour: Option<Colour>,
+    /// Words in the legend; empty: no entry.
+    #[serde(default)]
+    pub label: String,
 }
 
 impl Bars {
@@ -529,23 +521,12 @@ impl Bars {
             label: String::new(),
         }
     }
-
-    /// Colour instead of the panel's next.
-    pub fn colour(mut self, colour: Colour) -> Bars {
-        self.colour = Some(colour);
-        self
-    }
-
-    /// Words in the legend.
-    pub fn label(mut self, label: impl Into<String>) -> Bars {
-        self.label = label.into();
-        self
-    }
 }
 
 /// Anything that a panel shows. Maps and bands lie behind the rest, notes before it; otherwise later
 /// layers lie over earlier ones.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 #[allow(missing_docs)]
 pub enum Layer {
@@ -561,8 +542,42 @@ pub enum Layer {
     Bars(Bars),
 }
 
-macro_rules! into_layer {
-    ($($kind:ident),*) => {$(
+/// What several kinds of layers have in common.
+macro_rules! shared {
+    (colour: $($kind:ident)*) => {$(
+        impl $kind {
+            /// Another colour.
+            pub fn colour(mut self, colour: Colour) -> $kind {
+                self.colour = Some(colour);
+                self
+            }
+        }
+    )*};
+    (label: $($kind:ident)*) => {$(
+        impl $kind {
+            /// Words in the legend.
+            pub fn label(mut self, label: impl Into<String>) -> $kind {
+                self.label = label.into();
+                self
+            }
+        }
+    )*};
+    (line: $($kind:ident)*) => {$(
+        impl $kind {
+            /// Breaks the line.
+            pub fn dash(mut self, dash: Dash) -> $kind {
+                self.dash = dash;
+                self
+            }
+
+            /// Width in points (1/72 inch).
+            pub fn width(mut self, points: f64) -> $kind {
+                self.width = points;
+                self
+            }
+        }
+    )*};
+    (layer: $($kind:ident)*) => {$(
         impl From<$kind> for Layer {
             fn from(layer: $kind) -> Layer {
                 Layer::$kind(layer)
@@ -571,29 +586,52 @@ macro_rules! into_layer {
     )*};
 }
 
-into_layer!(
-    Line,
-    Points,
-    Markers,
-    Rule,
-    Band,
-    Note,
-    Heatmap,
-    CategoryMap,
-    Stems,
-    Bars
-);
+shared!(colour: Line Points Markers Rule Band Note Stems Bars);
+shared!(label: Line Points Markers Rule Band Stems Bars);
+shared!(line: Line Rule);
+shared!(layer: Line Points Markers Rule Band Note Heatmap CategoryMap Stems Bars);
 
 impl Layer {
-    /// Whether the layer takes the panel's next colour.
-    pub(crate) fn takes_colour(&self) -> bool {
+    /// The points of layers that hold points.
+    pub(crate) fn points(&self) -> &[(f64, f64)] {
         match self {
-            Layer::Line(l) => l.colour.is_none(),
-            Layer::Points(l) => l.colour.is_none(),
-            Layer::Markers(l) => l.colour.is_none(),
-            Layer::Stems(l) => l.colour.is_none(),
-            Layer::Bars(l) => l.colour.is_none(),
-            _ => false,
+            Layer::Line(l) => &l.points,
+            Layer::Points(l) => &l.points,
+            Layer::Markers(l) => &l.points,
+            Layer::Stems(l) => &l.points,
+            Layer::Bars(l) => &l.points,
+            _ => &[],
+        }
+    }
+
+    /// The layer's own colour, to be given; none for maps.
+    pub(crate) fn colour_mut(&mut self) -> Option<&mut Option<Colour>> {
+        match self {
+            Layer::Line(Line { colour, .. })
+            | Layer::Points(Points { colour, .. })
+            | Layer::Markers(Markers { colour, .. })
+            | Layer::Stems(Stems { colour, .. })
+            | Layer::Bars(Bars { colour, .. })
+            | Layer::Rule(Rule { colour, .. })
+            | Layer::Band(Band { colour, .. })
+            | Layer::Note(Note { colour, .. }) => Some(colour),
+            Layer::Heatmap(_) | Layer::CategoryMap(_) => None,
+        }
+    }
+
+    /// The layer's colour once it is given, and its words in the legend; none for maps and notes.
+    pub(crate) fn look(&self) -> Option<(Colour, &str)> {
+        match self {
+            Layer::Line(Line { colour, label, .. })
+            | Layer::Points(Points { colour, label, .. })
+            | Layer::Markers(Markers { colour, label, .. })
+            | Layer::Stems(Stems { colour, label, .. })
+            | Layer::Bars(Bars { colour, label, .. })
+            | Layer::Rule(Rule { colour, label, .. })
+            | Layer::Band(Band { colour, label, .. }) => {
+                Some((colour.unwrap_or(Colour::BLACK), label))
+            }
+            Layer::Note(_) | Layer::Heatmap(_) | Layer::CategoryMap(_) => None,
         }
     }
 

@@ -172,7 +172,7 @@ fn sides(panel: &Prepared, rect: Rect, stand: Stand, style: &Style) -> Sides {
     };
     let label = |words: &str| Words::set(words, style.label, false);
 
-    if panel.marked(&panel.panel.y) {
+    if panel.panel.y.marked() {
         let marks = Marks::new(&panel.panel.y, panel.y, rect.height(), true, style);
         sides.left_marks = style.mark + style.pad + marks.widest();
         if let Some(note) = &marks.note {
@@ -181,10 +181,11 @@ fn sides(panel: &Prepared, rect: Rect, stand: Stand, style: &Style) -> Sides {
             sides.top = sides.top.max(words.cap_height() / 2.0 + EDGE / 2.0);
         }
     }
-    if !panel.panel.y.label.is_empty() {
-        sides.left_label = style.pad + line_height(&label(&panel.panel.y.label)) + EDGE;
+    let y = panel.panel.y.words();
+    if !y.is_empty() {
+        sides.left_label = style.pad + line_height(&label(&y)) + EDGE;
     }
-    if panel.marked(&panel.panel.x) {
+    if panel.panel.x.marked() {
         let marks = Marks::new(&panel.panel.x, panel.x, rect.width(), false, style);
         sides.bottom_marks = style.mark;
         if panel.words_below {
@@ -203,13 +204,14 @@ fn sides(panel: &Prepared, rect: Rect, stand: Stand, style: &Style) -> Sides {
             }
         }
     }
-    if panel.words_below && !panel.panel.x.label.is_empty() {
-        sides.bottom_label += style.pad + line_height(&label(&panel.panel.x.label));
+    let x = panel.panel.x.words();
+    if panel.words_below && !x.is_empty() {
+        sides.bottom_label += style.pad + line_height(&label(&x));
     }
 
     for bar in &panel.bars {
         let marks = Marks::new(bar.axis, bar.view, rect.height(), true, style);
-        sides.right = sides.right.max(0.0) + bar_width(&marks, &bar.axis.label, style);
+        sides.right = sides.right.max(0.0) + bar_width(&marks, &bar.axis.words(), style);
         if let Some(note) = &marks.note {
             sides.top = sides.top.max(EDGE + line_height(note) + style.pad);
         }
@@ -246,9 +248,9 @@ pub(crate) fn title_height(panel: &Prepared, style: &Style) -> f64 {
 /// left for it.
 pub(crate) fn shares_row(panel: &Prepared, width: f64, style: &Style) -> bool {
     let marks = Marks::new(&panel.panel.x, panel.x, width, false, style);
-    let label = Words::set(&panel.panel.x.label, style.label, false);
+    let label = Words::set(&panel.panel.x.words(), style.label, false);
     let beside = |note: Words| label.width + style.gap + note.width <= width;
-    !panel.panel.x.label.is_empty() && marks.note.is_none_or(beside)
+    label.width > 0.0 && marks.note.is_none_or(beside)
 }
 
 /// Distance of a colour bar from what stands left of it, and its width, mm.

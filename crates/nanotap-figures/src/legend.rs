@@ -4,7 +4,7 @@ use crate::colour::Colour;
 use crate::draw;
 use crate::layer::{Layer, Place};
 use crate::panel::Legend;
-use crate::prepared::{Entry, Frame, Prepared, Sample, points_of};
+use crate::prepared::{Entry, Frame, Prepared, Sample};
 use crate::scene::{Point, Rect, Scene, Segment, Stroke};
 use crate::style::{INK, Style};
 use crate::text::{Across, Upright, Words};
@@ -156,7 +156,7 @@ impl Occupancy {
                 }
                 Layer::Stems(_) | Layer::Bars(_) => {
                     let foot = frame.upright(prepared.foot(layer));
-                    for at in points_of(layer).iter().filter_map(|p| frame.place(*p)) {
+                    for at in layer.points().iter().filter_map(|p| frame.place(*p)) {
                         let foot = Point::new(at.x, foot.unwrap_or(at.y));
                         seen.mark_line(foot, at);
                         if let Layer::Bars(bars) = layer
@@ -206,7 +206,7 @@ impl Occupancy {
                     }
                 }
                 Layer::Points(_) | Layer::Markers(_) => {
-                    for at in points_of(layer).iter().filter_map(|p| frame.place(*p)) {
+                    for at in layer.points().iter().filter_map(|p| frame.place(*p)) {
                         seen.mark(at);
                     }
                 }

@@ -1,9 +1,13 @@
-//! Publication figures: one data model, written as SVG, PNG and PDF.
+//! Publication figures: one data model, written as SVG, PNG, PDF and JSON.
 //!
-//! A [`Figure`] holds [`Panel`]s in a grid; a panel has two [`Axis`] and layers ([`Line`],
-//! [`Points`], [`Markers`], [`Heatmap`] …). Sizes are those of the printed page. Nothing depends on
-//! the machine: the typeface travels with the program, letters are drawn as shapes in every format,
-//! and the same figure gives the same bytes.
+//! A [`Figure`] is plain data: it holds [`Panel`]s in a grid; a panel has two [`Axis`] and layers
+//! ([`Line`], [`Points`], [`Markers`], [`Heatmap`] …). Sizes are those of the printed page. Nothing
+//! depends on the machine: the typeface travels with the program, letters are drawn as shapes in
+//! every format, and the same figure gives the same bytes.
+//!
+//! Whoever draws it otherwise (matplotlib, a browser) takes the same description from
+//! [`Figure::to_json`], with every range, colour and letter decided, or the SVG together with the map
+//! of its axes from [`Figure::to_svg_with_map`]. Colours of motions come from [`Motion::colour`].
 //!
 //! ```
 //! use nanotap_figures::{Axis, Figure, Line, Panel};
@@ -31,25 +35,29 @@ mod font;
 mod layer;
 mod layout;
 mod legend;
+mod map;
 mod marks;
+mod numbers;
 mod panel;
 mod pdf;
 mod pixels;
 mod polyline;
 mod prepared;
 mod raster;
+mod resolve;
 mod scene;
 mod style;
 mod svg;
 mod text;
 pub mod ticks;
 
-pub use axis::Axis;
-pub use colour::{Colour, Colourmap, LINES, category};
+pub use axis::{Axis, Range, Scale};
+pub use colour::{Colour, Colourmap, LINES, Motion, category};
 pub use error::FigureError;
 pub use figure::{DOUBLE_COLUMN, DPI, Figure, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
 pub use layer::{
-    Band, Bars, CategoryMap, Dash, Heatmap, Layer, Line, Markers, Note, Place, Points, Rule, Shape,
-    Side, Stems,
+    Band, Bars, Category, CategoryMap, Dash, Heatmap, Layer, Line, Markers, Note, Place, Points,
+    Rule, Shape, Side, Stems,
 };
+pub use map::{AxisMap, PanelMap};
 pub use panel::{Legend, Panel};

@@ -1,11 +1,14 @@
 //! One plot of a figure.
 
+use serde::{Deserialize, Serialize};
+
 use crate::axis::Axis;
 use crate::error::FigureError;
 use crate::layer::Layer;
 
 /// Where the legend stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Legend {
     /// In a corner or at an edge where it hides no data, else above the panel.
     #[default]
@@ -27,27 +30,31 @@ pub enum Legend {
 }
 
 /// Two axes and what is drawn between them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 #[must_use]
 pub struct Panel {
-    pub(crate) title: String,
-    pub(crate) letter: Option<String>,
-    pub(crate) x: Axis,
-    pub(crate) y: Axis,
-    pub(crate) layers: Vec<Layer>,
-    pub(crate) legend: Legend,
+    /// Words above the panel.
+    pub title: String,
+    /// The panel's letter, such as "(a)"; none: the one that the figure gives.
+    pub letter: Option<String>,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// What is drawn, from the back.
+    pub layers: Vec<Layer>,
+    /// Where the legend stands.
+    pub legend: Legend,
 }
 
 impl Panel {
     /// An empty panel.
     pub fn new(x: Axis, y: Axis) -> Panel {
         Panel {
-            title: String::new(),
-            letter: None,
             x,
             y,
-            layers: Vec::new(),
-            legend: Legend::Auto,
+            ..Panel::default()
         }
     }
 
@@ -103,7 +110,7 @@ impl Panel {
             }
             Layer::CategoryMap(l) => {
                 cells(l.columns, l.rows, l.cells.len())?;
-                let named = l.names.len();
+                let named = l.categories.len();
                 match l.cells.iter().flatten().find(|c| **c >= named) {
                     Some(&category) => Err(FigureError::Category { category, named }),
                     None => self.check_edges(l.x, l.y),

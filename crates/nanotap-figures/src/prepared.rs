@@ -1,9 +1,10 @@
 //! A panel with everything decided that does not depend on its size.
 
-use crate::axis::{Axis, Extent, Range, Scale, View};
+use crate::axis::{Axis, Extent, Scale, View};
 use crate::colour::{self, Colour};
-use crate::layer::{CategoryMap, Dash, Layer, Shape};
+use crate::layer::{Dash, Layer, Shape};
 use crate::panel::Panel;
+use crate::resolve;
 use crate::scene::{Point, Rect};
 use crate::text::MM_PER_POINT;
 
@@ -26,15 +27,13 @@ pub(crate) struct Entry {
 
 pub(crate) struct Prepared<'a> {
     pub(crate) panel: &'a Panel,
-    pub(crate) letter: String,
+    pub(crate) letter: &'a str,
     pub(crate) x: View,
     pub(crate) y: View,
     /// Whether nothing can be drawn.
     pub(crate) empty: bool,
     /// Whether the horizontal axis shows its words.
     pub(crate) words_below: bool,
-    /// The colour of each layer.
-    pub(crate) colours: Vec<Colour>,
     pub(crate) entries: Vec<Entry>,
     pub(crate) bars: Vec<ColourBar<'a>>,
 }
@@ -72,138 +71,31 @@ impl Frame {
     }
 }
 
-/// Points of layers that hold points.
-pub(crate) fn points_of(layer: &Layer) -> &[(f64, f64)] {
-    match layer {
-        Layer::Line(l) => &l.points,
-        Layer::Points(l) => &l.points,
-        Layer::Markers(l) => &l.points,
-        Layer::Stems(l) => &l.points,
-        Layer::Bars(l) => &l.points,
-        _ => &[],
-    }
-}
-
-/// How far a panel's layers reach along its axes, and whether there is anything to see.
-pub(crate) fn extents(panel: &Panel) -> (Extent, Extent, bool) {
-    let (mut x, mut y) = (Extent::EMPTY, Extent::EMPTY);
-    let mut any = false;
-    for layer in &panel.layers {
-        let mut own = false;
-        for &(px, py) in points_of(layer) {
-            if panel.x.holds(px) && panel.y.holds(py) {
-                own = true;
-                x.add(px);
-                y.add(py);
-                if let Layer::Bars(bars) = layer {
-                    for edge in [px - bars.width / 2.0, px + bars.width / 2.0] {
-                        if panel.x.holds(edge) {
-                            x.add(edge);
-                        }
-                    }
-                }
-            }
-        }
-        match layer {
-            Layer::Stems(_) | Layer::Bars(_) if own => {
-                let foot = match layer {
-                    Layer::Stems(stems) => stems.foot.unwrap_or(0.0),
-                    _ => 0.0,
-                };
-                if panel.y.holds(foot) {
-                    y.add_edge(foot);
-                }
-            }
-            Layer::Heatmap(map) => {
-                own = map.values.iter().any(|v| map.scale.holds(*v));
-                add_area(&mut x, &mut y, map.x, map.y);
-            }
-            Layer::CategoryMap(map) => {
-                own = map.cells.iter().any(Option::is_some);
-                add_area(&mut x, &mut y, map.x, map.y);
-            }
-            Layer::Rule(rule) => {
-                let (axis, extent) = if rule.upright {
-                    (&panel.x, &mut x)
-                } else {
-                    (&panel.y, &mut y)
-                };
-                if axis.holds(rule.at) {
-                    extent.add(rule.at);
-                }
-            }
-            _ => {}
-        }
-        any |= own;
-    }
-    (x, y, any)
-}
-
-fn add_area(x: &mut Extent, y: &mut Extent, across: (f64, f64), upright: (f64, f64)) {
-    for edge in [across.0, across.1] {
-        x.add_map(edge);
-    }
-    for edge in [upright.0, upright.1] {
-        y.add_map(edge);
-    }
-}
-
 impl<'a> Prepared<'a> {
-    /// `x` is the extent of the horizontal axis, which panels may share.
-    pub(crate) fn new(
-        panel: &'a Panel,
-        letter: String,
-        x: Extent,
-        words_below: bool,
-    ) -> Prepared<'a> {
-        let (_, y, any) = extents(panel);
-        let mut taken = 0;
-        let colours: Vec<Colour> = panel
-            .layers
-            .iter()
-            .map(|layer| {
-                if layer.takes_colour() {
-                    taken += 1;
-                    colour::LINES[(taken - 1) % colour::LINES.len()]
-                } else {
-                    own_colour(layer)
-                }
-            })
-            .collect();
+    /// Of a resolved panel.
+    pub(crate) fn new(panel: &'a Panel, words_below: bool) -> Prepared<'a> {
         let bars = panel
             .layers
             .iter()
             .filter_map(|layer| match layer {
-                Layer::Heatmap(map) => {
-                    let mut extent = Extent::EMPTY;
-                    for &value in map.values.iter().filter(|v| map.scale.holds(**v)) {
-                        extent.add_edge(value);
-                    }
-                    Some(ColourBar {
-                        axis: &map.scale,
-                        view: map.scale.view(extent),
-                        map: map.map,
-                    })
-                }
+                Layer::Heatmap(map) => Some(ColourBar {
+                    axis: &map.scale,
+                    view: map.scale.view(Extent::EMPTY),
+                    map: map.map,
+                }),
                 _ => None,
             })
             .collect();
         Prepared {
             panel,
-            letter,
-            x: panel.x.view(x),
-            y: panel.y.view(y),
-            empty: !any,
+            letter: panel.letter.as_deref().unwrap_or_default(),
+            x: panel.x.view(Extent::EMPTY),
+            y: panel.y.view(Extent::EMPTY),
+            empty: !resolve::extents(panel).2,
             words_below,
-            entries: entries(&panel.layers, &colours),
-            colours,
+            entries: entries(&panel.layers),
             bars,
         }
-    }
-
-    /// Whether an axis of an empty panel has marks: only if it was given a range.
-    pub(crate) fn marked(&self, axis: &Axis) -> bool {
-        !self.empty || matches!(axis.range, Range::Fixed(..)) || axis.marks.is_some()
     }
 
     pub(crate) fn frame(&self, rect: Rect) -> Frame {
@@ -229,35 +121,8 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The colour of a layer that has one.
-fn own_colour(layer: &Layer) -> Colour {
-    let given = match layer {
-        Layer::Line(l) => l.colour,
-        Layer::Points(l) => l.colour,
-        Layer::Markers(l) => l.colour,
-        Layer::Stems(l) => l.colour,
-        Layer::Bars(l) => l.colour,
-        Layer::Rule(l) => Some(l.colour),
-        Layer::Band(l) => Some(l.colour),
-        Layer::Note(l) => Some(l.colour),
-        Layer::Heatmap(_) | Layer::CategoryMap(_) => None,
-    };
-    given.unwrap_or(Colour::BLACK)
-}
-
-/// The colour of a category.
-pub(crate) fn category_colour(map: &CategoryMap, index: usize) -> Colour {
-    let given = map.names.get(index).and_then(|(_, colour)| *colour);
-    // A category with a colour of its own does not use one up.
-    let before = map.names[..index.min(map.names.len())]
-        .iter()
-        .filter(|(_, colour)| colour.is_none())
-        .count();
-    given.unwrap_or_else(|| colour::category(before))
-}
-
 /// The legend's entries; layers of the same label and look share one.
-fn entries(layers: &[Layer], colours: &[Colour]) -> Vec<Entry> {
+fn entries(layers: &[Layer]) -> Vec<Entry> {
     let mut all: Vec<Entry> = Vec::new();
     let mut add = |label: &str, colour: Colour, sample: Sample| {
         let entry = Entry {
@@ -269,50 +134,39 @@ fn entries(layers: &[Layer], colours: &[Colour]) -> Vec<Entry> {
             all.push(entry);
         }
     };
-    for (layer, &colour) in layers.iter().zip(colours) {
-        match layer {
-            Layer::Line(l) => add(
-                &l.label,
-                colour,
-                Sample::Line {
-                    width: l.width * MM_PER_POINT,
-                    dash: l.dash,
-                },
-            ),
-            Layer::Rule(l) => add(
-                &l.label,
-                colour,
-                Sample::Line {
-                    width: l.width * MM_PER_POINT,
-                    dash: l.dash,
-                },
-            ),
-            Layer::Points(l) => add(
-                &l.label,
-                // A legend's dot must be seen, however faint one dot of the cloud.
-                Colour { a: 255, ..colour },
-                Sample::Dot {
-                    diameter: l.diameter.max(0.8),
-                },
-            ),
-            Layer::Markers(l) => add(
-                &l.label,
-                colour,
-                Sample::Marker {
-                    shape: l.shape,
-                    size: l.size,
-                    open: l.open,
-                },
-            ),
-            Layer::Band(l) => add(&l.label, colour, Sample::Area),
-            Layer::Bars(l) => add(&l.label, colour, Sample::Area),
-            Layer::Stems(l) => add(&l.label, colour, Sample::Stem),
+    let line = |width: f64, dash: Dash| Sample::Line {
+        width: width * MM_PER_POINT,
+        dash,
+    };
+    for layer in layers {
+        let sample = match layer {
+            Layer::Line(l) => line(l.width, l.dash),
+            Layer::Rule(l) => line(l.width, l.dash),
+            Layer::Points(l) => Sample::Dot {
+                diameter: l.diameter.max(0.8),
+            },
+            Layer::Markers(l) => Sample::Marker {
+                shape: l.shape,
+                size: l.size,
+                open: l.open,
+            },
+            Layer::Band(_) | Layer::Bars(_) => Sample::Area,
+            Layer::Stems(_) => Sample::Stem,
             Layer::CategoryMap(map) => {
-                for (index, (name, _)) in map.names.iter().enumerate() {
-                    add(name, category_colour(map, index), Sample::Area);
+                for one in &map.categories {
+                    let colour = one.colour.unwrap_or(Colour::GREY);
+                    add(&one.label, colour, Sample::Area);
                 }
+                continue;
             }
-            Layer::Heatmap(_) | Layer::Note(_) => {}
+            Layer::Heatmap(_) | Layer::Note(_) => continue,
+        };
+        if let Some((mut colour, label)) = layer.look() {
+            if matches!(layer, Layer::Points(_)) {
+                // A legend's dot must be seen, however faint one dot of the cloud.
+                colour.a = 255;
+            }
+            add(label, colour, sample);
         }
     }
     all

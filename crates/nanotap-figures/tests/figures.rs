@@ -429,6 +429,109 @@ fn shared_axes_agree() {
 }
 
 #[test]
+fn json_describes_the_whole_figure() {
+    let figure = everything();
+    let json = figure.to_json().unwrap();
+    let read = Figure::from_json(&json).unwrap();
+    assert_eq!(read.to_svg().unwrap(), figure.to_svg().unwrap());
+    // What a figure decides by itself is decided, so that no other program has to.
+    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    for panel in value["panels"].as_array().unwrap() {
+        assert!(panel["letter"].as_str().unwrap().starts_with('('));
+        assert!(panel["x"]["range"]["fixed"].is_array(), "{}", panel["x"]);
+        for layer in panel["layers"].as_array().unwrap() {
+            let map = ["heatmap", "category-map"].contains(&layer["kind"].as_str().unwrap());
+            assert!(map || layer["colour"].as_str().unwrap().starts_with('#'));
+        }
+    }
+    // Gaps and open ends survive.
+    let gaps = plain(Line::new([
+        (0.0, 1.0),
+        (f64::NAN, 2.0),
+        (2.0, f64::NAN),
+        (3.0, 0.0),
+    ]))
+    .with(Band::x([(f64::NEG_INFINITY, 1.0), (2.0, f64::INFINITY)]));
+    let figure = Figure::single(gaps);
+    let read = Figure::from_json(&figure.to_json().unwrap()).unwrap();
+    assert_eq!(read.to_svg().unwrap(), figure.to_svg().unwrap());
+    // Little needs to be said.
+    let short = r#"{"panels": [{"x": {"label": "t", "unit": "s"}, "layers":
+        [{"kind": "line", "points": {"x": [0, 1], "y": [1, null]}, "width": 1}]}]}"#;
+    let svg = Figure::from_json(short).unwrap().to_svg().unwrap();
+    assert!(svg.contains("aria-label=\"t (s)\""));
+    for wrong in [
+        "",
+        "{\"panels\": 3}",
+        &short.replace("null", "null, 3"),
+        &short.replace("line", "rope"),
+    ] {
+        let error = Figure::from_json(wrong).unwrap_err();
+        assert!(matches!(error, FigureError::Json(_)), "{error}");
+    }
+}
+
+#[test]
+fn the_map_says_where_each_value_is_drawn() {
+    let log = Panel::new(
+        Axis::linear("a").unit("nm").range(2.0, 4.0),
+        Axis::log("b").range(1.0, 1e4),
+    )
+    .with(Markers::new([(3.5, 10.0)]).colour(Colour::rgb(1, 2, 3)))
+    .title("title");
+    let figure = Figure::new(1, 2)
+        .width(178.0)
+        .with(log)
+        .with(plain(Line::new(wave(9))));
+    let (svg, map) = figure.to_svg_with_map().unwrap();
+    assert_eq!(svg, figure.to_svg().unwrap());
+    assert_eq!(map.len(), 2);
+    let panel = &map[0];
+    assert_eq!(
+        (panel.letter.as_str(), panel.title.as_str()),
+        ("(a)", "title")
+    );
+    assert_eq!((panel.x.label.as_str(), panel.x.unit.as_str()), ("a", "nm"));
+    // The marker's outline starts at its right end, 0.75 mm from its centre.
+    let marker = &svg[svg.find("<g class=\"markers\"").unwrap()..];
+    let data = path_data(marker).trim_start_matches('m');
+    let end = data.find('c').unwrap();
+    let at: Vec<f64> = data[..end].split(' ').map(|v| v.parse().unwrap()).collect();
+    let along = |from: f64, to: f64, v: f64| (v - from) / (to - from);
+    let x = panel.left + panel.width * along(panel.x.from, panel.x.to, 3.5);
+    let y = panel.top + panel.height
+        - panel.height * along(panel.y.from.ln(), panel.y.to.ln(), 10f64.ln());
+    assert!(
+        (at[0] - 0.75 - x).abs() < 2e-3 && (at[1] - y).abs() < 2e-3,
+        "{at:?} {x} {y}"
+    );
+}
+
+#[test]
+fn rounding_is_not_magnified() {
+    let labels = |axis: Axis, values: [f64; 3]| -> String {
+        let points = values.into_iter().enumerate().map(|(i, v)| (i as f64, v));
+        let panel = Panel::new(Axis::linear("x"), axis).with(Line::new(points));
+        let svg = Figure::single(panel).to_svg().unwrap();
+        group(&svg, "axis-y").to_owned()
+    };
+    // 3e-24 of an energy of 1 is nothing: the axis is that of 1.
+    let zero = labels(Axis::linear("E").natural(1.0), [0.0, 3e-24, -1e-24]);
+    assert!(
+        zero.contains("\"0.5\"") && zero.contains("\"−0.5\""),
+        "{zero}"
+    );
+    assert!(!zero.contains("×10"), "{zero}");
+    // Without a natural size nothing can be said of small numbers.
+    assert!(labels(Axis::linear("E"), [0.0, 3e-24, -1e-24]).contains("×10"));
+    // What is constant but for rounding is drawn as constant.
+    let flat = labels(Axis::linear("E"), [2.5, 2.5 + 4e-14, 2.5 - 4e-14]);
+    assert!(flat.contains("\"2.50\"") && !flat.contains("×10"), "{flat}");
+    // What matters is drawn as it is.
+    assert!(labels(Axis::linear("E").natural(1.0), [0.0, 2e-6, 1e-6]).contains("×10−6"));
+}
+
+#[test]
 fn files_appear_whole_or_not_at_all() {
     let folder = std::env::temp_dir().join(format!("nanotap-figures-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();

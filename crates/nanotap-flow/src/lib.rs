@@ -12,6 +12,7 @@
 //!   complex exponentials; [`crossing`], [`extrema`] and [`integral`] work on it;
 //! - [`system`]: regimes and exits together, with every switch a precomputed
 //!   change of basis; [`flow`] runs it, [`trajectory`] records it;
+//! - [`accumulate`]: exact observables of a motion while it runs, at the price of the motion;
 //! - [`jacobian`] and [`sensitivity`]: derivatives with respect to the state and
 //!   to any parameter;
 //! - [`fixed_step`]: the Runge–Kutta method that switches on its grid, kept to
@@ -23,6 +24,7 @@
 // with vector registers; only what is inlined there gets their instructions.
 #![allow(clippy::inline_always)]
 
+pub mod accumulate;
 pub mod crossing;
 mod double_double;
 pub mod drive;

@@ -49,8 +49,11 @@ pub(crate) enum Pending {
     Zero(FallingZero, (Jet, f64)),
 }
 
-/// Switches without time passing before chatter without a sticking regime is refused.
+/// Switches in a row, hardly any time passing, before chatter is refused.
 const STALLED_SWITCHES: u32 = 1000;
+/// What counts as hardly any time, as a part of the fastest time scale: what switches again
+/// and again so soon does not come to rest in between.
+const BRIEF: f64 = 1e-6;
 /// An impact sequence ends in sticking when its flights last less than this part
 /// of the fastest time scale: what is left of it is below rounding (second order).
 const CHATTER_RESOLUTION: f64 = 1e-8;
@@ -309,7 +312,10 @@ impl Motion {
             }
             return Ok(());
         };
-        *stalled = if length <= f64::EPSILON * system.drive().period() {
+        // Impacts that may end in sticking are followed until they do.
+        let sticks = system.prepared(self.regime)[exit].sticking.is_some();
+        let brief = if sticks { 0.0 } else { BRIEF } / system.fastest();
+        *stalled = if length <= brief.max(f64::EPSILON * system.drive().period()) {
             *stalled + 1
         } else {
             0

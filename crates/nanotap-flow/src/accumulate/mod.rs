@@ -1,0 +1,61 @@
+//! Exact observables of a motion, accumulated while it runs.
+//!
+//! A [`Request`] names outputs (scalars affine in the state, which may differ from regime to
+//! regime) and what is wanted of each: its least or greatest value, its integral, its
+//! Fourier coefficient at a frequency, the integral of its product with another. Nothing else
+//! is computed. A [`Plan`] is the request made ready for one [`System`]; it is immutable and
+//! may be shared. An [`Accumulator`] is an [`Observer`](crate::flow::Observer) that carries
+//! the sums along:
+//!
+//! ```
+//! use nanotap_flow::accumulate::{Accumulator, Request};
+//! # use nalgebra::{DMatrix, DVector, RowDVector};
+//! # use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System};
+//! # let drive = Drive::single(1.0)?;
+//! # let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -4.0, -0.5]);
+//! # let push = DVector::from_vec(vec![0.0, 1.0]);
+//! # let forcing = HarmonicVector::zeros(2, 1).with_tone(0, &push, &DVector::zeros(2));
+//! # let regime = Regime::new(0, matrix, forcing, &drive)?;
+//! # let system = std::sync::Arc::new(System::new(drive, vec![regime], vec![vec![]])?);
+//! let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
+//! let mut request = Request::new();
+//! let position = request.output(&x);
+//! let (highest, mean) = (request.greatest(position), request.integral(position));
+//! let first = request.fourier(position, 1.0);
+//!
+//! let mut accumulator = Accumulator::new(&request.plan(&system)?);
+//! let mut flow = Flow::new(system);
+//! flow.start(&[0.3, 0.0], 0.0)?;
+//! for _ in 0..10 {
+//!     flow.run_period(&mut accumulator)?;
+//! }
+//! let duration = accumulator.duration();
+//! println!("{} {}", accumulator.extremum(highest), accumulator.integral(mean) / duration);
+//! println!("{}", accumulator.fourier(first).norm() * 2.0 / duration);
+//! # Ok::<(), nanotap_flow::FlowError>(())
+//! ```
+//!
+//! What is always accumulated, since it costs nothing: the time in each regime, and of each
+//! pair of regimes how often the motion switched from one to the other, how often it only
+//! grazed, its greatest speed and the sum of the squares of its speeds there.
+//!
+//! # Contract
+//! - Integrals are closed forms of the modal amplitudes, one term for each mode (or pair of
+//!   modes), over every stretch between switches; there is no quadrature.
+//! - Extrema are those of the continuous motion, ends and switches included, to rounding:
+//!   every stretch of time is either proved not to exceed what was found before or holds a
+//!   zero of the rate that was found. None is taken from samples.
+//! - An output that differs between regimes jumps at switches; both one-sided values count.
+//!   Where an output is identically zero in a regime, that zero counts as a value of it.
+//! - A request for the same thing twice returns the same key and costs nothing.
+//! - [`Accumulator::clear`] begins anew, [`Accumulator::take_extremum`] begins anew for one
+//!   extremum alone (extrema of every period, say). Time is counted, for Fourier
+//!   coefficients, from the start of the drive period in which the accumulator was last
+//!   cleared.
+//! - A stretch costs no allocation.
+
+mod accumulator;
+mod request;
+
+pub use accumulator::{Accumulator, Switches};
+pub use request::{Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request};

@@ -1,0 +1,320 @@
+//! What is accumulated while a motion runs is what its recorded trajectory gives, which is
+//! computed otherwise: on random systems of 1 to 12 oscillators of every damping, that meet a
+//! springy stop or hit a rigid one.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Drive, Exit, Flow, HarmonicVector, Output, Regime, Reset, System};
+use proptest::prelude::*;
+
+const OMEGA: f64 = 1.7;
+
+/// An oscillator: its frequency, damping ratio, displacement, velocity, and weight in the gap.
+type Oscillator = (f64, f64, f64, f64, f64);
+
+/// Oscillators that a drive pushes, whose weighted sum `w` with the gap `w + offset` meets a
+/// stop of stiffness `k` and damper `c`, or bounces off it with the restitution `e`.
+#[derive(Clone, Debug)]
+struct Example {
+    oscillators: Vec<Oscillator>,
+    offset: f64,
+    stop: Stop,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Stop {
+    Springy { k: f64, c: f64 },
+    Rigid { e: f64 },
+}
+
+impl Example {
+    fn dimension(&self) -> usize {
+        2 * self.oscillators.len()
+    }
+
+    /// Displacements with the weights of the gap; `offset` of the rows as given.
+    fn row(&self, first: usize) -> RowDVector<f64> {
+        let mut row = RowDVector::zeros(self.dimension());
+        for (j, oscillator) in self.oscillators.iter().enumerate() {
+            row[2 * j + first] = oscillator.4;
+        }
+        row
+    }
+
+    fn gap(&self) -> Output {
+        Output::linear(self.row(0), 1).with_constant(self.offset)
+    }
+
+    /// The force of the stop, in each regime.
+    fn force(&self) -> Vec<Output> {
+        let gap = self.gap();
+        match self.stop {
+            Stop::Springy { k, c } => {
+                let rate = Output::linear(self.row(1), 1);
+                vec![gap.scaled(0.0), gap.scaled(-k).plus(-c, &rate)]
+            }
+            Stop::Rigid { .. } => vec![gap],
+        }
+    }
+
+    fn start(&self) -> Vec<f64> {
+        let states = self.oscillators.iter().map(|o| [o.2, o.3 * o.0]);
+        states.flatten().collect()
+    }
+
+    /// `None` where eigenvalues are too close to tell apart in double precision.
+    fn system(&self) -> Option<Arc<System>> {
+        let n = self.dimension();
+        let drive = Drive::single(OMEGA).unwrap();
+        let mut free = DMatrix::zeros(n, n);
+        let mut push = DVector::zeros(n);
+        for (j, &(w, z, _, _, weight)) in self.oscillators.iter().enumerate() {
+            free[(2 * j, 2 * j + 1)] = 1.0;
+            free[(2 * j + 1, 2 * j)] = -w * w;
+            free[(2 * j + 1, 2 * j + 1)] = -2.0 * z * w;
+            push[2 * j + 1] = weight;
+        }
+        let forcing = HarmonicVector::zeros(n, 1).with_tone(0, &push, &(0.3 * &push));
+        let regime = |index, matrix, forcing| Regime::new(index, matrix, forcing, &drive).ok();
+        let gap = self.gap();
+        // Accelerations along the gap's weights: those of a stop.
+        let along = push.clone();
+        match self.stop {
+            Stop::Springy { k, c } => {
+                let touching = &free - &along * (self.row(0) * k) - &along * (self.row(1) * c);
+                let pressed = forcing.clone().with_constant(&(-k * self.offset * &along));
+                let regimes = vec![regime(0, free, forcing)?, regime(1, touching, pressed)?];
+                let exits = vec![
+                    vec![Exit::new(gap.clone(), 1)],
+                    vec![Exit::new(gap.scaled(-1.0), 0)],
+                ];
+                Some(Arc::new(
+                    System::new(drive.clone(), regimes, exits).unwrap(),
+                ))
+            }
+            Stop::Rigid { e } => {
+                // v⁺ = v⁻ − (1 + e) (r v⁻) r/|r|² reverses the gap's rate.
+                let row = self.row(1);
+                let size = row.norm_squared();
+                let matrix = DMatrix::identity(n, n) - row.transpose() * &row * ((1.0 + e) / size);
+                let reset = Reset {
+                    matrix,
+                    offset: HarmonicVector::zeros(n, 1),
+                };
+                let exits = vec![vec![Exit::new(gap, 0).with_reset(reset)]];
+                Some(Arc::new(
+                    System::new(drive.clone(), vec![regime(0, free, forcing)?], exits).unwrap(),
+                ))
+            }
+        }
+    }
+}
+
+fn damping() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => 0.001..0.3_f64,
+        1 => 0.9..1.1_f64,
+        1 => Just(1.0),
+        1 => 1.1..4.0_f64,
+    ]
+}
+
+fn example() -> impl Strategy<Value = Example> {
+    let oscillator = (
+        (-1.0..4.0_f64).prop_map(f64::exp),
+        damping(),
+        -0.3..0.3_f64,
+        -0.3..0.3_f64,
+        prop_oneof![-1.0..-0.2_f64, 0.2..1.0_f64],
+    );
+    let stop = prop_oneof![
+        3 => (1.0..60.0_f64, 0.0..1.0_f64).prop_map(|(k, c)| Stop::Springy { k, c }),
+        1 => (0.3..0.95_f64).prop_map(|e| Stop::Rigid { e }),
+    ];
+    (
+        proptest::collection::vec(oscillator, 1..=12),
+        0.0..0.3_f64,
+        stop,
+    )
+        .prop_map(|(oscillators, beyond, stop)| {
+            let at_start: f64 = oscillators.iter().map(|o| o.2 * o.4).sum();
+            Example {
+                offset: beyond - at_start,
+                oscillators,
+                stop,
+            }
+        })
+}
+
+/// Periods that are looked at.
+const PERIODS: usize = 3;
+
+fn compare(example: &Example) -> Result<(), TestCaseError> {
+    let Some(system) = example.system() else {
+        return Err(TestCaseError::reject("eigenvalues too close"));
+    };
+    let gap = example.gap();
+    let other = Output::linear(example.row(1), 1)
+        .plus(0.7, &Output::linear(example.row(0), 1))
+        .with_tone(0, 0.4, -0.2)
+        .with_constant(-0.1);
+    let force = example.force();
+    let frequencies = [OMEGA, 2.0 * OMEGA, OMEGA / 3.0, 1.234];
+
+    let mut request = Request::new();
+    let channels = [
+        request.output(&gap),
+        request.output(&other),
+        request.output_by_regime(&force),
+    ];
+    let extrema = channels.map(|c| (request.least(c), request.greatest(c)));
+    let integrals = channels.map(|c| request.integral(c));
+    let fouriers = channels.map(|c| frequencies.map(|omega| request.fourier(c, omega)));
+    let pairs = [(0, 0), (0, 1), (1, 2), (2, 2)];
+    let products = pairs.map(|(a, b)| request.product(channels[a], channels[b]));
+    let mut accumulator = Accumulator::new(&request.plan(&system).unwrap());
+
+    let mut flow = Flow::new(Arc::clone(&system));
+    flow.start(&example.start(), 0.0).unwrap();
+    let mut recorder = Recorder::default();
+    for _ in 0..PERIODS {
+        // Rigid stops may chatter, which is refused where there is no sticking.
+        if flow
+            .run_period(&mut (&mut accumulator, &mut recorder))
+            .is_err()
+        {
+            return Err(TestCaseError::reject("chatter"));
+        }
+    }
+    let trajectory = recorder.finish(Arc::clone(&system));
+
+    let signals = [
+        trajectory.signal(&gap),
+        trajectory.signal(&other),
+        trajectory.signal_by_regime(&force),
+    ];
+    let duration = trajectory.end();
+    prop_assert!((accumulator.duration() - duration).abs() < 1e-12 * duration);
+    for regime in 0..system.regimes().len() {
+        let (a, b) = (accumulator.time_in(regime), trajectory.time_in(regime));
+        prop_assert!((a - b).abs() < 1e-12 * duration);
+    }
+    let sizes: Vec<f64> = signals
+        .iter()
+        .map(|s| {
+            let (low, high) = s.range().unwrap();
+            // Terms of a signal cancel each other; its rounding is that of the largest.
+            let terms = s.pieces.iter().map(|p| p.signal.noise() / f64::EPSILON);
+            terms.fold(low.value.abs().max(high.value.abs()), f64::max)
+        })
+        .collect();
+    for (i, signal) in signals.iter().enumerate() {
+        let (low, high) = signal.range().unwrap();
+        for (key, expected) in [(extrema[i].0, low.value), (extrema[i].1, high.value)] {
+            let found = accumulator.extremum(key);
+            prop_assert!(
+                (found - expected).abs() <= 1e-12 * sizes[i],
+                "{i}: {found} {expected}"
+            );
+        }
+        let (found, expected) = (accumulator.integral(integrals[i]), signal.integral());
+        let known = 1e-12 * sizes[i] * duration;
+        prop_assert!((found - expected).abs() <= known, "{i}: {found} {expected}");
+        for (key, omega) in fouriers[i].iter().zip(frequencies) {
+            let found = accumulator.fourier(*key);
+            let expected = signal.fourier(omega) * (0.5 * duration);
+            prop_assert!(
+                (found - expected).norm() <= known,
+                "{i} {omega}: {found} {expected}"
+            );
+        }
+    }
+    for (key, (a, b)) in products.iter().zip(pairs) {
+        let found = accumulator.product(*key);
+        let expected = signals[a].product_integral(&signals[b]);
+        let known = 1e-12 * sizes[a] * sizes[b] * duration;
+        prop_assert!(
+            (found - expected).abs() <= known,
+            "{a} {b}: {found} {expected}"
+        );
+    }
+    let events = trajectory.events();
+    for (from, to) in [(0, 0), (0, 1), (1, 0)] {
+        let switches = accumulator.switches(from, to);
+        let here = events.iter().filter(|e| e.from == from && e.to == to);
+        prop_assert_eq!(switches.count, here.clone().count() as u64);
+        let speed = here.map(|e| -e.rate).fold(0.0, f64::max);
+        prop_assert_eq!(switches.greatest_speed, speed);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, max_shrink_iters: 50, ..ProptestConfig::default() })]
+
+    #[test]
+    fn what_is_accumulated_is_what_the_trajectory_gives(example in example()) {
+        compare(&example)?;
+    }
+}
+
+/// Cleared in between, an accumulator gives the later periods alone, with the same phase of
+/// the drive; an extremum that is taken gives each period's own.
+#[test]
+fn clearing_begins_anew() {
+    let example = Example {
+        oscillators: vec![(1.0, 0.05, 0.2, 0.0, 1.0), (6.3, 0.02, 0.0, 0.1, -0.5)],
+        offset: 0.1,
+        stop: Stop::Springy { k: 20.0, c: 0.2 },
+    };
+    let system = example.system().unwrap();
+    let mut request = Request::new();
+    let gap = request.output(&example.gap());
+    assert_eq!(
+        gap,
+        request.output(&example.gap()),
+        "one output, one channel"
+    );
+    let (least, first) = (request.least(gap), request.fourier(gap, OMEGA));
+    let plan = request.plan(&system).unwrap();
+    let mut flow = Flow::new(Arc::clone(&system));
+    flow.start(&example.start(), 0.0).unwrap();
+    let mut whole = Accumulator::new(&plan);
+    let mut each = Accumulator::new(&plan);
+    let (mut lowest, mut sum) = (f64::INFINITY, nanotap_flow::Complex::new(0.0, 0.0));
+    for _ in 0..5 {
+        flow.run_period(&mut (&mut whole, &mut each)).unwrap();
+        lowest = lowest.min(each.take_extremum(least));
+        sum += each.fourier(first);
+        assert_eq!(each.extremum(least), f64::INFINITY);
+        each.clear();
+        assert_eq!(each.duration(), 0.0);
+    }
+    assert_eq!(whole.extremum(least), lowest);
+    assert!((whole.fourier(first) - sum).norm() < 1e-13);
+    assert_eq!(whole.periods(), 5);
+}
+
+/// What does not fit is refused.
+#[test]
+fn outputs_that_do_not_fit_are_refused() {
+    let example = Example {
+        oscillators: vec![(1.0, 0.05, 0.2, 0.0, 1.0)],
+        offset: 0.1,
+        stop: Stop::Springy { k: 20.0, c: 0.2 },
+    };
+    let system = example.system().unwrap();
+    let mut request = Request::new();
+    request.output(&Output::linear(RowDVector::zeros(3), 1));
+    assert!(request.plan(&system).is_err());
+    let mut request = Request::new();
+    request.output_by_regime(&[example.gap()]);
+    assert!(request.plan(&system).is_err());
+    let mut request = Request::new();
+    let gap = request.output(&example.gap());
+    request.fourier(gap, f64::NAN);
+    assert!(request.plan(&system).is_err());
+}

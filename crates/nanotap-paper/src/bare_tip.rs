@@ -216,7 +216,8 @@ pub(super) fn fig15(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
                 Verdict::Ambiguous,
             )
             .evidence(format!("attractors at Ω = 20: {}; at Ω = 2.6: {}", kinds(&bare.fast), kinds(&bare.slow)))
-            .rerun(bare.slow.counted.rerun()),
+            .in_print()
+.rerun(bare.slow.counted.rerun()),
         )
         .check(
             Check::new(
@@ -226,7 +227,8 @@ pub(super) fn fig15(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
                 Verdict::Ambiguous,
             )
             .evidence("the paper contradicts itself; two of its three statements say 15–17")
-            .rerun(bare.fast.counted.rerun()),
+            .in_print()
+.rerun(bare.fast.counted.rerun()),
         ))
 }
 

@@ -99,10 +99,17 @@ pub(super) fn section(
             RANGE.1
         ),
     );
+    let beyond = sweep(
+        laboratory,
+        &subject,
+        OMEGA,
+        &inside_the_tori(&one),
+        starts.max(4),
+    )?;
     let checks = [
         subharmonics(&wide, [&one, &two], &again),
         nonperiodic_window(&window, &close, &window_again),
-        further(&wide, &one, &branch_again),
+        further(&wide, &beyond, &one, &branch_again),
         period_three(&wide, &again),
         coexistence(&wide, &again),
     ];
@@ -184,14 +191,36 @@ fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check
     .rerun(again)
 }
 
-/// "If the driving frequency further increases, nonperiodic motions will evolve from period-1."
-fn further(wide: &[Column], branch: &FollowedBranch, again: &str) -> Check {
+/// Frequencies a little beyond the Neimark–Sacker points above the paper's window, on the side
+/// where the period-1 orbit repels.
+fn inside_the_tori(branch: &FollowedBranch) -> Vec<f64> {
+    const BEYOND: f64 = 0.15;
     let tori: Vec<f64> = branch
         .tori()
         .into_iter()
         .filter(|omega| *omega > WINDOW.1)
         .collect();
-    let seen = wide.iter().any(|c| c.at > WINDOW.1 && c.has(Kind::Torus));
+    tori.chunks_exact(2)
+        .flat_map(|pair| {
+            let step = BEYOND * (pair[1] - pair[0]);
+            [pair[0] + step, pair[1] - step]
+        })
+        .collect()
+}
+
+/// "If the driving frequency further increases, nonperiodic motions will evolve from period-1."
+fn further(wide: &[Column], beyond: &[Column], branch: &FollowedBranch, again: &str) -> Check {
+    let tori: Vec<f64> = branch
+        .tori()
+        .into_iter()
+        .filter(|omega| *omega > WINDOW.1)
+        .collect();
+    // A coarse sweep can step over the short stretches where the torus attracts.
+    let mut columns: Vec<Column> = wide.iter().chain(beyond).cloned().collect();
+    columns.sort_by(|a, b| a.at.total_cmp(&b.at));
+    let seen = columns
+        .iter()
+        .any(|c| c.at > WINDOW.1 && c.has(Kind::Torus));
     Check::new(
         "fig5-further",
         "section 4: if the driving frequency further increases, nonperiodic motions evolve from period-1 motions",
@@ -204,7 +233,7 @@ fn further(wide: &[Column], branch: &FollowedBranch, again: &str) -> Check {
     )
     .evidence(format!(
         "quasi-periodic motion at Ω = {}; chaos at Ω = {}",
-        where_seen(wide, |c| c.has(Kind::Torus)),
+        where_seen(&columns, |c| c.has(Kind::Torus)),
         where_seen(wide, |c| c.has(Kind::Chaos))
     ))
     .rerun(again)

@@ -37,6 +37,16 @@ impl Verdict {
     }
 }
 
+/// What a statement is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum About {
+    /// A formula, a number or a caption as it is printed.
+    Print,
+    /// How the system moves.
+    Motion,
+}
+
 /// A statement of the paper, what holds here, and how anyone can see for themselves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
@@ -46,6 +56,8 @@ pub struct Check {
     pub paper: String,
     /// What holds here.
     pub here: String,
+    /// Whether it is about what is printed or about the motion.
+    pub about: About,
     /// Whether the two agree.
     pub verdict: Verdict,
     /// Why the verdict can be believed.
@@ -66,6 +78,7 @@ impl Check {
             id: id.into(),
             paper: paper.into(),
             here: here.into(),
+            about: About::Motion,
             verdict,
             evidence: String::new(),
             rerun: String::new(),
@@ -76,6 +89,13 @@ impl Check {
     #[must_use]
     pub fn evidence(mut self, evidence: impl Into<String>) -> Self {
         self.evidence = evidence.into();
+        self
+    }
+
+    /// Says that the statement is about a formula, a number or a caption as printed.
+    #[must_use]
+    pub fn in_print(mut self) -> Self {
+        self.about = About::Print;
         self
     }
 

@@ -40,7 +40,8 @@ pub(super) fn damping_units(_: &Laboratory<'_>, section: Section) -> Result<Sect
                 digits(printed, 4),
                 digits(corrected, 4)
             ))
-            .rerun(rerun::section("eq7")),
+            .in_print()
+.rerun(rerun::section("eq7")),
         ))
 }
 
@@ -125,7 +126,8 @@ pub(super) fn cosine_term(
                     "as printed, Eq. (14) contradicts Eq. (6); attractors of both forms: {}",
                     table.rows.iter().map(|r| format!("Ω = {}, α₁ = {}: {} | {}", r[1], r[2], r[3], r[4])).collect::<Vec<_>>().join("; ")
                 ))
-                .rerun(rerun::on_case("attractors", &printed_case, "--starts 64 --seed 1")),
+                .in_print()
+.rerun(rerun::on_case("attractors", &printed_case, "--starts 64 --seed 1")),
         )
         .table(table))
 }
@@ -149,6 +151,7 @@ pub(super) fn bare_frequencies(
             Verdict::of(holds),
         )
         .evidence("squares of the roots of cos β cosh β = −1, to the last bit")
+        .in_print()
         .rerun(rerun::on_case("modes", &bare, "")),
     ))
 }
@@ -235,7 +238,8 @@ pub(super) fn contact_frequencies(
                 Verdict::of(!agreeing.is_empty()),
             )
             .evidence(format!("N = 1 … {MOST_MODES} compared digit by digit (table)"))
-            .rerun(rerun::on_case("modes", &five, "")),
+            .in_print()
+.rerun(rerun::on_case("modes", &five, "")),
         )
         .check(
             Check::new(
@@ -249,7 +253,8 @@ pub(super) fn contact_frequencies(
                 100.0 * (three[2] / exact[2] - 1.0),
                 100.0 * (EQ25[2].0 / exact[2] - 1.0)
             ))
-            .rerun(rerun::on_case("modes", &Cantilever::paper_eq24(), "")),
+            .in_print()
+.rerun(rerun::on_case("modes", &Cantilever::paper_eq24(), "")),
         )
         .check(
             Check::new(
@@ -377,7 +382,8 @@ pub(super) fn samples(_: &Laboratory<'_>, section: Section) -> Result<Section, P
                  ν₂ = 0.3, 50 GPa has α₄ = {} instead of 233.5",
                 digits(scaled(Some(SILICON), 50e9), 4)
             ))
-            .rerun(rerun::section("alpha4")),
+            .in_print()
+.rerun(rerun::section("alpha4")),
         )
         .table(table))
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::check::{Check, Verdict};
+use super::check::Check;
 use super::section::{Section, Table};
 use super::{PaperError, Report};
 
@@ -40,10 +40,6 @@ pub(super) fn page(report: &Report) -> Result<String, PaperError> {
 }
 
 fn introduction(report: &Report) -> String {
-    let counts: Vec<String> = Verdict::ALL
-        .iter()
-        .map(|v| format!("{} {}", report.count(*v), v.name()))
-        .collect();
     let hurry = if report.quick {
         "<p><strong>Made with --quick: fewer starts and parameter values, wider bounds.</strong></p>\n"
     } else {
@@ -57,7 +53,7 @@ fn introduction(report: &Report) -> String {
          motion is called periodic only where Newton has closed its orbit. No parameter was adjusted to agree.</p>\n\
          <p><strong>{} statements: {}.</strong> Made by nanotap {}.</p>\n{hurry}",
         report.checks().count(),
-        counts.join(", "),
+        report.counts(),
         env!("CARGO_PKG_VERSION"),
     )
 }
@@ -174,6 +170,7 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Verdict;
     use super::*;
 
     #[test]

@@ -34,7 +34,7 @@ use nanotap::case::near_name::near_name;
 use nanotap::model::ModelError;
 use nanotap::study::orbit::OrbitError;
 
-pub use check::{Check, Verdict};
+pub use check::{About, Check, Verdict};
 use laboratory::Laboratory;
 pub use section::{Picture, Section, Table};
 pub use write::Written;
@@ -114,6 +114,25 @@ impl Report {
     /// Every check of every section.
     pub fn checks(&self) -> impl Iterator<Item = &Check> {
         self.sections.iter().flat_map(|section| &section.checks)
+    }
+
+    /// How many statements about `about` differ.
+    pub fn differing(&self, about: About) -> usize {
+        self.checks()
+            .filter(|c| c.verdict == Verdict::Differs && c.about == about)
+            .count()
+    }
+
+    /// The counts in words, slips of the print apart from differences in the motion.
+    pub fn counts(&self) -> String {
+        format!(
+            "{} reproduced, {} ambiguous, {} differ ({} in print, {} in the motion)",
+            self.count(Verdict::Reproduced),
+            self.count(Verdict::Ambiguous),
+            self.count(Verdict::Differs),
+            self.differing(About::Print),
+            self.differing(About::Motion),
+        )
     }
 
     /// How many checks came to `verdict`.

@@ -3,19 +3,14 @@
 use std::fmt::Write as _;
 
 use super::Report;
-use super::check::Verdict;
 
 /// The document.
 pub(super) fn document(report: &Report) -> String {
-    let counts: Vec<String> = Verdict::ALL
-        .iter()
-        .map(|v| format!("{} {}", report.count(*v), v.name()))
-        .collect();
     let mut text = format!(
         "# The paper computed again\n\n{} statements: {}. The page `report.html` beside this file shows the pictures \
          and tables.\n\n| id | the paper | here | verdict | evidence | run it again |\n|---|---|---|---|---|---|\n",
         report.checks().count(),
-        counts.join(", ")
+        report.counts()
     );
     for check in report.checks() {
         let _ = writeln!(
@@ -50,7 +45,7 @@ fn cell(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Check, Report, Section};
+    use super::super::{Check, Report, Section, Verdict};
     use super::*;
 
     #[test]

@@ -14,9 +14,11 @@ use super::laboratory::{Counted, Laboratory, SEED, how_many};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
 use super::section::{Picture, Section, Table};
+use super::time_step::Grid;
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
@@ -24,6 +26,8 @@ use nanotap::study::start_box::default_box;
 const LONGEST: usize = 3;
 /// Range of Ω over which the orbits are followed.
 const BRANCH_RANGE: (f64, f64) = (2.3, 3.6);
+/// Frequencies that are printed as Ω = 2.6.
+const PRINTED_ALIKE: (f64, f64) = (2.55, 2.65);
 /// Drive periods of chaos drawn against time, and in the phase portrait.
 const SHOWN: (usize, usize) = (16, 200);
 
@@ -99,28 +103,66 @@ impl Slow {
         }
     }
 
-    /// The check of "so many motions of this period".
+    /// Where the first orbit of a period attracts, followed over [`BRANCH_RANGE`].
+    fn attracting(
+        &self,
+        laboratory: &Laboratory<'_>,
+        period: usize,
+    ) -> Result<Vec<(f64, f64)>, PaperError> {
+        match self.of_period(period).first() {
+            Some(orbit) => Ok(self
+                .branch(laboratory, self.counted.case.omega, orbit)?
+                .attracting()),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// The check of "so many motions of this period". One that attracts only at another
+    /// frequency that is printed alike leaves the statement open.
     fn check(
         &self,
+        laboratory: &Laboratory<'_>,
         id: &str,
         paper: &str,
         period: usize,
         claimed: usize,
     ) -> Result<Check, PaperError> {
         let found = self.counted.stable(period).len();
-        let here = format!(
+        let mut here = format!(
             "{} attracts; {}",
             how_many(found, &format!("period-{period} motion")),
             self.describe(period)?
         );
-        Ok(Check::new(id, paper, here, Verdict::of(found >= claimed))
-            .evidence(format!(
-                "{}; {}",
-                self.counted.summary(),
-                self.counted.missed()
-            ))
+        let mut evidence = format!("{}; {}", self.counted.summary(), self.counted.missed());
+        let attracting = self.attracting(laboratory, period)?;
+        if !attracting.is_empty() {
+            evidence = format!(
+                "{evidence}; the orbit attracts at Ω = {}",
+                in_words(&attracting)
+            );
+        }
+        let alike = printed_alike(&attracting);
+        let mut verdict = Verdict::of(found >= claimed);
+        if verdict == Verdict::Differs && claimed == 1 && !alike.is_empty() {
+            verdict = Verdict::Ambiguous;
+            here = format!(
+                "{here}; among the frequencies that are printed as 2.6 it attracts at Ω = {}",
+                in_words(&alike)
+            );
+        }
+        Ok(Check::new(id, paper, here, verdict)
+            .evidence(evidence)
             .rerun(self.rerun_orbit(period)))
     }
+}
+
+/// The parts of these stretches whose frequencies round to the printed Ω = 2.6.
+fn printed_alike(stretches: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    stretches
+        .iter()
+        .map(|&(from, to)| (from.max(PRINTED_ALIKE.0), to.min(PRINTED_ALIKE.1)))
+        .filter(|(from, to)| from < to)
+        .collect()
 }
 
 /// The largest multiplier in words.
@@ -171,20 +213,13 @@ pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             .with(loop_view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         words.push("(c, d) The only period-1 orbit that Newton found.");
     }
-    let mut check = slow.check(
+    let check = slow.check(
+        laboratory,
         "fig6",
         "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1",
         1,
         2,
     )?;
-    if let Some(orbit) = slow.of_period(1).first() {
-        let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
-        check.evidence = format!(
-            "{}; the orbit attracts at Ω = {}",
-            check.evidence,
-            in_words(&branch.attracting())
-        );
-    }
     Ok(section
         .picture(Picture::new(
             "fig06",
@@ -234,21 +269,15 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
         ));
     }
     captions.push(KEY.to_owned());
-    let mut two = slow.check(
+    let two = slow.check(
+        laboratory,
         "fig7-period-2",
         "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1",
         2,
         1,
     )?;
-    if let Some(orbit) = slow.of_period(2).first() {
-        let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
-        two.evidence = format!(
-            "{}; the orbit attracts at Ω = {}",
-            two.evidence,
-            in_words(&branch.attracting())
-        );
-    }
     let mut three = slow.check(
+        laboratory,
         "fig7-period-3",
         "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1",
         3,
@@ -275,7 +304,14 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             figure,
             128.0,
         ))
+        .text(
+            "No one case has the two period-1 motions, the period 2 and the period 3 of Figs. 6 and 7. A tip that the \
+             sample presses a little at rest (a small negative α₅) has each of these kinds, at different gaps; fixed \
+             steps at Ω = 2.6 show several periods that the equations do not have.",
+        )
         .table(doubled_by_modes(laboratory)?)
+        .table(pressed_at_rest(laboratory)?)
+        .table(slow_grids(laboratory)?)
         .check(two)
         .check(three))
 }
@@ -297,6 +333,61 @@ fn doubled_by_modes(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
                 modes.to_string(),
                 multiplier(orbit),
                 in_words(&branch.attracting()),
+            ]);
+        }
+    }
+    Ok(table)
+}
+
+/// What attracts at Ω = 2.6 where the sample presses the tip a little at rest.
+fn pressed_at_rest(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
+    let mut table = Table::new(
+        "What attracts at Ω = 2.6, α₁ = 0.1, N = 3 with a small negative gap: the kinds of motion in Figs. 6 and 7, \
+         but not all at once",
+        ["α₅", "motions", "run it again"],
+    );
+    for alpha5 in [-0.10, -0.05, -0.045] {
+        let case = Cantilever::paper().with(Parameter::Alpha5, alpha5);
+        let counted = laboratory.count(&case)?;
+        table.row([
+            alpha5.to_string().replace('-', "−"),
+            counted.kinds().join(", "),
+            counted.rerun(),
+        ]);
+    }
+    Ok(table)
+}
+
+/// Steps a drive period of the grids tried at Ω = 2.6, and starts of each.
+const SLOW_GRIDS: ([u32; 2], usize) = ([34, 40], 48);
+
+/// What fixed steps settle on at Ω = 2.6 with two modes.
+fn slow_grids(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
+    let counted = laboratory.count(&Cantilever::paper().with_modes(2))?;
+    let (steps, most) = SLOW_GRIDS;
+    let starts = Laboratory::starts(&counted, laboratory.either(most, most / 4))?;
+    let mut table = Table::new(
+        format!(
+            "What fixed steps that switch on their grid settle on at Ω = 2.6, α₁ = 0.1, N = 2; the exact flow has: {}",
+            counted.kinds().join(", ")
+        ),
+        [
+            "steps a period",
+            "period",
+            "amplitude",
+            "starts",
+            "run it again",
+        ],
+    );
+    for steps in steps {
+        let grid = Grid::equal_steps(2, steps, starts.len());
+        for motion in grid.motions(&counted.model, &starts) {
+            table.row([
+                steps.to_string(),
+                motion.words(),
+                format!("{:.4}", motion.amplitude),
+                format!("{} of {}", motion.count, starts.len()),
+                motion.rerun_on(&counted.case),
             ]);
         }
     }

@@ -51,7 +51,7 @@ pub(super) struct GridMotion {
     /// Its strobe states, one period of it (or [`LONGEST`] drive periods).
     strobes: Vec<Vec<f64>>,
     /// Starts that came to it.
-    count: usize,
+    pub(super) count: usize,
 }
 
 /// Everything that the grids make of the case, and what the exact flow makes of that.
@@ -229,8 +229,19 @@ impl Scan {
 }
 
 impl Grid {
+    /// The same step in flight and in contact, switched at every step.
+    pub(super) const fn equal_steps(modes: usize, steps: u32, starts: usize) -> Self {
+        Self {
+            modes,
+            steps: [steps, steps],
+            switching: Switching::EveryStep,
+            transient: 1500,
+            starts,
+        }
+    }
+
     /// The different motions that starts come to.
-    fn motions(&self, model: &Model, starts: &[Vec<f64>]) -> Vec<GridMotion> {
+    pub(super) fn motions(&self, model: &Model, starts: &[Vec<f64>]) -> Vec<GridMotion> {
         let mut found: Vec<GridMotion> = Vec::new();
         for start in starts.iter().take(self.starts) {
             let Some(motion) = self.settle(model, start) else {
@@ -370,8 +381,13 @@ impl GridMotion {
         curve
     }
 
-    /// A command line that runs it again.
+    /// A command line that runs it again at Ω = 20.
     pub(super) fn rerun(&self) -> String {
+        self.rerun_on(&fast_case(self.grid.modes))
+    }
+
+    /// A command line that runs it again on the `case` that it is of.
+    pub(super) fn rerun_on(&self, case: &Cantilever) -> String {
         let [free, contact] = self.grid.steps;
         let switching = match self.grid.switching {
             Switching::EveryStep => "step",
@@ -381,7 +397,7 @@ impl GridMotion {
             "--method rk4 --steps {free},{contact} --switching {switching} --transient 0 --periods 256 {}",
             rerun::state(&self.state)
         );
-        rerun::on_case("simulate", &fast_case(self.grid.modes), &options)
+        rerun::on_case("simulate", case, &options)
     }
 
     /// What it is, in words.

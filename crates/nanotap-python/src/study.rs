@@ -14,7 +14,7 @@ use nanotap::study::orbit::OrbitOptions;
 use nanotap::study::simulate::SettleOptions;
 use nanotap::study::start_box::box_with;
 use nanotap::study::studied::ParameterUnit;
-use nanotap_paper::{Check, Options as PaperOptions, Verdict, report, section_names};
+use nanotap_paper::{About, Check, Options as PaperOptions, Verdict, report, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -262,6 +262,8 @@ struct Paper<'a> {
     reproduced: usize,
     differs: usize,
     ambiguous: usize,
+    differs_in_print: usize,
+    differs_in_motion: usize,
     checks: Vec<&'a Check>,
 }
 
@@ -292,6 +294,8 @@ pub(crate) fn paper(
             reproduced: report.count(Verdict::Reproduced),
             differs: report.count(Verdict::Differs),
             ambiguous: report.count(Verdict::Ambiguous),
+            differs_in_print: report.differing(About::Print),
+            differs_in_motion: report.differing(About::Motion),
             checks: report.checks().collect(),
         })?)
     })?;

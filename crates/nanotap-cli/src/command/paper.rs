@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use nanotap_paper::{Check, Options, PaperError, Report, Verdict, Written, report, section_names};
+use nanotap_paper::{
+    About, Check, Options, PaperError, Report, Verdict, Written, report, section_names,
+};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -43,6 +45,10 @@ struct Document<'a> {
     reproduced: usize,
     differs: usize,
     ambiguous: usize,
+    /// Of those that differ: formulas, numbers and captions as printed.
+    differs_in_print: usize,
+    /// Of those that differ: how the system moves.
+    differs_in_motion: usize,
     checks: Vec<&'a Check>,
     seconds: f64,
 }
@@ -71,6 +77,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         reproduced: report.count(Verdict::Reproduced),
         differs: report.count(Verdict::Differs),
         ambiguous: report.count(Verdict::Ambiguous),
+        differs_in_print: report.differing(About::Print),
+        differs_in_motion: report.differing(About::Motion),
         checks: report.checks().collect(),
         seconds: begun.elapsed().as_secs_f64(),
     };
@@ -103,10 +111,8 @@ fn text(document: &Document<'_>, report: &Report, written: &Written) -> String {
     }
     let _ = write!(
         text,
-        "\n  {} reproduced, {} differ, {} ambiguous; {} pictures; {:.0} s\n  {}\n",
-        document.reproduced,
-        document.differs,
-        document.ambiguous,
+        "\n  {}; {} pictures; {:.0} s\n  {}\n",
+        report.counts(),
         written.pictures.len() / 2,
         document.seconds,
         written.html.display()

@@ -3,60 +3,54 @@
 //!
 //! Nothing here knows of beams, tips or contact. A system implements
 //! [`map::StroboscopicMap`] (and [`map::MapFamily`] for continuation); everything
-//! else follows from it.
+//! else follows from it. One folder a concept, each calling only those before it:
+//!
+//! | folder | what it answers |
+//! |---|---|
+//! | [`orbit`] | which orbit closes near here, and is it stable |
+//! | [`neighbourhood`] | from where every motion goes to a given orbit |
+//! | [`lyapunov`] | how fast neighbouring motions part |
+//! | [`classify`] | what the motion from one start comes to |
+//! | [`census`] | which attractors a set of starts goes to, and what it may have missed |
+//! | [`basin`] | which points of a slice go to which attractor |
+//! | [`continuation`] | how an orbit goes on in one parameter, and its bifurcations |
+//! | [`curve`] | where a bifurcation goes on in two parameters |
 
-mod adapted_norm;
 pub mod basin;
-pub mod bifurcation;
-mod birkhoff;
-mod block_average;
-mod block_cyclic;
-mod branch_solver;
-pub mod branch_switching;
 pub mod census;
-pub mod confidence;
+pub mod classify;
 pub mod continuation;
 pub mod control;
-pub mod diagram;
+pub mod curve;
 mod failure;
-pub mod locus;
 pub mod lyapunov;
 pub mod map;
-pub mod multipliers;
 pub mod neighbourhood;
 pub mod orbit;
-pub mod period;
-pub mod settle;
-pub mod shooting;
-pub mod starts;
-pub mod unstable;
 mod vector;
 
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
-pub use bifurcation::{Bifurcation, BifurcationKind};
-pub use birkhoff::birkhoff_digits;
-pub use branch_solver::OrbitTangency;
-pub use branch_switching::switch_at_flip;
-pub use census::{Attractor, AttractorKind, Census, CensusOptions, Fate, TransientChaos, census};
-pub use confidence::{Fraction, Lifetime};
+pub use census::{
+    Attractor, AttractorKind, Census, CensusOptions, Fate, Fraction, Lifetime, SizeCount, StartBox,
+    StartBoxError, StartOrigin, StartSet, TransientChaos, Unseen, census, census_of,
+};
+pub use classify::{
+    Candidate, Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict, birkhoff_digits,
+    candidate_periods, settle,
+};
 pub use continuation::{
-    Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions, Direction,
-    continue_orbit,
+    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ContinuationError,
+    ContinuationOptions, Diagram, DiagramBranch, DiagramOptions, Direction, OrbitTangency,
+    assemble_diagram, continue_orbit, switch_at_flip,
 };
 pub use control::Control;
-pub use diagram::{Diagram, DiagramBranch, DiagramOptions, assemble_diagram};
+pub use curve::{Locus, LocusOptions, LocusPoint, TwoParameterFamily, trace_locus};
 pub use failure::MapFailure;
-pub use locus::{Locus, LocusOptions, LocusPoint, TwoParameterFamily, trace_locus};
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
 pub use map::{MapFamily, StroboscopicMap, Tangency};
-pub use multipliers::{MultiplierError, Multipliers, Stability};
 pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
-pub use orbit::PeriodicOrbit;
-pub use period::{Candidate, candidate_periods};
-pub use settle::{Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict, settle};
-pub use shooting::{
-    DivergenceReason, ShootingError, ShootingOptions, close_orbit, close_orbit_from_points,
+pub use orbit::{
+    DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
+    ShootingOptions, Stability, close_orbit, close_orbit_from_points, find_orbits,
 };
-pub use starts::{StartBox, StartBoxError};
-pub use unstable::{OrbitSearch, find_orbits};

@@ -57,6 +57,24 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), Self::Error>;
 
+    /// log|det DP| at `state` by other means than the Jacobian (the trace of the
+    /// equations, integrated), where the system has any: exact where the determinant
+    /// of a matrix drowns in rounding. `None` where it has none.
+    ///
+    /// # Errors
+    /// When the period cannot be computed from this state.
+    fn log_determinant(&mut self, state: &[f64]) -> Result<Option<f64>, Self::Error> {
+        let _ = state;
+        Ok(None)
+    }
+
+    /// An upper bound on log|det DP| over all states, infinite where none is known. A
+    /// negative one says that the map shrinks every volume: it has no torus of one
+    /// dimension less than the state, and if planar none at all.
+    fn log_determinant_bound(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Appends every local extremum of the switching functions over the period
     /// that starts at `state`, in order of phase, and replaces `state` by
     /// `P(state)`. A smooth system leaves `tangencies` as it is.

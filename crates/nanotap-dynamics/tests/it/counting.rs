@@ -5,11 +5,12 @@ use std::sync::atomic::AtomicBool;
 
 use nanotap_dynamics::{
     AttractorKind, Census, CensusOptions, Control, Fate, LyapunovOptions, Neighbourhood,
-    OrbitSearch, SettleOptions, ShootingOptions, StartBox, census, find_orbits,
+    OrbitSearch, SettleOptions, ShootingOptions, StartBox, StartSet, census, census_of,
+    find_orbits,
 };
 use rayon::ThreadPoolBuilder;
 
-use crate::systems::{Cubic, Focus, Formula, Henon, Logistic, OpenTent, System};
+use crate::systems::{Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System};
 
 fn starts(low: &[f64], high: &[f64], count: usize) -> Vec<Vec<f64>> {
     StartBox::new(low.to_vec(), high.to_vec())
@@ -220,4 +221,91 @@ fn neighbourhoods_stay_within_the_contracting_interval() {
     // |f'| ≤ 3/4, as the rate asks, holds within 0.159; trials lose a factor (3/4)² at most.
     assert!(half > 0.159 * 0.56, "{half}");
     assert!(centre - half > (0.5f64 / 3.0).sqrt() && centre + half < (2.5f64 / 3.0).sqrt());
+}
+
+/// Attractors that live in a ten-thousandth of the box are found by starts of all
+/// sizes, and counted for each size: all of the smallest go there, half to each.
+#[test]
+fn small_motions_are_found_by_small_starts() {
+    let s = 1e-4;
+    let map = System(Nested { r: 1.5, s });
+    let sides = StartBox::new(vec![-3.0], vec![3.0]).unwrap();
+    let one_size = StartSet::drawn(sides.clone(), 1);
+    let alone = census_of(
+        &map,
+        &one_size,
+        &CensusOptions {
+            max_starts: 300,
+            ..CensusOptions::default()
+        },
+        &Control::default(),
+    );
+    assert_eq!(alone.attractors.len(), 2);
+    let scales: Vec<f64> = (0..6).map(|k| 0.1f64.powi(k)).collect();
+    let spread = StartSet::spread(&sides, &[0.0], &scales, 1).unwrap();
+    let found = census_of(
+        &map,
+        &spread,
+        &CensusOptions::default(),
+        &Control::default(),
+    );
+    assert_eq!(found.attractors.len(), 4);
+    assert_eq!(found.by_size.len(), 6);
+    // 3e-5 < s √2.5: the smallest box lies wholly in the two small basins.
+    let smallest = found.by_size.last().unwrap();
+    for (a, part) in found.attractors.iter().zip(&smallest.attractors) {
+        let expected = if a.state[0].abs() < 1.0 { 0.5 } else { 0.0 };
+        assert!(part.low <= expected && expected <= part.high, "{part:?}");
+    }
+    let counted: usize = found.by_size.iter().map(|s| s.starts).sum();
+    assert_eq!(counted, found.counted);
+    let unseen = found.unseen.unwrap();
+    assert!(unseen.share <= CensusOptions::default().unseen);
+    assert_eq!(unseen.motions, 4);
+}
+
+/// Starts are drawn until the bound is met, and no further; a budget stops them
+/// earlier, with the larger bound that then holds.
+#[test]
+fn the_census_stops_when_nothing_new_has_come_for_long_enough() {
+    let sides = StartBox::new(vec![-1.0], vec![1.0]).unwrap();
+    let set = StartSet::drawn(sides, 5).with_given([vec![0.3]]);
+    let of = |unseen: f64, max_starts: usize| {
+        let options = CensusOptions {
+            unseen,
+            max_starts,
+            ..CensusOptions::default()
+        };
+        census_of(&System(Cubic(1.5)), &set, &options, &Control::default())
+    };
+    // Two motions: ln(0.05/6) = −4.787, so 479 starts for a bound of a per cent.
+    let long = of(0.01, 100_000);
+    let unseen = long.unseen.unwrap();
+    assert!(
+        unseen.starts >= 478 && unseen.starts < 478 + 32 + 128,
+        "{unseen:?}"
+    );
+    assert!(long.counted + 1 == long.fates.len());
+    let short = of(0.01, 100);
+    assert_eq!(short.counted, 100);
+    assert!(short.unseen.unwrap().share > 0.04);
+}
+
+/// A motion that a neighbour has is found from its state alone, and counts as found
+/// though no drawn start goes there.
+#[test]
+fn given_states_are_tried_but_not_counted() {
+    let map = System(Nested { r: 1.5, s: 1e-9 });
+    let sides = StartBox::new(vec![-3.0], vec![3.0]).unwrap();
+    let set = StartSet::drawn(sides, 1).with_given([vec![1e-9]]);
+    let options = CensusOptions {
+        max_starts: 64,
+        ..CensusOptions::default()
+    };
+    let found = census_of(&map, &set, &options, &Control::default());
+    assert_eq!(found.attractors.len(), 3);
+    assert_eq!(found.attractors[2].fraction.count, 0);
+    assert_eq!(found.attractors[2].first_start, Some(0));
+    let total: usize = found.attractors.iter().map(|a| a.fraction.count).sum();
+    assert_eq!(total, 64);
 }

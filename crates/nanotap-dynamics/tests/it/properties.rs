@@ -123,6 +123,7 @@ proptest! {
                 birkhoff_periods: 256,
                 ..SettleOptions::default()
             },
+            ..CensusOptions::default()
         };
         let result = census(&System(Logistic(r)), &starts, &options, &Control::default());
         let attracted: usize = result.attractors.iter().map(|a| a.fraction.count).sum();

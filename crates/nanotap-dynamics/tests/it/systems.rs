@@ -342,3 +342,36 @@ pub(crate) fn thrown(map: &mut impl StroboscopicMap, start: &[f64], periods: usi
     }
     x
 }
+
+/// Two sizes on one line: within |x| ≤ 2s a copy of [`Cubic`] shrunk by `s`, with the
+/// attractors ±s √(r−1) whose basins together are |x| < s √(r+1) (exactly: what
+/// starts between that and 2s grows past 2s); beyond 2s everything goes to ±2.
+#[derive(Clone, Debug)]
+pub(crate) struct Nested {
+    pub r: f64,
+    pub s: f64,
+}
+
+impl Formula for Nested {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let y = x[0];
+        out[0] = if y.abs() > 2.0 * self.s {
+            2.0f64.copysign(y) + 0.5 * (y - 2.0f64.copysign(y))
+        } else {
+            let z = y / self.s;
+            self.s * z * (self.r - z * z)
+        };
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = if x[0].abs() > 2.0 * self.s {
+            0.5
+        } else {
+            let z = x[0] / self.s;
+            self.r - 3.0 * z * z
+        };
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = if x[0].abs() > 2.0 * self.s { 0.0 } else { x[0] };
+    }
+}

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use nanotap_dynamics::{StroboscopicMap, Tangency};
 use nanotap_flow::extrema::sign_changes;
-use nanotap_flow::flow::{Observer, SegmentView};
+use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::signal::Signal;
+use nanotap_flow::system::Exit;
 use nanotap_flow::{Flow, FlowError, Output, System};
 
 use crate::model::Model;
@@ -119,6 +120,35 @@ impl StroboscopicMap for Strobe {
         Ok(())
     }
 
+    /// From the trace of the equations and the time in each regime, and of a rigid stop
+    /// from its impacts.
+    fn log_determinant(&mut self, state: &[f64]) -> Result<Option<f64>, FlowError> {
+        self.begin(state)?;
+        let mut sum = LogDeterminant(0.0);
+        self.flow.run_period(&mut sum)?;
+        Ok(Some(sum.0))
+    }
+
+    fn log_determinant_bound(&self) -> f64 {
+        let system = self.flow.system();
+        let expands = system
+            .exits()
+            .iter()
+            .flatten()
+            .any(|exit| log_impact(exit) > 0.0);
+        if expands {
+            return f64::INFINITY;
+        }
+        // Where nothing moves the motion sticks, and its volume is gone.
+        let fastest = system
+            .regimes()
+            .iter()
+            .filter(|r| r.matrix().amax() > 0.0)
+            .map(|r| r.matrix().trace())
+            .fold(f64::NEG_INFINITY, f64::max);
+        fastest * system.drive().period()
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -132,6 +162,28 @@ impl StroboscopicMap for Strobe {
         self.flow.run_period(&mut collector)?;
         self.end(state);
         Ok(())
+    }
+}
+
+/// log|det| of what an impact does to volumes: the reset itself, and once more as much
+/// for the times at which neighbouring motions meet the stop.
+fn log_impact(exit: &Exit) -> f64 {
+    exit.reset
+        .as_ref()
+        .map_or(0.0, |r| 2.0 * r.matrix.determinant().abs().ln())
+}
+
+/// Sums log|det| over a period: tr A · t in every regime, and the impacts.
+struct LogDeterminant(f64);
+
+impl Observer for LogDeterminant {
+    fn segment(&mut self, segment: &SegmentView<'_>) {
+        self.0 += segment.regime().matrix().trace() * segment.length;
+    }
+
+    fn switch(&mut self, switch: &SwitchView<'_>) {
+        let exits = &switch.system.exits()[switch.switch.from];
+        self.0 += exits.get(switch.exit).map_or(0.0, log_impact);
     }
 }
 

@@ -268,6 +268,7 @@ pub fn attractors(
         &CensusOptions {
             pilots: options.pilots,
             settle,
+            ..CensusOptions::default()
         },
         control,
     );

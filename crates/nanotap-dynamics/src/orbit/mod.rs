@@ -1,8 +1,18 @@
 //! A periodic orbit of the stroboscopic map, closed by Newton.
 
+pub(crate) mod block_cyclic;
+pub mod multipliers;
+pub mod search;
+pub mod shooting;
+
 use nalgebra::Complex;
 
-use crate::multipliers::Stability;
+pub use multipliers::{MultiplierError, Multipliers, Stability};
+pub use search::{OrbitSearch, find_orbits};
+pub use shooting::{
+    DivergenceReason, ShootingError, ShootingOptions, close_orbit, close_orbit_from_points,
+};
+
 use crate::vector::{distance, norm};
 
 /// A periodic orbit, its accuracy and its stability.

@@ -8,14 +8,13 @@
 //! Fails: where no size of a between a hundredth and a millionth of the orbit leads
 //! Newton to an orbit of doubled period.
 
-use crate::bifurcation::{Bifurcation, BifurcationKind};
-use crate::block_cyclic::BlockCyclic;
-use crate::branch_solver::Node;
-use crate::continuation::{
-    Branch, ContinuationError, ContinuationOptions, check, follow, solver_for,
-};
+use crate::continuation::bifurcation::{Bifurcation, BifurcationKind};
+use crate::continuation::follow::{check, follow, solver_for};
+use crate::continuation::solver::Node;
+use crate::continuation::{Branch, ContinuationError, ContinuationOptions};
 use crate::control::Control;
 use crate::map::MapFamily;
+use crate::orbit::block_cyclic::BlockCyclic;
 use crate::vector::{dot, norm, unit};
 
 /// Follows the doubled branch away from a flip.

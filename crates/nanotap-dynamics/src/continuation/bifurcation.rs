@@ -21,10 +21,10 @@
 
 use nalgebra::Complex;
 
-use crate::branch_solver::{BranchSolver, Node, OrbitTangency};
+use crate::continuation::solver::{BranchSolver, Node, OrbitTangency};
 use crate::map::MapFamily;
-use crate::multipliers::Multipliers;
 use crate::orbit::PeriodicOrbit;
+use crate::orbit::multipliers::Multipliers;
 use crate::vector::dot;
 
 /// What happens at a bifurcation point.

@@ -12,15 +12,15 @@
 //! Fails, with a typed reason: where no descent is possible (a residual minimum that
 //! is no orbit, a map that refuses), and near a multiplier +1 (fold), where the
 //! orbit is not isolated to rounding. Newton finds *an* orbit near the guess, not
-//! necessarily the one that the motion tends to: [`mod@crate::settle`] checks that.
+//! necessarily the one that the motion tends to: [`mod@crate::classify`] checks that.
 
 use nalgebra::DMatrix;
 
-use crate::block_cyclic::BlockCyclic;
 use crate::failure::{MapFailure, advance, advance_with_jacobian};
 use crate::map::StroboscopicMap;
-use crate::multipliers::{MultiplierError, Multipliers};
 use crate::orbit::PeriodicOrbit;
+use crate::orbit::block_cyclic::BlockCyclic;
+use crate::orbit::multipliers::{MultiplierError, Multipliers};
 use crate::vector::{distance, mix, norm, sum_of_squares};
 
 /// How hard Newton tries.

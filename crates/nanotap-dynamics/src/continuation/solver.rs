@@ -7,11 +7,11 @@
 
 use nalgebra::DMatrix;
 
-use crate::block_cyclic::BlockCyclic;
 use crate::failure::{MapFailure, advance_with_tangencies, finite};
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
-use crate::shooting::{Segments, ShootingError};
+use crate::orbit::block_cyclic::BlockCyclic;
+use crate::orbit::shooting::{Segments, ShootingError};
 use crate::vector::{distance, dot, norm};
 
 /// Newton steps after which a corrector gives up: the caller shortens its step.

@@ -7,15 +7,15 @@
 //!
 //! Fails by omission: isolated branches that no seed lies on are not found.
 
-use crate::bifurcation::BifurcationKind;
-use crate::branch_switching::switch_at_flip;
+use crate::continuation::bifurcation::BifurcationKind;
+use crate::continuation::switching::switch_at_flip;
 use crate::continuation::{
     Branch, BranchEnd, ContinuationError, ContinuationOptions, Direction, continue_orbit,
 };
 use crate::control::Control;
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
-use crate::shooting::{ShootingOptions, close_orbit_from_points};
+use crate::orbit::shooting::{ShootingOptions, close_orbit_from_points};
 
 /// How a diagram is assembled.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,8 +13,7 @@ use rayon::prelude::*;
 use crate::control::Control;
 use crate::failure::advance;
 use crate::map::StroboscopicMap;
-use crate::orbit::PeriodicOrbit;
-use crate::shooting::{ShootingOptions, close_orbit, close_orbit_from_points};
+use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit, close_orbit_from_points};
 use crate::vector::{distance, norm};
 
 /// What to search for orbits.

@@ -15,9 +15,12 @@
 //! [`Neighbourhood::holds`] and its users ask, on entry, that the next return has
 //! really contracted.
 
+mod adapted_norm;
+
 use nalgebra::DMatrix;
 
-use crate::adapted_norm::AdaptedNorm;
+pub(crate) use adapted_norm::AdaptedNorm;
+
 use crate::failure::{MapFailure, advance, advance_with_jacobian};
 use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
@@ -36,6 +39,8 @@ pub struct Neighbourhood {
     norm: AdaptedNorm,
     radius: f64,
     rate: f64,
+    /// −ln|μ| of the largest multiplier, per period.
+    decay: f64,
     /// Half width of the box that holds the ball: a cheap first test.
     extents: Vec<f64>,
     /// Below this distance rounding hides any contraction.
@@ -90,6 +95,7 @@ impl Neighbourhood {
                     norm,
                     radius,
                     rate,
+                    decay: -orbit.spectral_radius().ln() / orbit.period as f64,
                     floor,
                 }));
             }
@@ -147,15 +153,25 @@ impl Neighbourhood {
         Ok(after <= self.rate * before || after <= self.floor)
     }
 
+    /// Periods after which a motion that comes from a box with these sides, and decays
+    /// as the largest multiplier says, has entered the ball.
+    pub(crate) fn expected_entry(&self, sides: &[f64]) -> f64 {
+        self.widening(sides).ln() / self.decay
+    }
+
     /// Periods that the slowest linear decay needs from a box with these sides to the
     /// ball: the natural length of a transient that is no chaos.
     pub fn relaxation(&self, sides: &[f64]) -> f64 {
-        let ratio = sides
+        self.widening(sides).ln() * self.period as f64 / -self.rate.ln()
+    }
+
+    /// How many times wider than the ball a box with these sides is.
+    fn widening(&self, sides: &[f64]) -> f64 {
+        sides
             .iter()
             .zip(&self.extents)
             .map(|(s, e)| s / e.max(f64::MIN_POSITIVE))
-            .fold(1.0, f64::max);
-        ratio.ln() * self.period as f64 / -self.rate.ln()
+            .fold(1.0, f64::max)
     }
 }
 

@@ -6,17 +6,23 @@
 //! averages (`block_average.rs`), which follow the correlations of the motion.
 //!
 //! Fails: exponents of a finite stretch say nothing of what the motion does later;
-//! positive ones for thousands of periods may be a transient ([`mod@crate::settle`] and
+//! positive ones for thousands of periods may be a transient ([`mod@crate::classify`] and
 //! [`mod@crate::census`] look for the escape). Near zero, convergence is like 1/T with
 //! no random scatter, so a bar may understate the error by up to about
 //! log(stretch)/T. A singular Jacobian counts as a stretch of the smallest positive
 //! number.
 
+mod block_average;
+
 use nalgebra::DMatrix;
 
-use crate::block_average::BlockAverage;
+use block_average::BlockAverage;
+
 use crate::failure::{MapFailure, advance_with_jacobian};
 use crate::map::StroboscopicMap;
+
+/// Part of a Jacobian's largest entry below which a stretch is rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// How many periods to average over.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,6 +77,10 @@ pub struct LyapunovSpectrum {
     pub mean: Vec<f64>,
     /// One standard error of that mean.
     pub mean_errors: Vec<f64>,
+    /// Mean of log|det DP| over the same periods, which the sum of the exponents must
+    /// be: by other means than the Jacobian where the map has any
+    /// ([`StroboscopicMap::log_determinant`]), else by its LU factors.
+    pub log_determinant: f64,
 }
 
 impl LyapunovSpectrum {
@@ -80,6 +90,29 @@ impl LyapunovSpectrum {
             self.exponents.first().copied().unwrap_or(f64::NAN),
             self.errors.first().copied().unwrap_or(f64::NAN),
         )
+    }
+
+    /// True if two motions have the same exponents and mean states within six standard
+    /// errors of the difference (and what 1/T convergence leaves).
+    pub(crate) fn agrees_with(&self, other: &Self) -> bool {
+        let length = self.periods.min(other.periods).max(1) as f64;
+        let close = |x: f64, ex: f64, y: f64, ey: f64, floor: f64| {
+            (x - y).abs() <= 6.0 * ex.hypot(ey) + floor
+        };
+        let exponents = self
+            .exponents
+            .iter()
+            .zip(&self.errors)
+            .zip(other.exponents.iter().zip(&other.errors))
+            .all(|((x, ex), (y, ey))| close(*x, *ex, *y, *ey, 20.0 / length));
+        let scale = self.mean.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let means = self
+            .mean
+            .iter()
+            .zip(&self.mean_errors)
+            .zip(other.mean.iter().zip(&other.mean_errors))
+            .all(|((x, ex), (y, ey))| close(*x, *ex, *y, *ey, 20.0 * scale / length));
+        exponents && means
     }
 
     /// Kaplan–Yorke dimension of the strobe points: j + Σ_{i≤j}λ_i/|λ_{j+1}| for the
@@ -128,7 +161,7 @@ pub(crate) struct LyapunovRun {
     frame: Vec<f64>,
     image: Vec<f64>,
     jacobian: DMatrix<f64>,
-    /// Logarithms of the stretches, then the state.
+    /// Logarithms of the stretches, the state, log|det DP|.
     sample: Vec<f64>,
     average: BlockAverage,
 }
@@ -144,8 +177,8 @@ impl LyapunovRun {
             image: frame.clone(),
             frame,
             jacobian: DMatrix::zeros(d, d),
-            sample: vec![0.0; 2 * d],
-            average: BlockAverage::new(2 * d),
+            sample: vec![0.0; 2 * d + 1],
+            average: BlockAverage::new(2 * d + 1),
         }
     }
 
@@ -181,7 +214,7 @@ impl LyapunovRun {
     /// Counts the period just stepped, which ended at `state`.
     #[inline]
     pub(crate) fn record(&mut self, state: &[f64]) {
-        self.sample[self.d..].copy_from_slice(state);
+        self.sample[self.d..2 * self.d].copy_from_slice(state);
         self.average.push(&self.sample);
     }
 
@@ -191,8 +224,9 @@ impl LyapunovRun {
         map: &mut M,
         state: &mut [f64],
     ) -> Result<(), MapFailure> {
-        advance_with_jacobian(map, state, &mut self.jacobian)?;
         let d = self.d;
+        let exact = map.log_determinant(state).map_err(MapFailure::refused)?;
+        advance_with_jacobian(map, state, &mut self.jacobian)?;
         let jacobian = self.jacobian.as_slice();
         self.image.fill(0.0);
         for (image, frame) in self
@@ -208,6 +242,18 @@ impl LyapunovRun {
         }
         self.orthonormalise();
         std::mem::swap(&mut self.frame, &mut self.image);
+        self.sample[2 * d] = exact.unwrap_or_else(|| log_determinant(&self.jacobian));
+        if let Some(exact) = exact
+            && d > 1
+        {
+            // A direction shrunk below the rounding of the Jacobian has lost its length:
+            // what the determinant leaves over is the last direction's.
+            let others: f64 = self.sample[..d - 1].iter().sum();
+            let hidden = self.jacobian.amax() * ROUNDING;
+            if exact - others < hidden.ln() {
+                self.sample[d - 1] = exact - others;
+            }
+        }
         Ok(())
     }
 
@@ -246,10 +292,21 @@ impl LyapunovRun {
             exponents: order.iter().map(|&i| mean[i]).collect(),
             errors: order.iter().map(|&i| errors[i]).collect(),
             periods: self.periods(),
-            mean: mean[d..].to_vec(),
-            mean_errors: errors[d..].to_vec(),
+            mean: mean[d..2 * d].to_vec(),
+            mean_errors: errors[d..2 * d].to_vec(),
+            log_determinant: mean[2 * d],
         }
     }
+}
+
+/// log|det A| by LU, of the smallest positive number where it vanishes.
+fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
+    let lu = matrix.clone().lu();
+    let pivots = lu.u().diagonal();
+    pivots
+        .iter()
+        .map(|v| v.abs().max(f64::MIN_POSITIVE).ln())
+        .sum()
 }
 
 /// Removes from `v` its parts along the orthonormal rows of `done`, twice, and

@@ -21,15 +21,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::bifurcation::{Bifurcation, BifurcationKind};
-use crate::branch_solver::OrbitTangency;
+use crate::continuation::bifurcation::{Bifurcation, BifurcationKind};
+use crate::continuation::solver::OrbitTangency;
 use crate::continuation::{BranchEnd, ContinuationError};
 use crate::control::Control;
 use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
 use crate::map::StroboscopicMap;
-use crate::multipliers::Multipliers;
 use crate::orbit::PeriodicOrbit;
-use crate::shooting::Segments;
+use crate::orbit::multipliers::Multipliers;
+use crate::orbit::shooting::Segments;
 use crate::vector::{distance, norm, unit};
 
 /// A two-parameter family of stroboscopic maps.

@@ -1,0 +1,249 @@
+//! From what every start came to, to attractors with their counts.
+
+use crate::census::escapes::Escapes;
+use crate::census::{
+    Attractor, AttractorKind, Census, Fate, Fraction, Lifetime, Outcome, SizeCount, StartOrigin,
+    StartSet, TransientChaos, Unseen,
+};
+use crate::control::Control;
+use crate::lyapunov::LyapunovSpectrum;
+use crate::orbit::PeriodicOrbit;
+
+/// A group of starts on the same motion.
+struct Group {
+    kind: AttractorKind,
+    members: Vec<usize>,
+    state: Vec<f64>,
+}
+
+pub(crate) fn assemble(
+    outcomes: &[Outcome],
+    starts: &StartSet,
+    orbits: Vec<PeriodicOrbit>,
+    relaxation: f64,
+    transient_spectrum: Option<LyapunovSpectrum>,
+    row: usize,
+    control: &Control<'_>,
+) -> Census {
+    let total = outcomes.len();
+    let mut groups: Vec<Group> = orbits
+        .into_iter()
+        .map(|orbit| Group {
+            state: orbit.states[0].clone(),
+            kind: AttractorKind::Periodic(orbit),
+            members: Vec::new(),
+        })
+        .collect();
+    let escapes = Escapes::count(outcomes, relaxation);
+    let chaos_lasts = escapes.chaos_lasts();
+    let mut undecided = Vec::new();
+    let mut unbounded = Vec::new();
+    let mut wandering = Vec::new();
+    let mut wandering_spectrum = transient_spectrum;
+    for (k, outcome) in outcomes.iter().enumerate() {
+        match outcome {
+            Outcome::Orbit { index, .. } => groups[*index].members.push(k),
+            Outcome::Torus(torus, state) => {
+                let found = groups.iter_mut().find(|g| {
+                    matches!(&g.kind, AttractorKind::QuasiPeriodic(t)
+                        if t.spectrum.agrees_with(&torus.spectrum))
+                });
+                if let Some((members, state)) = join(found, k, state) {
+                    groups.push(Group {
+                        kind: AttractorKind::QuasiPeriodic(torus.clone()),
+                        members,
+                        state,
+                    });
+                }
+            }
+            Outcome::Chaos(chaos, _) if !chaos_lasts => {
+                wandering.push(k);
+                if wandering.len() == 1 {
+                    wandering_spectrum = Some(chaos.spectrum.clone());
+                }
+            }
+            Outcome::Chaos(chaos, state) => {
+                let found = groups.iter_mut().find(|g| {
+                    matches!(&g.kind, AttractorKind::Chaotic { spectrum, .. }
+                        if spectrum.agrees_with(&chaos.spectrum))
+                });
+                if let Some((members, state)) = join(found, k, state) {
+                    groups.push(Group {
+                        kind: AttractorKind::Chaotic {
+                            spectrum: chaos.spectrum.clone(),
+                            lifetime: Lifetime::new(0, 0.0),
+                        },
+                        members,
+                        state,
+                    });
+                }
+            }
+            Outcome::Unbounded => unbounded.push(k),
+            Outcome::Undecided(reason) => undecided.push((k, reason.clone())),
+        }
+    }
+    for group in &mut groups {
+        if let AttractorKind::Chaotic { lifetime, .. } = &mut group.kind {
+            let exposure = group
+                .members
+                .iter()
+                .map(|&k| match &outcomes[k] {
+                    Outcome::Chaos(chaos, _) => escapes.exposure_without_escape(chaos.observed),
+                    _ => 0.0,
+                })
+                .sum();
+            *lifetime = Lifetime::new(0, exposure);
+        }
+    }
+    let counts = Counts::new(starts, total);
+    let members = |g: &Group| counts.of(&g.members);
+    // Most frequent first; the first member breaks ties.
+    let mut order: Vec<usize> = (0..groups.len()).collect();
+    order.sort_by_key(|&g| {
+        let first = groups[g].members.first().copied().unwrap_or(usize::MAX);
+        (usize::MAX - members(&groups[g]).count, first)
+    });
+    let mut fates = vec![Fate::Undecided; total];
+    for (index, &g) in order.iter().enumerate() {
+        for &k in &groups[g].members {
+            fates[k] = Fate::Attractor {
+                index,
+                periods: periods_of(&outcomes[k]),
+            };
+        }
+    }
+    for &k in &wandering {
+        fates[k] = Fate::Wandering {
+            periods: periods_of(&outcomes[k]),
+        };
+    }
+    for (fate, outcome) in fates.iter_mut().zip(outcomes) {
+        if matches!(outcome, Outcome::Unbounded) {
+            *fate = Fate::Unbounded;
+        }
+    }
+    let transient_chaos = wandering_spectrum
+        .filter(|_| escapes.escaped.len() + wandering.len() > 0)
+        .map(|spectrum| TransientChaos {
+            spectrum,
+            lifetime: escapes.lifetime(),
+            wandering: counts.of(&wandering),
+            destinations: destinations(&escapes.escaped, &fates, order.len()),
+        });
+    let by_size = counts.by_size(&fates, order.len());
+    let unseen = (!by_size.is_empty()).then(|| Unseen::new(order.len(), row));
+    let mut slots: Vec<Option<Group>> = groups.into_iter().map(Some).collect();
+    let attractors = order
+        .iter()
+        .filter_map(|&g| slots[g].take())
+        .map(|g| Attractor {
+            fraction: counts.of(&g.members),
+            first_start: g.members.first().copied(),
+            kind: g.kind,
+            state: g.state,
+        })
+        .collect();
+    Census {
+        attractors,
+        transient_chaos,
+        unbounded: counts.of(&unbounded),
+        undecided,
+        fates,
+        counted: counts.counted,
+        by_size,
+        unseen,
+        cancelled: control.is_cancelled(),
+    }
+}
+
+/// Adds start `k` to a group that is there, or hands back what a new one needs.
+fn join(found: Option<&mut Group>, k: usize, state: &[f64]) -> Option<(Vec<usize>, Vec<f64>)> {
+    if let Some(group) = found {
+        group.members.push(k);
+        None
+    } else {
+        Some((vec![k], state.to_vec()))
+    }
+}
+
+pub(crate) fn periods_of(outcome: &Outcome) -> usize {
+    match outcome {
+        Outcome::Orbit { periods, .. } => *periods,
+        Outcome::Chaos(chaos, _) => chaos.observed,
+        Outcome::Torus(torus, _) => torus.spectrum.periods,
+        Outcome::Unbounded | Outcome::Undecided(_) => 0,
+    }
+}
+
+fn destinations(
+    escaped: &[(usize, usize)],
+    fates: &[Fate],
+    attractors: usize,
+) -> Vec<(usize, usize)> {
+    let mut counts = vec![0; attractors];
+    for &(k, _) in escaped {
+        if let Fate::Attractor { index, .. } = fates[k] {
+            counts[index] += 1;
+        }
+    }
+    counts
+        .into_iter()
+        .enumerate()
+        .filter(|(_, count)| *count > 0)
+        .collect()
+}
+
+/// What fractions are of.
+struct Counts<'a> {
+    starts: &'a StartSet,
+    total: usize,
+    counted: usize,
+}
+
+impl<'a> Counts<'a> {
+    fn new(starts: &'a StartSet, total: usize) -> Self {
+        let counted = match starts.len() {
+            Some(_) => total,
+            None => total.saturating_sub(starts.given_count()),
+        };
+        Self {
+            starts,
+            total,
+            counted,
+        }
+    }
+
+    /// The part that these starts are of all that count.
+    fn of(&self, members: &[usize]) -> Fraction {
+        let uncounted = self.total - self.counted;
+        let count = members.iter().filter(|&&k| k >= uncounted).count();
+        Fraction::new(count, self.counted)
+    }
+
+    fn by_size(&self, fates: &[Fate], attractors: usize) -> Vec<SizeCount> {
+        let scales = self.starts.scales();
+        (0..scales.len())
+            .map(|size| {
+                let of_this_size: Vec<Fate> = (0..fates.len())
+                    .filter(|&k| self.starts.origin(k) == Some(StartOrigin::Drawn(size)))
+                    .map(|k| fates[k])
+                    .collect();
+                let part = |is: &dyn Fn(&Fate) -> bool| {
+                    let count = of_this_size.iter().filter(|f| is(f)).count();
+                    Fraction::new(count, of_this_size.len())
+                };
+                SizeCount {
+                    scale: scales[size],
+                    starts: of_this_size.len(),
+                    attractors: (0..attractors)
+                        .map(|a| {
+                            part(&|f| matches!(f, Fate::Attractor { index, .. } if *index == a))
+                        })
+                        .collect(),
+                    unbounded: part(&|f| matches!(f, Fate::Unbounded)),
+                    undecided: part(&|f| matches!(f, Fate::Undecided | Fate::Wandering { .. })),
+                }
+            })
+            .collect()
+    }
+}

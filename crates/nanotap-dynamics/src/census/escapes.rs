@@ -1,0 +1,80 @@
+//! How often starts escape from a motion that seems chaotic.
+
+use crate::census::Outcome;
+use crate::census::confidence::Lifetime;
+
+/// Escapes of starts that outlived every linear transient.
+pub(crate) struct Escapes {
+    /// Periods up to which nothing is counted.
+    after: f64,
+    /// Start and periods of each escape.
+    pub(crate) escaped: Vec<(usize, usize)>,
+    /// Periods watched of each start that is still chaotic.
+    wandering: Vec<usize>,
+}
+
+impl Escapes {
+    pub(crate) fn count(outcomes: &[Outcome], relaxation: f64) -> Self {
+        let after = (3.0 * relaxation).max(64.0);
+        let mut escaped = Vec::new();
+        let mut wandering = Vec::new();
+        for (k, outcome) in outcomes.iter().enumerate() {
+            match outcome {
+                Outcome::Orbit { periods, .. } if *periods as f64 > after => {
+                    escaped.push((k, *periods));
+                }
+                Outcome::Chaos(chaos, _) => wandering.push(chaos.observed),
+                _ => {}
+            }
+        }
+        Self {
+            after,
+            escaped,
+            wandering,
+        }
+    }
+
+    /// End of the first quarter of the time for which all wanderers were watched.
+    fn early(&self) -> f64 {
+        let end = self.wandering.iter().copied().min().unwrap_or(0) as f64;
+        self.after + 0.25 * (end - self.after).max(0.0)
+    }
+
+    fn exposure_between(&self, from: f64, to: f64) -> f64 {
+        let share = |t: usize| ((t as f64).min(to) - from).max(0.0);
+        self.escaped.iter().map(|&(_, t)| share(t)).sum::<f64>()
+            + self.wandering.iter().map(|&t| share(t)).sum::<f64>()
+    }
+
+    pub(crate) fn lifetime(&self) -> Lifetime {
+        Lifetime::new(
+            self.escaped.len(),
+            self.exposure_between(self.after, f64::INFINITY),
+        )
+    }
+
+    /// True if the wanderers are on an attractor: none escaped, or escapes stopped
+    /// early in a way that a constant rate would show with probability below 1 %.
+    pub(crate) fn chaos_lasts(&self) -> bool {
+        if self.escaped.is_empty() {
+            return true;
+        }
+        let early = self.early();
+        if self.escaped.iter().any(|&(_, t)| t as f64 > early) {
+            return false;
+        }
+        let rate = self.escaped.len() as f64 / self.exposure_between(self.after, early).max(1.0);
+        let expected = rate * self.exposure_between(early, f64::INFINITY);
+        expected > 100f64.ln()
+    }
+
+    /// Part of a wanderer's time that counts towards "none escaped".
+    pub(crate) fn exposure_without_escape(&self, observed: usize) -> f64 {
+        let from = if self.escaped.is_empty() {
+            self.after.min(observed as f64)
+        } else {
+            self.early()
+        };
+        (observed as f64 - from).max(0.0)
+    }
+}

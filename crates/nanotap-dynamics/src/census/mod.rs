@@ -1,0 +1,511 @@
+//! Which attractors there are, and what part of a set of starts goes to each.
+//!
+//! 1. Pilot starts are classified one by one ([`mod@crate::classify`]); orbits that are
+//!    the same up to a cyclic shift, within their own error estimates, are merged.
+//! 2. Around each stable orbit a contracting neighbourhood is found
+//!    ([`crate::neighbourhood`]). A neighbourhood that a start with another
+//!    destination enters is discarded.
+//! 3. The other starts follow in batches. Each is run until it enters a neighbourhood,
+//!    or is classified like a pilot; what a batch finds is known to the next.
+//! 4. Starts that can be drawn without end ([`StartSet`]) go on until the share of
+//!    them that may lead to motions not yet found is bounded ([`Unseen`]) as the
+//!    options ask, or the budget is spent. Stable orbits that Newton closed on the way
+//!    are attractors too, with a fraction of zero if no start goes there.
+//! 5. Motions that do not close are merged when their exponents and mean states
+//!    agree within six standard errors.
+//! 6. Chaos is claimed as an attractor only if no run escaped from it, with the mean
+//!    lifetime that this bounds from below. If runs that outlived every linear
+//!    transient escaped while others are still on it, it is transient chaos, with its
+//!    lifetime and where the escaped ones went.
+//!
+//! What happens to a start depends on the map, the starts before it and itself alone,
+//! so the result is the same for any number of threads and any order of work.
+//!
+//! Fails: attractors whose basins are a smaller part of the set of starts than
+//! [`Census::unseen`] says are missed; two different chaotic attractors with equal
+//! exponents and means would be merged; an attractor and a chaotic transient beside it
+//! are told apart only by the hazard of escape falling with time, as documented at
+//! [`Census::transient_chaos`].
+
+mod assemble;
+mod confidence;
+mod escapes;
+mod start_box;
+mod start_set;
+mod unseen;
+
+use std::sync::atomic::AtomicUsize;
+
+use rayon::prelude::*;
+
+use crate::classify::{
+    Arrival, Chaos, Known, SettleOptions, Settled, Torus, UndecidedReason, Verdict, arrive,
+};
+use crate::control::Control;
+use crate::lyapunov::LyapunovSpectrum;
+use crate::map::StroboscopicMap;
+use crate::neighbourhood::Neighbourhood;
+use crate::orbit::PeriodicOrbit;
+use crate::orbit::search::merge;
+
+pub use confidence::{Fraction, Lifetime};
+pub use start_box::{StartBox, StartBoxError};
+pub use start_set::{StartOrigin, StartSet};
+pub use unseen::Unseen;
+
+/// Starts of one batch after the pilots.
+const BATCH: usize = 128;
+/// Periods for which a start that enters no neighbourhood is left to itself at least,
+/// once attractors are known.
+const LEAST_PATIENCE: usize = 64;
+
+/// How a census is taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CensusOptions {
+    /// Starts that are classified without knowledge of any attractor.
+    pub pilots: usize,
+    /// Budgets of each start.
+    pub settle: SettleOptions,
+    /// Drawn starts go on until the share that may lead to motions not yet found is
+    /// below this with 95 % confidence.
+    pub unseen: f64,
+    /// Drawn starts at most, whatever that bound is then.
+    pub max_starts: usize,
+    /// Periods of all starts together after which no further batch is begun.
+    pub max_periods: usize,
+}
+
+impl Default for CensusOptions {
+    fn default() -> Self {
+        Self {
+            pilots: 32,
+            settle: SettleOptions::default(),
+            unseen: 0.002,
+            max_starts: 5000,
+            max_periods: 2_000_000,
+        }
+    }
+}
+
+/// What a census found.
+#[derive(Clone, Debug)]
+pub struct Census {
+    /// Attractors, most frequent first.
+    pub attractors: Vec<Attractor>,
+    /// Chaos from which some starts escaped while it was watched.
+    ///
+    /// Counted are starts that are in no attractor's neighbourhood after three times
+    /// the slowest linear decay from the box (64 periods at least). If some of them
+    /// escape and others have not yet, the others are on transient chaos, unless all
+    /// escapes fell in the first quarter of the time watched and that would happen
+    /// with probability below 1 % at a constant rate: then there is an attractor,
+    /// with a chaotic transient beside it.
+    pub transient_chaos: Option<TransientChaos>,
+    /// Starts that left every bound.
+    pub unbounded: Fraction,
+    /// Starts without a verdict, by index.
+    pub undecided: Vec<(usize, UndecidedReason)>,
+    /// What happened to each start.
+    pub fates: Vec<Fate>,
+    /// What the fractions are of: all starts of a set of given ones, the drawn starts
+    /// of one that is drawn.
+    pub counted: usize,
+    /// The same counts for every size of the set of starts; empty if none was drawn.
+    pub by_size: Vec<SizeCount>,
+    /// How much of the set of starts may lead to motions not found; `None` if no start
+    /// was drawn.
+    pub unseen: Option<Unseen>,
+    /// True if the work was stopped before all starts were done.
+    pub cancelled: bool,
+}
+
+/// What happened to the starts of one size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SizeCount {
+    /// Its scale, 1 for the largest box.
+    pub scale: f64,
+    /// Starts of this size.
+    pub starts: usize,
+    /// Part that goes to each attractor, in the order of [`Census::attractors`].
+    pub attractors: Vec<Fraction>,
+    /// Part that left every bound.
+    pub unbounded: Fraction,
+    /// Part without a verdict, or on transient chaos.
+    pub undecided: Fraction,
+}
+
+/// One attractor.
+#[derive(Clone, Debug)]
+pub struct Attractor {
+    /// What it is.
+    pub kind: AttractorKind,
+    /// What part of the starts goes there.
+    pub fraction: Fraction,
+    /// Index of the first start that does; `None` if none does and Newton found it.
+    pub first_start: Option<usize>,
+    /// A state on the attractor.
+    pub state: Vec<f64>,
+}
+
+/// What an attractor is, with the evidence.
+#[derive(Clone, Debug)]
+pub enum AttractorKind {
+    /// A stable periodic orbit.
+    Periodic(PeriodicOrbit),
+    /// A torus.
+    QuasiPeriodic(Torus),
+    /// Chaos, from which none escaped.
+    Chaotic {
+        /// Exponents, of the first start that found it.
+        spectrum: LyapunovSpectrum,
+        /// Lower bound on the mean lifetime, over all starts on it.
+        lifetime: Lifetime,
+    },
+}
+
+/// Chaos that ends.
+#[derive(Clone, Debug)]
+pub struct TransientChaos {
+    /// Exponents while it lasts, of the first start seen on it.
+    pub spectrum: LyapunovSpectrum,
+    /// Mean lifetime in periods, by maximum likelihood with the wanderers censored.
+    pub lifetime: Lifetime,
+    /// Starts still wandering at the end.
+    pub wandering: Fraction,
+    /// Attractors (by index) that escaped starts went to, with counts.
+    pub destinations: Vec<(usize, usize)>,
+}
+
+/// What happened to a start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It went to this attractor, and was known to after so many periods.
+    Attractor {
+        /// Index into [`Census::attractors`].
+        index: usize,
+        /// Periods run.
+        periods: usize,
+    },
+    /// It was still on the transient chaos after so many periods.
+    Wandering {
+        /// Periods run.
+        periods: usize,
+    },
+    /// It left every bound.
+    Unbounded,
+    /// No verdict; the reason is in [`Census::undecided`].
+    Undecided,
+}
+
+/// What one start came to, before attractors are put together.
+enum Outcome {
+    Orbit { index: usize, periods: usize },
+    Torus(Torus, Vec<f64>),
+    Chaos(Chaos, Vec<f64>),
+    Unbounded,
+    Undecided(UndecidedReason),
+}
+
+/// Takes the census of all `starts` (each of the map's dimension).
+pub fn census<M: StroboscopicMap>(
+    map: &M,
+    starts: &[Vec<f64>],
+    options: &CensusOptions,
+    control: &Control<'_>,
+) -> Census {
+    census_of(map, &StartSet::given(starts.to_vec()), options, control)
+}
+
+/// Takes the census of a set of starts.
+pub fn census_of<M: StroboscopicMap>(
+    map: &M,
+    starts: &StartSet,
+    options: &CensusOptions,
+    control: &Control<'_>,
+) -> Census {
+    let given = starts.given_count();
+    let last = starts
+        .len()
+        .unwrap_or_else(|| given.saturating_add(options.max_starts));
+    let mut work = Work {
+        map,
+        starts,
+        options,
+        control,
+        done: AtomicUsize::new(0),
+        last,
+        outcomes: Vec::new(),
+        orbits: Vec::new(),
+        neighbourhoods: Vec::new(),
+        motions: 0,
+        chaos: Vec::new(),
+        transient_spectrum: None,
+        patience: 0,
+        periods: 0,
+        row: 0,
+    };
+    let mut size = options.pilots.max(1);
+    while work.outcomes.len() < last && !work.is_enough() {
+        work.batch(size);
+        size = BATCH;
+    }
+    let relaxation = work.relaxation();
+    assemble::assemble(
+        &work.outcomes,
+        starts,
+        work.orbits,
+        relaxation,
+        work.transient_spectrum,
+        work.row,
+        control,
+    )
+}
+
+/// A census under way.
+struct Work<'a, M> {
+    map: &'a M,
+    starts: &'a StartSet,
+    options: &'a CensusOptions,
+    control: &'a Control<'a>,
+    done: AtomicUsize,
+    /// Starts at most.
+    last: usize,
+    outcomes: Vec<Outcome>,
+    orbits: Vec<PeriodicOrbit>,
+    /// Index of an orbit and a neighbourhood of it.
+    neighbourhoods: Vec<(usize, Neighbourhood)>,
+    /// Orbits whose neighbourhood was looked for.
+    motions: usize,
+    /// Spectra of the chaotic motions and tori found, one of each.
+    chaos: Vec<LyapunovSpectrum>,
+    transient_spectrum: Option<LyapunovSpectrum>,
+    /// Periods after which most starts are in a neighbourhood.
+    patience: usize,
+    /// Periods run so far.
+    periods: usize,
+    /// Drawn starts with a verdict since the last new motion.
+    row: usize,
+}
+
+impl<M: StroboscopicMap> Work<'_, M> {
+    /// True if the next batch is not wanted.
+    fn is_enough(&self) -> bool {
+        if self.starts.len().is_some() {
+            return false;
+        }
+        let found = self.orbits.len() + self.chaos.len();
+        self.control.is_cancelled()
+            || Unseen::new(found, self.row).share <= self.options.unseen
+            || self.outcomes.len() > self.starts.given_count()
+                && self.periods >= self.options.max_periods
+    }
+
+    /// Runs the next `size` starts.
+    fn batch(&mut self, size: usize) {
+        let first = self.outcomes.len();
+        let range: Vec<usize> = (first..self.last.min(first + size)).collect();
+        let arrivals = self.run(&range, true);
+        let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
+        let mut classified = Vec::new();
+        for (k, arrival) in range.into_iter().zip(arrivals) {
+            let before = self.orbits.len() + self.chaos.len();
+            if matches!(arrival, Some(Arrival::Settled(_))) {
+                classified.push(k);
+            }
+            let outcome = self.outcome(arrival, &known);
+            self.periods += assemble::periods_of(&outcome);
+            let drawn = matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
+            if self.orbits.len() + self.chaos.len() > before {
+                self.row = 0;
+            } else if drawn && !matches!(outcome, Outcome::Undecided(_)) {
+                self.row += 1;
+            }
+            self.outcomes.push(outcome);
+        }
+        self.find_neighbourhoods();
+        self.check_neighbourhoods(&classified);
+        let sides = self.sides();
+        self.patience = self
+            .neighbourhoods
+            .iter()
+            .map(|(_, ball)| ball.expected_entry(&sides) as usize)
+            .fold(0, usize::max)
+            .clamp(
+                LEAST_PATIENCE,
+                self.options.settle.max_transient.max(LEAST_PATIENCE),
+            );
+    }
+
+    /// Sides of the box around the starts so far.
+    fn sides(&self) -> Vec<f64> {
+        sides(&(0..self.outcomes.len()).filter_map(|k| self.starts.start(k)))
+    }
+
+    fn run(&self, indices: &[usize], count: bool) -> Vec<Option<Arrival>> {
+        let balls: Vec<Neighbourhood> = self
+            .neighbourhoods
+            .iter()
+            .map(|(_, ball)| ball.clone())
+            .collect();
+        let known = Known {
+            balls: &balls,
+            chaos: &self.chaos,
+            patience: self.patience,
+        };
+        indices
+            .par_iter()
+            .map_init(
+                || self.map.clone(),
+                |map, &k| {
+                    if self.control.is_cancelled() {
+                        return None;
+                    }
+                    let start = self.starts.start(k)?;
+                    let arrival = arrive(map, &start, known, &self.options.settle);
+                    if count {
+                        self.control.report(&self.done, self.last);
+                    }
+                    Some(arrival)
+                },
+            )
+            .collect()
+    }
+
+    fn outcome(&mut self, arrival: Option<Arrival>, known: &[usize]) -> Outcome {
+        let settled = match arrival {
+            None => return Outcome::Undecided(UndecidedReason::Cancelled),
+            Some(Arrival::Entered { index, periods }) => {
+                return Outcome::Orbit {
+                    index: known[index],
+                    periods,
+                };
+            }
+            Some(Arrival::Settled(settled)) => *settled,
+        };
+        let Settled {
+            verdict,
+            periods,
+            state,
+            met,
+        } = settled;
+        let outcome = match verdict {
+            Verdict::Periodic(orbit) => Outcome::Orbit {
+                index: merge(&mut self.orbits, orbit),
+                periods,
+            },
+            Verdict::TransientChaos {
+                orbit, spectrum, ..
+            } => {
+                self.transient_spectrum.get_or_insert(spectrum);
+                Outcome::Orbit {
+                    index: merge(&mut self.orbits, orbit),
+                    periods,
+                }
+            }
+            Verdict::QuasiPeriodic(torus) => {
+                self.know(&torus.spectrum);
+                Outcome::Torus(torus, state)
+            }
+            Verdict::Chaotic(chaos) => {
+                self.know(&chaos.spectrum);
+                Outcome::Chaos(chaos, state)
+            }
+            Verdict::Unbounded => Outcome::Unbounded,
+            Verdict::Undecided { reason, .. } => Outcome::Undecided(reason),
+        };
+        for orbit in met {
+            merge(&mut self.orbits, orbit);
+        }
+        outcome
+    }
+
+    fn know(&mut self, spectrum: &LyapunovSpectrum) {
+        if !self.chaos.iter().any(|k| k.agrees_with(spectrum)) {
+            self.chaos.push(spectrum.clone());
+        }
+    }
+
+    /// Looks for the contracting neighbourhoods of the orbits that are new.
+    fn find_neighbourhoods(&mut self) {
+        let new: Vec<(usize, Neighbourhood)> = self.orbits[self.motions..]
+            .par_iter()
+            .enumerate()
+            .map_init(
+                || self.map.clone(),
+                |map, (k, orbit)| {
+                    let found = Neighbourhood::around(map, orbit).ok().flatten()?;
+                    Some((self.motions + k, found))
+                },
+            )
+            .collect::<Vec<_>>()
+            .into_iter()
+            .flatten()
+            .collect();
+        self.motions = self.orbits.len();
+        self.neighbourhoods.extend(new);
+    }
+
+    /// How long the starts that were `classified` really took, now that their goal is
+    /// known; and a check of the neighbourhoods by starts whose destination was found
+    /// without them.
+    fn check_neighbourhoods(&mut self, classified: &[usize]) {
+        let checked: Vec<usize> = classified
+            .iter()
+            .copied()
+            .filter(|&k| match self.outcomes[k] {
+                Outcome::Orbit { index, .. } => {
+                    self.neighbourhoods.iter().any(|(i, _)| *i == index)
+                }
+                _ => false,
+            })
+            .collect();
+        let mut discarded = Vec::new();
+        for (&k, arrival) in checked.iter().zip(self.run(&checked, false)) {
+            let (
+                Outcome::Orbit { index, periods },
+                Some(Arrival::Entered {
+                    index: ball,
+                    periods: after,
+                }),
+            ) = (&mut self.outcomes[k], arrival)
+            else {
+                continue;
+            };
+            if self.neighbourhoods[ball].0 == *index {
+                *periods = after;
+            } else {
+                discarded.push(ball);
+            }
+        }
+        let mut position = 0;
+        self.neighbourhoods.retain(|_| {
+            position += 1;
+            !discarded.contains(&(position - 1))
+        });
+    }
+
+    /// The natural length of a transient that is no chaos.
+    fn relaxation(&self) -> f64 {
+        let sides = self.sides();
+        self.neighbourhoods
+            .iter()
+            .map(|(_, ball)| ball.relaxation(&sides))
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Sides of the box around some starts.
+fn sides(starts: &(impl Iterator<Item = Vec<f64>> + Clone)) -> Vec<f64> {
+    let Some(first) = starts.clone().next() else {
+        return Vec::new();
+    };
+    let mut low = first.clone();
+    let mut high = first;
+    for start in starts.clone() {
+        for (v, (l, h)) in start.iter().zip(low.iter_mut().zip(&mut high)) {
+            *l = l.min(*v);
+            *h = h.max(*v);
+        }
+    }
+    low.iter().zip(&high).map(|(l, h)| h - l).collect()
+}

@@ -1,0 +1,210 @@
+//! The starts of a census: states that were given, then seeded draws from boxes of
+//! several sizes around one centre.
+//!
+//! No single size is right. A box as wide as the resonant response holds the basin of
+//! a subharmonic a hundred times smaller as one part in a million, and a box as small
+//! as that subharmonic has none of the large motions. Sizes therefore run down
+//! logarithmically, and the drawn starts take them in turn, so that any number of
+//! starts has (nearly) as many of each. What fraction of the starts goes somewhere is
+//! a property of this set, not of the motion alone.
+//!
+//! The k-th start depends on the set and k alone.
+
+use crate::census::start_box::{StartBox, StartBoxError};
+use crate::vector::mix;
+
+/// Where starts come from. Every set has a first start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartSet {
+    given: Vec<Vec<f64>>,
+    sizes: Vec<Size>,
+    seed: u64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Size {
+    scale: f64,
+    sides: StartBox,
+}
+
+/// Where one start comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartOrigin {
+    /// It was given as a state, with this index.
+    Given(usize),
+    /// It was drawn from the box of the size with this index.
+    Drawn(usize),
+}
+
+impl StartSet {
+    /// Draws from one box.
+    pub fn drawn(sides: StartBox, seed: u64) -> Self {
+        Self {
+            given: Vec::new(),
+            sizes: vec![Size { scale: 1.0, sides }],
+            seed,
+        }
+    }
+
+    /// Draws from `sides` shrunk towards `centre` by each of `scales` (1 is the box as
+    /// it is).
+    ///
+    /// # Errors
+    /// [`StartBoxError::Length`] if the centre has another dimension than the box or
+    /// there is no scale, [`StartBoxError::Side`] if a shrunk side is no interval
+    /// between finite numbers.
+    pub fn spread(
+        sides: &StartBox,
+        centre: &[f64],
+        scales: &[f64],
+        seed: u64,
+    ) -> Result<Self, StartBoxError> {
+        if centre.len() != sides.dimension() || scales.is_empty() {
+            return Err(StartBoxError::Length {
+                lower: sides.dimension(),
+                upper: centre.len().min(scales.len()),
+            });
+        }
+        let towards = |side: &[f64], scale: f64| -> Vec<f64> {
+            side.iter()
+                .zip(centre)
+                .map(|(s, c)| c + scale * (s - c))
+                .collect()
+        };
+        let sizes = scales
+            .iter()
+            .map(|&scale| {
+                let (lower, upper) = (towards(sides.lower(), scale), towards(sides.upper(), scale));
+                Ok(Size {
+                    scale,
+                    sides: StartBox::new(lower, upper)?,
+                })
+            })
+            .collect::<Result<_, StartBoxError>>()?;
+        Ok(Self {
+            given: Vec::new(),
+            sizes,
+            seed,
+        })
+    }
+
+    /// These states and no others.
+    pub fn given(states: Vec<Vec<f64>>) -> Self {
+        Self {
+            given: states,
+            sizes: Vec::new(),
+            seed: 0,
+        }
+    }
+
+    /// The same set with these states before the others. They are run, but count in no
+    /// fraction of a set that is drawn.
+    #[must_use]
+    pub fn with_given(mut self, states: impl IntoIterator<Item = Vec<f64>>) -> Self {
+        self.given.extend(states);
+        self
+    }
+
+    /// How many states were given.
+    pub fn given_count(&self) -> usize {
+        self.given.len()
+    }
+
+    /// The scale of every size, in the order in which they are drawn.
+    pub fn scales(&self) -> Vec<f64> {
+        self.sizes.iter().map(|s| s.scale).collect()
+    }
+
+    /// The boxes of every size.
+    pub fn boxes(&self) -> impl Iterator<Item = &StartBox> {
+        self.sizes.iter().map(|s| &s.sides)
+    }
+
+    /// The seed of the draws.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// How many starts there are; `None` if they can be drawn without end.
+    pub fn len(&self) -> Option<usize> {
+        self.sizes.is_empty().then_some(self.given.len())
+    }
+
+    /// True if there is no start at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == Some(0)
+    }
+
+    /// Where the `index`-th start comes from; `None` if there is none.
+    pub fn origin(&self, index: usize) -> Option<StartOrigin> {
+        match index.checked_sub(self.given.len()) {
+            None => Some(StartOrigin::Given(index)),
+            Some(_) if self.sizes.is_empty() => None,
+            Some(drawn) => Some(StartOrigin::Drawn(drawn % self.sizes.len())),
+        }
+    }
+
+    /// The `index`-th start; `None` if there is none.
+    pub fn start(&self, index: usize) -> Option<Vec<f64>> {
+        match self.origin(index)? {
+            StartOrigin::Given(k) => Some(self.given[k].clone()),
+            StartOrigin::Drawn(size) => {
+                let turn = (index - self.given.len()) / self.sizes.len();
+                // The first size has the seed itself: a set of one size draws what its
+                // box would.
+                let seed = match size {
+                    0 => self.seed,
+                    _ => mix(self.seed ^ mix(size as u64)),
+                };
+                Some(self.sizes[size].sides.start(seed, turn as u64))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> StartBox {
+        StartBox::new(vec![-1.0, -2.0], vec![1.0, 2.0]).unwrap()
+    }
+
+    #[test]
+    fn sizes_take_turns_and_hold_their_starts() {
+        let set = StartSet::spread(&square(), &[0.5, 0.0], &[1.0, 0.1, 0.01], 7)
+            .unwrap()
+            .with_given([vec![9.0, 9.0]]);
+        assert_eq!(set.start(0), Some(vec![9.0, 9.0]));
+        assert_eq!(set.origin(0), Some(StartOrigin::Given(0)));
+        for k in 1..100 {
+            let Some(StartOrigin::Drawn(size)) = set.origin(k) else {
+                panic!()
+            };
+            assert_eq!(size, (k - 1) % 3);
+            let scale = set.scales()[size];
+            let x = set.start(k).unwrap();
+            assert!(x[0] >= 0.5 - 1.5 * scale && x[0] <= 0.5 + 0.5 * scale);
+            assert!(x[1].abs() <= 2.0 * scale);
+        }
+        assert_eq!(set.len(), None);
+    }
+
+    #[test]
+    fn one_size_draws_what_its_box_would() {
+        let set = StartSet::drawn(square(), 3);
+        for k in 0..10 {
+            assert_eq!(set.start(k), Some(square().start(3, k as u64)));
+        }
+    }
+
+    #[test]
+    fn given_states_end() {
+        let set = StartSet::given(vec![vec![1.0], vec![2.0]]);
+        assert_eq!((set.len(), set.start(2)), (Some(2), None));
+        assert!(StartSet::given(Vec::new()).is_empty());
+        assert!(StartSet::spread(&square(), &[0.0], &[1.0], 1).is_err());
+        assert!(StartSet::spread(&square(), &[0.0, 0.0], &[], 1).is_err());
+        assert!(StartSet::spread(&square(), &[0.0, 0.0], &[f64::NAN], 1).is_err());
+    }
+}

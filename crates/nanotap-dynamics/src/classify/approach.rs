@@ -1,0 +1,73 @@
+//! Whether a run really goes to an orbit that Newton closed beside it.
+
+use nalgebra::DMatrix;
+
+use crate::failure::{MapFailure, advance, advance_with_jacobian};
+use crate::map::StroboscopicMap;
+use crate::neighbourhood::AdaptedNorm;
+use crate::orbit::PeriodicOrbit;
+use crate::vector::distance;
+
+/// Longest of the four stretches of returns over which the approach to a weakly
+/// stable orbit is watched.
+const LONGEST_WINDOW: f64 = 512.0;
+
+/// True if the run from `state` approaches the stable `orbit` as its multipliers
+/// say: nearer by a factor 100 in the adapted norm or, for weak stability, with the
+/// peaks of four stretches falling one after the other, at half the linear rate at
+/// least. Peaks, because beside a flip or a Neimark–Sacker point the distance falls
+/// only on average over the turns. Four stretches together are one decay time long,
+/// or 2048 returns; a torus around the orbit that beats more slowly than that, and
+/// happens to shrink meanwhile, would be mistaken.
+pub(crate) fn approaches<M: StroboscopicMap>(
+    map: &mut M,
+    state: &[f64],
+    orbit: &PeriodicOrbit,
+) -> Result<bool, MapFailure> {
+    let (d, n) = (state.len(), orbit.period);
+    let mut monodromy = DMatrix::identity(d, d);
+    let mut factor = DMatrix::zeros(d, d);
+    let mut point = orbit.states[0].clone();
+    for _ in 0..n {
+        advance_with_jacobian(map, &mut point, &mut factor)?;
+        monodromy = &factor * monodromy;
+    }
+    let Some(adapted) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
+        return Ok(false);
+    };
+    let center = &orbit.states[0];
+    let nearest = (0..n)
+        .min_by(|&a, &b| {
+            distance(&orbit.states[a], state).total_cmp(&distance(&orbit.states[b], state))
+        })
+        .unwrap_or(0);
+    let mut x = state.to_vec();
+    for _ in 0..(n - nearest) % n {
+        advance(map, &mut x)?;
+    }
+    let floor = adapted.floor(center, &point);
+    let first = adapted.distance(&x, center);
+    if first <= floor {
+        return Ok(true);
+    }
+    let radius = orbit.spectral_radius();
+    let window = (0.25 / -radius.ln()).ceil().clamp(16.0, LONGEST_WINDOW) as usize;
+    let mut highest = [0.0f64; 4];
+    for peak in &mut highest {
+        for _ in 0..window {
+            for _ in 0..n {
+                advance(map, &mut x)?;
+            }
+            let now = adapted.distance(&x, center);
+            if now <= floor || now <= 0.01 * first {
+                return Ok(true);
+            }
+            if now > 4.0 * first {
+                return Ok(false);
+            }
+            *peak = peak.max(now);
+        }
+    }
+    let wanted = 1.5 * window as f64 * radius.ln();
+    Ok(highest.windows(2).all(|w| w[1] < w[0]) && (highest[3] / highest[0]).ln() <= wanted)
+}

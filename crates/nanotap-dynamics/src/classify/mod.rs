@@ -1,0 +1,170 @@
+//! Where one start settles.
+//!
+//! The run is looked at after 16, 32, 64, … periods. Each time the best candidate
+//! periods go to Newton; a closed orbit counts only if its multipliers are stable
+//! *and* the run is seen to approach it at the rate those multipliers say, in the
+//! norm in which every linear motion near the orbit contracts at each return. So the
+//! transient is as long as the motion needs, a slow decay towards a weakly stable
+//! orbit is recognised for what it is (Newton jumps to its end), and no tolerance on
+//! how nearly the run repeats ever decides.
+//!
+//! What does not close is measured on: Lyapunov spectrum with error bars, still
+//! looking for an escape, then weighted Birkhoff averages. The verdicts:
+//!
+//! - periodic: closed, stable, approached;
+//! - transient chaos: the exponents were positive by more than five standard errors,
+//!   and then the run escaped to a periodic orbit;
+//! - chaotic: positive by more than five standard errors to the end. One run of T
+//!   periods without escape says that the mean lifetime is above T/3 at 95 %
+//!   (exponential lifetimes: e⁻³ ≈ 0.05) and no more; [`mod@crate::census`] pools runs;
+//! - quasi-periodic: the largest exponent is zero within its error, no orbit up to
+//!   the longest period tried closes, and Birkhoff averages converge as on a torus;
+//! - undecided: anything else, with the numbers.
+//!
+//! Fails: a chaotic saddle whose lifetime is far above the budget is called chaotic
+//! (with the bound); a torus with a nearly rational rotation number, or a drift too
+//! slow for the budget, is left undecided.
+
+mod approach;
+mod birkhoff;
+mod candidates;
+mod run;
+mod undecided;
+
+use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
+use crate::map::StroboscopicMap;
+use crate::orbit::{PeriodicOrbit, ShootingOptions};
+
+pub use birkhoff::birkhoff_digits;
+pub use candidates::{Candidate, candidate_periods};
+pub(crate) use run::{Arrival, Known, arrive};
+pub use undecided::UndecidedReason;
+
+/// Budgets of [`settle`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SettleOptions {
+    /// Longest period tried at every look.
+    pub max_period: usize,
+    /// Longest period tried where none of these closed the motion, before it is called
+    /// anything but periodic.
+    pub long_period: usize,
+    /// Periods after which exponents start to be measured (looking for periodic
+    /// orbits goes on).
+    pub max_transient: usize,
+    /// A state with an entry above this is called unbounded.
+    pub bound: f64,
+    /// Newton's options for closing candidates.
+    pub shooting: ShootingOptions,
+    /// How long exponents are measured; `max_periods` is the budget of a motion that
+    /// never closes.
+    pub lyapunov: LyapunovOptions,
+    /// Length of one weighted Birkhoff stretch; two are run.
+    pub birkhoff_periods: usize,
+    /// Digits to which the two stretches must agree for a torus.
+    pub torus_digits: f64,
+}
+
+impl Default for SettleOptions {
+    fn default() -> Self {
+        Self {
+            max_period: 64,
+            long_period: 512,
+            max_transient: 1024,
+            bound: 1e8,
+            shooting: ShootingOptions {
+                max_iterations: 20,
+                ..ShootingOptions::default()
+            },
+            lyapunov: LyapunovOptions::default(),
+            birkhoff_periods: 8192,
+            torus_digits: 7.0,
+        }
+    }
+}
+
+/// Where a start settled.
+#[derive(Clone, Debug)]
+pub struct Settled {
+    /// What the motion is.
+    pub verdict: Verdict,
+    /// Periods run up to the verdict.
+    pub periods: usize,
+    /// The state there.
+    pub state: Vec<f64>,
+    /// Stable orbits that Newton closed on the way and that the motion does not go to:
+    /// attractors too, of other starts.
+    pub met: Vec<PeriodicOrbit>,
+}
+
+/// What a motion is.
+#[derive(Clone, Debug)]
+pub enum Verdict {
+    /// It goes to this stable orbit.
+    Periodic(PeriodicOrbit),
+    /// It was chaotic for a while and then went to this stable orbit.
+    TransientChaos {
+        /// Where it went.
+        orbit: PeriodicOrbit,
+        /// The exponents before it escaped.
+        spectrum: LyapunovSpectrum,
+        /// Periods after which the escape was noticed (looks are a factor 2 apart).
+        lasted: usize,
+    },
+    /// It fills a torus.
+    QuasiPeriodic(Torus),
+    /// It is chaotic for as long as it was watched.
+    Chaotic(Chaos),
+    /// It left every bound.
+    Unbounded,
+    /// None of these could be shown.
+    Undecided {
+        /// Why not.
+        reason: UndecidedReason,
+        /// Exponents, if they were measured.
+        spectrum: Option<LyapunovSpectrum>,
+    },
+}
+
+/// Evidence for a quasi-periodic motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Torus {
+    /// Exponents; the largest is zero within its error.
+    pub spectrum: LyapunovSpectrum,
+    /// Digits to which weighted Birkhoff averages of two stretches agree.
+    pub birkhoff_digits: f64,
+    /// Smallest closure found over all periods tried, in units of the state.
+    pub nearest_return: f64,
+    /// Periods run.
+    pub observed: usize,
+    /// No orbit of a period up to this one closed.
+    pub longest_period: usize,
+}
+
+/// Evidence for a chaotic motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chaos {
+    /// Exponents; the largest is positive by more than five standard errors.
+    pub spectrum: LyapunovSpectrum,
+    /// Periods without escape, the transient included.
+    pub observed: usize,
+    /// Mean lifetime in periods that this one run bounds from below at 95 %.
+    pub lifetime_above: f64,
+    /// No stable orbit of a period up to this one was approached.
+    pub longest_period: usize,
+}
+/// Follows the motion from `start` until it can be named, within the budgets.
+pub fn settle<M: StroboscopicMap>(map: &mut M, start: &[f64], options: &SettleOptions) -> Settled {
+    match arrive(map, start, Known::default(), options) {
+        Arrival::Settled(settled) => *settled,
+        // No neighbourhood was given, so none can have been entered.
+        Arrival::Entered { periods, .. } => Settled {
+            verdict: Verdict::Undecided {
+                reason: UndecidedReason::Cancelled,
+                spectrum: None,
+            },
+            periods,
+            state: start.to_vec(),
+            met: Vec::new(),
+        },
+    }
+}

@@ -1,0 +1,439 @@
+//! One start on its way to a verdict.
+
+use crate::classify::approach::approaches;
+use crate::classify::birkhoff::birkhoff_digits;
+use crate::classify::candidates::candidate_periods;
+use crate::classify::{Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict};
+use crate::failure::{MapFailure, advance};
+use crate::lyapunov::{LyapunovRun, LyapunovSpectrum};
+use crate::map::StroboscopicMap;
+use crate::neighbourhood::Neighbourhood;
+use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit_from_points};
+use crate::vector::{distance, norm};
+
+/// Standard errors by which a positive exponent must clear zero.
+const CLEAR: f64 = 5.0;
+/// Periods after which a run is looked at first.
+const FIRST_LOOK: usize = 16;
+/// Newton steps of a guess: near an orbit half as many are needed, and far from one
+/// Newton would only wander to some orbit that the run does not go to.
+const CLOSING_STEPS: usize = 10;
+/// Closure, as a part of the motion's spread, up to which a period is worth trying.
+const WORTH_TRYING: f64 = 0.2;
+/// The same for periods beyond [`SettleOptions::max_period`], where Newton costs more.
+const LONG_WORTH_TRYING: f64 = 1e-2;
+/// The same in the last search before a motion is called anything but periodic.
+const LAST_WORTH_TRYING: f64 = 0.1;
+
+/// What is known already when a start sets out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Known<'a> {
+    /// Neighbourhoods of attracting orbits.
+    pub(crate) balls: &'a [Neighbourhood],
+    /// Exponents and means of chaotic attractors.
+    pub(crate) chaos: &'a [LyapunovSpectrum],
+    /// Periods after which most runs are in one of the neighbourhoods: before that,
+    /// looking where a run goes costs more than waiting.
+    pub(crate) patience: usize,
+}
+
+/// Where a start arrives when some attractors are known already.
+#[derive(Clone, Debug)]
+pub(crate) enum Arrival {
+    /// In the neighbourhood of a known attractor, after so many periods.
+    Entered {
+        index: usize,
+        periods: usize,
+    },
+    Settled(Box<Settled>),
+}
+
+pub(crate) fn arrive<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    known: Known<'_>,
+    options: &SettleOptions,
+) -> Arrival {
+    let d = map.dimension();
+    let bad = if start.len() != d || d == 0 {
+        Some(format!("{} numbers given, {d} needed", start.len()))
+    } else {
+        start
+            .iter()
+            .find(|v| !v.is_finite())
+            .map(|v| format!("{v} is not finite"))
+    };
+    if let Some(reason) = bad {
+        return Arrival::Settled(Box::new(Settled {
+            verdict: undecided(UndecidedReason::BadStart(reason), None),
+            periods: 0,
+            state: start.to_vec(),
+            met: Vec::new(),
+        }));
+    }
+    let mut run = Run::new(start, known, options);
+    let verdict = match run.follow(map) {
+        Ok(verdict) => verdict,
+        Err(Stop::Entered(index)) => {
+            return Arrival::Entered {
+                index,
+                periods: run.periods,
+            };
+        }
+        Err(Stop::Unbounded) => Verdict::Unbounded,
+        Err(Stop::Failed(failure)) => undecided(
+            UndecidedReason::Map {
+                periods: run.periods,
+                failure,
+            },
+            None,
+        ),
+    };
+    Arrival::Settled(Box::new(Settled {
+        verdict,
+        periods: run.periods,
+        state: run.state,
+        met: run.met,
+    }))
+}
+
+fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Verdict {
+    Verdict::Undecided { reason, spectrum }
+}
+
+/// Why following a start ended early.
+enum Stop {
+    Entered(usize),
+    Unbounded,
+    Failed(MapFailure),
+}
+
+impl From<MapFailure> for Stop {
+    fn from(failure: MapFailure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
+struct Run<'a> {
+    d: usize,
+    state: Vec<f64>,
+    scratch: Vec<f64>,
+    periods: usize,
+    /// The latest strobe states, oldest first, at least the last twice the longest
+    /// period.
+    recent: Vec<f64>,
+    keep: usize,
+    known: Known<'a>,
+    options: &'a SettleOptions,
+    closing: ShootingOptions,
+    met: Vec<PeriodicOrbit>,
+}
+
+impl<'a> Run<'a> {
+    fn new(start: &[f64], known: Known<'a>, options: &'a SettleOptions) -> Self {
+        let keep = (2 * longest(options)).max(FIRST_LOOK) * start.len();
+        Self {
+            d: start.len(),
+            state: start.to_vec(),
+            scratch: start.to_vec(),
+            periods: 0,
+            recent: start.to_vec(),
+            keep,
+            known,
+            options,
+            closing: ShootingOptions {
+                max_iterations: options.shooting.max_iterations.min(CLOSING_STEPS),
+                ..options.shooting.clone()
+            },
+            met: Vec::new(),
+        }
+    }
+
+    fn follow<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Verdict, Stop> {
+        let mut target = FIRST_LOOK.max(self.known.patience);
+        loop {
+            let target_now = target.min(self.options.max_transient);
+            while self.periods < target_now {
+                self.step(map)?;
+            }
+            if let Some(verdict) = self.look(map)? {
+                return Ok(verdict);
+            }
+            if target >= self.options.max_transient {
+                break;
+            }
+            target *= 2;
+        }
+        self.measure(map)
+    }
+
+    fn step<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
+        // A motion that runs off ends in an overflow; that is its verdict.
+        match advance(map, &mut self.state) {
+            Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
+            other => other?,
+        }
+        self.arrived(map)
+    }
+
+    /// Bookkeeping after every period: history, bounds, known neighbourhoods.
+    #[inline]
+    fn arrived<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
+        self.periods += 1;
+        if self.recent.len() >= 4 * self.keep {
+            let cut = self.recent.len() - self.keep;
+            self.recent.copy_within(cut.., 0);
+            self.recent.truncate(self.keep);
+        }
+        self.recent.extend_from_slice(&self.state);
+        if norm(&self.state) > self.options.bound {
+            return Err(Stop::Unbounded);
+        }
+        for (index, ball) in self.known.balls.iter().enumerate() {
+            if ball.contains(&self.state) && ball.holds(map, &self.state, &mut self.scratch)? {
+                return Err(Stop::Entered(index));
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries to close the motion; a verdict if it goes to a stable orbit or sits on
+    /// another.
+    fn look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Option<Verdict>, Stop> {
+        let long = longest(self.options);
+        let mut guesses = self.guesses(self.options.max_period, WORTH_TRYING);
+        if self.periods >= 2 * long {
+            let more = self.guesses(long, LONG_WORTH_TRYING);
+            guesses.extend(
+                more.into_iter()
+                    .filter(|(n, _)| *n > self.options.max_period),
+            );
+        }
+        if !guesses.iter().any(|(n, _)| *n == 1) {
+            guesses.push((1, self.state.clone()));
+        }
+        // A slow spiral around a fixed point has its centre at the mean.
+        guesses.push((1, self.recent_mean()));
+        self.close(map, guesses)
+    }
+
+    /// The latest states of the periods after which they most nearly repeat.
+    fn guesses(&self, longest: usize, worth_trying: f64) -> Vec<(usize, Vec<f64>)> {
+        let allowed = worth_trying * self.recent_spread(2 * longest);
+        candidate_periods(&self.recent, self.d, longest)
+            .into_iter()
+            .take(3)
+            .filter(|c| c.closure <= allowed && c.period * self.d <= self.recent.len())
+            .map(|c| {
+                let from = self.recent.len() - c.period * self.d;
+                (c.period, self.recent[from..].to_vec())
+            })
+            .collect()
+    }
+
+    fn close<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        guesses: Vec<(usize, Vec<f64>)>,
+    ) -> Result<Option<Verdict>, Stop> {
+        let mut tried: Vec<PeriodicOrbit> = Vec::new();
+        for (period, points) in guesses {
+            let Ok(orbit) = close_orbit_from_points(map, &points, period, &self.closing) else {
+                continue;
+            };
+            if tried.iter().any(|t| t.is_same_as(&orbit)) {
+                continue;
+            }
+            if orbit.is_stable() {
+                if approaches(map, &self.state, &orbit)? {
+                    return Ok(Some(Verdict::Periodic(orbit)));
+                }
+                if !self.met.iter().any(|m| m.is_same_as(&orbit)) {
+                    self.met.push(orbit.clone());
+                }
+            } else if orbit
+                .states
+                .iter()
+                .any(|x| distance(x, &self.state) <= 10.0 * orbit.error)
+            {
+                let reason = UndecidedReason::OnOrbitThatDoesNotAttract(Box::new(orbit));
+                return Ok(Some(undecided(reason, None)));
+            }
+            tried.push(orbit);
+        }
+        Ok(None)
+    }
+
+    fn recent_mean(&self) -> Vec<f64> {
+        let rows = self.recent.chunks_exact(self.d);
+        let window = rows.len().min(2 * self.options.max_period).max(1);
+        let mut mean = vec![0.0; self.d];
+        for row in rows.rev().take(window) {
+            for (m, v) in mean.iter_mut().zip(row) {
+                *m += v / window as f64;
+            }
+        }
+        mean
+    }
+
+    /// Largest distance of one of the last states from the last.
+    fn recent_spread(&self, count: usize) -> f64 {
+        self.recent
+            .chunks_exact(self.d)
+            .rev()
+            .take(count)
+            .fold(0.0, |m: f64, row| m.max(distance(row, &self.state)))
+    }
+
+    /// Exponents of what does not close, looking for an escape after every doubling.
+    fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Verdict, Stop> {
+        let budget = &self.options.lyapunov;
+        let mut exponents = LyapunovRun::new(self.d);
+        for _ in 0..budget.alignment {
+            self.step_with(map, &mut exponents)?;
+        }
+        let mut before: Option<LyapunovSpectrum> = None;
+        let mut target = budget.min_periods.max(64);
+        let spectrum = loop {
+            while exponents.periods() < target {
+                self.step_with(map, &mut exponents)?;
+                exponents.record(&self.state);
+            }
+            if let Some(verdict) = self.look(map)? {
+                return Ok(match (verdict, before.filter(is_chaotic)) {
+                    (Verdict::Periodic(orbit), Some(spectrum)) => Verdict::TransientChaos {
+                        orbit,
+                        spectrum,
+                        lasted: self.periods,
+                    },
+                    (verdict, _) => verdict,
+                });
+            }
+            let spectrum = exponents.spectrum();
+            let enough = || {
+                budget.is_met_by(&spectrum)
+                    || self.known.chaos.iter().any(|k| k.agrees_with(&spectrum))
+            };
+            if target >= budget.max_periods || (is_chaotic(&spectrum) && enough()) {
+                break spectrum;
+            }
+            before = Some(spectrum);
+            target = (2 * target).min(budget.max_periods);
+        };
+        if is_chaotic(&spectrum) {
+            return Ok(Verdict::Chaotic(Chaos {
+                spectrum,
+                observed: self.periods,
+                lifetime_above: self.periods as f64 / 3.0,
+                longest_period: longest(self.options),
+            }));
+        }
+        self.neither_periodic_nor_chaotic(map, spectrum)
+    }
+
+    fn step_with<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        exponents: &mut LyapunovRun,
+    ) -> Result<(), Stop> {
+        match exponents.step(map, &mut self.state) {
+            Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
+            other => other?,
+        }
+        self.arrived(map)
+    }
+
+    /// A motion without a clearly positive exponent that did not close so far.
+    fn neither_periodic_nor_chaotic<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        spectrum: LyapunovSpectrum,
+    ) -> Result<Verdict, Stop> {
+        let longest_period = longest(self.options);
+        let (exponent, error) = spectrum.largest();
+        while self.recent.len() < 2 * longest_period * self.d {
+            self.step(map)?;
+        }
+        let last_guesses = self.guesses(longest_period, LAST_WORTH_TRYING);
+        if let Some(verdict) = self.close(map, last_guesses)? {
+            return Ok(verdict);
+        }
+        // The average of a bounded logarithm is off by its bound over the length.
+        let zero = (3.0 * error).max(10.0 / spectrum.periods as f64);
+        if exponent < -zero {
+            return Ok(undecided(
+                UndecidedReason::NothingCloses {
+                    exponent,
+                    error,
+                    max_period: longest_period,
+                },
+                Some(spectrum),
+            ));
+        }
+        let nearest = candidate_periods(&self.recent, self.d, longest_period)
+            .first()
+            .copied();
+        let spread = self.recent_spread(usize::MAX);
+        if let Some(c) = nearest.filter(|c| c.closure <= 1e-9 * spread) {
+            return Ok(undecided(
+                UndecidedReason::NotIsolated {
+                    period: c.period,
+                    closure: c.closure,
+                },
+                Some(spectrum),
+            ));
+        }
+        // A torus of one dimension less than the state encloses a volume, which the map
+        // would have to keep.
+        let neutral = spectrum
+            .exponents
+            .iter()
+            .take_while(|l| l.abs() <= zero)
+            .count();
+        let contraction = map.log_determinant_bound();
+        if neutral + 1 >= self.d && contraction < 0.0 {
+            return Ok(undecided(
+                UndecidedReason::NoTorusHere {
+                    exponent,
+                    error,
+                    contraction: -contraction,
+                    max_period: longest_period,
+                    observed: self.periods,
+                },
+                Some(spectrum),
+            ));
+        }
+        let stretch = self.options.birkhoff_periods.max(16);
+        let digits = birkhoff_digits(map, &mut self.state, stretch)?;
+        self.periods += 2 * stretch;
+        if digits >= self.options.torus_digits && exponent <= zero {
+            return Ok(Verdict::QuasiPeriodic(Torus {
+                spectrum,
+                birkhoff_digits: digits,
+                nearest_return: nearest.map_or(f64::INFINITY, |c| c.closure),
+                observed: self.periods,
+                longest_period,
+            }));
+        }
+        Ok(undecided(
+            UndecidedReason::NeitherTorusNorChaos {
+                exponent,
+                error,
+                digits,
+            },
+            Some(spectrum),
+        ))
+    }
+}
+
+/// The longest period that is ever tried.
+fn longest(options: &SettleOptions) -> usize {
+    options.long_period.max(options.max_period)
+}
+
+/// A largest exponent positive beyond doubt: by more than five standard errors, and
+/// with a total growth that no start of the frame explains.
+fn is_chaotic(spectrum: &LyapunovSpectrum) -> bool {
+    let (exponent, error) = spectrum.largest();
+    exponent > CLEAR * error && exponent * spectrum.periods as f64 > 20.0
+}

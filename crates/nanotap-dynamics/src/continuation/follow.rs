@@ -1,0 +1,229 @@
+//! From a first point step by step until the branch ends.
+
+use crate::continuation::bifurcation::{Tests, between};
+use crate::continuation::end::dead_end;
+use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
+use crate::continuation::solver::{BranchSolver, Node};
+use crate::continuation::step::{angle, at_range_end, projection, trial};
+use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions};
+use crate::control::Control;
+use crate::map::MapFamily;
+use crate::orbit::PeriodicOrbit;
+use crate::vector::norm;
+
+/// Scaled step at which a branch that keeps slipping onto one of shorter period is
+/// taken to have met it.
+const SHORTEST_MEETING: f64 = 1e-6;
+
+pub(crate) fn solver_for<'a, F: MapFamily>(
+    family: &'a F,
+    orbit: &PeriodicOrbit,
+    options: &ContinuationOptions,
+) -> BranchSolver<'a, F> {
+    let size = orbit.scale();
+    let default = if size > 0.0 { size } else { 1.0 };
+    BranchSolver::new(
+        family,
+        orbit.dimension(),
+        orbit.period,
+        options.state_scale.unwrap_or(default),
+        options
+            .parameter_scale
+            .unwrap_or(options.range.1 - options.range.0),
+        options.residual_tolerance,
+    )
+}
+
+pub(crate) fn check(
+    options: &ContinuationOptions,
+    parameter: f64,
+) -> Result<(), ContinuationError> {
+    let bad = |reason: String| Err(ContinuationError::BadOptions(reason));
+    let (low, high) = options.range;
+    if !(low < high && (high - low).is_finite()) {
+        return bad(format!(
+            "the range {low} … {high} must run upwards between finite numbers"
+        ));
+    }
+    if !(low..=high).contains(&parameter) {
+        return bad(format!(
+            "the parameter {parameter} is outside the range {low} … {high}"
+        ));
+    }
+    let steps = [options.min_step, options.initial_step, options.max_step];
+    if !(steps[0] > 0.0 && steps[0] <= steps[1] && steps[1] <= steps[2] && steps[2].is_finite()) {
+        return bad(format!(
+            "steps must satisfy 0 < min ≤ initial ≤ max, {steps:?} given"
+        ));
+    }
+    for scale in [options.state_scale, options.parameter_scale]
+        .into_iter()
+        .flatten()
+    {
+        if !(scale > 0.0 && scale.is_finite()) {
+            return bad(format!("a scale must be positive, {scale} given"));
+        }
+    }
+    if options.max_angle.is_nan() || options.max_angle <= 0.0 {
+        return bad(format!(
+            "the largest angle must be positive, {} given",
+            options.max_angle
+        ));
+    }
+    Ok(())
+}
+
+/// Steps from a first node until the branch ends.
+pub(crate) fn follow<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    first: Node,
+    options: &ContinuationOptions,
+    control: &Control<'_>,
+) -> Result<Branch, ContinuationError> {
+    let mut tests = tests_at(solver, &first)?;
+    let mut arclength = 0.0;
+    let mut branch = Branch {
+        period: solver.n,
+        points: vec![point(solver, &first, &tests, arclength)?],
+        bifurcations: Vec::new(),
+        end: BranchEnd::PointLimit,
+    };
+    let start = first.clone();
+    let mut node = first;
+    let mut step = options.initial_step;
+    while branch.points.len() < options.max_points {
+        if control.is_cancelled() {
+            branch.end = BranchEnd::Cancelled;
+            break;
+        }
+        if let Some(progress) = control.progress {
+            progress(branch.points.len(), options.max_points);
+        }
+        if at_range_end(&node, options) {
+            branch.end = BranchEnd::RangeEnd;
+            break;
+        }
+        let next = match trial(solver, &node, step, options) {
+            Ok(next) => next,
+            Err(why) => {
+                step *= 0.5;
+                if step < options.min_step {
+                    branch.end = dead_end(solver, &mut branch, &node, &why);
+                    break;
+                }
+                continue;
+            }
+        };
+        if let Some(m) = slipped(solver, &node, &next) {
+            step *= 0.5;
+            if step < SHORTEST_MEETING.max(options.min_step) {
+                branch.end = BranchEnd::Collapsed {
+                    period: m,
+                    parameter: node.parameter,
+                };
+                break;
+            }
+            continue;
+        }
+        if norm(&next.points) > options.bound {
+            branch.end = BranchEnd::LeftDomain;
+            break;
+        }
+        let Some(next_tests) = Tests::new(solver, &next) else {
+            step *= 0.5;
+            if step < options.min_step {
+                branch.end = BranchEnd::StepTooSmall {
+                    reason: "the multipliers could not be computed".into(),
+                };
+                break;
+            }
+            continue;
+        };
+        let index = branch.points.len() - 1;
+        let taken = projection(solver, &node, &next);
+        if let Some((m, at, mut parameter)) = shortest_collapse(solver, &node, &next, taken) {
+            // What happens before the meeting still counts.
+            if let Ok(near) = solver.along(&node, 0.9 * at) {
+                parameter = meeting(solver, &node, &near, m).unwrap_or(parameter);
+            }
+            if let Ok(near) = solver.along(&node, 0.99 * at)
+                && let Some(near_tests) = Tests::new(solver, &near)
+            {
+                let found = between(solver, &node, &tests, &near_tests, 0.99 * at, index);
+                branch.bifurcations.extend(found);
+                branch
+                    .points
+                    .push(point(solver, &near, &near_tests, arclength + 0.99 * at)?);
+            }
+            branch.end = BranchEnd::Collapsed {
+                period: m,
+                parameter,
+            };
+            break;
+        }
+        let found = between(solver, &node, &tests, &next_tests, taken, index);
+        branch.bifurcations.extend(found);
+        arclength += taken;
+        branch
+            .points
+            .push(point(solver, &next, &next_tests, arclength)?);
+        let turn = angle(solver, &node, &next);
+        if next.iterations <= 4 && turn < 0.5 * options.max_angle {
+            step = (1.5 * step).min(options.max_step);
+        } else if next.iterations >= 7 {
+            step *= 0.7;
+        }
+        let closed = branch.points.len() > 8 && is_return(solver, &start, &next, taken);
+        node = next;
+        tests = next_tests;
+        if closed {
+            branch.end = BranchEnd::Closed;
+            break;
+        }
+    }
+    Ok(branch)
+}
+
+fn tests_at<F: MapFamily>(
+    solver: &BranchSolver<'_, F>,
+    node: &Node,
+) -> Result<Tests, ContinuationError> {
+    Tests::new(solver, node).ok_or(ContinuationError::NoStart {
+        parameter: node.parameter,
+        reason: "its multipliers or tangencies could not be computed".into(),
+    })
+}
+
+fn point<F: MapFamily>(
+    solver: &BranchSolver<'_, F>,
+    node: &Node,
+    tests: &Tests,
+    arclength: f64,
+) -> Result<BranchPoint, ContinuationError> {
+    Ok(BranchPoint {
+        parameter: node.parameter,
+        orbit: solver.orbit(node)?,
+        arclength,
+        slope: node.slope,
+        tangencies: tests.tangencies.clone(),
+    })
+}
+
+/// True if `node` is the first node again, in any phase and in the same direction.
+fn is_return<F: MapFamily>(
+    solver: &BranchSolver<'_, F>,
+    start: &Node,
+    node: &Node,
+    step: f64,
+) -> bool {
+    if (node.parameter - start.parameter).abs() / solver.parameter_scale > 0.6 * step {
+        return false;
+    }
+    let mut turned = node.clone();
+    (0..solver.n).any(|_| {
+        turned.points.rotate_left(solver.d);
+        turned.tangent.rotate_left(solver.d);
+        solver.separation(&turned, start) <= 0.6 * step
+            && solver.product(&turned.tangent, turned.slope, &start.tangent, start.slope) > 0.0
+    })
+}

@@ -1,0 +1,105 @@
+//! One step along a branch: tried, judged, taken or refused.
+
+use crate::continuation::ContinuationOptions;
+use crate::continuation::solver::{BranchSolver, CorrectorFailure, Node};
+use crate::map::MapFamily;
+use crate::vector::distance;
+
+/// Why a trial step was not taken.
+pub(crate) enum Rejected {
+    Corrector(CorrectorFailure),
+    Turn,
+    Jump,
+}
+
+impl std::fmt::Display for Rejected {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Corrector(failure) => write!(f, "{failure}"),
+            Self::Turn => write!(f, "the tangent turns too fast"),
+            Self::Jump => write!(f, "the correction is as large as the step"),
+        }
+    }
+}
+
+/// True if the branch is at an end of the range and heading out of it.
+pub(crate) fn at_range_end(node: &Node, options: &ContinuationOptions) -> bool {
+    let margin = 1e-12 * (options.range.1 - options.range.0);
+    node.slope > 0.0 && node.parameter >= options.range.1 - margin
+        || node.slope < 0.0 && node.parameter <= options.range.0 + margin
+}
+
+/// One step, onto the end of the range if it would lead out.
+pub(crate) fn trial<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    node: &Node,
+    step: f64,
+    options: &ContinuationOptions,
+) -> Result<Node, Rejected> {
+    let (low, high) = options.range;
+    let outside = |parameter: f64| {
+        if parameter > high {
+            Some(high)
+        } else if parameter < low {
+            Some(low)
+        } else {
+            None
+        }
+    };
+    let onto = |solver: &mut BranchSolver<'_, F>, end: f64| {
+        solver
+            .onto_parameter(node, end)
+            .map_err(Rejected::Corrector)
+    };
+    let next = if let Some(end) = outside(node.parameter + step * node.slope) {
+        onto(solver, end)?
+    } else {
+        let next = solver.along(node, step).map_err(Rejected::Corrector)?;
+        match outside(next.parameter) {
+            Some(end) => onto(solver, end)?,
+            None => next,
+        }
+    };
+    // At the shortest steps a turn is a kink, to be passed.
+    let forgiving = step < 1e3 * options.min_step;
+    if !forgiving && angle(solver, node, &next) > options.max_angle {
+        return Err(Rejected::Turn);
+    }
+    let taken = projection(solver, node, &next);
+    let predicted: Vec<f64> = node.points[..solver.d]
+        .iter()
+        .zip(&node.tangent)
+        .map(|(x, t)| x + taken * t)
+        .collect();
+    let correction = distance(&predicted, &next.points[..solver.d]) / solver.state_scale;
+    if taken <= 0.0 || !forgiving && correction > 0.5 * taken {
+        return Err(Rejected::Jump);
+    }
+    Ok(next)
+}
+
+/// Scaled arclength from one node to the next, along the tangent of the first.
+pub(crate) fn projection<F: MapFamily>(
+    solver: &BranchSolver<'_, F>,
+    from: &Node,
+    to: &Node,
+) -> f64 {
+    let shift: Vec<f64> = to.points[..solver.d]
+        .iter()
+        .zip(&from.points)
+        .map(|(p, q)| p - q)
+        .collect();
+    solver.product(
+        &shift,
+        to.parameter - from.parameter,
+        &from.tangent,
+        from.slope,
+    )
+}
+
+pub(crate) fn angle<F: MapFamily>(solver: &BranchSolver<'_, F>, a: &Node, b: &Node) -> f64 {
+    solver
+        .product(&a.tangent, a.slope, &b.tangent, b.slope)
+        .clamp(-1.0, 1.0)
+        .acos()
+}

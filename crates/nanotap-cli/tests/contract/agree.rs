@@ -15,13 +15,12 @@ pub(crate) fn differences(line: &str, pinned: &[Fact], actual: &[Fact]) -> Strin
     if pinned.is_empty() {
         differences.push_str("  nothing is pinned of it\n");
     }
-    let near_zero = near_zero(line);
     for fact in pinned {
         match now.get(fact.name.as_str()) {
             None => {
                 let _ = writeln!(differences, "  lost: {fact}");
             }
-            Some(value) if !holds(fact, value, near_zero) => {
+            Some(value) if !holds(fact, value, near_zero(line, &fact.name)) => {
                 let _ = writeln!(differences, "  was: {fact}\n  now: {} = {value}", fact.name);
             }
             Some(_) => {}
@@ -30,10 +29,15 @@ pub(crate) fn differences(line: &str, pinned: &[Fact], actual: &[Fact]) -> Strin
     differences
 }
 
-/// Below what two numbers are the same: rounding in the model's units, in which everything is
-/// of order one; nothing where forces and energies stand in SI.
-fn near_zero(line: &str) -> f64 {
-    if line.contains("lever") { 0.0 } else { 1e-11 }
+/// Below what a number is rounding: in the model's units everything is of order one, but for a
+/// lever, whose unit of length is a thousand times what it moves; energies in SI are 1e-17.
+fn near_zero(line: &str, name: &str) -> f64 {
+    match () {
+        () if !line.contains("lever") => 1e-11,
+        () if name.contains("/physical") => 1e-23,
+        () if name.starts_with("csv") => 1e-19,
+        () => 1e-17,
+    }
 }
 
 fn holds(fact: &Fact, value: &str, near_zero: f64) -> bool {

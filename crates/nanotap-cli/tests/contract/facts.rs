@@ -102,7 +102,7 @@ fn offered(help: &str) -> BTreeSet<String> {
 }
 
 /// Entries whose numbers depend on time, rounding, step control or chance.
-const FLEETING: [&str; 12] = [
+const FLEETING: [&str; 13] = [
     "seconds",
     "periods_per_second",
     "residual",
@@ -113,6 +113,8 @@ const FLEETING: [&str; 12] = [
     "transient",
     "nanotap_version",
     "evaluations",
+    // Of chaos; that of an orbit follows from its multipliers.
+    "lyapunov",
     "steps",
     "start",
 ];
@@ -302,7 +304,9 @@ fn attribute(prefix: &str, name: &str, value: &Value) -> Vec<Fact> {
         _ if name == "_ARRAY_DIMENSIONS" => Vec::new(),
         _ if FLEETING.contains(&name) => vec![Fact::new(prefix, "")],
         // A document within.
-        Some(Ok(document)) if document.is_object() => flat(prefix, &document),
+        Some(Ok(document)) if document.is_object() || document.is_array() => {
+            flat(prefix, &document)
+        }
         _ => vec![Fact::new(prefix, value.to_string())],
     }
 }

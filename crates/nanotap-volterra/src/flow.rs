@@ -1,0 +1,674 @@
+//! Running a system: from step to step and from switch to switch.
+
+use crate::bracket::{Fall, first_fall};
+use crate::error::Refusal;
+use crate::kernel::{LENGTHS, TimeMap};
+use crate::law::{Approach, Exit, Guard};
+use crate::linear::add_product;
+use crate::quadrature::derivative;
+use crate::step::{Quality, Solver, Statistics, Step};
+use crate::system::System;
+use crate::VolterraError;
+use std::sync::Arc;
+
+/// Switches at one instant beyond which the law is said to switch without end.
+const MOST_SWITCHES_AT_ONCE: usize = 64;
+/// The first step of a run: a quarter of the longest.
+const FIRST_INDEX: usize = 4;
+/// A guard that is not certainly positive must be resolved to this fraction of its size.
+const RESOLVED: f64 = 1e-11;
+/// The same on the first step after a switch.
+const RESOLVED_FRESH: f64 = 1e-8;
+
+/// A switch of the law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Switch {
+    /// When.
+    pub time: f64,
+    /// The branch left.
+    pub from: usize,
+    /// The number of the exit taken.
+    pub exit: usize,
+    /// The branch entered.
+    pub to: usize,
+    /// The gap.
+    pub gap: f64,
+    /// Its rate.
+    pub rate: f64,
+}
+
+/// Something that follows a run.
+pub(crate) trait Observer {
+    /// A step was completed, up to `step.end`, where the modal coordinates are `end`.
+    fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]);
+    /// The law switched after that step, at modal coordinates `modal`.
+    fn switch(&mut self, system: &System, switch: &Switch, exit: &Exit, modal: &[f64]);
+}
+
+impl Observer for () {
+    fn step(&mut self, _: &System, _: &mut Solver, _: &Step, _: &[f64]) {}
+    fn switch(&mut self, _: &System, _: &Switch, _: &Exit, _: &[f64]) {}
+}
+
+impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
+    fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]) {
+        self.0.step(system, solver, step, end);
+        self.1.step(system, solver, step, end);
+    }
+    fn switch(&mut self, system: &System, switch: &Switch, exit: &Exit, modal: &[f64]) {
+        self.0.switch(system, switch, exit, modal);
+        self.1.switch(system, switch, exit, modal);
+    }
+}
+
+/// A motion of a [`System`] with its work space. Cloning shares the system.
+#[derive(Clone, Debug)]
+pub struct Flow {
+    pub(crate) system: Arc<System>,
+    time: f64,
+    branch: usize,
+    modal: Vec<f64>,
+    /// The gap at the last switch, if nothing has been stepped since.
+    pinned: Option<f64>,
+    /// How the force sets in after the switch that has just happened.
+    onset: Option<Approach>,
+    solver: Solver,
+    step: Step,
+    /// The last accepted step, not yet handed on: a step that ends a contact may cut it.
+    pending: Step,
+    has_pending: bool,
+    /// Length numbers that were accepted last on each branch.
+    hints: Vec<usize>,
+    work: Work,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Work {
+    values: Vec<f64>,
+    series: Vec<f64>,
+    slope: Vec<f64>,
+    curvature: Vec<f64>,
+    scratch: Vec<f64>,
+    modal: Vec<f64>,
+}
+
+/// Where a guard falls on a step.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    exit: usize,
+    u: f64,
+}
+
+enum Attempt {
+    /// The step stands, with nothing happening on it; the next may be longer by this many
+    /// numbers.
+    Whole(usize),
+    /// The law switches on it.
+    Falls(Found),
+    /// A shorter one of this length number must be tried.
+    Shorter(usize, Refusal),
+    /// A singular exit is reached about this time after the start.
+    Ends(usize, f64),
+}
+
+impl Flow {
+    /// A flow of `system`, at time 0 in the state zero.
+    pub fn new(system: Arc<System>) -> Self {
+        let n = system.kernel().nodes;
+        let zeros = vec![0.0; n];
+        let mut flow = Self {
+            time: 0.0,
+            branch: 0,
+            modal: vec![0.0; system.dimension()],
+            pinned: None,
+            onset: None,
+            solver: Solver::new(&system),
+            step: Step::new(&system),
+            pending: Step::new(&system),
+            has_pending: false,
+            hints: vec![FIRST_INDEX; system.law().branches()],
+            work: Work {
+                values: zeros.clone(),
+                series: zeros.clone(),
+                slope: zeros.clone(),
+                curvature: zeros,
+                scratch: Vec::new(),
+                modal: vec![0.0; system.dimension()],
+            },
+            system,
+        };
+        let state = vec![0.0; flow.system.dimension()];
+        // The state zero is finite and of the right length.
+        let _ = flow.start(&state, 0.0);
+        flow
+    }
+
+    /// The system.
+    pub fn system(&self) -> &Arc<System> {
+        &self.system
+    }
+
+    /// What the runs so far have cost.
+    pub fn statistics(&self) -> Statistics {
+        self.solver.statistics
+    }
+
+    /// The time reached.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The branch of the law.
+    pub fn branch(&self) -> usize {
+        self.branch
+    }
+
+    /// Puts the motion at state `x` at a time, on the branch that the law takes when nothing
+    /// is known of the past.
+    ///
+    /// # Errors
+    /// When the length is wrong or a value is not finite.
+    pub fn start(&mut self, x: &[f64], time: f64) -> Result<(), VolterraError> {
+        let n = self.system.dimension();
+        if x.len() != n {
+            return Err(VolterraError::Shape {
+                what: "the state",
+                found: x.len(),
+                expected: n,
+            });
+        }
+        if let Some(&found) = x.iter().chain([&time]).find(|v| !v.is_finite()) {
+            return Err(VolterraError::Value {
+                what: "an entry of the state or the time".into(),
+                found,
+                needed: "finite",
+            });
+        }
+        self.time = time;
+        self.system.to_modal(time, x, &mut self.modal);
+        let (gap, rate) = self.system.gap_of(time, &self.modal);
+        self.branch = self.system.law().branch_at(gap, rate);
+        self.pinned = None;
+        self.onset = None;
+        self.has_pending = false;
+        Ok(())
+    }
+
+    /// As [`Flow::start`], on a branch that the law remembers.
+    ///
+    /// # Errors
+    /// As [`Flow::start`], and when there is no such branch.
+    pub fn start_on(&mut self, x: &[f64], time: f64, branch: usize) -> Result<(), VolterraError> {
+        let branches = self.system.law().branches();
+        if branch >= branches {
+            return Err(VolterraError::TooLarge {
+                what: "the number of the branch",
+                found: branch,
+                limit: branches - 1,
+            });
+        }
+        self.start(x, time)?;
+        self.branch = branch;
+        Ok(())
+    }
+
+    /// Writes the state to `x`.
+    pub fn state(&self, x: &mut [f64]) {
+        self.system.to_state(self.time, &self.modal, x);
+    }
+
+    /// The gap and its rate.
+    pub fn gap(&self) -> (f64, f64) {
+        self.system.gap_of(self.time, &self.modal)
+    }
+
+    /// Runs to time `end`.
+    ///
+    /// # Errors
+    /// When no step could be certified, the motion diverges, or the law switches without end.
+    pub fn run_until(&mut self, end: f64) -> Result<(), VolterraError> {
+        self.run(end, &mut ())
+    }
+
+    pub(crate) fn run<O: Observer>(
+        &mut self,
+        end: f64,
+        observer: &mut O,
+    ) -> Result<(), VolterraError> {
+        let system = self.system.clone();
+        if !end.is_finite() {
+            return Err(VolterraError::Value {
+                what: "the end of the run".into(),
+                found: end,
+                needed: "finite",
+            });
+        }
+        // The same start gives the same motion, whatever was run before.
+        self.hints.fill(FIRST_INDEX);
+        let most = system.options().max_steps;
+        let mut at_once = (self.time, 0);
+        for count in 0.. {
+            if self.time >= end {
+                self.commit_pending(&system, end, observer);
+                return Ok(());
+            }
+            if count >= most {
+                return Err(VolterraError::TooManySteps {
+                    steps: count,
+                    time: self.time,
+                });
+            }
+            let Some((exit, u)) = self.advance(&system, end, observer)? else {
+                continue;
+            };
+            if self.step.time(u) >= end {
+                self.step.end = u;
+                std::mem::swap(&mut self.step, &mut self.pending);
+                self.has_pending = true;
+                self.pinned = None;
+                self.onset = None;
+                self.time = end;
+                continue;
+            }
+            self.switch(&system, exit, u, observer)?;
+            if self.time - at_once.0 > 1e-13 * system.kernel().length(0) {
+                at_once = (self.time, 0);
+            }
+            at_once.1 += 1;
+            if at_once.1 > MOST_SWITCHES_AT_ONCE {
+                return Err(VolterraError::Accumulation {
+                    time: self.time,
+                    gap: self.gap().0,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries steps until one stands. Returns the exit taken on it and where, if the law
+    /// switches; the step is then in `self.step` and everything before it handed on.
+    fn advance<O: Observer>(
+        &mut self,
+        system: &System,
+        end: f64,
+        observer: &mut O,
+    ) -> Result<Option<(usize, f64)>, VolterraError> {
+        let (map, moving) = match self.onset {
+            None | Some(Approach::Analytic) => (TimeMap::Plain, false),
+            Some(Approach::ThreeHalves) => (TimeMap::Start, false),
+            Some(Approach::Half) => (TimeMap::Start, true),
+        };
+        let mut index = self.hints[self.branch];
+        let mut refused = false;
+        loop {
+            if index >= LENGTHS {
+                return Err(self.uncertified(Refusal::Unresolved));
+            }
+            self.prepare(map, index, moving);
+            let solved = self.solver.solve(system, &mut self.step);
+            match self.judge(system, solved) {
+                Attempt::Whole(growth) => {
+                    let growth = if refused { 0 } else { growth };
+                    self.hints[self.branch] = index.saturating_sub(growth);
+                    self.accept(system, end, observer)?;
+                    return Ok(None);
+                }
+                Attempt::Falls(found) => {
+                    self.hints[self.branch] = index;
+                    self.commit_pending(system, f64::INFINITY, observer);
+                    return Ok(Some((found.exit, found.u)));
+                }
+                Attempt::Shorter(next, reason) => {
+                    self.solver.statistics.refused += 1;
+                    refused = true;
+                    if next >= LENGTHS {
+                        return Err(self.uncertified(reason));
+                    }
+                    index = next;
+                }
+                Attempt::Ends(exit, after) => {
+                    if self.has_pending && self.end_step(system, exit, after) {
+                        let start = self.step.start;
+                        if start >= end {
+                            self.time = end;
+                            self.commit_pending(system, end, observer);
+                            return Ok(None);
+                        }
+                        self.commit_pending(system, start, observer);
+                        return Ok(Some((exit, 1.0)));
+                    }
+                    self.solver.statistics.refused += 1;
+                    refused = true;
+                    let half = system.kernel().index_below(0.5 * after);
+                    match half {
+                        Some(next) => index = next.max(index + 1),
+                        None => return Err(self.uncertified(Refusal::Switch)),
+                    }
+                }
+            }
+        }
+    }
+
+    fn prepare(&mut self, map: TimeMap, index: usize, moving: bool) {
+        let step = &mut self.step;
+        step.map = map;
+        step.index = index;
+        step.branch = self.branch;
+        step.start = self.time;
+        step.modal.copy_from_slice(&self.modal);
+        step.pinned_start = self.pinned;
+        step.pinned_end = None;
+        step.moving_start = moving;
+        step.moving_end = false;
+    }
+
+    fn judge(&mut self, system: &System, solved: Result<Quality, Refusal>) -> Attempt {
+        let index = self.step.index;
+        let quality = match solved {
+            Ok(quality) => quality,
+            Err(reason) => return Attempt::Shorter(index + 2, reason),
+        };
+        // A singular exit is passed: the step means nothing beyond, but says about when.
+        let mut passed: Option<(usize, f64)> = None;
+        let n = self.step.forces.len();
+        for (number, exit) in system.exits(self.branch).iter().enumerate() {
+            self.guard_values(system, exit, n);
+            if let Some(i) = (1..n).find(|&i| self.work.values[i] < 0.0) {
+                let (a, b) = (self.work.values[i - 1].max(0.0), self.work.values[i]);
+                let nodes = &system.kernel().points;
+                let u = nodes[i - 1] + (nodes[i] - nodes[i - 1]) * a / (a - b);
+                let time = self.step.map.time(self.step.length, u);
+                if passed.is_none_or(|(_, t)| time < t) {
+                    passed = Some((number, time));
+                }
+            }
+        }
+        if let Some((number, time)) = passed
+            && system.exits(self.branch)[number].before != Approach::Analytic
+        {
+            return Attempt::Ends(number, time);
+        }
+        let degree = match self.step.map {
+            TimeMap::Plain => n as f64,
+            TimeMap::Start | TimeMap::End => 0.5 * n as f64,
+        };
+        if !(quality.error <= 1.0) {
+            let notches = (2.0 * quality.error.log2() / degree).ceil().clamp(1.0, 8.0) as usize;
+            let mut next = index + notches;
+            // No need to resolve what lies beyond a switch.
+            if let Some((_, time)) = passed
+                && let Some(below) = system.kernel().index_below(1.5 * time)
+            {
+                next = next.max(below);
+            }
+            return Attempt::Shorter(next, Refusal::Unresolved);
+        }
+        match self.first_switch(system) {
+            Err(reason) => Attempt::Shorter(index + 1, reason),
+            Ok(Some(found)) => {
+                let exit = &system.exits(self.branch)[found.exit];
+                if exit.before == Approach::Analytic {
+                    Attempt::Falls(found)
+                } else {
+                    Attempt::Ends(found.exit, self.step.map.time(self.step.length, found.u))
+                }
+            }
+            Ok(None) => {
+                let growth = if quality.rounding {
+                    2
+                } else {
+                    (2.0 * (0.5 / quality.error).log2() / degree).floor().clamp(0.0, 2.0) as usize
+                };
+                Attempt::Whole(growth)
+            }
+        }
+    }
+
+    /// Takes the step in `self.step` as it is.
+    fn accept<O: Observer>(
+        &mut self,
+        system: &System,
+        end: f64,
+        observer: &mut O,
+    ) -> Result<(), VolterraError> {
+        self.commit_pending(system, f64::INFINITY, observer);
+        std::mem::swap(&mut self.step, &mut self.pending);
+        self.has_pending = true;
+        self.pending.modal_at(system, 1.0, &mut self.modal);
+        self.time = self.pending.time(1.0);
+        self.pinned = None;
+        self.onset = None;
+        if self.modal.iter().any(|y| !y.is_finite()) {
+            return Err(VolterraError::Diverged { time: self.time });
+        }
+        if self.time <= self.pending.start && self.time < end {
+            return Err(self.uncertified(Refusal::Unresolved));
+        }
+        Ok(())
+    }
+
+    /// Hands on the pending step, cut at time `until` if that lies on it.
+    fn commit_pending<O: Observer>(&mut self, system: &System, until: f64, observer: &mut O) {
+        if !self.has_pending {
+            return;
+        }
+        self.has_pending = false;
+        let step = &mut self.pending;
+        if step.end_time() >= until {
+            step.end = step.map.variable(step.length, until - step.start);
+            step.modal_at(system, step.end, &mut self.work.modal);
+            self.modal.copy_from_slice(&self.work.modal);
+            self.time = until;
+        } else if step.end < 1.0 {
+            step.modal_at(system, step.end, &mut self.work.modal);
+        } else {
+            step.modal_at(system, 1.0, &mut self.work.modal);
+        }
+        self.solver.statistics.steps += 1;
+        observer.step(system, &mut self.solver, step, &self.work.modal);
+    }
+
+    /// Cuts the step in `self.step` at `u`, hands it on and switches.
+    fn switch<O: Observer>(
+        &mut self,
+        system: &System,
+        number: usize,
+        u: f64,
+        observer: &mut O,
+    ) -> Result<(), VolterraError> {
+        let exit = system.exits(self.branch)[number];
+        let level = match exit.guard {
+            Guard::Falls(level) | Guard::Rises(level) => Some(level),
+            Guard::Turns | Guard::Own(_) => None,
+        };
+        self.step.end = u;
+        self.step.modal_at(system, u, &mut self.modal);
+        // The gap's series is good to rounding and its tail; the modes know it better.
+        if let Some(level) = level
+            && u < 1.0
+        {
+            for _ in 0..3 {
+                let time = self.step.end_time();
+                let (gap, rate) = system.gap_of(time, &self.modal);
+                let slope = rate * self.step.map.rate(self.step.length, self.step.end);
+                let next = self.step.end - (gap - level) / slope;
+                if !(next > 0.0 && next <= 1.0) || (next - self.step.end).abs() <= 1e-15 {
+                    break;
+                }
+                self.step.end = next;
+                self.step.modal_at(system, next, &mut self.modal);
+            }
+        }
+        self.time = self.step.end_time();
+        self.solver.statistics.steps += 1;
+        self.solver.statistics.switches += 1;
+        observer.step(system, &mut self.solver, &self.step, &self.modal);
+        let (gap, rate) = system.gap_of(self.time, &self.modal);
+        let switch = Switch {
+            time: self.time,
+            from: self.branch,
+            exit: number,
+            to: exit.target,
+            gap: level.unwrap_or(gap),
+            rate,
+        };
+        observer.switch(system, &switch, &exit, &self.modal);
+        self.branch = exit.target;
+        self.pinned = level;
+        self.onset = Some(exit.after);
+        if self.modal.iter().any(|y| !y.is_finite()) {
+            return Err(VolterraError::Diverged { time: self.time });
+        }
+        Ok(())
+    }
+
+    /// Tries the step that ends the branch through the singular exit `number`, about `after`
+    /// from now, beginning somewhere on the pending step. It is left in `self.step`.
+    fn end_step(&mut self, system: &System, number: usize, after: f64) -> bool {
+        let kernel = system.kernel();
+        let exit = system.exits(self.branch)[number];
+        let (Guard::Falls(level) | Guard::Rises(level)) = exit.guard else {
+            return false;
+        };
+        let Some(below) = kernel.index_below(after) else {
+            return false;
+        };
+        let Some(index) = below.checked_sub(1) else {
+            return false;
+        };
+        let length = kernel.length(index);
+        if length - after > 0.8 * self.pending.length {
+            return false;
+        }
+        self.prepare(TimeMap::End, index, false);
+        let step = &mut self.step;
+        step.start = self.time + after - length;
+        step.pinned_start = None;
+        step.pinned_end = Some(level);
+        step.moving_end = exit.before == Approach::Half;
+        match self.solver.solve_end(system, &self.pending, step) {
+            Ok(quality) if quality.error <= 1.0 => {}
+            _ => return false,
+        }
+        // Inside until the end, and no other way out before it.
+        let n = self.step.forces.len();
+        self.guard_values(system, &exit, n);
+        if self.work.values[..n - 1].iter().any(|g| !(*g > 0.0)) {
+            return false;
+        }
+        system.exits(self.branch).iter().enumerate().all(|(other, exit)| {
+            other == number || {
+                self.guard_values(system, exit, n);
+                self.guard_series(system);
+                first_fall(&self.work.series, &mut self.work.scratch) == Fall::None
+            }
+        })
+    }
+
+    /// The values of a guard at the nodes, in `self.work.values`.
+    fn guard_values(&mut self, system: &System, exit: &Exit, n: usize) {
+        let step = &self.step;
+        for i in 0..n {
+            self.work.values[i] = match exit.guard {
+                Guard::Falls(level) => step.gap[i] - level,
+                Guard::Rises(level) => level - step.gap[i],
+                Guard::Turns => -step.rate[i],
+                Guard::Own(index) => system.law().guard(index, step.gap[i], step.rate[i]).value,
+            };
+        }
+    }
+
+    /// The Chebyshev series of `self.work.values`.
+    fn guard_series(&mut self, system: &System) {
+        self.work.series.fill(0.0);
+        add_product(
+            &system.kernel().coefficients,
+            &self.work.values,
+            &mut self.work.series,
+        );
+    }
+
+    /// The first switch on the step in `self.step`.
+    fn first_switch(&mut self, system: &System) -> Result<Option<Found>, Refusal> {
+        let n = self.step.forces.len();
+        let fresh = self.onset.is_some();
+        let mut found: Option<Found> = None;
+        for (number, exit) in system.exits(self.branch).iter().enumerate() {
+            self.guard_values(system, exit, n);
+            let size = crate::step::largest(&self.work.values);
+            self.guard_series(system);
+            if fresh && self.work.values[0].abs() <= 1e-9 * size {
+                self.deflate(system);
+            }
+            let c = &self.work.series;
+            let rest: f64 = c[1..].iter().map(|c| c.abs()).sum();
+            let tail = c[n - 1].abs() + c[n - 2].abs() + c[n - 3].abs();
+            if c[0] > rest + 10.0 * tail + self.unresolved(system, exit) {
+                continue;
+            }
+            // After division by the time since the switch, rounding weighs more near it.
+            let resolved = if fresh { RESOLVED_FRESH } else { RESOLVED };
+            if tail > resolved * (c[0].abs() + rest) {
+                return Err(Refusal::Switch);
+            }
+            if let Fall::At(u) = first_fall(&self.work.series, &mut self.work.scratch)
+                && found.is_none_or(|f| u < f.u)
+            {
+                found = Some(Found { exit: number, u });
+            }
+        }
+        Ok(found)
+    }
+
+    /// Divides a guard that starts at zero by the time since, and takes its series again.
+    fn deflate(&mut self, system: &System) {
+        let table = system.kernel().table(self.step.map, self.step.index);
+        let work = &mut self.work;
+        derivative(&work.series, &mut work.slope);
+        let at_zero = |c: &[f64]| crate::quadrature::series(c, 0.0);
+        work.values[0] = match self.step.map {
+            TimeMap::Start => {
+                derivative(&work.slope, &mut work.curvature);
+                at_zero(&work.curvature) / (2.0 * table.length)
+            }
+            _ => at_zero(&work.slope) / table.length,
+        };
+        for (value, time) in work.values.iter_mut().zip(&table.times).skip(1) {
+            *value /= time;
+        }
+        self.guard_series(system);
+    }
+
+    /// Twice the amplitude in the gap of the modes too fast for the step's polynomial.
+    fn unresolved(&self, system: &System, exit: &Exit) -> f64 {
+        if !matches!(exit.guard, Guard::Falls(_) | Guard::Rises(_)) {
+            return 0.0;
+        }
+        let kernel = system.kernel();
+        let n = self.step.forces.len() as f64;
+        kernel
+            .modes()
+            .blocks()
+            .iter()
+            .filter(|block| block.rate() * self.step.length > n)
+            .map(|block| {
+                let norm = |v: &[f64]| {
+                    v[block.start..block.start + block.size]
+                        .iter()
+                        .map(|x| x * x)
+                        .sum::<f64>()
+                        .sqrt()
+                };
+                2.0 * norm(&kernel.readout) * norm(&self.step.modal)
+            })
+            .sum()
+    }
+
+    fn uncertified(&self, reason: Refusal) -> VolterraError {
+        VolterraError::Uncertified {
+            time: self.time,
+            gap: self.gap().0,
+            reason,
+        }
+    }
+}

@@ -1,0 +1,450 @@
+//! What a unit of force does to the gap: the Green's function of the modes, integrated
+//! against the polynomials of a step once and for all.
+//!
+//! On a step the force is a polynomial in `u ∈ [0, 1]`, given by its values at `n` Chebyshev
+//! nodes. Its effect on the gap and the gap's rate at the nodes, at a few check points
+//! between them, and on the modal coordinates at the end depends on the step's length and on
+//! how `u` runs with time, and on nothing else. Lengths are `h₀ 2^{−k/2}`.
+
+use crate::modes::{Block, Modes};
+use crate::quadrature::{chebyshev_basis, chebyshev_coefficients, chebyshev_nodes, gauss_legendre};
+use crate::VolterraError;
+use nalgebra::{DVector, RowDVector};
+use std::f64::consts::SQRT_2;
+use std::sync::{Arc, OnceLock};
+
+/// Step lengths tabulated: the shortest is `h₀ 2^{−(LENGTHS − 1)/2}`.
+pub(crate) const LENGTHS: usize = 72;
+/// Points between the nodes at which the law is compared with the polynomial.
+pub(crate) const CHECKS: usize = 4;
+/// The largest number of nodes of a step.
+pub const MAX_NODES: usize = 32;
+/// Points of the Gauss–Legendre rule of one panel.
+const PANEL_POINTS: usize = 24;
+/// How far a mode may turn or decay within one panel.
+const PANEL_REACH: f64 = 8.0;
+
+/// How time runs with the step's variable `u`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimeMap {
+    /// `t = h u`.
+    Plain,
+    /// `t = h u²`: the force begins like a power of `√t`.
+    Start,
+    /// `t = h (1 − (1 − u)²)`: the force ends like a power of `√(h − t)`.
+    End,
+}
+
+impl TimeMap {
+    /// Time since the step's start.
+    #[inline]
+    pub(crate) fn time(self, h: f64, u: f64) -> f64 {
+        match self {
+            Self::Plain => h * u,
+            Self::Start => h * u * u,
+            Self::End => h * u * (2.0 - u),
+        }
+    }
+
+    /// Its derivative by `u`.
+    #[inline]
+    pub(crate) fn rate(self, h: f64, u: f64) -> f64 {
+        match self {
+            Self::Plain => h,
+            Self::Start => 2.0 * h * u,
+            Self::End => 2.0 * h * (1.0 - u),
+        }
+    }
+
+    /// The `u` of a time `0 ≤ t ≤ h`.
+    #[inline]
+    pub(crate) fn variable(self, h: f64, t: f64) -> f64 {
+        let x = (t / h).clamp(0.0, 1.0);
+        match self {
+            Self::Plain => x,
+            Self::Start => x.sqrt(),
+            // 1 − √(1 − x) without cancellation.
+            Self::End => x / (1.0 + (1.0 - x).sqrt()),
+        }
+    }
+}
+
+/// The modes with a gap read from them and a column by which the force enters.
+#[derive(Debug)]
+pub struct Kernel {
+    modes: Modes,
+    /// `row · R`.
+    pub(crate) readout: Vec<f64>,
+    /// `row · R B`.
+    pub(crate) rate_readout: Vec<f64>,
+    /// `L p`.
+    pub(crate) source: Vec<f64>,
+    row: RowDVector<f64>,
+    column: DVector<f64>,
+    pub(crate) nodes: usize,
+    /// Nodes, then check points.
+    pub(crate) points: Vec<f64>,
+    /// From values at the nodes to coefficients, column-major.
+    pub(crate) coefficients: Vec<f64>,
+    longest: f64,
+    /// Bound of the amplitude in the gap that a unit impulse of force excites.
+    pub(crate) reach: f64,
+    panel: (Vec<f64>, Vec<f64>),
+    tables: [Vec<OnceLock<Box<Table>>>; 3],
+}
+
+/// Everything about a step that its length and map fix. Matrices are column-major.
+#[derive(Debug)]
+pub(crate) struct Table {
+    pub(crate) length: f64,
+    /// Times of the points.
+    pub(crate) times: Vec<f64>,
+    /// Gap at the points from the modal coordinates at the start, points × dimension.
+    pub(crate) gap: Vec<f64>,
+    /// Its rate.
+    pub(crate) rate: Vec<f64>,
+    /// Gap at the points from the forces at the nodes, points × nodes.
+    pub(crate) gap_force: Vec<f64>,
+    /// Its rate.
+    pub(crate) rate_force: Vec<f64>,
+    /// Force at the check points from the forces at the nodes, checks × nodes.
+    pub(crate) between: Vec<f64>,
+    /// Modal coordinates at the end from the forces at the nodes, dimension × nodes.
+    pub(crate) carry: Vec<f64>,
+    /// `e^{Bh}` of each block.
+    pub(crate) exponentials: Vec<[[f64; 2]; 2]>,
+    /// Sums of the sizes in the rows of `gap_force` and `rate_force`, at the nodes.
+    pub(crate) row_sums: Vec<[f64; 2]>,
+}
+
+impl Kernel {
+    /// Prepares the modes with the gap `row · x` and the force entering as `column · F`.
+    /// `longest` is the longest step, a fraction of the slowest mode's period or of the
+    /// drive's; `nodes` (8 to [`MAX_NODES`]) is the number of forces a step.
+    ///
+    /// # Errors
+    /// When sizes do not fit, a value is not finite or out of range, or the force acts on the
+    /// gap's rate without inertia.
+    pub fn new(
+        modes: Modes,
+        row: RowDVector<f64>,
+        column: DVector<f64>,
+        longest: f64,
+        nodes: usize,
+    ) -> Result<Arc<Self>, VolterraError> {
+        let n = modes.dimension();
+        for (what, found) in [
+            ("the row of the gap", row.len()),
+            ("the column of the force", column.len()),
+        ] {
+            if found != n {
+                return Err(VolterraError::Shape {
+                    what,
+                    found,
+                    expected: n,
+                });
+            }
+        }
+        if let Some(&found) = row.iter().chain(column.iter()).find(|v| !v.is_finite()) {
+            return Err(VolterraError::Value {
+                what: "an entry of the gap's row or the force's column".into(),
+                found,
+                needed: "finite",
+            });
+        }
+        if !(longest > 0.0 && longest.is_finite()) {
+            return Err(VolterraError::Value {
+                what: "the longest step".into(),
+                found: longest,
+                needed: "positive and finite",
+            });
+        }
+        if !(8..=MAX_NODES).contains(&nodes) {
+            return Err(VolterraError::Value {
+                what: "the number of nodes".into(),
+                found: nodes as f64,
+                needed: "between 8 and 32",
+            });
+        }
+        let readout: Vec<f64> = (&row * modes.right()).iter().copied().collect();
+        let source: Vec<f64> = (modes.left() * &column).iter().copied().collect();
+        let mut reach = 0.0;
+        let mut rate_readout = vec![0.0; n];
+        for block in modes.blocks() {
+            let s = block.start;
+            let norm = |v: &[f64]| v[s..s + block.size].iter().map(|x| x * x).sum::<f64>().sqrt();
+            reach += norm(&readout) * norm(&source);
+            for j in 0..block.size {
+                for i in 0..block.size {
+                    rate_readout[s + j] += readout[s + i] * block.matrix[i][j];
+                }
+            }
+        }
+        let direct: f64 = readout.iter().zip(&source).map(|(r, b)| r * b).sum();
+        if direct.abs() > 1e-9 * reach {
+            return Err(VolterraError::Inertialess);
+        }
+        let mut points = chebyshev_nodes(nodes);
+        // Between the nodes, where the polynomial's error is largest, spread over the step.
+        for k in 0..CHECKS {
+            let i = (2 * k + 1) * (nodes - 1) / (2 * CHECKS);
+            points.push(0.5 * (points[i] + points[i + 1]));
+        }
+        Ok(Arc::new(Self {
+            modes,
+            readout,
+            rate_readout,
+            source,
+            row,
+            column,
+            nodes,
+            points,
+            coefficients: chebyshev_coefficients(nodes),
+            longest,
+            reach,
+            panel: gauss_legendre(PANEL_POINTS),
+            tables: std::array::from_fn(|_| (0..LENGTHS).map(|_| OnceLock::new()).collect()),
+        }))
+    }
+
+    /// The modes.
+    pub fn modes(&self) -> &Modes {
+        &self.modes
+    }
+
+    /// The row of the gap.
+    pub fn row(&self) -> &RowDVector<f64> {
+        &self.row
+    }
+
+    /// The column of the force.
+    pub fn column(&self) -> &DVector<f64> {
+        &self.column
+    }
+
+    /// Length of the steps number `index`.
+    pub(crate) fn length(&self, index: usize) -> f64 {
+        let half = if index % 2 == 1 { 1.0 / SQRT_2 } else { 1.0 };
+        self.longest * half * 0.5_f64.powi((index / 2) as i32)
+    }
+
+    /// The longest tabulated step that is no longer than `length`, if there is one.
+    pub(crate) fn index_below(&self, length: f64) -> Option<usize> {
+        if !(length > 0.0) {
+            return None;
+        }
+        let guess = (2.0 * (self.longest / length).log2()).floor() as i64 - 1;
+        let first = guess.clamp(0, LENGTHS as i64) as usize;
+        (first..LENGTHS).find(|&k| self.length(k) <= length)
+    }
+
+    /// The table of steps of length number `index` under `map`.
+    pub(crate) fn table(&self, map: TimeMap, index: usize) -> &Table {
+        self.tables[map as usize][index].get_or_init(|| Box::new(self.build(map, index)))
+    }
+
+    fn build(&self, map: TimeMap, index: usize) -> Table {
+        let (h, n, dimension) = (self.length(index), self.nodes, self.modes.dimension());
+        let rows = self.points.len();
+        let mut table = Table {
+            length: h,
+            times: self.points.iter().map(|&u| map.time(h, u)).collect(),
+            gap: vec![0.0; rows * dimension],
+            rate: vec![0.0; rows * dimension],
+            gap_force: vec![0.0; rows * n],
+            rate_force: vec![0.0; rows * n],
+            between: vec![0.0; CHECKS * n],
+            carry: vec![0.0; dimension * n],
+            exponentials: self.modes.blocks().iter().map(|b| b.exp(h)).collect(),
+            row_sums: vec![[0.0; 2]; n],
+        };
+        let mut moments = vec![[0.0; 2]; n];
+        let (mut of_gap, mut of_rate) = (vec![0.0; n], vec![0.0; n]);
+        for (i, &u) in self.points.iter().enumerate() {
+            let time = table.times[i];
+            of_gap.fill(0.0);
+            of_rate.fill(0.0);
+            for block in self.modes.blocks() {
+                let s = block.start;
+                let e = block.exp(time);
+                for j in 0..block.size {
+                    for k in 0..block.size {
+                        table.gap[(s + j) * rows + i] += self.readout[s + k] * e[k][j];
+                        table.rate[(s + j) * rows + i] += self.rate_readout[s + k] * e[k][j];
+                    }
+                }
+                self.moments(block, map, h, u, &mut moments);
+                for (j, moment) in moments.iter().enumerate() {
+                    for k in 0..block.size {
+                        of_gap[j] += self.readout[s + k] * moment[k];
+                        of_rate[j] += self.rate_readout[s + k] * moment[k];
+                    }
+                }
+                if i + 1 == n {
+                    for k in 0..block.size {
+                        for node in 0..n {
+                            let column = &self.coefficients[node * n..(node + 1) * n];
+                            table.carry[node * dimension + s + k] = moments
+                                .iter()
+                                .zip(column)
+                                .map(|(m, c)| m[k] * c)
+                                .sum();
+                        }
+                    }
+                }
+            }
+            for node in 0..n {
+                let column = &self.coefficients[node * n..(node + 1) * n];
+                let dot = |v: &[f64]| v.iter().zip(column).map(|(a, c)| a * c).sum::<f64>();
+                table.gap_force[node * rows + i] = dot(&of_gap);
+                table.rate_force[node * rows + i] = dot(&of_rate);
+            }
+            if i < n {
+                let sum = |m: &[f64]| (0..n).map(|node| m[node * rows + i].abs()).sum::<f64>();
+                table.row_sums[i] = [sum(&table.gap_force), sum(&table.rate_force)];
+            }
+        }
+        let mut basis = vec![0.0; n];
+        for (i, &u) in self.points[n..].iter().enumerate() {
+            chebyshev_basis(u, &mut basis);
+            for node in 0..n {
+                let column = &self.coefficients[node * n..(node + 1) * n];
+                table.between[node * CHECKS + i] =
+                    basis.iter().zip(column).map(|(b, c)| b * c).sum();
+            }
+        }
+        table
+    }
+
+    /// How many panels the integral of a block over `[0, u]` needs.
+    fn panels(block: &Block, map: TimeMap, h: f64, u: f64) -> usize {
+        let fastest = map.rate(h, 0.0).max(map.rate(h, u)) * u;
+        ((block.rate() * fastest / PANEL_REACH).ceil() as usize).max(1)
+    }
+
+    /// `∫₀^{t(u)} e^{B(t(u) − s)} b T_j(s) ds` of one block for all `j`, in `out`.
+    pub(crate) fn moments(
+        &self,
+        block: &Block,
+        map: TimeMap,
+        h: f64,
+        u: f64,
+        out: &mut [[f64; 2]],
+    ) {
+        out.fill([0.0; 2]);
+        if u == 0.0 {
+            return;
+        }
+        let panels = Self::panels(block, map, h, u);
+        let width = u / panels as f64;
+        let end = map.time(h, u);
+        let source = self.source_of(block);
+        let mut basis = [0.0; MAX_NODES];
+        let basis = &mut basis[..out.len()];
+        for panel in 0..panels {
+            for (x, w) in self.panel.0.iter().zip(&self.panel.1) {
+                let at = width * (panel as f64 + x);
+                let weight = w * width * map.rate(h, at);
+                let e = block.exp(end - map.time(h, at));
+                let value = [
+                    weight * (e[0][0] * source[0] + e[0][1] * source[1]),
+                    weight * (e[1][0] * source[0] + e[1][1] * source[1]),
+                ];
+                chebyshev_basis(at, basis);
+                for (out, t) in out.iter_mut().zip(basis.iter()) {
+                    out[0] += value[0] * t;
+                    out[1] += value[1] * t;
+                }
+            }
+        }
+    }
+
+    fn source_of(&self, block: &Block) -> [f64; 2] {
+        let s = block.start;
+        let second = if block.size == 2 { self.source[s + 1] } else { 0.0 };
+        [self.source[s], second]
+    }
+
+    /// Modal coordinates at `u` of a step that starts from `y` and whose force has the given
+    /// coefficients, written to `out`.
+    pub(crate) fn partial(
+        &self,
+        map: TimeMap,
+        h: f64,
+        u: f64,
+        y: &[f64],
+        coefficients: &[f64],
+        out: &mut [f64],
+    ) {
+        let end = map.time(h, u);
+        let mut panels = 0;
+        // (time to the end, weighted force) at the quadrature points.
+        let mut forces: Vec<(f64, f64)> = Vec::new();
+        for block in self.modes.blocks() {
+            let s = block.start;
+            let e = block.exp(end);
+            let second = if block.size == 2 { y[s + 1] } else { 0.0 };
+            let mut value = [
+                e[0][0] * y[s] + e[0][1] * second,
+                e[1][0] * y[s] + e[1][1] * second,
+            ];
+            let needed = Self::panels(block, map, h, u);
+            if needed != panels {
+                panels = needed;
+                self.forces(map, h, u, panels, coefficients, &mut forces);
+            }
+            let source = self.source_of(block);
+            for &(rest, force) in &forces {
+                if force != 0.0 {
+                    let e = block.exp(rest);
+                    value[0] += force * (e[0][0] * source[0] + e[0][1] * source[1]);
+                    value[1] += force * (e[1][0] * source[0] + e[1][1] * source[1]);
+                }
+            }
+            out[s..s + block.size].copy_from_slice(&value[..block.size]);
+        }
+    }
+
+    fn forces(
+        &self,
+        map: TimeMap,
+        h: f64,
+        u: f64,
+        panels: usize,
+        coefficients: &[f64],
+        out: &mut Vec<(f64, f64)>,
+    ) {
+        out.clear();
+        let end = map.time(h, u);
+        let width = u / panels as f64;
+        for panel in 0..panels {
+            for (x, w) in self.panel.0.iter().zip(&self.panel.1) {
+                let at = width * (panel as f64 + x);
+                let force = crate::quadrature::series(coefficients, at);
+                out.push((
+                    end - map.time(h, at),
+                    w * width * map.rate(h, at) * force,
+                ));
+            }
+        }
+    }
+
+    /// `∂y(u)/∂forces` (dimension × nodes, column-major) of a step cut at `u`.
+    pub(crate) fn partial_carry(&self, map: TimeMap, h: f64, u: f64, out: &mut [f64]) {
+        let (n, dimension) = (self.nodes, self.modes.dimension());
+        let mut moments = [[0.0; 2]; MAX_NODES];
+        for block in self.modes.blocks() {
+            self.moments(block, map, h, u, &mut moments[..n]);
+            for node in 0..n {
+                let column = &self.coefficients[node * n..(node + 1) * n];
+                for k in 0..block.size {
+                    out[node * dimension + block.start + k] = moments[..n]
+                        .iter()
+                        .zip(column)
+                        .map(|(m, c)| m[k] * c)
+                        .sum();
+                }
+            }
+        }
+    }
+}

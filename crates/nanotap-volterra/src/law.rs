@@ -1,0 +1,139 @@
+//! What a force law is to the flow: branches, on each of which the force is an analytic
+//! function of the gap and its rate, and exits between them.
+
+use std::fmt::Debug;
+
+/// A value with its derivatives by the gap and by the gap's rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Force {
+    /// The value.
+    pub value: f64,
+    /// By the gap.
+    pub by_gap: f64,
+    /// By the gap's rate.
+    pub by_rate: f64,
+}
+
+/// When a branch is left. A guard is positive inside its branch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Guard {
+    /// When the gap falls to this value.
+    Falls(f64),
+    /// When the gap rises to this value.
+    Rises(f64),
+    /// When the gap stops falling.
+    Turns,
+    /// When a quantity of the law's own, [`ForceLaw::guard`], falls to zero.
+    Own(usize),
+}
+
+/// How the force comes up to a switch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Approach {
+    /// Analytic up to the switch and beyond.
+    Analytic,
+    /// As a power 3/2 of the distance from the switch: twice the square root of time is the
+    /// right variable, and the derivative of the force by the gap stays finite.
+    ThreeHalves,
+    /// As a power 1/2: the derivative of the force by the gap is infinite at the switch.
+    Half,
+}
+
+/// A way out of a branch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exit {
+    /// When.
+    pub guard: Guard,
+    /// The branch after it.
+    pub target: usize,
+    /// How the force of the branch that is left comes up to the switch. Only switches at a
+    /// value of the gap may be other than analytic.
+    pub before: Approach,
+    /// How the force of the target sets in.
+    pub after: Approach,
+}
+
+impl Exit {
+    /// A switch that is analytic on both sides.
+    pub const fn new(guard: Guard, target: usize) -> Self {
+        Self {
+            guard,
+            target,
+            before: Approach::Analytic,
+            after: Approach::Analytic,
+        }
+    }
+
+    /// With the force before and after it coming up to the switch as said.
+    #[must_use]
+    pub const fn with(mut self, before: Approach, after: Approach) -> Self {
+        self.before = before;
+        self.after = after;
+        self
+    }
+}
+
+/// Where a motion leaves the range for which a law was derived.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remark {
+    /// What is out of range, as a formula: `δ/R`.
+    pub ratio: &'static str,
+    /// Its largest value.
+    pub value: f64,
+    /// The value up to which the law holds.
+    pub limit: f64,
+}
+
+/// A scalar force of a gap and its rate, repulsive positive.
+pub trait ForceLaw: Debug + Send + Sync {
+    /// Names of the parameters that the law can be differentiated by.
+    fn parameters(&self) -> Vec<&'static str>;
+
+    /// Number of branches.
+    fn branches(&self) -> usize;
+
+    /// The branch of a motion whose history is not known.
+    fn branch_at(&self, gap: f64, rate: f64) -> usize;
+
+    /// The force on a branch, also a little beyond where it is left.
+    fn force(&self, branch: usize, gap: f64, rate: f64) -> Force;
+
+    /// The ways out of a branch.
+    fn exits(&self, branch: usize) -> Vec<Exit>;
+
+    /// The law's own guard number `index`.
+    fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
+        let _ = (index, gap, rate);
+        Force::default()
+    }
+
+    /// The derivatives of the force by the parameters, written to `out`.
+    fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]);
+
+    /// The derivatives by the parameters of a guard (positive inside the branch) at the
+    /// switch, written to `out`.
+    fn guard_by_parameters(&self, branch: usize, exit: usize, gap: f64, rate: f64, out: &mut [f64]);
+
+    /// The energy stored at this gap, zero far away; none where the law has no potential.
+    fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
+        let _ = (branch, gap);
+        None
+    }
+
+    /// Whether the force on a branch is zero whatever the gap does.
+    fn vanishes(&self, branch: usize) -> bool {
+        let _ = branch;
+        false
+    }
+
+    /// Whether the force depends on the gap alone.
+    fn conservative(&self) -> bool {
+        false
+    }
+
+    /// What a motion that came as close as `least_gap` violates.
+    fn remarks(&self, least_gap: f64) -> Vec<Remark> {
+        let _ = least_gap;
+        Vec::new()
+    }
+}

@@ -1,0 +1,168 @@
+//! Electrostatic attraction of a biased sphere, and DLVO interaction in an electrolyte.
+//!
+//! `−π ε U² R²/(d (d + R))` (Hudlet, Saint Jean, Guthmann, Berger, Eur. Phys. J. B 2, 1998);
+//! `(4πR/ε) σ_tσ_s λ_D e^{−d/λ_D} − H R/(6 d²)` (Butt, Cappella, Kappl, Surf. Sci. Rep. 59,
+//! 2005), `ε` the absolute permittivity of the medium. In contact (`d < a0`) each stays as it
+//! is at `a0`, so that neither jumps there.
+
+use crate::dual::Scalar;
+use crate::law::Approach;
+use crate::laws::elastic::contact_ways;
+use crate::laws::entry::{
+    CONTACT_DISTANCE, Dimension, Entry, HAMAKER, ParameterEntry, Part, RADIUS, Range, own,
+};
+use crate::laws::formula::{Formula, Way};
+use std::f64::consts::PI;
+
+const PERMITTIVITY: ParameterEntry = own(
+    "permittivity",
+    "absolute permittivity of the medium",
+    Dimension::PERMITTIVITY,
+    Some(8.854_187_812_8e-12),
+    Range::Positive,
+);
+
+/// Of a biased sphere.
+#[derive(Clone, Copy, Debug)]
+pub struct Electrostatic;
+
+/// Its entry.
+pub static ELECTROSTATIC: Entry = Entry {
+    name: "electrostatic",
+    words: "electrostatic attraction of a biased sphere and a conducting sample",
+    formula: "−π ε U² R²/(d (d + R)) for d > a0, its value at a0 in contact",
+    source: "Hudlet, Saint Jean, Guthmann, Berger, Eur. Phys. J. B 2, 5 (1998)",
+    parameters: &[
+        own(
+            "voltage",
+            "voltage U between tip and sample",
+            Dimension::VOLTAGE,
+            None,
+            Range::Finite,
+        ),
+        RADIUS,
+        CONTACT_DISTANCE,
+        PERMITTIVITY,
+    ],
+    parts: &[],
+    conservative: true,
+};
+
+impl Formula for Electrostatic {
+    fn entry(&self) -> &'static Entry {
+        &ELECTROSTATIC
+    }
+
+    fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
+        let strength = p[3] * p[0].square() * p[1].square() * (-PI);
+        vec![
+            p[2],
+            strength,
+            p[1],
+            strength / (p[2] * (p[2] + p[1])),
+        ]
+    }
+
+    fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
+        if branch == 0 {
+            c[1] / (gap * (gap + c[2]))
+        } else {
+            c[3]
+        }
+    }
+
+    fn ways(&self, branch: usize) -> Vec<Way> {
+        contact_ways(branch, Approach::Analytic)
+    }
+
+    fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
+        let away = |d: f64| c[1] / c[2] * (c[2] / d).ln_1p();
+        Some(if branch == 0 {
+            away(gap)
+        } else {
+            away(c[0]) - c[3] * (gap - c[0])
+        })
+    }
+}
+
+/// Double layer and van der Waals attraction.
+#[derive(Clone, Copy, Debug)]
+pub struct Dlvo;
+
+/// Its entry.
+pub static DLVO: Entry = Entry {
+    name: "dlvo",
+    words: "double-layer force and van der Waals attraction of a sphere in an electrolyte",
+    formula: "(4πR/ε) σ_t σ_s λ_D e^(−d/λ_D) − H R/(6 d²) for d > a0, its value at a0 in contact",
+    source: "Butt, Cappella, Kappl, Surf. Sci. Rep. 59, 1 (2005)",
+    parameters: &[
+        HAMAKER,
+        RADIUS,
+        CONTACT_DISTANCE,
+        own(
+            "tip_charge",
+            "surface charge density of the tip",
+            Dimension::CHARGE_DENSITY,
+            None,
+            Range::Finite,
+        ),
+        own(
+            "sample_charge",
+            "surface charge density of the sample",
+            Dimension::CHARGE_DENSITY,
+            None,
+            Range::Finite,
+        ),
+        own(
+            "debye_length",
+            "Debye length λ_D",
+            Dimension::LENGTH,
+            None,
+            Range::Positive,
+        ),
+        PERMITTIVITY,
+    ],
+    parts: &[Part::Adhesion],
+    conservative: true,
+};
+
+impl Formula for Dlvo {
+    fn entry(&self) -> &'static Entry {
+        &DLVO
+    }
+
+    /// `a0`, the double layer's strength, `−1/λ_D`, `H R/6`, the force in contact.
+    fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
+        let layer = p[1] / p[6] * p[3] * p[4] * p[5] * (4.0 * PI);
+        let decay = -p[5].recip();
+        let attraction = p[0] * p[1] * (1.0 / 6.0);
+        vec![
+            p[2],
+            layer,
+            decay,
+            attraction,
+            layer * (decay * p[2]).exp() - attraction / p[2].square(),
+        ]
+    }
+
+    fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
+        if branch == 0 {
+            c[1] * (c[2] * gap).exp() - c[3] * gap.square().recip()
+        } else {
+            c[4]
+        }
+    }
+
+    fn ways(&self, branch: usize) -> Vec<Way> {
+        contact_ways(branch, Approach::Analytic)
+    }
+
+    fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
+        let away = |d: f64| -c[1] / c[2] * (c[2] * d).exp() - c[3] / d;
+        Some(if branch == 0 {
+            away(gap)
+        } else {
+            away(c[0]) - c[4] * (gap - c[0])
+        })
+    }
+}

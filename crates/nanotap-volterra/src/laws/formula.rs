@@ -1,0 +1,252 @@
+//! A law written once over numbers with derivatives becomes a [`ForceLaw`].
+
+use crate::dual::{Dual, Scalar};
+use crate::law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
+use crate::laws::entry::Entry;
+use std::fmt::Debug;
+
+/// When a branch is left, with a level of the gap named by its place among the constants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edge {
+    /// The gap falls to the constant.
+    Falls(usize),
+    /// The gap rises to it.
+    Rises(usize),
+    /// The gap stops falling.
+    Turns,
+    /// The guard of this number falls to zero.
+    Own(usize),
+}
+
+/// A way out of a branch: when, to which branch, and how the force comes up to the switch on
+/// either side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Way {
+    /// When.
+    pub edge: Edge,
+    /// The branch after it.
+    pub target: usize,
+    /// How the force comes up to it before.
+    pub before: Approach,
+    /// And after.
+    pub after: Approach,
+}
+
+impl Way {
+    /// Analytic on both sides.
+    pub const fn new(edge: Edge, target: usize) -> Self {
+        Self {
+            edge,
+            target,
+            before: Approach::Analytic,
+            after: Approach::Analytic,
+        }
+    }
+
+    /// With the approach of the branch that is left.
+    #[must_use]
+    pub const fn before(mut self, approach: Approach) -> Self {
+        self.before = approach;
+        self
+    }
+
+    /// With the approach of the branch that is entered.
+    #[must_use]
+    pub const fn after(mut self, approach: Approach) -> Self {
+        self.after = approach;
+        self
+    }
+}
+
+/// The formula of a law.
+pub trait Formula: Clone + Debug + Send + Sync + 'static {
+    /// Its entry in the table of laws, with the parameters in the order of `p`.
+    fn entry(&self) -> &'static Entry;
+    /// What the force needs of the parameters, computed once. Levels at which branches end
+    /// are among them.
+    fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S>;
+    /// The number of branches.
+    fn branches(&self) -> usize {
+        2
+    }
+    /// The branch of a motion whose past is not known.
+    fn branch_at(&self, c: &[f64], gap: f64, rate: f64) -> usize {
+        let _ = rate;
+        usize::from(gap < c[0])
+    }
+    /// The force.
+    fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, rate: S) -> S;
+    /// The ways out.
+    fn ways(&self, branch: usize) -> Vec<Way>;
+    /// A guard of the law's own.
+    fn guard<S: Scalar>(&self, c: &[S], index: usize, gap: S, rate: S) -> S {
+        let _ = (c, index, rate);
+        gap
+    }
+    /// See [`ForceLaw::energy`].
+    fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
+        let _ = (c, branch, gap);
+        None
+    }
+    /// See [`ForceLaw::vanishes`].
+    fn vanishes(&self, branch: usize) -> bool {
+        let _ = branch;
+        false
+    }
+    /// See [`ForceLaw::remarks`].
+    fn remarks(&self, p: &[f64], least_gap: f64) -> Vec<Remark> {
+        let _ = (p, least_gap);
+        Vec::new()
+    }
+}
+
+/// A formula with values of its parameters.
+#[derive(Clone, Debug)]
+pub struct Law<F: Formula> {
+    formula: F,
+    parameters: Vec<f64>,
+    constants: Vec<f64>,
+    lifted: Vec<Dual<2>>,
+    /// The constants with their derivatives by each parameter.
+    varied: Vec<Vec<Dual<1>>>,
+}
+
+impl<F: Formula> Law<F> {
+    /// The law with these values of its parameters, in the order of its entry.
+    pub(crate) fn new(formula: F, parameters: Vec<f64>) -> Self {
+        let constants = formula.constants(&parameters);
+        let varied = (0..parameters.len())
+            .map(|k| {
+                let p: Vec<Dual<1>> = parameters
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &v)| {
+                        if i == k {
+                            Dual::variable(v, 0)
+                        } else {
+                            Dual::constant(v)
+                        }
+                    })
+                    .collect();
+                formula.constants(&p)
+            })
+            .collect();
+        Self {
+            lifted: constants.iter().map(|&c| Dual::constant(c)).collect(),
+            formula,
+            parameters,
+            constants,
+            varied,
+        }
+    }
+}
+
+fn force_of(d: Dual<2>) -> Force {
+    Force {
+        value: d.value,
+        by_gap: d.slopes[0],
+        by_rate: d.slopes[1],
+    }
+}
+
+impl<F: Formula> ForceLaw for Law<F> {
+    fn parameters(&self) -> Vec<&'static str> {
+        self.formula
+            .entry()
+            .parameters
+            .iter()
+            .map(|p| p.name)
+            .collect()
+    }
+
+    fn branches(&self) -> usize {
+        self.formula.branches()
+    }
+
+    fn branch_at(&self, gap: f64, rate: f64) -> usize {
+        self.formula.branch_at(&self.constants, gap, rate)
+    }
+
+    fn force(&self, branch: usize, gap: f64, rate: f64) -> Force {
+        force_of(self.formula.force(
+            &self.lifted,
+            branch,
+            Dual::variable(gap, 0),
+            Dual::variable(rate, 1),
+        ))
+    }
+
+    fn exits(&self, branch: usize) -> Vec<Exit> {
+        self.formula
+            .ways(branch)
+            .into_iter()
+            .map(|way| {
+                let guard = match way.edge {
+                    Edge::Falls(k) => Guard::Falls(self.constants[k]),
+                    Edge::Rises(k) => Guard::Rises(self.constants[k]),
+                    Edge::Turns => Guard::Turns,
+                    Edge::Own(k) => Guard::Own(k),
+                };
+                Exit::new(guard, way.target).with(way.before, way.after)
+            })
+            .collect()
+    }
+
+    fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
+        force_of(self.formula.guard(
+            &self.lifted,
+            index,
+            Dual::variable(gap, 0),
+            Dual::variable(rate, 1),
+        ))
+    }
+
+    fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]) {
+        for (out, c) in out.iter_mut().zip(&self.varied) {
+            let force = self
+                .formula
+                .force(c, branch, Dual::constant(gap), Dual::constant(rate));
+            *out = force.slopes[0];
+        }
+    }
+
+    fn guard_by_parameters(
+        &self,
+        branch: usize,
+        exit: usize,
+        gap: f64,
+        rate: f64,
+        out: &mut [f64],
+    ) {
+        out.fill(0.0);
+        let ways = self.formula.ways(branch);
+        let Some(way) = ways.get(exit) else { return };
+        for (out, c) in out.iter_mut().zip(&self.varied) {
+            *out = match way.edge {
+                Edge::Falls(k) => -c[k].slopes[0],
+                Edge::Rises(k) => c[k].slopes[0],
+                Edge::Turns => 0.0,
+                Edge::Own(k) => {
+                    let (gap, rate) = (Dual::constant(gap), Dual::constant(rate));
+                    self.formula.guard(c, k, gap, rate).slopes[0]
+                }
+            };
+        }
+    }
+
+    fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
+        self.formula.energy(&self.constants, branch, gap)
+    }
+
+    fn vanishes(&self, branch: usize) -> bool {
+        self.formula.vanishes(branch)
+    }
+
+    fn conservative(&self) -> bool {
+        self.formula.entry().conservative
+    }
+
+    fn remarks(&self, least_gap: f64) -> Vec<Remark> {
+        self.formula.remarks(&self.parameters, least_gap)
+    }
+}

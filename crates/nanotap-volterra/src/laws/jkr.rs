@@ -1,0 +1,115 @@
+//! JKR: adhesion of an elastic sphere with a neck.
+//!
+//! `F = 4E*a³/(3R) − √(8π w E* a³)`, `δ = a²/R − √(2πwa/E*)` with the contact radius `a`
+//! (Johnson, Kendall, Roberts, Proc. R. Soc. A 324, 1971). On approach contact forms at
+//! `d = a0`; it lets go at `a³ = πwR²/(8E*)`, where at held ends `F = −(5/6)πwR`: whether the
+//! tip is attached is a state, and no force acts while it is not.
+
+use crate::dual::Scalar;
+use crate::law::{Approach, Remark};
+use crate::laws::elastic::{deep, reduced_modulus};
+use crate::laws::entry::{
+    CONTACT_DISTANCE, Entry, MODULUS, POISSON, Part, RADIUS, TIP_MODULUS, TIP_POISSON,
+    WORK_OF_ADHESION,
+};
+use crate::laws::formula::{Edge, Formula, Way};
+use std::f64::consts::PI;
+
+/// See the module.
+#[derive(Clone, Copy, Debug)]
+pub struct Jkr;
+
+/// Its entry.
+pub static JKR: Entry = Entry {
+    name: "jkr",
+    words: "elastic sphere with an adhesive neck; attached or not is a state",
+    formula: "4E*a³/(3R) − √(8π w E* a³), δ = a²/R − √(2πwa/E*), from d = a0 to a³ = πwR²/(8E*)",
+    source: "Johnson, Kendall, Roberts, Proc. R. Soc. Lond. A 324, 301 (1971)",
+    parameters: &[
+        MODULUS,
+        POISSON,
+        TIP_MODULUS,
+        TIP_POISSON,
+        RADIUS,
+        CONTACT_DISTANCE,
+        WORK_OF_ADHESION,
+    ],
+    parts: &[Part::Elasticity, Part::Adhesion],
+    conservative: false,
+};
+
+impl Formula for Jkr {
+    fn entry(&self) -> &'static Entry {
+        &JKR
+    }
+
+    /// `a0, 1/R, √(2πw/E*), √a` at the end, the gap there, `4E*/(3R)`, `√(8πwE*)`.
+    fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
+        let (modulus, radius, contact, work) = (reduced_modulus(p), p[4], p[5], p[6]);
+        let tension = (work / modulus * (2.0 * PI)).sqrt();
+        let cube = radius.square() * work / modulus * (PI / 8.0);
+        let least = cube.cbrt();
+        vec![
+            contact,
+            radius.recip(),
+            tension,
+            least.sqrt(),
+            contact + least.square() / radius * 3.0,
+            modulus / radius * (4.0 / 3.0),
+            (work * modulus * (8.0 * PI)).sqrt(),
+        ]
+    }
+
+    fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
+        if branch == 0 {
+            return S::constant(0.0);
+        }
+        let root = contact_radius_root(c, c[0] - gap);
+        let cube = root.square() * root;
+        c[5] * cube.square() - c[6] * cube
+    }
+
+    fn ways(&self, branch: usize) -> Vec<Way> {
+        if branch == 0 {
+            vec![Way::new(Edge::Falls(0), 1)]
+        } else {
+            vec![Way::new(Edge::Rises(4), 0).before(Approach::Half)]
+        }
+    }
+
+    fn vanishes(&self, branch: usize) -> bool {
+        branch == 0
+    }
+
+    fn remarks(&self, p: &[f64], least_gap: f64) -> Vec<Remark> {
+        deep(p[4], p[5], least_gap)
+    }
+}
+
+/// `√a`, the larger root of `s⁴/R − s √(2πw/E*) = δ`; that of the end beyond it.
+fn contact_radius_root<S: Scalar>(c: &[S], indentation: S) -> S {
+    let (curvature, tension, least) = (c[1].value(), c[2].value(), c[3].value());
+    let delta = indentation.value();
+    if delta <= -3.0 * curvature * least.powi(4) {
+        return c[3];
+    }
+    // From above the quartic, convex there, lets Newton fall on the root from one side.
+    let mut s = (delta.max(0.0) / curvature).sqrt().sqrt() + (tension / curvature).cbrt();
+    for _ in 0..60 {
+        let cube = curvature * s * s * s;
+        let slope = 4.0 * cube - tension;
+        let next = s - (cube * s - tension * s - delta) / slope;
+        if !(next < s) || next <= least {
+            break;
+        }
+        s = next;
+    }
+    // One more step in numbers with derivatives differentiates the root.
+    let start = S::constant(s);
+    let cube = c[1] * (s * s * s);
+    let slope = 4.0 * curvature * s * s * s - tension;
+    if slope <= 0.0 {
+        return c[3];
+    }
+    start - (cube * s - c[2] * s - indentation) * (1.0 / slope)
+}

@@ -1,0 +1,204 @@
+//! The table of contact laws. A law is one file: its formula and source, its branches, its
+//! stored energy, where it ceases to hold; its parameters are declared once, here, for
+//! whatever reads them.
+//!
+//! Lengths, forces and all else may be in any consistent units; the defaults are SI.
+
+pub mod capillary;
+pub mod dmt;
+pub mod elastic;
+pub mod electric;
+pub mod entry;
+pub mod formula;
+pub mod hysteresis;
+pub mod jkr;
+pub mod kelvin_voigt;
+pub mod lennard_jones;
+pub mod polyline;
+pub mod spring_damper;
+pub mod sum;
+pub mod thin;
+pub mod van_der_waals;
+pub mod viscous;
+
+use crate::error::VolterraError;
+use crate::law::ForceLaw;
+use elastic::Shape;
+use entry::{Entry, Part};
+use formula::{Formula, Law};
+use std::sync::Arc;
+
+/// The largest number of laws in a sum.
+pub const MAX_TERMS: usize = 8;
+
+/// A law of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct TableLaw {
+    /// What is said of it.
+    pub entry: &'static Entry,
+    make: fn(Vec<f64>) -> Arc<dyn ForceLaw>,
+}
+
+impl TableLaw {
+    /// The law with these parameters, in the order of its entry.
+    ///
+    /// # Errors
+    /// When the number of parameters is wrong or a value makes no sense.
+    pub fn with(&self, parameters: &[f64]) -> Result<Arc<dyn ForceLaw>, VolterraError> {
+        let expected = self.entry.parameters.len();
+        if parameters.len() != expected {
+            return Err(VolterraError::Shape {
+                what: "the list of a law's parameters",
+                found: parameters.len(),
+                expected,
+            });
+        }
+        for (entry, &found) in self.entry.parameters.iter().zip(parameters) {
+            if !entry.range.holds(found) {
+                return Err(VolterraError::Value {
+                    what: format!("the {} of the law {:?}", entry.name, self.entry.name),
+                    found,
+                    needed: entry.range.words(),
+                });
+            }
+        }
+        Ok((self.make)(parameters.to_vec()))
+    }
+}
+
+macro_rules! table {
+    ($($entry:expr => $formula:expr),* $(,)?) => {
+        &[$(TableLaw {
+            entry: &$entry,
+            make: |p| make($formula, p),
+        }),*]
+    };
+}
+
+fn make<F: Formula>(formula: F, parameters: Vec<f64>) -> Arc<dyn ForceLaw> {
+    Arc::new(Law::new(formula, parameters))
+}
+
+const fn voigt(shape: Shape, pulls: bool) -> kelvin_voigt::KelvinVoigt {
+    kelvin_voigt::KelvinVoigt { shape, pulls }
+}
+
+/// Every law that has parameters ([`polyline::Polyline`] has points instead).
+pub static TABLE: &[TableLaw] = table! {
+    elastic::HERTZ => elastic::Elastic(Shape::Sphere),
+    elastic::CONE => elastic::Elastic(Shape::Cone),
+    elastic::PUNCH => elastic::Elastic(Shape::Punch),
+    thin::SPHERE => thin::Thin(Shape::Sphere),
+    thin::CONE => thin::Thin(Shape::Cone),
+    thin::PUNCH => thin::Thin(Shape::Punch),
+    dmt::DMT => dmt::Dmt,
+    jkr::JKR => jkr::Jkr,
+    van_der_waals::SPHERE => van_der_waals::VanDerWaals(Shape::Sphere),
+    van_der_waals::CONE => van_der_waals::VanDerWaals(Shape::Cone),
+    van_der_waals::PUNCH => van_der_waals::VanDerWaals(Shape::Punch),
+    lennard_jones::LENNARD_JONES => lennard_jones::LennardJones,
+    kelvin_voigt::SPHERE => voigt(Shape::Sphere, false),
+    kelvin_voigt::SPHERE_PULLING => voigt(Shape::Sphere, true),
+    kelvin_voigt::CONE => voigt(Shape::Cone, false),
+    kelvin_voigt::CONE_PULLING => voigt(Shape::Cone, true),
+    kelvin_voigt::PUNCH => voigt(Shape::Punch, false),
+    kelvin_voigt::PUNCH_PULLING => voigt(Shape::Punch, true),
+    viscous::ROOT_VISCOSITY => viscous::RootViscosity,
+    viscous::EXPONENTIAL_DAMPING => viscous::ExponentialDamping,
+    hysteresis::ADHESION_HYSTERESIS => hysteresis::AdhesionHysteresis,
+    capillary::CAPILLARY => capillary::Capillary,
+    electric::ELECTROSTATIC => electric::Electrostatic,
+    electric::DLVO => electric::Dlvo,
+    spring_damper::SPRING_DAMPER => spring_damper::SpringDamper,
+};
+
+/// The law of a name.
+///
+/// # Errors
+/// [`VolterraError::UnknownLaw`].
+pub fn law(name: &str) -> Result<&'static TableLaw, VolterraError> {
+    TABLE
+        .iter()
+        .find(|law| law.entry.name == name)
+        .ok_or_else(|| VolterraError::UnknownLaw { name: name.into() })
+}
+
+/// The law of a name with parameters by name, defaults for the others.
+///
+/// # Errors
+/// When there is no such law or parameter, one is missing, or a value makes no sense.
+pub fn build(name: &str, values: &[(&str, f64)]) -> Result<Arc<dyn ForceLaw>, VolterraError> {
+    let law = law(name)?;
+    for (key, found) in values {
+        if !law.entry.parameters.iter().any(|p| p.name == *key) {
+            return Err(VolterraError::Value {
+                what: format!("{key} of the law {name:?}"),
+                found: *found,
+                needed: "absent: the law has no such parameter",
+            });
+        }
+    }
+    let parameters = law
+        .entry
+        .parameters
+        .iter()
+        .map(|p| {
+            values
+                .iter()
+                .find(|(key, _)| *key == p.name)
+                .map(|(_, value)| *value)
+                .or(p.default)
+                .ok_or_else(|| VolterraError::Value {
+                    what: format!("the {} of the law {name:?}", p.name),
+                    found: f64::NAN,
+                    needed: "given",
+                })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    law.with(&parameters)
+}
+
+/// The sum of laws of the table, with what must not be counted twice refused: two elastic
+/// repulsions, or two laws that each hold the adhesion.
+///
+/// # Errors
+/// [`VolterraError::Sum`] for such a pair, [`VolterraError::TooLarge`] for more than
+/// [`MAX_TERMS`] laws, [`VolterraError::Shape`] for none.
+pub fn build_sum(
+    terms: &[(&'static Entry, Arc<dyn ForceLaw>)],
+) -> Result<Arc<dyn ForceLaw>, VolterraError> {
+    if terms.is_empty() {
+        return Err(VolterraError::Shape {
+            what: "the sum of laws",
+            found: 0,
+            expected: 1,
+        });
+    }
+    if terms.len() > MAX_TERMS {
+        return Err(VolterraError::TooLarge {
+            what: "the number of laws in a sum",
+            found: terms.len(),
+            limit: MAX_TERMS,
+        });
+    }
+    for (k, (second, _)) in terms.iter().enumerate() {
+        for (first, _) in &terms[..k] {
+            if let Some(part) = first.parts.iter().find(|p| second.parts.contains(p)) {
+                return Err(VolterraError::Sum {
+                    first: first.name,
+                    second: second.name,
+                    reason: match part {
+                        Part::Elasticity => "the elastic repulsion would be counted twice",
+                        Part::Adhesion => "the adhesion would be counted twice",
+                    },
+                });
+            }
+        }
+    }
+    if let [(_, law)] = terms {
+        return Ok(law.clone());
+    }
+    Ok(Arc::new(sum::Sum::new(
+        terms.iter().map(|(_, law)| law.clone()).collect(),
+    )))
+}

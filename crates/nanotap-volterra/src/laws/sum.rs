@@ -1,0 +1,170 @@
+//! Laws that act together.
+
+use crate::law::{Exit, Force, ForceLaw, Guard, Remark};
+use std::sync::Arc;
+
+/// The sum of laws. A branch of the sum is a branch of each, counted with the first fastest.
+/// Ways out of several laws at the same value of the gap are one.
+#[derive(Clone, Debug)]
+pub struct Sum {
+    terms: Vec<Arc<dyn ForceLaw>>,
+    /// How many parameters each has.
+    counts: Vec<usize>,
+    /// How many guards of their own the terms before each have at most.
+    guards: Vec<usize>,
+}
+
+impl Sum {
+    /// The sum of these laws; what must not be added is for
+    /// [`build`](crate::laws::build_sum) to refuse.
+    pub(crate) fn new(terms: Vec<Arc<dyn ForceLaw>>) -> Self {
+        let mut guards = Vec::with_capacity(terms.len());
+        let mut first = 0;
+        for term in &terms {
+            guards.push(first);
+            first += own_guards(term.as_ref());
+        }
+        Self {
+            counts: terms.iter().map(|t| t.parameters().len()).collect(),
+            terms,
+            guards,
+        }
+    }
+
+    /// The terms with their own branches.
+    fn split(&self, mut branch: usize) -> impl Iterator<Item = (usize, &dyn ForceLaw, usize)> {
+        self.terms.iter().enumerate().map(move |(k, term)| {
+            let own = branch % term.branches();
+            branch /= term.branches();
+            (k, term.as_ref(), own)
+        })
+    }
+
+    /// The exits of a branch, each with the exits of the terms that it stands for.
+    fn ways(&self, branch: usize) -> Vec<(Exit, Vec<(usize, usize)>)> {
+        let mut ways: Vec<(Exit, Vec<(usize, usize)>)> = Vec::new();
+        let mut stride = 1;
+        for (k, term, own) in self.split(branch) {
+            for (number, exit) in term.exits(own).into_iter().enumerate() {
+                let guard = match exit.guard {
+                    Guard::Own(index) => Guard::Own(self.guards[k] + index),
+                    other => other,
+                };
+                let change = |target: usize| target - own * stride + exit.target * stride;
+                if let Some((way, members)) = ways.iter_mut().find(|(w, _)| w.guard == guard) {
+                    way.target = change(way.target);
+                    way.before = way.before.max(exit.before);
+                    way.after = way.after.max(exit.after);
+                    members.push((k, number));
+                } else {
+                    let way = Exit::new(guard, change(branch)).with(exit.before, exit.after);
+                    ways.push((way, vec![(k, number)]));
+                }
+            }
+            stride *= term.branches();
+        }
+        ways
+    }
+}
+
+fn own_guards(term: &dyn ForceLaw) -> usize {
+    (0..term.branches())
+        .flat_map(|b| term.exits(b))
+        .map(|e| match e.guard {
+            Guard::Own(index) => index + 1,
+            _ => 0,
+        })
+        .max()
+        .unwrap_or(0)
+}
+
+impl ForceLaw for Sum {
+    fn parameters(&self) -> Vec<&'static str> {
+        self.terms.iter().flat_map(|t| t.parameters()).collect()
+    }
+
+    fn branches(&self) -> usize {
+        self.terms.iter().map(|t| t.branches()).product()
+    }
+
+    fn branch_at(&self, gap: f64, rate: f64) -> usize {
+        self.terms.iter().rev().fold(0, |branch, term| {
+            branch * term.branches() + term.branch_at(gap, rate)
+        })
+    }
+
+    fn force(&self, branch: usize, gap: f64, rate: f64) -> Force {
+        let mut sum = Force::default();
+        for (_, term, own) in self.split(branch) {
+            let force = term.force(own, gap, rate);
+            sum.value += force.value;
+            sum.by_gap += force.by_gap;
+            sum.by_rate += force.by_rate;
+        }
+        sum
+    }
+
+    fn exits(&self, branch: usize) -> Vec<Exit> {
+        self.ways(branch).into_iter().map(|(exit, _)| exit).collect()
+    }
+
+    fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
+        let k = self.guards.partition_point(|first| *first <= index) - 1;
+        self.terms[k].guard(index - self.guards[k], gap, rate)
+    }
+
+    fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]) {
+        let mut first = 0;
+        for (k, term, own) in self.split(branch) {
+            let next = first + self.counts[k];
+            term.by_parameters(own, gap, rate, &mut out[first..next]);
+            first = next;
+        }
+    }
+
+    /// Where several laws leave a branch at one gap, a change that parts their levels has no
+    /// derivative; the first one's is taken, which is right where they move together.
+    fn guard_by_parameters(
+        &self,
+        branch: usize,
+        exit: usize,
+        gap: f64,
+        rate: f64,
+        out: &mut [f64],
+    ) {
+        out.fill(0.0);
+        let ways = self.ways(branch);
+        let Some((_, members)) = ways.get(exit) else {
+            return;
+        };
+        let Some(&(member, number)) = members.first() else {
+            return;
+        };
+        let mut first = 0;
+        for (k, term, own) in self.split(branch) {
+            let next = first + self.counts[k];
+            if k == member {
+                term.guard_by_parameters(own, number, gap, rate, &mut out[first..next]);
+            }
+            first = next;
+        }
+    }
+
+    fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
+        self.split(branch)
+            .map(|(_, term, own)| term.energy(own, gap))
+            .sum()
+    }
+
+    fn vanishes(&self, branch: usize) -> bool {
+        self.split(branch).all(|(_, term, own)| term.vanishes(own))
+    }
+
+    fn conservative(&self) -> bool {
+        self.terms.iter().all(|t| t.conservative())
+    }
+
+    fn remarks(&self, least_gap: f64) -> Vec<Remark> {
+        self.terms.iter().flat_map(|t| t.remarks(least_gap)).collect()
+    }
+}

@@ -1,0 +1,514 @@
+//! One step: Newton for the forces at the nodes, and the tests that it must pass.
+
+use crate::error::Refusal;
+use crate::kernel::{CHECKS, MAX_NODES, Table, TimeMap};
+use crate::law::Force;
+use crate::linear::{add_product, factor, solve};
+use crate::quadrature::series;
+use crate::system::System;
+
+/// Newton steps before a shorter step is tried.
+const MAX_ITERATIONS: usize = 20;
+/// Below this contraction number plain iteration is cheaper than a factorisation.
+const CONTRACTION: f64 = 0.1;
+/// How much the force may amplify an error on one step, as `∫|G| |∂F|`: by `cosh √(2κ)`, 27.
+const STEEPEST: f64 = 8.0;
+
+/// A step with its forces. Points are the nodes, then the check points.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    pub(crate) map: TimeMap,
+    pub(crate) index: usize,
+    pub(crate) branch: usize,
+    /// Time of its start.
+    pub(crate) start: f64,
+    pub(crate) length: f64,
+    /// The variable at which it is cut, 1 if it is not.
+    pub(crate) end: f64,
+    /// Modal coordinates at its start.
+    pub(crate) modal: Vec<f64>,
+    /// The gap at the start where a switch fixed it.
+    pub(crate) pinned_start: Option<f64>,
+    /// The gap at the end where a switch fixes it.
+    pub(crate) pinned_end: Option<f64>,
+    /// At the nodes.
+    pub(crate) forces: Vec<f64>,
+    /// Of the force in `T_j(2u − 1)`.
+    pub(crate) coefficients: Vec<f64>,
+    /// At the points.
+    pub(crate) gap: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
+    /// Of the law at the nodes.
+    pub(crate) by_gap: Vec<f64>,
+    pub(crate) by_rate: Vec<f64>,
+    /// How the force's derivative is singular at the pinned end(s): see
+    /// [`Approach::Half`](crate::law::Approach::Half).
+    pub(crate) moving_start: bool,
+    pub(crate) moving_end: bool,
+}
+
+impl Step {
+    pub(crate) fn new(system: &System) -> Self {
+        let n = system.kernel().nodes;
+        Self {
+            map: TimeMap::Plain,
+            index: 0,
+            branch: 0,
+            start: 0.0,
+            length: 0.0,
+            end: 1.0,
+            modal: vec![0.0; system.dimension()],
+            pinned_start: None,
+            pinned_end: None,
+            forces: vec![0.0; n],
+            coefficients: vec![0.0; n],
+            gap: vec![0.0; n + CHECKS],
+            rate: vec![0.0; n + CHECKS],
+            by_gap: vec![0.0; n],
+            by_rate: vec![0.0; n],
+            moving_start: false,
+            moving_end: false,
+        }
+    }
+
+    /// Time of variable `u`.
+    pub(crate) fn time(&self, u: f64) -> f64 {
+        self.start + self.map.time(self.length, u)
+    }
+
+    /// Time of its (cut) end.
+    pub(crate) fn end_time(&self) -> f64 {
+        self.time(self.end)
+    }
+
+    /// The force at variable `u`.
+    pub(crate) fn force_at(&self, u: f64) -> f64 {
+        series(&self.coefficients, u)
+    }
+
+    /// Modal coordinates at variable `u`, written to `out`.
+    pub(crate) fn modal_at(&self, system: &System, u: f64, out: &mut [f64]) {
+        let kernel = system.kernel();
+        if u >= 1.0 {
+            let table = kernel.table(self.map, self.index);
+            advance_free(system, table, &self.modal, out);
+            add_product(&table.carry, &self.forces, out);
+        } else {
+            kernel.partial(
+                self.map,
+                self.length,
+                u,
+                &self.modal,
+                &self.coefficients,
+                out,
+            );
+        }
+    }
+}
+
+/// `e^{Bh} y`.
+pub(crate) fn advance_free(system: &System, table: &Table, y: &[f64], out: &mut [f64]) {
+    for (block, e) in system
+        .kernel()
+        .modes()
+        .blocks()
+        .iter()
+        .zip(&table.exponentials)
+    {
+        let s = block.start;
+        if block.size == 1 {
+            out[s] = e[0][0] * y[s];
+        } else {
+            out[s] = e[0][0] * y[s] + e[0][1] * y[s + 1];
+            out[s + 1] = e[1][0] * y[s] + e[1][1] * y[s + 1];
+        }
+    }
+}
+
+/// What a solved step is worth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quality {
+    /// The larger of the force's tail and its defect between the nodes, as a fraction of
+    /// what is allowed.
+    pub(crate) error: f64,
+    /// Whether the error is at the level of rounding.
+    pub(crate) rounding: bool,
+}
+
+/// Work space of the solver, and what it has cost.
+#[derive(Clone, Debug)]
+pub(crate) struct Solver {
+    base_gap: Vec<f64>,
+    base_rate: Vec<f64>,
+    /// How the base changes as the start moves along the motion.
+    shift_gap: Vec<f64>,
+    shift_rate: Vec<f64>,
+    residual: Vec<f64>,
+    matrix: Vec<f64>,
+    pivots: Vec<usize>,
+    column: Vec<f64>,
+    slope: Vec<f64>,
+    /// The law's derivative by the gap at a pinned end.
+    end_slope: f64,
+    pub(crate) statistics: Statistics,
+}
+
+/// What a run has cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Steps accepted.
+    pub steps: u64,
+    /// Steps tried and refused.
+    pub refused: u64,
+    /// Iterations for the forces.
+    pub iterations: u64,
+    /// Evaluations of the law.
+    pub evaluations: u64,
+    /// Factorisations.
+    pub factorisations: u64,
+    /// Switches of the law.
+    pub switches: u64,
+}
+
+impl Solver {
+    pub(crate) fn new(system: &System) -> Self {
+        let n = system.kernel().nodes;
+        let rows = n + CHECKS;
+        Self {
+            base_gap: vec![0.0; rows],
+            base_rate: vec![0.0; rows],
+            shift_gap: vec![0.0; rows],
+            shift_rate: vec![0.0; rows],
+            residual: vec![0.0; n],
+            matrix: vec![0.0; n * n],
+            pivots: vec![0; n],
+            column: vec![0.0; n],
+            slope: vec![0.0; system.dimension()],
+            end_slope: 0.0,
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// The gap and its rate at the points without the step's force.
+    fn free(&mut self, system: &System, table: &Table, step: &Step) {
+        let rows = self.base_gap.len();
+        self.base_gap.fill(system.gap_constant);
+        self.base_rate.fill(0.0);
+        let phasors = system.phasors(step.map, step.index);
+        for (k, (tone, amplitude)) in system
+            .drive()
+            .tones
+            .iter()
+            .zip(&system.gap_tones)
+            .enumerate()
+        {
+            let (sin, cos) = (tone.frequency * step.start).sin_cos();
+            let re = amplitude.re * cos - amplitude.im * sin;
+            let im = amplitude.re * sin + amplitude.im * cos;
+            for (i, [c, s]) in phasors[k * rows..(k + 1) * rows].iter().enumerate() {
+                self.base_gap[i] += re * c - im * s;
+                self.base_rate[i] -= tone.frequency * (re * s + im * c);
+            }
+        }
+        add_product(&table.gap, &step.modal, &mut self.base_gap);
+        add_product(&table.rate, &step.modal, &mut self.base_rate);
+    }
+
+    /// The gap, its rate and the law at the nodes for the step's present forces; the law's
+    /// values less the forces go to `residual`. Returns the gap's excess over the pinned end.
+    fn evaluate(&mut self, system: &System, table: &Table, step: &mut Step) -> f64 {
+        let n = step.forces.len();
+        step.gap.copy_from_slice(&self.base_gap);
+        step.rate.copy_from_slice(&self.base_rate);
+        if step.forces.iter().any(|f| *f != 0.0) {
+            add_product(&table.gap_force, &step.forces, &mut step.gap);
+            add_product(&table.rate_force, &step.forces, &mut step.rate);
+        }
+        let mut excess = 0.0;
+        if let Some(level) = step.pinned_end {
+            excess = step.gap[n - 1] - level;
+            step.gap[n - 1] = level;
+        }
+        if let Some(level) = step.pinned_start {
+            step.gap[0] = level;
+        }
+        let law = system.law();
+        for i in 0..n {
+            let Force {
+                value,
+                by_gap,
+                by_rate,
+            } = law.force(step.branch, step.gap[i], step.rate[i]);
+            self.residual[i] = value - step.forces[i];
+            step.by_gap[i] = by_gap;
+            step.by_rate[i] = by_rate;
+        }
+        // Where the gap is held its slope is of no use to Newton, and may be infinite.
+        if step.pinned_end.is_some() {
+            self.end_slope = std::mem::take(&mut step.by_gap[n - 1]);
+        }
+        if step.moving_start {
+            step.by_gap[0] = 0.0;
+        }
+        self.statistics.evaluations += n as u64;
+        excess
+    }
+
+    /// Factors `1 − ∂F_d W − ∂F_v W'` at the present point.
+    pub(crate) fn factor(&mut self, table: &Table, step: &Step) -> bool {
+        let n = step.forces.len();
+        let rows = n + CHECKS;
+        for node in 0..n {
+            let gap = &table.gap_force[node * rows..node * rows + n];
+            let rate = &table.rate_force[node * rows..node * rows + n];
+            let out = &mut self.matrix[node * n..(node + 1) * n];
+            for i in 0..n {
+                out[i] = -step.by_gap[i] * gap[i] - step.by_rate[i] * rate[i];
+            }
+            out[node] += 1.0;
+        }
+        self.statistics.factorisations += 1;
+        factor(&mut self.matrix, n, &mut self.pivots)
+    }
+
+    /// Solves with the last factors, in place.
+    pub(crate) fn back_substitute(&self, x: &mut [f64]) {
+        solve(&self.matrix, x.len(), &self.pivots, x);
+    }
+
+    /// Solves the step for its forces.
+    pub(crate) fn solve(&mut self, system: &System, step: &mut Step) -> Result<Quality, Refusal> {
+        let table = system.kernel().table(step.map, step.index);
+        step.length = table.length;
+        step.end = 1.0;
+        self.free(system, table, step);
+        if system.vanishes(step.branch) {
+            step.forces.fill(0.0);
+            step.coefficients.fill(0.0);
+            step.by_gap.fill(0.0);
+            step.by_rate.fill(0.0);
+            step.gap.copy_from_slice(&self.base_gap);
+            step.rate.copy_from_slice(&self.base_rate);
+            if let Some(level) = step.pinned_start {
+                step.gap[0] = level;
+            }
+            return Ok(Quality {
+                error: 0.0,
+                rounding: true,
+            });
+        }
+        let first = step.pinned_start.unwrap_or(self.base_gap[0]);
+        let start = system
+            .law()
+            .force(step.branch, first, self.base_rate[0])
+            .value;
+        step.forces.fill(start);
+        let mut factored = false;
+        let mut last = f64::INFINITY;
+        for _ in 0..MAX_ITERATIONS {
+            self.statistics.iterations += 1;
+            self.evaluate(system, table, step);
+            let size = largest(&self.residual);
+            if !size.is_finite() {
+                return Err(Refusal::Newton);
+            }
+            if size <= 0.1 * self.allowed(system, table, step).0 {
+                for (force, r) in step.forces.iter_mut().zip(&self.residual) {
+                    *force += r;
+                }
+                return self.assess(system, table, step);
+            }
+            let contraction = steepness(table, step);
+            if contraction > CONTRACTION {
+                if !factored || size > 0.02 * last {
+                    if !self.factor(table, step) {
+                        return Err(Refusal::Newton);
+                    }
+                    factored = true;
+                }
+                solve(&self.matrix, step.forces.len(), &self.pivots, &mut self.residual);
+            }
+            last = size;
+            for (force, r) in step.forces.iter_mut().zip(&self.residual) {
+                *force += r;
+            }
+        }
+        Err(Refusal::Newton)
+    }
+
+    /// Solves a step that ends where the gap reaches `step.pinned_end`, by moving its start
+    /// along `before`, the step it continues; `step.start` is the first guess.
+    pub(crate) fn solve_end(
+        &mut self,
+        system: &System,
+        before: &Step,
+        step: &mut Step,
+    ) -> Result<Quality, Refusal> {
+        let kernel = system.kernel();
+        let table = kernel.table(step.map, step.index);
+        step.length = table.length;
+        step.end = 1.0;
+        let n = step.forces.len();
+        let rows = n + CHECKS;
+        let (earliest, latest) = (before.start, before.time(1.0));
+        let scale = gap_scale(system, &before.modal).0;
+        let mut first = true;
+        for _ in 0..MAX_ITERATIONS {
+            self.statistics.iterations += 1;
+            let u = before.map.variable(before.length, step.start - before.start);
+            before.modal_at(system, u, &mut step.modal);
+            self.free(system, table, step);
+            if first {
+                step.forces.fill(before.force_at(u));
+                first = false;
+            }
+            let excess = self.evaluate(system, table, step);
+            let size = largest(&self.residual);
+            if !(size.is_finite() && excess.is_finite()) {
+                return Err(Refusal::Newton);
+            }
+            let floor = 8.0 * f64::EPSILON * scale;
+            if size <= 0.1 * self.allowed(system, table, step).0 && excess.abs() <= floor {
+                for (force, r) in step.forces.iter_mut().zip(&self.residual) {
+                    *force += r;
+                }
+                if !step.moving_end {
+                    // A variation at fixed time changes the gap at the end.
+                    step.by_gap[n - 1] = self.end_slope;
+                }
+                return self.assess(system, table, step);
+            }
+            if !self.factor(table, step) {
+                return Err(Refusal::Newton);
+            }
+            self.shift(system, table, step, before.force_at(u));
+            for i in 0..n {
+                self.column[i] =
+                    step.by_gap[i] * self.shift_gap[i] + step.by_rate[i] * self.shift_rate[i];
+            }
+            solve(&self.matrix, n, &self.pivots, &mut self.residual);
+            solve(&self.matrix, n, &self.pivots, &mut self.column);
+            let effect = |x: &[f64]| -> f64 {
+                (0..n).map(|j| table.gap_force[j * rows + n - 1] * x[j]).sum()
+            };
+            let slope = self.shift_gap[n - 1] + effect(&self.column);
+            let delta = -(excess + effect(&self.residual)) / slope;
+            if !delta.is_finite() {
+                return Err(Refusal::Newton);
+            }
+            step.start += delta;
+            for ((force, r), c) in step.forces.iter_mut().zip(&self.residual).zip(&self.column) {
+                *force += r + c * delta;
+            }
+            if step.start < earliest || step.start > latest {
+                return Err(Refusal::Switch);
+            }
+        }
+        Err(Refusal::Newton)
+    }
+
+    /// How gap and rate at the points change as the start of the step moves along the motion,
+    /// on which the force at the start is `force`.
+    pub(crate) fn shift(&mut self, system: &System, table: &Table, step: &Step, force: f64) {
+        let kernel = system.kernel();
+        kernel.modes().apply(&step.modal, &mut self.slope);
+        for (s, b) in self.slope.iter_mut().zip(&kernel.source) {
+            *s += b * force;
+        }
+        self.tone_shift(system, table, step);
+        add_product(&table.gap, &self.slope, &mut self.shift_gap);
+        add_product(&table.rate, &self.slope, &mut self.shift_rate);
+    }
+
+    /// The part of [`Self::shift`] that the drive makes, the modal coordinates held.
+    pub(crate) fn tone_shift(&mut self, system: &System, table: &Table, step: &Step) {
+        for (i, time) in table.times.iter().enumerate() {
+            let forced = system.forced_gap(step.start + time);
+            self.shift_gap[i] = forced[1];
+            self.shift_rate[i] = forced[2];
+        }
+    }
+
+    /// The shifts computed last.
+    pub(crate) fn shifts(&self) -> (&[f64], &[f64]) {
+        (&self.shift_gap, &self.shift_rate)
+    }
+
+    /// What an error of the force may be: what the tolerance allows or what rounding makes,
+    /// and the latter alone.
+    fn allowed(&self, system: &System, table: &Table, step: &Step) -> (f64, f64) {
+        let wanted = system.options().tolerance / (table.length * system.kernel().reach);
+        let (gap, rate) = gap_scale(system, &step.modal);
+        let n = step.forces.len();
+        let mut rounding: f64 = 0.0;
+        for i in 0..n {
+            rounding = rounding.max(
+                step.forces[i].abs() + step.by_gap[i].abs() * gap + step.by_rate[i].abs() * rate,
+            );
+        }
+        let rounding = 2.0 * f64::EPSILON * rounding;
+        (wanted.max(rounding), rounding)
+    }
+
+    /// The tests that a solved step must pass.
+    fn assess(&mut self, system: &System, table: &Table, step: &mut Step) -> Result<Quality, Refusal> {
+        let n = step.forces.len();
+        step.coefficients.fill(0.0);
+        add_product(&system.kernel().coefficients, &step.forces, &mut step.coefficients);
+        let tail = step.coefficients[n - 1].abs() + step.coefficients[n - 2].abs();
+        let mut between = [0.0; CHECKS];
+        add_product(&table.between, &step.forces, &mut between);
+        let mut defect: f64 = 0.0;
+        for (k, force) in between.iter().enumerate() {
+            let law = system
+                .law()
+                .force(step.branch, step.gap[n + k], step.rate[n + k]);
+            defect = defect.max((force - law.value).abs());
+        }
+        self.statistics.evaluations += CHECKS as u64;
+        let (allowed, rounding) = self.allowed(system, table, step);
+        let steepness = steepness(table, step);
+        if !(steepness <= STEEPEST) {
+            return Err(Refusal::Steep);
+        }
+        let error = tail.max(0.25 * defect);
+        Ok(Quality {
+            error: error / allowed,
+            rounding: error <= 2.0 * rounding,
+        })
+    }
+}
+
+/// `max |∂F_d| ∫|G| + |∂F_v| ∫|G'|` over the nodes.
+fn steepness(table: &Table, step: &Step) -> f64 {
+    step.by_gap
+        .iter()
+        .zip(&step.by_rate)
+        .zip(&table.row_sums)
+        .map(|((d, v), sums)| d.abs() * sums[0] + v.abs() * sums[1])
+        .fold(0.0, f64::max)
+}
+
+/// Bounds of the gap and its rate over the motion to come, for what rounding makes of them.
+pub(crate) fn gap_scale(system: &System, y: &[f64]) -> (f64, f64) {
+    let kernel = system.kernel();
+    let mut gap = system.gap_constant.abs();
+    let mut rate = 0.0;
+    for (tone, amplitude) in system.drive().tones.iter().zip(&system.gap_tones) {
+        gap += amplitude.norm();
+        rate += amplitude.norm() * tone.frequency;
+    }
+    for (k, y) in y.iter().enumerate() {
+        gap += (kernel.readout[k] * y).abs();
+        rate += (kernel.rate_readout[k] * y).abs();
+    }
+    (gap, rate)
+}
+
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    debug_assert!(values.len() <= MAX_NODES + CHECKS);
+    // A NaN must not be lost in the maximum.
+    values
+        .iter()
+        .fold(0.0, |m, v| if v.abs() <= m { m } else { v.abs() })
+}

@@ -1,0 +1,407 @@
+//! Modes, drive and law together.
+
+use crate::kernel::{Kernel, LENGTHS, TimeMap};
+use crate::law::{Exit, ForceLaw};
+use crate::{Complex, VolterraError};
+use nalgebra::DVector;
+use std::sync::{Arc, OnceLock};
+
+/// The largest number of tones.
+pub const MAX_TONES: usize = 64;
+/// The largest number of branches of a law.
+pub const MAX_BRANCHES: usize = 4096;
+
+/// One tone of the drive: `Re(… e^{iωt})`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tone {
+    /// `ω`.
+    pub frequency: f64,
+    /// What it adds to `ẋ`, of the length of the state.
+    pub forcing: DVector<Complex>,
+    /// What it adds to the gap (motion of the base or of the sample).
+    pub gap: Complex,
+}
+
+/// The linear forcing of state and gap.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// The constant part of `ẋ`.
+    pub constant: DVector<f64>,
+    /// The constant part of the gap.
+    pub offset: f64,
+    /// The tones.
+    pub tones: Vec<Tone>,
+}
+
+/// How well steps are resolved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// How much the error of one step may move the gap. Rounding sets a floor of its own.
+    pub tolerance: f64,
+    /// The largest number of steps of one run.
+    pub max_steps: usize,
+}
+
+impl Options {
+    /// A tolerance in the unit of the gap, and at most ten million steps a run.
+    pub const fn new(tolerance: f64) -> Self {
+        Self {
+            tolerance,
+            max_steps: 10_000_000,
+        }
+    }
+}
+
+/// `ẋ = A x + f(t) + p F(d, ḋ)`, `d = row · x + offset + tones`, ready to run.
+#[derive(Clone, Debug)]
+pub struct System {
+    kernel: Arc<Kernel>,
+    law: Arc<dyn ForceLaw>,
+    drive: Drive,
+    options: Options,
+    exits: Vec<Vec<Exit>>,
+    vanishes: Vec<bool>,
+    /// Modal coordinates of the forced response.
+    response: Response,
+    /// The forced response in the state.
+    forced: Response,
+    /// Complex amplitudes of the gap's forced part.
+    pub(crate) gap_tones: Vec<Complex>,
+    pub(crate) gap_constant: f64,
+    phasors: Arc<[Vec<OnceLock<Vec<[f64; 2]>>>; 3]>,
+}
+
+/// A constant and complex amplitudes of the tones.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Response {
+    pub(crate) constant: DVector<f64>,
+    pub(crate) tones: Vec<DVector<Complex>>,
+}
+
+impl Response {
+    /// The modal response of the kernel's modes to a forcing.
+    pub(crate) fn of(
+        kernel: &Kernel,
+        constant: &DVector<f64>,
+        tones: &[(f64, DVector<Complex>)],
+    ) -> Result<Self, VolterraError> {
+        let modes = kernel.modes();
+        let left = modes.left();
+        let real = |v: &DVector<f64>| v.map(|x| Complex::new(x, 0.0));
+        Ok(Self {
+            constant: modes.response(0.0, &real(&(left * constant)))?.map(|z| z.re),
+            tones: tones
+                .iter()
+                .map(|(omega, forcing)| {
+                    let re = left * forcing.map(|z| z.re);
+                    let im = left * forcing.map(|z| z.im);
+                    modes.response(*omega, &re.zip_map(&im, Complex::new))
+                })
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    pub(crate) fn to_state(&self, kernel: &Kernel) -> Self {
+        let right = kernel.modes().right();
+        Self {
+            constant: right * &self.constant,
+            tones: self
+                .tones
+                .iter()
+                .map(|y| {
+                    let re = right * y.map(|z| z.re);
+                    let im = right * y.map(|z| z.im);
+                    re.zip_map(&im, Complex::new)
+                })
+                .collect(),
+        }
+    }
+}
+
+impl System {
+    /// Joins them.
+    ///
+    /// # Errors
+    /// When sizes do not fit, a number is out of range, or a tone meets an undamped mode.
+    pub fn new(
+        kernel: Arc<Kernel>,
+        law: Arc<dyn ForceLaw>,
+        drive: Drive,
+        options: Options,
+    ) -> Result<Self, VolterraError> {
+        let n = kernel.modes().dimension();
+        check_drive(&drive, n)?;
+        if !(options.tolerance > 0.0 && options.tolerance.is_finite()) {
+            return Err(VolterraError::Value {
+                what: "the tolerance".into(),
+                found: options.tolerance,
+                needed: "positive and finite",
+            });
+        }
+        let branches = law.branches();
+        if branches > MAX_BRANCHES {
+            return Err(VolterraError::TooLarge {
+                what: "the number of branches of the law",
+                found: branches,
+                limit: MAX_BRANCHES,
+            });
+        }
+        let exits: Vec<Vec<Exit>> = (0..branches).map(|b| law.exits(b)).collect();
+        let tones: Vec<(f64, DVector<Complex>)> = drive
+            .tones
+            .iter()
+            .map(|t| (t.frequency, t.forcing.clone()))
+            .collect();
+        let response = Response::of(&kernel, &drive.constant, &tones)?;
+        let dot = |z: &DVector<Complex>| -> Complex {
+            kernel.readout.iter().zip(z.iter()).map(|(r, z)| z * *r).sum()
+        };
+        let gap_tones = drive
+            .tones
+            .iter()
+            .zip(&response.tones)
+            .map(|(tone, y)| tone.gap + dot(y))
+            .collect();
+        let gap_constant = drive.offset
+            + kernel
+                .readout
+                .iter()
+                .zip(response.constant.iter())
+                .map(|(r, y)| r * y)
+                .sum::<f64>();
+        Ok(Self {
+            vanishes: (0..branches).map(|b| law.vanishes(b)).collect(),
+            forced: response.to_state(&kernel),
+            exits,
+            law,
+            drive,
+            options,
+            response,
+            gap_tones,
+            gap_constant,
+            phasors: Arc::new(std::array::from_fn(|_| {
+                (0..LENGTHS).map(|_| OnceLock::new()).collect()
+            })),
+            kernel,
+        })
+    }
+
+    /// The same modes, drive and law with another offset of the gap; shares all tables.
+    ///
+    /// # Errors
+    /// When the offset is not finite.
+    pub fn with_offset(&self, offset: f64) -> Result<Self, VolterraError> {
+        if !offset.is_finite() {
+            return Err(not_finite("the offset of the gap", offset));
+        }
+        let mut system = self.clone();
+        system.gap_constant += offset - self.drive.offset;
+        system.drive.offset = offset;
+        Ok(system)
+    }
+
+    /// Dimension of the state.
+    pub fn dimension(&self) -> usize {
+        self.kernel.modes().dimension()
+    }
+
+    /// Modes, gap and column.
+    pub fn kernel(&self) -> &Arc<Kernel> {
+        &self.kernel
+    }
+
+    /// The law.
+    pub fn law(&self) -> &Arc<dyn ForceLaw> {
+        &self.law
+    }
+
+    /// The drive.
+    pub fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// The options.
+    pub fn options(&self) -> Options {
+        self.options
+    }
+
+    /// The ways out of a branch.
+    pub fn exits(&self, branch: usize) -> &[Exit] {
+        &self.exits[branch]
+    }
+
+    pub(crate) fn vanishes(&self, branch: usize) -> bool {
+        self.vanishes[branch]
+    }
+
+    pub(crate) fn forced(&self) -> &Response {
+        &self.forced
+    }
+
+    /// `e^{iω t}` of every tone, tone after tone, at the points of a table.
+    pub(crate) fn phasors(&self, map: TimeMap, index: usize) -> &[[f64; 2]] {
+        self.phasors[map as usize][index].get_or_init(|| {
+            let table = self.kernel.table(map, index);
+            self.drive
+                .tones
+                .iter()
+                .flat_map(|tone| {
+                    table.times.iter().map(|t| {
+                        let (sin, cos) = (tone.frequency * t).sin_cos();
+                        [cos, sin]
+                    })
+                })
+                .collect()
+        })
+    }
+
+    /// The forced part of the gap at a time, and its first two derivatives.
+    pub(crate) fn forced_gap(&self, time: f64) -> [f64; 3] {
+        let mut out = [self.gap_constant, 0.0, 0.0];
+        for (tone, amplitude) in self.drive.tones.iter().zip(&self.gap_tones) {
+            let (sin, cos) = (tone.frequency * time).sin_cos();
+            let z = amplitude * Complex::new(cos, sin);
+            out[0] += z.re;
+            out[1] -= tone.frequency * z.im;
+            out[2] -= tone.frequency * tone.frequency * z.re;
+        }
+        out
+    }
+
+    /// The gap and its rate at modal coordinates `y`.
+    pub(crate) fn gap_of(&self, time: f64, y: &[f64]) -> (f64, f64) {
+        let forced = self.forced_gap(time);
+        let dot = |row: &[f64]| row.iter().zip(y).map(|(r, y)| r * y).sum::<f64>();
+        (
+            forced[0] + dot(&self.kernel.readout),
+            forced[1] + dot(&self.kernel.rate_readout),
+        )
+    }
+
+    /// The gap and its rate in state `x` at a time.
+    pub fn gap(&self, time: f64, x: &[f64]) -> (f64, f64) {
+        let mut y = vec![0.0; self.dimension()];
+        self.to_modal(time, x, &mut y);
+        self.gap_of(time, &y)
+    }
+
+    /// The forced response at a time, written to `x`.
+    pub(crate) fn write_forced(&self, time: f64, x: &mut [f64]) {
+        x.copy_from_slice(self.forced.constant.as_slice());
+        for (tone, response) in self.drive.tones.iter().zip(&self.forced.tones) {
+            let (sin, cos) = (tone.frequency * time).sin_cos();
+            for (x, z) in x.iter_mut().zip(response.iter()) {
+                *x += z.re * cos - z.im * sin;
+            }
+        }
+    }
+
+    /// Modal coordinates (without the forced response) of state `x`.
+    pub(crate) fn to_modal(&self, time: f64, x: &[f64], y: &mut [f64]) {
+        let mut rest = vec![0.0; x.len()];
+        self.write_forced(time, &mut rest);
+        let left = self.kernel.modes().left();
+        y.fill(0.0);
+        for (k, (x, p)) in x.iter().zip(&rest).enumerate() {
+            for (y, l) in y.iter_mut().zip(left.column(k).iter()) {
+                *y += l * (x - p);
+            }
+        }
+    }
+
+    /// The state of modal coordinates `y`.
+    pub(crate) fn to_state(&self, time: f64, y: &[f64], x: &mut [f64]) {
+        self.write_forced(time, x);
+        let right = self.kernel.modes().right();
+        for (k, y) in y.iter().enumerate() {
+            for (x, r) in x.iter_mut().zip(right.column(k).iter()) {
+                *x += r * y;
+            }
+        }
+    }
+
+    /// The vector field `ẋ` in state `x` at a time on a branch of the law, written to `out`.
+    pub fn field(&self, time: f64, x: &[f64], branch: usize, out: &mut [f64]) {
+        let n = self.dimension();
+        let mut y = vec![0.0; n];
+        self.to_modal(time, x, &mut y);
+        let (gap, rate) = self.gap_of(time, &y);
+        let force = self.law.force(branch, gap, rate).value;
+        let mut slope = vec![0.0; n];
+        self.kernel.modes().apply(&y, &mut slope);
+        for (s, b) in slope.iter_mut().zip(&self.kernel.source) {
+            *s += b * force;
+        }
+        let right = self.kernel.modes().right();
+        out.fill(0.0);
+        for (k, s) in slope.iter().enumerate() {
+            for (o, r) in out.iter_mut().zip(right.column(k).iter()) {
+                *o += r * s;
+            }
+        }
+        for (tone, response) in self.drive.tones.iter().zip(&self.forced.tones) {
+            let (sin, cos) = (tone.frequency * time).sin_cos();
+            for (o, z) in out.iter_mut().zip(response.iter()) {
+                *o -= tone.frequency * (z.re * sin + z.im * cos);
+            }
+        }
+    }
+
+    /// Modal coordinates of the forced response.
+    pub(crate) fn response(&self) -> &Response {
+        &self.response
+    }
+}
+
+fn not_finite(what: &str, found: f64) -> VolterraError {
+    VolterraError::Value {
+        what: what.into(),
+        found,
+        needed: "finite",
+    }
+}
+
+fn check_drive(drive: &Drive, n: usize) -> Result<(), VolterraError> {
+    if drive.tones.len() > MAX_TONES {
+        return Err(VolterraError::TooLarge {
+            what: "the number of tones",
+            found: drive.tones.len(),
+            limit: MAX_TONES,
+        });
+    }
+    let lengths = drive
+        .tones
+        .iter()
+        .map(|t| ("a tone's forcing", t.forcing.len()))
+        .chain([("the constant forcing", drive.constant.len())]);
+    for (what, found) in lengths {
+        if found != n {
+            return Err(VolterraError::Shape {
+                what,
+                found,
+                expected: n,
+            });
+        }
+    }
+    if !drive.offset.is_finite() {
+        return Err(not_finite("the offset of the gap", drive.offset));
+    }
+    if let Some(&found) = drive.constant.iter().find(|v| !v.is_finite()) {
+        return Err(not_finite("the constant forcing", found));
+    }
+    for tone in &drive.tones {
+        if !(tone.frequency > 0.0 && tone.frequency.is_finite()) {
+            return Err(VolterraError::Value {
+                what: "a tone's angular frequency".into(),
+                found: tone.frequency,
+                needed: "positive and finite",
+            });
+        }
+        for z in tone.forcing.iter().chain([&tone.gap]) {
+            if !(z.re.is_finite() && z.im.is_finite()) {
+                return Err(not_finite("a tone's amplitude", z.norm()));
+            }
+        }
+    }
+    Ok(())
+}

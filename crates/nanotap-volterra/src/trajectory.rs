@@ -1,0 +1,357 @@
+//! Dense output: a run recorded step by step, read at any time, with extrema and integrals.
+
+use crate::flow::{Flow, Observer, Switch};
+use crate::kernel::TimeMap;
+use crate::law::Exit;
+use crate::quadrature::gauss_legendre;
+use crate::step::{Solver, Step};
+use crate::system::System;
+use crate::{Complex, VolterraError};
+use nalgebra::{DVector, RowDVector};
+use std::sync::Arc;
+
+/// Points of the Gauss–Legendre rule of one panel of an integral.
+const POINTS: usize = 24;
+/// How far the fastest mode may turn within a panel.
+const REACH: f64 = 6.0;
+/// The largest number of steps a trajectory keeps.
+pub const MAX_RECORDED_STEPS: usize = 4_000_000;
+
+/// A scalar read from the state: `row · x + offset + Re Σ tones e^{iωt}`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output {
+    /// Of the length of the state.
+    pub row: RowDVector<f64>,
+    /// The constant.
+    pub offset: f64,
+    /// One complex amplitude a tone of the drive (empty: none).
+    pub tones: Vec<Complex>,
+}
+
+impl Output {
+    /// A plain component of the state.
+    pub fn component(dimension: usize, index: usize) -> Self {
+        let mut row = RowDVector::zeros(dimension);
+        row[index] = 1.0;
+        Self {
+            row,
+            offset: 0.0,
+            tones: Vec::new(),
+        }
+    }
+}
+
+/// The motion at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// When.
+    pub time: f64,
+    /// The state.
+    pub state: DVector<f64>,
+    /// The gap.
+    pub gap: f64,
+    /// Its rate.
+    pub rate: f64,
+    /// The force of the law.
+    pub force: f64,
+    /// The branch of the law.
+    pub branch: usize,
+}
+
+/// A stretch of motion between two steps' ends.
+#[derive(Clone, Debug)]
+struct Piece {
+    map: TimeMap,
+    start: f64,
+    length: f64,
+    end: f64,
+    branch: usize,
+    modal: Vec<f64>,
+    coefficients: Vec<f64>,
+}
+
+/// A recorded run.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    system: Arc<System>,
+    pieces: Vec<Piece>,
+    switches: Vec<Switch>,
+    overflow: bool,
+}
+
+impl Observer for Trajectory {
+    fn step(&mut self, _: &System, _: &mut Solver, step: &Step, _: &[f64]) {
+        if self.pieces.len() >= MAX_RECORDED_STEPS {
+            self.overflow = true;
+            return;
+        }
+        self.pieces.push(Piece {
+            map: step.map,
+            start: step.start,
+            length: step.length,
+            end: step.end,
+            branch: step.branch,
+            modal: step.modal.clone(),
+            coefficients: step.coefficients.clone(),
+        });
+    }
+
+    fn switch(&mut self, _: &System, switch: &Switch, _: &Exit, _: &[f64]) {
+        self.switches.push(*switch);
+    }
+}
+
+impl Flow {
+    /// Runs to time `end` and keeps the motion.
+    ///
+    /// # Errors
+    /// As [`Flow::run_until`]; [`VolterraError::TooLarge`] beyond [`MAX_RECORDED_STEPS`].
+    pub fn record_until(&mut self, end: f64) -> Result<Trajectory, VolterraError> {
+        let mut trajectory = Trajectory {
+            system: self.system.clone(),
+            pieces: Vec::new(),
+            switches: Vec::new(),
+            overflow: false,
+        };
+        self.run(end, &mut trajectory)?;
+        if trajectory.overflow {
+            return Err(VolterraError::TooLarge {
+                what: "the number of recorded steps",
+                found: MAX_RECORDED_STEPS + 1,
+                limit: MAX_RECORDED_STEPS,
+            });
+        }
+        Ok(trajectory)
+    }
+}
+
+impl Piece {
+    fn end_time(&self) -> f64 {
+        self.start + self.map.time(self.length, self.end)
+    }
+
+    fn sample(&self, system: &System, u: f64) -> Sample {
+        let time = self.start + self.map.time(self.length, u);
+        let mut modal = vec![0.0; system.dimension()];
+        system.kernel().partial(
+            self.map,
+            self.length,
+            u,
+            &self.modal,
+            &self.coefficients,
+            &mut modal,
+        );
+        let mut state = DVector::zeros(system.dimension());
+        system.to_state(time, &modal, state.as_mut_slice());
+        let (gap, rate) = system.gap_of(time, &modal);
+        Sample {
+            time,
+            state,
+            gap,
+            rate,
+            force: crate::quadrature::series(&self.coefficients, u),
+            branch: self.branch,
+        }
+    }
+}
+
+impl Trajectory {
+    /// The switches of the law, in order.
+    pub fn switches(&self) -> &[Switch] {
+        &self.switches
+    }
+
+    /// When it begins and ends (0 and 0 of an empty one).
+    pub fn span(&self) -> (f64, f64) {
+        match (self.pieces.first(), self.pieces.last()) {
+            (Some(first), Some(last)) => (first.start, last.end_time()),
+            _ => (0.0, 0.0),
+        }
+    }
+
+    /// The number of steps.
+    pub fn steps(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// The motion at a time, none outside the span.
+    pub fn at(&self, time: f64) -> Option<Sample> {
+        let (start, end) = self.span();
+        if !(time >= start && time <= end) {
+            return None;
+        }
+        let k = self
+            .pieces
+            .partition_point(|p| p.end_time() < time)
+            .min(self.pieces.len().checked_sub(1)?);
+        let piece = &self.pieces[k];
+        let u = piece
+            .map
+            .variable(piece.length, time - piece.start)
+            .min(piece.end);
+        Some(piece.sample(&self.system, u))
+    }
+
+    /// The value of an output and its rate at a sample.
+    pub fn read(&self, output: &Output, sample: &Sample) -> (f64, f64) {
+        let mut field = vec![0.0; self.system.dimension()];
+        self.system
+            .field(sample.time, sample.state.as_slice(), sample.branch, &mut field);
+        let mut value = output.offset + (&output.row * &sample.state)[0];
+        let mut rate: f64 = output.row.iter().zip(&field).map(|(r, f)| r * f).sum();
+        for (tone, z) in self.system.drive().tones.iter().zip(&output.tones) {
+            let (sin, cos) = (tone.frequency * sample.time).sin_cos();
+            value += z.re * cos - z.im * sin;
+            rate -= tone.frequency * (z.re * sin + z.im * cos);
+        }
+        (value, rate)
+    }
+
+    /// The integrals over time of `count` functions of the motion, which `integrand` writes.
+    pub fn integrate(&self, count: usize, mut integrand: impl FnMut(&Sample, &mut [f64])) -> Vec<f64> {
+        let (nodes, weights) = gauss_legendre(POINTS);
+        let mut sums = vec![0.0; count];
+        let mut values = vec![0.0; count];
+        for piece in &self.pieces {
+            let panels = self.panels(piece);
+            let width = piece.end / panels as f64;
+            for panel in 0..panels {
+                for (x, w) in nodes.iter().zip(&weights) {
+                    let u = width * (panel as f64 + x);
+                    let weight = w * width * piece.map.rate(piece.length, u);
+                    integrand(&piece.sample(&self.system, u), &mut values);
+                    for (sum, value) in sums.iter_mut().zip(&values) {
+                        *sum += weight * value;
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// The time mean of an output.
+    pub fn mean(&self, output: &Output) -> f64 {
+        let (start, end) = self.span();
+        self.integrate(1, |s, out| out[0] = self.read(output, s).0)[0] / (end - start)
+    }
+
+    /// The Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the span `D`, so that the
+    /// component at `ω` is `Re(c e^{iωt})`.
+    pub fn fourier(&self, output: &Output, omega: f64) -> Complex {
+        let (start, end) = self.span();
+        let sums = self.integrate(2, |s, out| {
+            let value = self.read(output, s).0;
+            let (sin, cos) = (omega * s.time).sin_cos();
+            out[0] = value * cos;
+            out[1] = -value * sin;
+        });
+        Complex::new(sums[0], sums[1]) * (2.0 / (end - start))
+    }
+
+    /// `∫ F ḋ dt`, the work of the law's force on the gap: what it stores and (below zero over
+    /// a closed motion) dissipates.
+    pub fn work(&self) -> f64 {
+        self.integrate(1, |s, out| out[0] = s.force * s.rate)[0]
+    }
+
+    /// The fraction of time spent where `inside` says.
+    pub fn fraction(&self, inside: impl Fn(usize) -> bool) -> f64 {
+        let (start, end) = self.span();
+        let time: f64 = self
+            .pieces
+            .iter()
+            .filter(|p| inside(p.branch))
+            .map(|p| p.end_time() - p.start)
+            .sum();
+        time / (end - start)
+    }
+
+    /// The local extrema of an output inside the span, as times and values, in order.
+    pub fn extrema(&self, output: &Output) -> Vec<(f64, f64)> {
+        let mut found: Vec<(f64, f64)> = Vec::new();
+        for piece in &self.pieces {
+            let count = 16 * self.panels(piece);
+            let rate = |u: f64| self.read(output, &piece.sample(&self.system, u)).1;
+            let mut last = (0.0, rate(0.0));
+            for k in 1..=count {
+                let u = piece.end * k as f64 / count as f64;
+                let here = (u, rate(u));
+                if last.1 * here.1 < 0.0 || (last.1 != 0.0 && here.1 == 0.0) {
+                    let u = bisect(&rate, last, here);
+                    let sample = piece.sample(&self.system, u);
+                    found.push((sample.time, self.read(output, &sample).0));
+                }
+                last = here;
+            }
+        }
+        found
+    }
+
+    /// The least and the largest value of an output over the span, ends included.
+    pub fn range(&self, output: &Output) -> (f64, f64) {
+        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut take = |value: f64| range = (range.0.min(value), range.1.max(value));
+        for piece in &self.pieces {
+            for u in [0.0, piece.end] {
+                take(self.read(output, &piece.sample(&self.system, u)).0);
+            }
+        }
+        for (_, value) in self.extrema(output) {
+            take(value);
+        }
+        range
+    }
+
+    /// The gap as an output.
+    pub fn gap_output(&self) -> Output {
+        let drive = self.system.drive();
+        Output {
+            row: self.system.kernel().row().clone(),
+            offset: drive.offset,
+            tones: drive.tones.iter().map(|t| t.gap).collect(),
+        }
+    }
+
+    fn panels(&self, piece: &Piece) -> usize {
+        let fastest = self
+            .system
+            .kernel()
+            .modes()
+            .blocks()
+            .iter()
+            .map(crate::modes::Block::rate)
+            .chain(self.system.drive().tones.iter().map(|t| t.frequency))
+            .fold(0.0, f64::max);
+        let steepest = piece
+            .map
+            .rate(piece.length, 0.0)
+            .max(piece.map.rate(piece.length, piece.end));
+        ((fastest * steepest * piece.end / REACH).ceil() as usize).max(1)
+    }
+}
+
+/// The zero between two points of opposite sign: the Illinois rule, then halving.
+fn bisect(f: &impl Fn(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
+    for _ in 0..60 {
+        let u = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
+        let u = if u > a.0.min(b.0) && u < a.0.max(b.0) {
+            u
+        } else {
+            0.5 * (a.0 + b.0)
+        };
+        let value = f(u);
+        if value == 0.0 || (b.0 - a.0).abs() < 1e-15 {
+            return u;
+        }
+        if value * b.1 < 0.0 {
+            a = b;
+        } else {
+            a.1 *= 0.5;
+        }
+        b = (u, value);
+        if (a.0 - b.0).abs() < 1e-15 {
+            break;
+        }
+    }
+    b.0
+}

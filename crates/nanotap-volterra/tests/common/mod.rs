@@ -1,0 +1,160 @@
+//! What several tests share: a stroboscopic map over the flow and the reference lever.
+#![allow(dead_code, missing_docs)]
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_dynamics::map::StroboscopicMap;
+use nanotap_volterra::{
+    Complex, Drive, Flow, ForceLaw, Kernel, Modes, Options, System, Tone, VolterraError,
+};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// One eV in nN nm.
+pub const EV: f64 = 0.1602176634;
+
+/// The flow over one period of the drive.
+#[derive(Clone)]
+pub struct Strobe {
+    pub flow: Flow,
+    pub period: f64,
+}
+
+impl Strobe {
+    pub fn new(system: System, period: f64) -> Self {
+        Self {
+            flow: Flow::new(Arc::new(system)),
+            period,
+        }
+    }
+}
+
+impl StroboscopicMap for Strobe {
+    type Error = VolterraError;
+
+    fn dimension(&self) -> usize {
+        self.flow.system().dimension()
+    }
+
+    fn period(&self) -> f64 {
+        self.period
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), VolterraError> {
+        self.flow.start(state, 0.0)?;
+        self.flow.run_until(self.period)?;
+        self.flow.state(state);
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), VolterraError> {
+        self.flow.start(state, 0.0)?;
+        let mut none = DMatrix::zeros(state.len(), 0);
+        self.flow
+            .run_with_derivatives(self.period, &[], jacobian, &mut none)?;
+        self.flow.state(state);
+        Ok(())
+    }
+}
+
+/// One mode, `z̈ + ż/Q + z = (A₀/Q) cos t + F/k`, gap `z + zc`; lengths in nm, forces in nN,
+/// times in units of `1/ω₀`.
+pub struct Lever {
+    pub k: f64,
+    pub q: f64,
+    pub amplitude: f64,
+    pub zc: f64,
+}
+
+impl Lever {
+    pub fn system(&self, law: Arc<dyn ForceLaw>, nodes: usize) -> System {
+        self.system_at(law, nodes, 1e-13)
+    }
+
+    pub fn system_at(&self, law: Arc<dyn ForceLaw>, nodes: usize, tolerance: f64) -> System {
+        let modes = Modes::from_oscillators(&[(1.0, 1.0 / self.q)]).unwrap();
+        let kernel = Kernel::new(
+            modes,
+            RowDVector::from_row_slice(&[1.0, 0.0]),
+            DVector::from_row_slice(&[0.0, 1.0 / self.k]),
+            TAU / 4.0,
+            nodes,
+        )
+        .unwrap();
+        let tones = if self.amplitude == 0.0 {
+            Vec::new()
+        } else {
+            vec![Tone {
+                frequency: 1.0,
+                forcing: DVector::from_row_slice(&[
+                    Complex::new(0.0, 0.0),
+                    Complex::new(self.amplitude / self.q, 0.0),
+                ]),
+                gap: Complex::new(0.0, 0.0),
+            }]
+        };
+        let drive = Drive {
+            constant: DVector::zeros(2),
+            offset: self.zc,
+            tones,
+        };
+        System::new(kernel, law, drive, Options::new(tolerance)).unwrap()
+    }
+}
+
+/// A chain of `count` modes like those of a beam whose first has unit frequency, driven at
+/// the tip, with the reading of the gap at the free end.
+pub fn beam(
+    law: Arc<dyn ForceLaw>,
+    count: usize,
+    k: f64,
+    q: f64,
+    amplitude: f64,
+    zc: f64,
+    nodes: usize,
+) -> System {
+    // Roots of cos β cosh β = −1; beyond the fourth (n − ½)π to rounding.
+    let root = |n: usize| -> f64 {
+        const FIRST: [f64; 4] = [
+            1.875_104_068_711_961,
+            4.694_091_132_974_175,
+            7.854_757_438_237_613,
+            10.995_540_734_875_467,
+        ];
+        FIRST
+            .get(n)
+            .copied()
+            .unwrap_or((n as f64 + 0.5) * std::f64::consts::PI)
+    };
+    let oscillators: Vec<(f64, f64)> = (0..count)
+        .map(|n| {
+            let ratio = (root(n) / root(0)).powi(2);
+            (ratio * ratio, ratio / q)
+        })
+        .collect();
+    let modes = Modes::from_oscillators(&oscillators).unwrap();
+    let mut row = RowDVector::zeros(2 * count);
+    let mut column = DVector::zeros(2 * count);
+    let mut forcing = DVector::from_element(2 * count, Complex::new(0.0, 0.0));
+    for n in 0..count {
+        // Every mode's modal mass at the tip is the same, a quarter of the beam's.
+        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+        row[n] = sign;
+        column[count + n] = sign / k;
+        forcing[count + n] = Complex::new(sign * amplitude / q, 0.0);
+    }
+    let kernel = Kernel::new(modes, row, column, TAU / 4.0, nodes).unwrap();
+    let drive = Drive {
+        constant: DVector::zeros(2 * count),
+        offset: zc,
+        tones: vec![Tone {
+            frequency: 1.0,
+            forcing,
+            gap: Complex::new(0.0, 0.0),
+        }],
+    };
+    System::new(kernel, law, drive, Options::new(1e-13)).unwrap()
+}

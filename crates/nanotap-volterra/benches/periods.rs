@@ -1,2 +1,74 @@
-//! placeholder
-fn main() {}
+//! Periods of DMT contact with van der Waals attraction, by number of modes.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use nanotap_volterra::{Flow, laws};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+fn main() {
+    divan::main();
+}
+
+fn flow(modes: usize) -> (Flow, Vec<f64>) {
+    let law = laws::build(
+        "dmt",
+        &[
+            ("modulus", 1.0),
+            ("poisson", 0.3),
+            ("tip_modulus", 160.0),
+            ("tip_poisson", 0.3),
+            ("radius", 5.0),
+            ("contact_distance", 0.169),
+            ("hamaker", 0.03),
+        ],
+    )
+    .unwrap();
+    let system = common::beam(law, modes, 0.9, 200.0, 20.0, 18.0, 20);
+    let mut flow = Flow::new(Arc::new(system));
+    // Near the repulsive orbit, and settled for a while.
+    let mut state = vec![0.0; 2 * modes];
+    (state[0], state[modes]) = (7.0048, 17.1408);
+    for _ in 0..50 {
+        flow.start(&state, 0.0).unwrap();
+        flow.run_until(TAU).unwrap();
+        flow.state(&mut state);
+    }
+    (flow, state)
+}
+
+#[divan::bench(args = [1, 3, 5, 10, 20])]
+fn dmt_period(bencher: divan::Bencher, modes: usize) {
+    let (mut flow, mut state) = flow(modes);
+    let before = flow.statistics();
+    let mut periods: u64 = 0;
+    bencher.bench_local(|| {
+        flow.start(&state, 0.0).unwrap();
+        flow.run_until(TAU).unwrap();
+        flow.state(&mut state);
+        periods += 1;
+    });
+    let after = flow.statistics();
+    let per = |a: u64, b: u64| (a - b) as f64 / periods as f64;
+    println!(
+        "N = {modes}: a period has {:.1} steps, {:.1} refused, {:.0} evaluations of the law, \
+         {:.1} factorisations",
+        per(after.steps, before.steps),
+        per(after.refused, before.refused),
+        per(after.evaluations, before.evaluations),
+        per(after.factorisations, before.factorisations),
+    );
+}
+
+#[divan::bench(args = [1, 3, 10])]
+fn dmt_period_with_jacobian(bencher: divan::Bencher, modes: usize) {
+    let (mut flow, state) = flow(modes);
+    let mut jacobian = nalgebra::DMatrix::zeros(2 * modes, 2 * modes);
+    let mut none = nalgebra::DMatrix::zeros(2 * modes, 0);
+    bencher.bench_local(|| {
+        flow.start(&state, 0.0).unwrap();
+        flow.run_with_derivatives(TAU, &[], &mut jacobian, &mut none)
+            .unwrap();
+    });
+}

@@ -76,7 +76,11 @@ fn root(c: &[f64], slope: &[f64], mut a: f64, mut b: f64) -> f64 {
             b = u;
         }
         let next = u - g / series(slope, u);
-        let next = if next > a && next < b { next } else { 0.5 * (a + b) };
+        let next = if next > a && next < b {
+            next
+        } else {
+            0.5 * (a + b)
+        };
         if (next - u).abs() <= 1e-16 {
             break;
         }

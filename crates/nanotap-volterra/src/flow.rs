@@ -1,5 +1,6 @@
 //! Running a system: from step to step and from switch to switch.
 
+use crate::VolterraError;
 use crate::bracket::{Fall, first_fall};
 use crate::error::Refusal;
 use crate::kernel::{LENGTHS, TimeMap};
@@ -8,7 +9,6 @@ use crate::linear::add_product;
 use crate::quadrature::derivative;
 use crate::step::{Quality, Solver, Statistics, Step};
 use crate::system::System;
-use crate::VolterraError;
 use std::sync::Arc;
 
 /// Switches at one instant beyond which the law is said to switch without end.
@@ -392,7 +392,8 @@ impl Flow {
             TimeMap::Plain => n as f64,
             TimeMap::Start | TimeMap::End => 0.5 * n as f64,
         };
-        if !(quality.error <= 1.0) {
+        // An error that is no number is too large as well.
+        if quality.error > 1.0 || quality.error.is_nan() {
             let notches = (2.0 * quality.error.log2() / degree).ceil().clamp(1.0, 8.0) as usize;
             let mut next = index + notches;
             // No need to resolve what lies beyond a switch.
@@ -417,7 +418,9 @@ impl Flow {
                 let growth = if quality.rounding {
                     2
                 } else {
-                    (2.0 * (0.5 / quality.error).log2() / degree).floor().clamp(0.0, 2.0) as usize
+                    (2.0 * (0.5 / quality.error).log2() / degree)
+                        .floor()
+                        .clamp(0.0, 2.0) as usize
                 };
                 Attempt::Whole(growth)
             }
@@ -553,16 +556,23 @@ impl Flow {
         // Inside until the end, and no other way out before it.
         let n = self.step.forces.len();
         self.guard_values(system, &exit, n);
-        if self.work.values[..n - 1].iter().any(|g| !(*g > 0.0)) {
+        if self.work.values[..n - 1]
+            .iter()
+            .any(|g| *g <= 0.0 || g.is_nan())
+        {
             return false;
         }
-        system.exits(self.branch).iter().enumerate().all(|(other, exit)| {
-            other == number || {
-                self.guard_values(system, exit, n);
-                self.guard_series(system);
-                first_fall(&self.work.series, &mut self.work.scratch) == Fall::None
-            }
-        })
+        system
+            .exits(self.branch)
+            .iter()
+            .enumerate()
+            .all(|(other, exit)| {
+                other == number || {
+                    self.guard_values(system, exit, n);
+                    self.guard_series(system);
+                    first_fall(&self.work.series, &mut self.work.scratch) == Fall::None
+                }
+            })
     }
 
     /// The values of a guard at the nodes, in `self.work.values`.

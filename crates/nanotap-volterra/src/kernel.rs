@@ -6,9 +6,9 @@
 //! between them, and on the modal coordinates at the end depends on the step's length and on
 //! how `u` runs with time, and on nothing else. Lengths are `h₀ 2^{−k/2}`.
 
+use crate::VolterraError;
 use crate::modes::{Block, Modes};
 use crate::quadrature::{chebyshev_basis, chebyshev_coefficients, chebyshev_nodes, gauss_legendre};
-use crate::VolterraError;
 use nalgebra::{DVector, RowDVector};
 use std::f64::consts::SQRT_2;
 use std::sync::{Arc, OnceLock};
@@ -172,7 +172,13 @@ impl Kernel {
         let mut rate_readout = vec![0.0; n];
         for block in modes.blocks() {
             let s = block.start;
-            let norm = |v: &[f64]| v[s..s + block.size].iter().map(|x| x * x).sum::<f64>().sqrt();
+            let norm = |v: &[f64]| {
+                v[s..s + block.size]
+                    .iter()
+                    .map(|x| x * x)
+                    .sum::<f64>()
+                    .sqrt()
+            };
             reach += norm(&readout) * norm(&source);
             for j in 0..block.size {
                 for i in 0..block.size {
@@ -230,7 +236,7 @@ impl Kernel {
 
     /// The longest tabulated step that is no longer than `length`, if there is one.
     pub(crate) fn index_below(&self, length: f64) -> Option<usize> {
-        if !(length > 0.0) {
+        if length <= 0.0 || length.is_nan() {
             return None;
         }
         let guess = (2.0 * (self.longest / length).log2()).floor() as i64 - 1;
@@ -284,11 +290,8 @@ impl Kernel {
                     for k in 0..block.size {
                         for node in 0..n {
                             let column = &self.coefficients[node * n..(node + 1) * n];
-                            table.carry[node * dimension + s + k] = moments
-                                .iter()
-                                .zip(column)
-                                .map(|(m, c)| m[k] * c)
-                                .sum();
+                            table.carry[node * dimension + s + k] =
+                                moments.iter().zip(column).map(|(m, c)| m[k] * c).sum();
                         }
                     }
                 }
@@ -361,7 +364,11 @@ impl Kernel {
 
     fn source_of(&self, block: &Block) -> [f64; 2] {
         let s = block.start;
-        let second = if block.size == 2 { self.source[s + 1] } else { 0.0 };
+        let second = if block.size == 2 {
+            self.source[s + 1]
+        } else {
+            0.0
+        };
         [self.source[s], second]
     }
 
@@ -421,10 +428,7 @@ impl Kernel {
             for (x, w) in self.panel.0.iter().zip(&self.panel.1) {
                 let at = width * (panel as f64 + x);
                 let force = crate::quadrature::series(coefficients, at);
-                out.push((
-                    end - map.time(h, at),
-                    w * width * map.rate(h, at) * force,
-                ));
+                out.push((end - map.time(h, at), w * width * map.rate(h, at) * force));
             }
         }
     }
@@ -438,11 +442,8 @@ impl Kernel {
             for node in 0..n {
                 let column = &self.coefficients[node * n..(node + 1) * n];
                 for k in 0..block.size {
-                    out[node * dimension + block.start + k] = moments[..n]
-                        .iter()
-                        .zip(column)
-                        .map(|(m, c)| m[k] * c)
-                        .sum();
+                    out[node * dimension + block.start + k] =
+                        moments[..n].iter().zip(column).map(|(m, c)| m[k] * c).sum();
                 }
             }
         }

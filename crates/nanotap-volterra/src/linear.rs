@@ -56,7 +56,10 @@ pub(crate) fn solve(factors: &[f64], n: usize, pivots: &[usize], x: &mut [f64]) 
     }
     for k in 0..n {
         let value = x[k];
-        for (x, c) in x[k + 1..].iter_mut().zip(&factors[k * n + k + 1..(k + 1) * n]) {
+        for (x, c) in x[k + 1..]
+            .iter_mut()
+            .zip(&factors[k * n + k + 1..(k + 1) * n])
+        {
             *x -= value * c;
         }
     }
@@ -76,7 +79,9 @@ mod tests {
     #[test]
     fn solving_undoes_a_product() {
         let n = 7;
-        let matrix: Vec<f64> = (0..n * n).map(|k| ((k * k * 37 + 11) % 23) as f64 - 11.0).collect();
+        let matrix: Vec<f64> = (0..n * n)
+            .map(|k| ((k * k * 37 + 11) % 23) as f64 - 11.0)
+            .collect();
         let x: Vec<f64> = (0..n).map(|k| k as f64 - 2.5).collect();
         let mut b = vec![0.0; n];
         add_product(&matrix, &x, &mut b);

@@ -41,10 +41,7 @@ impl Block {
         let discriminant = half * half + b * c;
         let decay = (mean * t).exp();
         let (even, odd) = even_and_odd(discriminant, t, mean, decay);
-        [
-            [even + odd * half, odd * b],
-            [odd * c, even - odd * half],
-        ]
+        [[even + odd * half, odd * b], [odd * c, even - odd * half]]
     }
 
     /// A bound of the eigenvalues' sizes.
@@ -117,9 +114,7 @@ impl Modes {
                     residual: f64::INFINITY,
                 });
             }
-            right
-                .columns_mut(column, basis.ncols())
-                .copy_from(&basis);
+            right.columns_mut(column, basis.ncols()).copy_from(&basis);
             column += basis.ncols();
             sizes.push(basis.ncols());
         }
@@ -150,7 +145,7 @@ impl Modes {
             start += size;
         }
         let residual = rest.amax() / balanced.amax().max(f64::MIN_POSITIVE);
-        if !(residual <= ACCEPTED_RESIDUAL) {
+        if residual > ACCEPTED_RESIDUAL || residual.is_nan() {
             return Err(VolterraError::IllConditioned { residual });
         }
         let mut modes = Self {

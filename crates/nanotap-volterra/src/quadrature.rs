@@ -45,11 +45,7 @@ fn legendre(count: usize, x: f64) -> (f64, f64) {
 pub(crate) fn chebyshev_nodes(count: usize) -> Vec<f64> {
     // 2 sin² keeps the distance from 0 accurate, which square-root time needs.
     (0..count)
-        .map(|i| {
-            (PI * i as f64 / (2.0 * (count - 1) as f64))
-                .sin()
-                .powi(2)
-        })
+        .map(|i| (PI * i as f64 / (2.0 * (count - 1) as f64)).sin().powi(2))
         .collect()
 }
 

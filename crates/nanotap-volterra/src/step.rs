@@ -312,7 +312,7 @@ impl Solver {
             if !size.is_finite() {
                 return Err(Refusal::Newton);
             }
-            if size <= 0.1 * self.allowed(system, table, step).0 {
+            if size <= 0.1 * Self::allowed(system, table, step).0 {
                 for (force, r) in step.forces.iter_mut().zip(&self.residual) {
                     *force += r;
                 }
@@ -326,7 +326,12 @@ impl Solver {
                     }
                     factored = true;
                 }
-                solve(&self.matrix, step.forces.len(), &self.pivots, &mut self.residual);
+                solve(
+                    &self.matrix,
+                    step.forces.len(),
+                    &self.pivots,
+                    &mut self.residual,
+                );
             }
             last = size;
             for (force, r) in step.forces.iter_mut().zip(&self.residual) {
@@ -355,7 +360,9 @@ impl Solver {
         let mut first = true;
         for _ in 0..MAX_ITERATIONS {
             self.statistics.iterations += 1;
-            let u = before.map.variable(before.length, step.start - before.start);
+            let u = before
+                .map
+                .variable(before.length, step.start - before.start);
             before.modal_at(system, u, &mut step.modal);
             self.free(system, table, step);
             if first {
@@ -368,7 +375,7 @@ impl Solver {
                 return Err(Refusal::Newton);
             }
             let floor = 8.0 * f64::EPSILON * scale;
-            if size <= 0.1 * self.allowed(system, table, step).0 && excess.abs() <= floor {
+            if size <= 0.1 * Self::allowed(system, table, step).0 && excess.abs() <= floor {
                 for (force, r) in step.forces.iter_mut().zip(&self.residual) {
                     *force += r;
                 }
@@ -389,7 +396,9 @@ impl Solver {
             solve(&self.matrix, n, &self.pivots, &mut self.residual);
             solve(&self.matrix, n, &self.pivots, &mut self.column);
             let effect = |x: &[f64]| -> f64 {
-                (0..n).map(|j| table.gap_force[j * rows + n - 1] * x[j]).sum()
+                (0..n)
+                    .map(|j| table.gap_force[j * rows + n - 1] * x[j])
+                    .sum()
             };
             let slope = self.shift_gap[n - 1] + effect(&self.column);
             let delta = -(excess + effect(&self.residual)) / slope;
@@ -436,7 +445,7 @@ impl Solver {
 
     /// What an error of the force may be: what the tolerance allows or what rounding makes,
     /// and the latter alone.
-    fn allowed(&self, system: &System, table: &Table, step: &Step) -> (f64, f64) {
+    fn allowed(system: &System, table: &Table, step: &Step) -> (f64, f64) {
         let wanted = system.options().tolerance / (table.length * system.kernel().reach);
         let (gap, rate) = gap_scale(system, &step.modal);
         let n = step.forces.len();
@@ -451,10 +460,19 @@ impl Solver {
     }
 
     /// The tests that a solved step must pass.
-    fn assess(&mut self, system: &System, table: &Table, step: &mut Step) -> Result<Quality, Refusal> {
+    fn assess(
+        &mut self,
+        system: &System,
+        table: &Table,
+        step: &mut Step,
+    ) -> Result<Quality, Refusal> {
         let n = step.forces.len();
         step.coefficients.fill(0.0);
-        add_product(&system.kernel().coefficients, &step.forces, &mut step.coefficients);
+        add_product(
+            &system.kernel().coefficients,
+            &step.forces,
+            &mut step.coefficients,
+        );
         let tail = step.coefficients[n - 1].abs() + step.coefficients[n - 2].abs();
         let mut between = [0.0; CHECKS];
         add_product(&table.between, &step.forces, &mut between);
@@ -466,9 +484,9 @@ impl Solver {
             defect = defect.max((force - law.value).abs());
         }
         self.statistics.evaluations += CHECKS as u64;
-        let (allowed, rounding) = self.allowed(system, table, step);
+        let (allowed, rounding) = Self::allowed(system, table, step);
         let steepness = steepness(table, step);
-        if !(steepness <= STEEPEST) {
+        if steepness > STEEPEST || steepness.is_nan() {
             return Err(Refusal::Steep);
         }
         let error = tail.max(0.25 * defect);

@@ -68,8 +68,11 @@ pub struct System {
     /// Complex amplitudes of the gap's forced part.
     pub(crate) gap_tones: Vec<Complex>,
     pub(crate) gap_constant: f64,
-    phasors: Arc<[Vec<OnceLock<Vec<[f64; 2]>>>; 3]>,
+    phasors: Arc<[Vec<OnceLock<Phasors>>; 3]>,
 }
+
+/// Cosine and sine of every tone at the points of a table.
+type Phasors = Vec<[f64; 2]>;
 
 /// A constant and complex amplitudes of the tones.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,7 +92,9 @@ impl Response {
         let left = modes.left();
         let real = |v: &DVector<f64>| v.map(|x| Complex::new(x, 0.0));
         Ok(Self {
-            constant: modes.response(0.0, &real(&(left * constant)))?.map(|z| z.re),
+            constant: modes
+                .response(0.0, &real(&(left * constant)))?
+                .map(|z| z.re),
             tones: tones
                 .iter()
                 .map(|(omega, forcing)| {
@@ -154,7 +159,12 @@ impl System {
             .collect();
         let response = Response::of(&kernel, &drive.constant, &tones)?;
         let dot = |z: &DVector<Complex>| -> Complex {
-            kernel.readout.iter().zip(z.iter()).map(|(r, z)| z * *r).sum()
+            kernel
+                .readout
+                .iter()
+                .zip(z.iter())
+                .map(|(r, z)| z * *r)
+                .sum()
         };
         let gap_tones = drive
             .tones

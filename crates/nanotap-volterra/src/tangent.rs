@@ -103,7 +103,12 @@ impl Forced {
             .collect();
         let response = Response::of(kernel, &constant, &tones)?;
         let dot = |z: &DVector<Complex>| -> Complex {
-            kernel.readout.iter().zip(z.iter()).map(|(r, z)| z * *r).sum()
+            kernel
+                .readout
+                .iter()
+                .zip(z.iter())
+                .map(|(r, z)| z * *r)
+                .sum()
         };
         let gap_constant = parameter.offset
             + kernel
@@ -181,10 +186,13 @@ fn check(system: &System, parameter: &Parameter) -> Result<(), VolterraError> {
             system.drive().tones.len(),
         ),
     ];
-    let forcings = parameter
-        .tones
-        .iter()
-        .map(|t| ("a parameter's change of a tone's forcing", t.forcing.len(), n));
+    let forcings = parameter.tones.iter().map(|t| {
+        (
+            "a parameter's change of a tone's forcing",
+            t.forcing.len(),
+            n,
+        )
+    });
     for (what, found, expected) in lengths.into_iter().chain(forcings) {
         if found != 0 && found != expected {
             return Err(VolterraError::Shape {
@@ -265,7 +273,12 @@ impl Observer for Tangents {
             table.exponentials.clone()
         } else {
             let time = step.map.time(step.length, step.end);
-            kernel.modes().blocks().iter().map(|b| b.exp(time)).collect()
+            kernel
+                .modes()
+                .blocks()
+                .iter()
+                .map(|b| b.exp(time))
+                .collect()
         };
         if !idle {
             if whole {
@@ -294,7 +307,9 @@ impl Observer for Tangents {
             solver.back_substitute(&mut shift_solution);
         }
         let effect = |x: &[f64]| -> f64 {
-            (0..n).map(|j| table.gap_force[j * rows + n - 1] * x[j]).sum()
+            (0..n)
+                .map(|j| table.gap_force[j * rows + n - 1] * x[j])
+                .sum()
         };
         let end_slope = Self::slope(system, end, step.force_at(step.end));
         for column in 0..self.shifts.len() {
@@ -309,8 +324,11 @@ impl Observer for Tangents {
             }
             self.base.clear();
             if let Some(p) = parameter {
-                self.base
-                    .extend(table.times[..n].iter().map(|t| p.gap(system, step.start + t)));
+                self.base.extend(
+                    table.times[..n]
+                        .iter()
+                        .map(|t| p.gap(system, step.start + t)),
+                );
             }
             let mut gap_end = 0.0;
             if !idle {
@@ -410,7 +428,8 @@ impl Observer for Tangents {
             let y = &mut self.columns[column * dimension..(column + 1) * dimension];
             if !self.moving {
                 let dot = |row: &[f64]| row.iter().zip(y.iter()).map(|(r, y)| r * y).sum::<f64>();
-                let mut change = by_gap * dot(&kernel.readout) + by_rate * dot(&kernel.rate_readout);
+                let mut change =
+                    by_gap * dot(&kernel.readout) + by_rate * dot(&kernel.rate_readout);
                 if let Some(p) = column.checked_sub(dimension).map(|p| &self.parameters[p]) {
                     let (d, v) = p.gap(system, switch.time);
                     change += by_gap * d + by_rate * v;
@@ -448,9 +467,10 @@ fn level_change(system: &System, step: &Step, parameter: &Forced, scratch: &mut 
         return 0.0;
     };
     let exits = system.exits(step.branch);
-    let Some(number) = exits.iter().position(|e| {
-        matches!(e.guard, Guard::Rises(l) | Guard::Falls(l) if l == level)
-    }) else {
+    let Some(number) = exits
+        .iter()
+        .position(|e| matches!(e.guard, Guard::Rises(l) | Guard::Falls(l) if l == level))
+    else {
         return 0.0;
     };
     system

@@ -195,8 +195,12 @@ impl Trajectory {
     /// The value of an output and its rate at a sample.
     pub fn read(&self, output: &Output, sample: &Sample) -> (f64, f64) {
         let mut field = vec![0.0; self.system.dimension()];
-        self.system
-            .field(sample.time, sample.state.as_slice(), sample.branch, &mut field);
+        self.system.field(
+            sample.time,
+            sample.state.as_slice(),
+            sample.branch,
+            &mut field,
+        );
         let mut value = output.offset + (&output.row * &sample.state)[0];
         let mut rate: f64 = output.row.iter().zip(&field).map(|(r, f)| r * f).sum();
         for (tone, z) in self.system.drive().tones.iter().zip(&output.tones) {
@@ -208,7 +212,11 @@ impl Trajectory {
     }
 
     /// The integrals over time of `count` functions of the motion, which `integrand` writes.
-    pub fn integrate(&self, count: usize, mut integrand: impl FnMut(&Sample, &mut [f64])) -> Vec<f64> {
+    pub fn integrate(
+        &self,
+        count: usize,
+        mut integrand: impl FnMut(&Sample, &mut [f64]),
+    ) -> Vec<f64> {
         let (nodes, weights) = gauss_legendre(POINTS);
         let mut sums = vec![0.0; count];
         let mut values = vec![0.0; count];

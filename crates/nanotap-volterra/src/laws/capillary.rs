@@ -9,8 +9,8 @@
 use crate::dual::Scalar;
 use crate::laws::elastic::reduced_modulus;
 use crate::laws::entry::{
-    CONTACT_DISTANCE, Dimension, Entry, MODULUS, POISSON, RADIUS, Range, TIP_MODULUS,
-    TIP_POISSON, own,
+    CONTACT_DISTANCE, Dimension, Entry, MODULUS, POISSON, RADIUS, Range, TIP_MODULUS, TIP_POISSON,
+    own,
 };
 use crate::laws::formula::{Edge, Formula, Way};
 use std::f64::consts::PI;

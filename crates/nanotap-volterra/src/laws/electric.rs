@@ -55,12 +55,7 @@ impl Formula for Electrostatic {
 
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let strength = p[3] * p[0].square() * p[1].square() * (-PI);
-        vec![
-            p[2],
-            strength,
-            p[1],
-            strength / (p[2] * (p[2] + p[1])),
-        ]
+        vec![p[2], strength, p[1], strength / (p[2] * (p[2] + p[1]))]
     }
 
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {

@@ -99,7 +99,7 @@ fn contact_radius_root<S: Scalar>(c: &[S], indentation: S) -> S {
         let cube = curvature * s * s * s;
         let slope = 4.0 * cube - tension;
         let next = s - (cube * s - tension * s - delta) / slope;
-        if !(next < s) || next <= least {
+        if next >= s || next <= least || next.is_nan() {
             break;
         }
         s = next;

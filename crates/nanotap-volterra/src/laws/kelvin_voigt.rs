@@ -115,11 +115,7 @@ impl Formula for KelvinVoigt {
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let plane = (-p[1].square() + 1.0).recip();
         let factor = self.shape.factor(p[3]) * plane;
-        vec![
-            p[4],
-            p[0] * factor,
-            p[2] * factor * self.shape.exponent(),
-        ]
+        vec![p[4], p[0] * factor, p[2] * factor * self.shape.exponent()]
     }
 
     fn branches(&self) -> usize {

@@ -44,7 +44,7 @@ impl Polyline {
                     reason: "a value is not finite",
                 });
             }
-            if row > 0 && !(*gap > points[row - 1].0) {
+            if row > 0 && *gap <= points[row - 1].0 {
                 return Err(VolterraError::Table {
                     row: row + 1,
                     reason: "the gap must increase from row to row",
@@ -56,8 +56,8 @@ impl Polyline {
         let mut potential = vec![0.0; points.len()];
         for k in (0..points.len() - 1).rev() {
             // U = −∫F dd, counted inwards.
-            potential[k] = potential[k + 1]
-                + 0.5 * (forces[k] + forces[k + 1]) * (gaps[k + 1] - gaps[k]);
+            potential[k] =
+                potential[k + 1] + 0.5 * (forces[k] + forces[k + 1]) * (gaps[k + 1] - gaps[k]);
         }
         Ok(Self {
             gaps,

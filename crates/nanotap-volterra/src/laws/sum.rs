@@ -105,7 +105,10 @@ impl ForceLaw for Sum {
     }
 
     fn exits(&self, branch: usize) -> Vec<Exit> {
-        self.ways(branch).into_iter().map(|(exit, _)| exit).collect()
+        self.ways(branch)
+            .into_iter()
+            .map(|(exit, _)| exit)
+            .collect()
     }
 
     fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
@@ -165,6 +168,9 @@ impl ForceLaw for Sum {
     }
 
     fn remarks(&self, least_gap: f64) -> Vec<Remark> {
-        self.terms.iter().flat_map(|t| t.remarks(least_gap)).collect()
+        self.terms
+            .iter()
+            .flat_map(|t| t.remarks(least_gap))
+            .collect()
     }
 }

@@ -146,9 +146,7 @@ impl Formula for Thin {
         let sum: f64 = coefficients
             .iter()
             .enumerate()
-            .map(|(k, a)| {
-                a * ratio.powi(k as i32) / (self.0.exponent() + 1.0 + step * k as f64)
-            })
+            .map(|(k, a)| a * ratio.powi(k as i32) / (self.0.exponent() + 1.0 + step * k as f64))
             .sum();
         Some(c[1] * self.0.power(delta) * delta * sum)
     }

@@ -1,8 +1,11 @@
 //! What several tests share: a stroboscopic map over the flow and the reference lever.
-#![allow(dead_code, missing_docs)]
+// Every test takes what it needs.
+#![allow(dead_code)]
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_dynamics::map::StroboscopicMap;
+use nanotap_volterra::laws;
+use nanotap_volterra::laws::entry::{Entry, Part};
 use nanotap_volterra::{
     Complex, Drive, Flow, ForceLaw, Kernel, Modes, Options, System, Tone, VolterraError,
 };
@@ -10,17 +13,17 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// One eV in nN nm.
-pub const EV: f64 = 0.1602176634;
+pub(crate) const EV: f64 = 0.1602176634;
 
 /// The flow over one period of the drive.
 #[derive(Clone)]
-pub struct Strobe {
-    pub flow: Flow,
-    pub period: f64,
+pub(crate) struct Strobe {
+    pub(crate) flow: Flow,
+    pub(crate) period: f64,
 }
 
 impl Strobe {
-    pub fn new(system: System, period: f64) -> Self {
+    pub(crate) fn new(system: System, period: f64) -> Self {
         Self {
             flow: Flow::new(Arc::new(system)),
             period,
@@ -62,19 +65,19 @@ impl StroboscopicMap for Strobe {
 
 /// One mode, `z̈ + ż/Q + z = (A₀/Q) cos t + F/k`, gap `z + zc`; lengths in nm, forces in nN,
 /// times in units of `1/ω₀`.
-pub struct Lever {
-    pub k: f64,
-    pub q: f64,
-    pub amplitude: f64,
-    pub zc: f64,
+pub(crate) struct Lever {
+    pub(crate) k: f64,
+    pub(crate) q: f64,
+    pub(crate) amplitude: f64,
+    pub(crate) zc: f64,
 }
 
 impl Lever {
-    pub fn system(&self, law: Arc<dyn ForceLaw>, nodes: usize) -> System {
+    pub(crate) fn system(&self, law: Arc<dyn ForceLaw>, nodes: usize) -> System {
         self.system_at(law, nodes, 1e-13)
     }
 
-    pub fn system_at(&self, law: Arc<dyn ForceLaw>, nodes: usize, tolerance: f64) -> System {
+    pub(crate) fn system_at(&self, law: Arc<dyn ForceLaw>, nodes: usize, tolerance: f64) -> System {
         let modes = Modes::from_oscillators(&[(1.0, 1.0 / self.q)]).unwrap();
         let kernel = Kernel::new(
             modes,
@@ -107,7 +110,7 @@ impl Lever {
 
 /// A chain of `count` modes like those of a beam whose first has unit frequency, driven at
 /// the tip, with the reading of the gap at the free end.
-pub fn beam(
+pub(crate) fn beam(
     law: Arc<dyn ForceLaw>,
     count: usize,
     k: f64,
@@ -157,4 +160,58 @@ pub fn beam(
         }],
     };
     System::new(kernel, law, drive, Options::new(1e-13)).unwrap()
+}
+
+/// Values in nm, nN and 1/ω0 for the parameters of the table of laws.
+const VALUES: [(&str, f64); 23] = [
+    ("modulus", 0.4),
+    ("poisson", 0.3),
+    ("tip_modulus", 160.0),
+    ("tip_poisson", 0.3),
+    ("radius", 6.0),
+    ("half_angle", 0.5),
+    ("contact_distance", 0.2),
+    ("hamaker", 0.03),
+    ("attraction", 0.03),
+    ("repulsion", 2e-5),
+    ("work_of_adhesion", 0.02),
+    ("work_of_retraction", 0.03),
+    ("viscosity", 0.02),
+    ("thickness", 8.0),
+    ("damping", 0.3),
+    ("decay_length", 1.5),
+    ("surface_tension", 0.02),
+    ("film_thickness", 0.5),
+    ("surface_energy", 0.05),
+    ("voltage", 1.3),
+    ("permittivity", 0.01),
+    ("debye_length", 2.0),
+    ("stiffness", 3.0),
+];
+
+/// See [`VALUES`]; charges are 0.01.
+pub(crate) fn value(name: &str) -> f64 {
+    VALUES
+        .iter()
+        .find(|(key, _)| *key == name)
+        .map_or(0.01, |(_, value)| *value)
+}
+
+/// A law of the table with [`value`]s, one of them changed; attraction and dissipation alone
+/// would pull the tip in, so they get an elastic contact beside them.
+pub(crate) fn table_law(index: usize, change: Option<(usize, f64)>) -> Arc<dyn ForceLaw> {
+    let of =
+        |entry: &Entry| -> Vec<f64> { entry.parameters.iter().map(|p| value(p.name)).collect() };
+    let table = &laws::TABLE[index];
+    let mut parameters = of(table.entry);
+    if let Some((k, h)) = change {
+        parameters[k] += h;
+    }
+    let law = table.with(&parameters).unwrap();
+    if table.entry.parts.contains(&Part::Elasticity) {
+        return law;
+    }
+    let hertz = laws::law("hertz").unwrap();
+    let elastic = hertz.with(&of(hertz.entry)).unwrap();
+    laws::build_sum(&[(table.entry, law), (hertz.entry, elastic)]).unwrap()
 }

@@ -186,6 +186,14 @@ fn text(studied: &Studied, model: &Model, run: &Simulation) -> String {
             "What follows is what was recorded; it need not be what remains in the end.",
         ));
     }
+    // Far above rounding and what Newton leaves.
+    if let Some(distance) = run.distance_to_orbit.filter(|d| *d > 1e-6) {
+        text.push_str(&motion::paragraph(&format!(
+            "What follows is the way there, not yet the orbit: at its end the state is still {} % of the orbit's \
+             size away. Without --transient the orbit itself is shown.",
+            number::significant(100.0 * distance, 2)
+        )));
+    }
     if let Some(exponents) = &run.lyapunov {
         text.push_str(&motion::paragraph(&format!(
             "Lyapunov exponents per drive period: {}",

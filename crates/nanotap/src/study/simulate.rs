@@ -139,6 +139,10 @@ pub struct Simulation {
     /// Lyapunov exponents per drive period, if they were measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lyapunov: Option<Vec<f64>>,
+    /// Of a periodic motion, how far the end of the recording is from the orbit, as a part of
+    /// the orbit's size: what is recorded is the orbit only where this is rounding.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_to_orbit: Option<f64>,
     /// States at the end of each of the last periods asked for.
     pub strobe: Vec<Vec<f64>>,
     /// Contacts begun and ended.
@@ -160,10 +164,8 @@ pub struct Simulation {
 
 /// Periods observed in one piece; bounds the memory of long runs.
 const BLOCK: usize = 512;
-/// A run that starts at a periodic orbit is as near as rounding lets it be.
+/// A run this near to a periodic orbit, as a part of its size, has arrived.
 const ARRIVED: f64 = 1e-11;
-/// Longest approach to a weakly stable orbit that is waited for.
-const LONGEST_APPROACH: usize = 200_000;
 
 /// Runs `model`.
 ///
@@ -179,7 +181,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         map.advance_by(&mut state, transient)?;
         transient
     } else {
-        measured_transient(&mut map, &mut state, &options.settle)?
+        measured_transient(&mut map, &mut state, &options.settle)
     };
     let record = record(model, &state, options)?;
     let named = Named::of(&settle(&mut map, &state, &options.settle).verdict);
@@ -191,6 +193,10 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         period: named.orbit.as_ref().map(|o| o.period),
         evidence: named.evidence,
         lyapunov: named.spectrum.map(|s| s.exponents),
+        distance_to_orbit: named
+            .orbit
+            .as_ref()
+            .map(|orbit| nearest_phase(orbit, &record.end).1 / orbit.scale()),
         strobe: record.strobe,
         events: record.events,
         observables: record.observables,
@@ -238,50 +244,45 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
     Ok(state)
 }
 
-/// Runs until the motion has been named and, if it goes to a periodic orbit, has
-/// arrived there to rounding.
-fn measured_transient(
-    map: &mut Strobe,
-    state: &mut Vec<f64>,
-    options: &SettleOptions,
-) -> Result<usize, SimulateError> {
+/// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
+/// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
+/// for: near a multiplier of modulus one it takes longer than anyone would run.
+fn measured_transient(map: &mut Strobe, state: &mut Vec<f64>, options: &SettleOptions) -> usize {
     let settled = settle(map, state, options);
-    let mut periods = settled.periods;
     state.copy_from_slice(&settled.state);
     let (Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. }) = &settled.verdict
     else {
-        return Ok(periods);
+        return settled.periods;
     };
+    let (nearest, distance) = nearest_phase(orbit, &settled.state);
     let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
-    let mut previous = f64::INFINITY;
-    for k in 0..LONGEST_APPROACH {
-        let distance = orbit
-            .states
-            .iter()
-            .map(|x| {
-                x.iter()
-                    .zip(&*state)
-                    .map(|(a, b)| (a - b).abs())
-                    .fold(0.0, f64::max)
-            })
-            .fold(f64::INFINITY, f64::min);
-        if distance <= near {
-            break;
-        }
-        // At the floor of rounding the distance no longer falls.
-        if k % 1000 == 999 {
-            if distance > 0.9 * previous {
-                break;
-            }
-            previous = distance;
-        }
-        map.advance(state)?;
-        periods += 1;
+    let decay = -orbit.spectral_radius().ln();
+    let rest = ((distance / near).ln() / decay).ceil().max(0.0) as usize;
+    if !nearest.is_empty() {
+        state.copy_from_slice(nearest);
     }
-    Ok(periods)
+    settled.periods + rest.next_multiple_of(orbit.period)
+}
+
+/// The state of an orbit at drive phase 0 that is nearest to `state`, and how near it is.
+fn nearest_phase<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> (&'a [f64], f64) {
+    let distance = |x: &[f64]| {
+        x.iter()
+            .zip(state)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+    };
+    orbit
+        .states
+        .iter()
+        .map(|x| (x.as_slice(), distance(x)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((&[], f64::NAN))
 }
 
 struct Record {
+    /// The state at the end.
+    end: Vec<f64>,
     strobe: Vec<Vec<f64>>,
     events: Vec<ContactEvent>,
     observables: Observables,
@@ -327,7 +328,10 @@ fn record(
     let (Some(trajectory), Some(observables)) = (first, observables) else {
         return Err(SimulateError::NoPeriods);
     };
+    let mut end = vec![0.0; model.dimension()];
+    flow.state(&mut end);
     Ok(Record {
+        end,
         strobe,
         events,
         observables,

@@ -65,7 +65,7 @@ impl DatasetArguments {
             },
         };
         if !self.chunk.is_whole() && (plot.is_some() || destination.table.is_some()) {
-            return Err(Failure::request(
+            return Err(Failure::input(
                 format!(
                     "--chunk {} computes a share; a picture or a table needs all",
                     self.chunk
@@ -106,7 +106,7 @@ impl DatasetArguments {
         match done {
             Ok(()) => Ok(store),
             Err(WorkError::Store(error)) => Err(error.into()),
-            Err(stopped @ WorkError::Cancelled { .. }) => Err(Failure::Failed(format!(
+            Err(stopped @ WorkError::Cancelled { .. }) => Err(Failure::numerics(format!(
                 "{stopped} in {}; run the same command again to go on",
                 path.display()
             ))),
@@ -193,7 +193,7 @@ pub(crate) fn derived_name(case: Option<&Path>, what: &[&str]) -> String {
 /// at all.
 pub(crate) fn write_table(store: &Store, path: &Path) -> Result<(), Failure> {
     let refuse = |error: std::io::Error| {
-        Failure::Failed(format!("cannot write {}: {error}", path.display()))
+        Failure::numerics(format!("cannot write {}: {error}", path.display()))
     };
     let hidden = format!(".{}.csv.tmp", std::process::id());
     let temporary = path.with_file_name(hidden);
@@ -209,20 +209,6 @@ pub(crate) fn write_table(store: &Store, path: &Path) -> Result<(), Failure> {
         let _ = std::fs::remove_file(&temporary);
     }
     written
-}
-
-impl From<StoreError> for Failure {
-    fn from(error: StoreError) -> Self {
-        let help = match &error {
-            StoreError::Occupied { .. } => "give another name with --out",
-            StoreError::Mismatch { .. } => {
-                "give another name with --out, or remove that dataset to begin anew"
-            }
-            StoreError::NotAStore { .. } => "name a folder that `nanotap sweep` or `basin` made",
-            _ => return Self::Failed(error.to_string()),
-        };
-        Self::request(error.to_string(), help)
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 /// Writes `bytes` to `path` under a temporary name beside it, then renames: a reader
 /// never meets half a file, and a failure leaves what was there before.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let refuse = |why: String| Failure::Failed(format!("cannot write {}: {why}", path.display()));
+    let refuse = |why: String| Failure::files(format!("cannot write {}: {why}", path.display()));
     let Some(name) = path.file_name() else {
         return Err(refuse("it has no file name".into()));
     };
@@ -40,7 +40,7 @@ pub(crate) fn ending<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fa
         .find(|ending| Some(*ending) == given.as_deref())
         .ok_or_else(|| {
             let list: Vec<String> = endings.iter().map(|ending| format!(".{ending}")).collect();
-            Failure::request(
+            Failure::input(
                 format!(
                     "{}: the ending says no format that is written here",
                     path.display()

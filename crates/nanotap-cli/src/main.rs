@@ -29,6 +29,6 @@ fn main() -> ExitCode {
     let output = Output::new(arguments.json, arguments.quiet);
     match command::run(&arguments.command, &output) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+        Err(error) => failure::report(error),
     }
 }

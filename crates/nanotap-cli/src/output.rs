@@ -34,7 +34,7 @@ impl Output {
     ) -> Result<(), Failure> {
         if self.json {
             let mut json = serde_json::to_string_pretty(result)
-                .map_err(|error| Failure::Failed(format!("no JSON of the result: {error}")))?;
+                .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
             json.push('\n');
             print(&json)
         } else {
@@ -65,7 +65,7 @@ fn print(text: &str) -> Result<(), Failure> {
     {
         // Whoever reads has seen enough (`| head`).
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        Err(error) => Err(Failure::Failed(format!(
+        Err(error) => Err(Failure::numerics(format!(
             "cannot write to standard output: {error}"
         ))),
         Ok(()) => Ok(()),

@@ -49,7 +49,7 @@ fn listen() -> Result<(), Failure> {
             std::process::exit(130);
         }
     })
-    .map_err(|error| Failure::Failed(format!("cannot listen for Ctrl-C: {error}")))
+    .map_err(|error| Failure::numerics(format!("cannot listen for Ctrl-C: {error}")))
 }
 
 /// One line on standard error, written over itself.

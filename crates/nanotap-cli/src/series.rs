@@ -47,6 +47,6 @@ pub(crate) fn write(
         }
         csv.push('\n');
     })
-    .map_err(|error| Failure::Failed(error.to_string()))?;
+    .map_err(|error| Failure::numerics(error.to_string()))?;
     file::write(path, csv.as_bytes())
 }

@@ -6,7 +6,6 @@ use std::ops::Deref;
 use nanotap::case::physical::Severity;
 use nanotap::case::subject::{Key, Subject};
 use nanotap::model::Model;
-use nanotap::study::setpoint::SetpointError;
 pub(crate) use nanotap::study::studied::ParameterUnit;
 
 use crate::arguments::CaseArguments;
@@ -33,12 +32,9 @@ pub(crate) fn at_setpoint(
     if !studied.leaves_distance_to_setpoint() {
         return Ok(studied);
     }
-    let solved = progress::watched(output, "distances", |control| studied.at_setpoint(control))?;
-    solved.map_err(|error| match error {
-        SetpointError::Approach(error) => error.into(),
-        SetpointError::None => Failure::request(error.to_string(), "give drive.setpoint"),
-        other => Failure::Failed(other.to_string()),
-    })
+    Ok(progress::watched(output, "distances", |control| {
+        studied.at_setpoint(control)
+    })??)
 }
 
 impl Studied {
@@ -72,12 +68,7 @@ impl Studied {
     /// The same with these parameters free to vary, quantities of a physical case
     /// (`drive.frequency`) among them.
     pub(crate) fn varying(self, names: &[&str]) -> Result<Self, Failure> {
-        self.0.varying(names).map(Self).map_err(|error| {
-            Failure::request(
-                error.to_string(),
-                "name a quantity of the case file as section.key, as in drive.frequency",
-            )
-        })
+        Ok(Self(self.0.varying(names)?))
     }
 
     /// Its model.
@@ -115,12 +106,7 @@ impl Studied {
 
     /// The parameter that is called `name`.
     pub(crate) fn key(&self, name: &str) -> Result<Key, Failure> {
-        self.0.key(name).map_err(|error| {
-            Failure::request(
-                error.to_string(),
-                "name a parameter of the dimensionless model",
-            )
-        })
+        Ok(self.0.key(name)?)
     }
 
     /// The parameter that is called `name`, and values of it given after their options.
@@ -134,14 +120,14 @@ impl Studied {
         let mut values = [0.0; N];
         for (value, (option, text)) in values.iter_mut().zip(given) {
             let (read, number) = self.0.key_and_value(plain, text).map_err(|error| {
-                Failure::request(
+                Failure::input(
                     format!("{option} {error}"),
                     "give a number or a quantity with its unit",
                 )
             })?;
             *value = number;
             if *key.get_or_insert(read) != read {
-                return Err(Failure::request(
+                return Err(Failure::input(
                     format!("{option} {text}: the ends of the range measure different things"),
                     "give both in units of the same quantity",
                 ));
@@ -158,7 +144,7 @@ impl Studied {
                 Some(_) => "give a number or a quantity".to_owned(),
                 None => format!("give a value of {} as a number", key.name()),
             };
-            Failure::request(format!("{option} {error}"), help)
+            Failure::input(format!("{option} {error}"), help)
         })
     }
 }

@@ -27,7 +27,7 @@ impl ThreadsArgument {
             return Ok(work());
         };
         if threads == 0 {
-            return Err(Failure::request(
+            return Err(Failure::input(
                 "--threads 0: nobody would work",
                 "give 1 or more",
             ));
@@ -36,10 +36,10 @@ impl ThreadsArgument {
             .num_threads(threads)
             .build()
             .map(|pool| pool.install(work))
-            .map_err(|error| Failure::Failed(format!("cannot start {threads} threads: {error}")))
+            .map_err(|error| Failure::numerics(format!("cannot start {threads} threads: {error}")))
     }
 }
 
 fn nobody() -> Failure {
-    Failure::request("--threads 0: nobody would work", "give 1 or more")
+    Failure::input("--threads 0: nobody would work", "give 1 or more")
 }

@@ -374,6 +374,19 @@ fn chosen(only: &[String]) -> Result<Vec<&'static Topic>, PaperError> {
     Ok(TOPICS.iter().filter(wanted).collect())
 }
 
+impl From<PaperError> for nanotap::Error {
+    fn from(error: PaperError) -> Self {
+        match error {
+            PaperError::UnknownSection { .. } => {
+                Self::new(nanotap::ErrorKind::BadInput, error.to_string()).at("only")
+            }
+            PaperError::Cancelled => Self::new(nanotap::ErrorKind::Stopped, error.to_string()),
+            PaperError::Model(error) => error.into(),
+            other => Self::numerics(other.to_string()),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -194,7 +194,7 @@ impl CaseCore {
 
 fn text_of(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path)
-        .map_err(|error| Failure::Input(format!("{}: cannot be read: {error}", path.display())))
+        .map_err(|error| Failure::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
 /// The keys of a case file by table, each with the other names that it goes by.

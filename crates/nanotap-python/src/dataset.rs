@@ -90,7 +90,7 @@ impl Recipe {
         };
         let follow = follow
             .map_or(Ok(Follow::Off), str::parse)
-            .map_err(Failure::Input)?;
+            .map_err(Failure::input)?;
         let options = SweepOptions {
             starts,
             follow,
@@ -163,7 +163,7 @@ impl Recipe {
     ) -> PyResult<bool> {
         let share: Share = share
             .parse()
-            .map_err(|error: dataset::ShareError| Failure::Input(error.to_string()))?;
+            .map_err(|error: dataset::ShareError| Failure::input(error.to_string()))?;
         let store = self.store(&path)?;
         let kind = Arc::clone(&self.kind);
         let done = watched(py, progress, move |control| {
@@ -189,7 +189,7 @@ impl Recipe {
         let kind = Arc::clone(&self.kind);
         let done = watched(py, None, move |control| {
             kind.chunk_files(chunk, control)
-                .ok_or_else(|| Failure::Input(format!("there is no chunk {chunk}")))
+                .ok_or_else(|| Failure::input(format!("there is no chunk {chunk}")))
         })?;
         let files = done.result.iter().map(|file| PyBytes::new(py, file));
         Ok(files.collect())
@@ -311,7 +311,7 @@ fn drawn(figure: &Figure, format: &str) -> Result<Vec<u8>, Failure> {
         "png" => figure.to_png(200.0)?,
         "pdf" => figure.to_pdf()?,
         other => {
-            return Err(Failure::Input(format!(
+            return Err(Failure::input(format!(
                 "`{other}` is no format that can be drawn; there are svg, png and pdf"
             )));
         }
@@ -323,8 +323,8 @@ fn drawn(figure: &Figure, format: &str) -> Result<Vec<u8>, Failure> {
 pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
     let write = || -> Result<(), Failure> {
         let (store, _) = opened(&path)?;
-        let refuse = |error: std::io::Error| {
-            Failure::File(format!("cannot write {}: {error}", out.display()))
+        let refuse = |error: std::io::Error| -> Failure {
+            nanotap::Error::files(format!("cannot write {}: {error}", out.display())).into()
         };
         let temporary = out.with_file_name(format!(".{}.csv.tmp", std::process::id()));
         let written = File::create(&temporary).map_err(refuse).and_then(|file| {
@@ -365,6 +365,6 @@ pub(crate) fn gsf<'py>(
     };
     let file = field
         .to_gsf()
-        .map_err(|error| Failure::Input(error.to_string()))?;
+        .map_err(|error| Failure::input(error.to_string()))?;
     Ok(PyBytes::new(py, &file))
 }

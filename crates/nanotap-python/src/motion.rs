@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use nanotap::ErrorKind;
 use nanotap::case::subject::Subject;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
@@ -81,7 +82,7 @@ pub(crate) fn modes<'py>(
         return Err(oscillator(&studied, "modes").into());
     };
     let table = ModeTable::new(case).map_err(Failure::from)?;
-    let beam = Modes::new(case.modes).map_err(|error| Failure::Input(error.to_string()))?;
+    let beam = Modes::new(case.modes).map_err(|error| Failure::input(error.to_string()))?;
     let step = 1.0 / points.saturating_sub(1).max(1) as f64;
     let xi: Vec<f64> = (0..points).map(|point| point as f64 * step).collect();
     let shapes: Vec<f64> = xi
@@ -95,7 +96,7 @@ pub(crate) fn modes<'py>(
 
 /// A case of the wrong kind.
 pub(crate) fn oscillator(studied: &Studied, command: &str) -> Failure {
-    Failure::Input(format!(
+    Failure::input(format!(
         "{}: `{command}` needs a cantilever; this is an oscillator",
         studied.title
     ))
@@ -299,8 +300,8 @@ pub(crate) fn observe(
             }
             let observed = match how.one(studied) {
                 Ok(document) => Ok(document),
-                Err(Failure::Failed(reason)) => Err(reason),
-                Err(input) => return Err(input),
+                Err(Failure(error)) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
+                Err(other) => return Err(other),
             };
             let count = finished.fetch_add(1, Ordering::Relaxed) + 1;
             if let Some(progress) = control.progress {

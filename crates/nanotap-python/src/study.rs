@@ -99,7 +99,7 @@ pub(crate) fn branch(
         let (key, from) = studied.key_and_value(key, from)?;
         let (other, end) = studied.key_and_value(key, to)?;
         if other != key {
-            return Err(Failure::Input(format!(
+            return Err(Failure::input(format!(
                 "{to}: the ends of the range measure different things"
             )));
         }
@@ -281,8 +281,9 @@ pub(crate) fn paper(
 ) -> PyResult<(String, bool)> {
     let done = watched(py, progress, move |control| {
         // Before the work, not after it.
-        std::fs::create_dir_all(&out)
-            .map_err(|error| Failure::File(format!("cannot make {}: {error}", out.display())))?;
+        std::fs::create_dir_all(&out).map_err(|error| {
+            nanotap::Error::files(format!("cannot make {}: {error}", out.display()))
+        })?;
         let report = on_threads(threads, || report(&PaperOptions { only, quick }, control))??;
         let written = report.write(&out)?;
         Ok(serde_json::to_string(&Paper {

@@ -145,5 +145,9 @@ pub(crate) fn on_threads<R: Send>(
         .num_threads(threads)
         .build()
         .map(|pool| pool.install(work))
-        .map_err(|error| Failure::Failed(format!("cannot start {threads} threads: {error}")))
+        .map_err(|error| {
+            Failure(nanotap::Error::numerics(format!(
+                "cannot start {threads} threads: {error}"
+            )))
+        })
 }

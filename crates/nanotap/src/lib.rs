@@ -8,9 +8,11 @@
 
 pub mod case;
 pub mod dataset;
+pub mod error;
 pub mod figure;
 pub mod model;
 pub mod observe;
 pub mod study;
 
+pub use error::{Error, ErrorKind};
 pub use nanotap_dynamics::control;

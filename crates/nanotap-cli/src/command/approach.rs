@@ -7,9 +7,7 @@ use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::figure::approach::approach_figure;
-use nanotap::study::approach::{
-    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, approach, gap_key,
-};
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, approach, gap_key};
 use nanotap::study::branch::Sight;
 use nanotap::study::studied::ParameterUnit;
 use serde::Serialize;
@@ -313,23 +311,4 @@ fn text(studied: &Studied, report: &ApproachReport) -> String {
         )));
     }
     text
-}
-
-impl From<ApproachError> for Failure {
-    fn from(error: ApproachError) -> Self {
-        match error {
-            ApproachError::Points { .. } => Self::request(error.to_string(), "give --points 80"),
-            ApproachError::Range { .. } => {
-                Self::request(error.to_string(), "change --from or --to")
-            }
-            ApproachError::NoDrive => {
-                Self::request(error.to_string(), "give --from, or drive the lever")
-            }
-            ApproachError::NoPeriod | ApproachError::NoPeriods => {
-                Self::request(error.to_string(), "give --max-period 1 or more")
-            }
-            ApproachError::Model(error) => error.into(),
-            ApproachError::Branch(error) => error.into(),
-        }
-    }
 }

@@ -70,7 +70,7 @@ pub(super) fn parse_side(text: &str) -> Result<(String, f64, f64), String> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     if arguments.max_period == 0 {
-        return Err(Failure::request(
+        return Err(Failure::input(
             "--max-period 0: no motion has that period",
             "give at least 1",
         ));
@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let studied = Studied::of(&arguments.case, output)?;
     let model = studied.model()?;
     let start_box = box_with(&model, &arguments.sides).map_err(|error| {
-        Failure::request(
+        Failure::input(
             format!("--box: {error}"),
             "name coordinates as in --box a1=-1:1",
         )

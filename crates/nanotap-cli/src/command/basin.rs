@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::study::basin::{Basin, BasinError, BasinOptions, Shares, SliceRange, figure, shares};
+use nanotap::study::basin::{Basin, BasinOptions, Shares, SliceRange, figure, shares};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -104,7 +104,7 @@ impl Arguments {
     fn options(&self) -> Result<BasinOptions, Failure> {
         let range = |option: &str, given: &str| {
             SliceRange::parse(given).map_err(|error| {
-                Failure::request(
+                Failure::input(
                     format!("--{option} {error}"),
                     format!(
                         "write --{option} a1=-1:1:200: entry, first value, last value, how many"
@@ -128,7 +128,7 @@ impl Arguments {
 /// The states on the attractors that a file of `nanotap attractors --json` names.
 fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
     let refuse = |why: String| {
-        Failure::request(
+        Failure::input(
             format!("{}: {why}", path.display()),
             "make it with `nanotap attractors CASE --json > FILE`",
         )
@@ -194,18 +194,4 @@ fn parts(shares: &Shares) -> String {
         }
     }
     table.render()
-}
-
-impl From<BasinError> for Failure {
-    fn from(error: BasinError) -> Self {
-        match error {
-            BasinError::State(error) => error.into(),
-            BasinError::Model(error) => error.into(),
-            BasinError::NoAttractor { .. } => Self::Failed(error.to_string()),
-            BasinError::Cancelled => Self::Failed(format!(
-                "{error}; nothing was written; run the same command again"
-            )),
-            _ => Self::request(error.to_string(), "change --x or --y"),
-        }
-    }
 }

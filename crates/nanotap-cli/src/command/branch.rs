@@ -209,7 +209,7 @@ fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Fa
         ..SeedOptions::default()
     });
     if census.is_some() && (arguments.values < 2 || arguments.starts == 0) {
-        return Err(Failure::request(
+        return Err(Failure::input(
             format!(
                 "--diagram with --values {} and --starts {}",
                 arguments.values, arguments.starts
@@ -237,7 +237,7 @@ fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Fa
 
 fn second(studied: &Studied, text: &str) -> Result<(Key, f64, f64), Failure> {
     let wrong = || {
-        Failure::request(
+        Failure::input(
             format!("--second {text}: not a parameter with its range"),
             "write it as --second alpha4=5:40",
         )

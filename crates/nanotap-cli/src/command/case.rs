@@ -1,6 +1,7 @@
 //! `nanotap case`: the case, checked and resolved.
 
 use clap::Args;
+use nanotap::ErrorKind;
 use nanotap::case::document::CaseDocument;
 use nanotap::case::file as case_file;
 use nanotap::case::physical::quantity::format_electronvolts;
@@ -31,8 +32,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     // The case is shown also where no distance has the setpoint.
     let studied = match at_setpoint(read.clone(), output) {
         Ok(studied) => studied,
-        Err(Failure::Failed(why)) => {
-            output.warning(&why);
+        Err(error) if error.kind == ErrorKind::Numerics => {
+            output.warning(&error.to_string());
             read
         }
         Err(other) => return Err(other),
@@ -40,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let document = CaseDocument::of(&studied);
     if let Subject::Oscillator(given) = &studied.subject {
         if let Some(path) = &arguments.out.out {
-            return Err(Failure::request(
+            return Err(Failure::input(
                 format!("--out {}: an oscillator is not written out", path.display()),
                 "leave --out away, or take --json",
             ));

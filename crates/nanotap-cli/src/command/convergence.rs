@@ -48,13 +48,13 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     if !(2..=MAX_MODES).contains(&arguments.largest) {
-        return Err(Failure::request(
+        return Err(Failure::input(
             format!("--largest {}: nothing to compare", arguments.largest),
             format!("give a number of modes from 2 to {MAX_MODES}"),
         ));
     }
     if !(arguments.tolerance > 0.0 && arguments.tolerance.is_finite()) {
-        return Err(Failure::request(
+        return Err(Failure::input(
             format!(
                 "--tolerance {}: no difference is that small",
                 arguments.tolerance

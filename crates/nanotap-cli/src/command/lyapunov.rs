@@ -67,7 +67,7 @@ enum Cut {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     if !arguments.phase.is_finite() {
-        return Err(Failure::request(
+        return Err(Failure::input(
             format!("--phase {}: no phase", arguments.phase),
             "give a drive phase in degrees, as in --phase 90",
         ));

@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if merged.missing.is_empty() {
         return Ok(());
     }
-    Err(Failure::Failed(format!(
+    Err(Failure::numerics(format!(
         "{} missing; merge the other shares too, or give the sweep's or basin's command with --out {}",
         number::counted(merged.missing.len(), "chunk is", "chunks are"),
         arguments.out.display()

@@ -114,7 +114,7 @@ fn cantilever(
 /// The dimensionless cantilever that is studied, for `command`.
 fn cantilever_of(studied: &Studied, command: &str) -> Result<Cantilever, Failure> {
     studied.subject.case().ok_or_else(|| {
-        Failure::request(
+        Failure::input(
             format!(
                 "{}: `{command}` needs a cantilever; this is an oscillator",
                 studied.title

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 use nanotap::model::beam::Modes;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::modes::{ModeTable, ModeTableError, damping_ratio, shapes_figure};
+use nanotap::study::modes::{ModeTable, damping_ratio, shapes_figure};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -29,11 +29,8 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let case = super::cantilever(&arguments.case, "nanotap modes", output)?;
-    let table = ModeTable::new(&case).map_err(|error| match error {
-        ModeTableError::Case(error) => Failure::from(error),
-        ModeTableError::Spectrum(error) => Failure::Failed(error.to_string()),
-    })?;
-    let beam = Modes::new(case.modes).map_err(|error| Failure::Failed(error.to_string()))?;
+    let table = ModeTable::new(&case)?;
+    let beam = Modes::new(case.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
         file::write(path, shapes(&beam).as_bytes())?;

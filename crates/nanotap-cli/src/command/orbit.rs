@@ -61,7 +61,7 @@ struct Document<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     if arguments.resolution == 0 {
-        return Err(Failure::request(
+        return Err(Failure::input(
             "--resolution 0: nothing would be written",
             "give at least 1 sample a period",
         ));

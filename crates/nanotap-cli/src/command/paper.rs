@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use nanotap_paper::{
-    About, Check, Options, PaperError, Report, Verdict, Written, report, section_names,
-};
+use nanotap_paper::{About, Check, Options, Report, Verdict, Written, report};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -57,7 +55,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let begun = Instant::now();
     // Before the work, not after it.
     std::fs::create_dir_all(&arguments.out).map_err(|error| {
-        Failure::Failed(format!("cannot make {}: {error}", arguments.out.display()))
+        Failure::files(format!("cannot make {}: {error}", arguments.out.display()))
     })?;
     let options = Options {
         only: arguments.only.clone(),
@@ -65,9 +63,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     };
     let report = progress::watched(output, "percent", |control| {
         arguments.threads.install(|| report(&options, control))
-    })??
-    .map_err(failure)?;
-    let written = report.write(&arguments.out).map_err(failure)?;
+    })???;
+    let written = report.write(&arguments.out)?;
     let document = Document {
         out: &arguments.out,
         html: &written.html,
@@ -83,19 +80,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         seconds: begun.elapsed().as_secs_f64(),
     };
     output.result(&document, |document| text(document, &report, &written))
-}
-
-fn failure(error: PaperError) -> Failure {
-    match error {
-        PaperError::UnknownSection { .. } => Failure::request(
-            error.to_string(),
-            format!(
-                "name sections as in --only {}",
-                section_names().next().unwrap_or_default()
-            ),
-        ),
-        other => Failure::Failed(other.to_string()),
-    }
 }
 
 fn text(document: &Document<'_>, report: &Report, written: &Written) -> String {

@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     let studied = Studied::of(&arguments.case, output)?;
     let Subject::Cantilever(case) = &studied.subject else {
-        return Err(Failure::request(
+        return Err(Failure::input(
             format!(
                 "{}: `nanotap samples` needs a cantilever; this is an oscillator",
                 studied.title

@@ -105,13 +105,13 @@ struct Document<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     if arguments.resolution == 0 {
-        return Err(Failure::request(
+        return Err(Failure::input(
             "--resolution 0: nothing would be written",
             "give at least 1 sample a period",
         ));
     }
     if arguments.max_period == 0 {
-        return Err(Failure::request(
+        return Err(Failure::input(
             "--max-period 0: no motion has that period",
             "give at least 1",
         ));
@@ -247,7 +247,7 @@ fn rk4(
         [both] => [both, both],
         [free, contact] => [free, contact],
         _ => {
-            return Err(Failure::request(
+            return Err(Failure::input(
                 format!("--steps has {} numbers", arguments.steps.len()),
                 "give the steps a drive period in free flight and in contact: --steps 200,400",
             ));

@@ -5,8 +5,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use nanotap::case::physical::Kind;
 use nanotap::study::sweep::{
-    Follow, Over, OverError, Starts, Summary, Sweep, SweepError, SweepOptions, figure,
-    response_figure, summary,
+    Follow, Over, Starts, Summary, Sweep, SweepOptions, figure, response_figure, summary,
 };
 
 use super::attractors::parse_side;
@@ -230,30 +229,4 @@ fn counts(summary: &Summary) -> String {
         }
     }
     table.render()
-}
-
-impl From<OverError> for Failure {
-    fn from(error: OverError) -> Self {
-        Self::request(
-            format!("--over {error}"),
-            "write --over omega=2:4:400: parameter, first value, last value, how many",
-        )
-    }
-}
-
-impl From<SweepError> for Failure {
-    fn from(error: SweepError) -> Self {
-        let help = match &error {
-            SweepError::Count { .. } | SweepError::Twice { .. } | SweepError::Range { .. } => {
-                "change --over"
-            }
-            SweepError::Model { .. } => "keep --over where the model makes sense",
-            SweepError::Start(_) => "count the numbers after --state",
-            SweepError::Box(_) => "name coordinates as in --box a1=-1:1",
-            SweepError::StateWithModes => "leave --state away: every run starts from rest",
-            SweepError::Zero { .. } => "give 1 or more",
-            SweepError::TooMuch { .. } => "take less at a time",
-        };
-        Self::request(error.to_string(), help)
-    }
 }

@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         .map(|over| over.split('=').next().unwrap_or_default().trim())
         .collect();
     if names.len() != 2 {
-        return Err(Failure::request(
+        return Err(Failure::input(
             format!("{} parameters make no window", names.len()),
             "give --over twice, as in --over gap.tip=5nm:25nm:41 --over drive.frequency=320kHz:340kHz:41",
         ));

@@ -427,3 +427,12 @@ impl Serialize for PhysicalSubject {
         map.end()
     }
 }
+
+impl From<VaryError> for crate::Error {
+    fn from(error: VaryError) -> Self {
+        Self::input(
+            error.to_string(),
+            "name a quantity of the case file as section.key, as in drive.frequency",
+        )
+    }
+}

@@ -307,3 +307,12 @@ fn strobe_at(subject: &Subject, values: &[(Key, f64)]) -> Result<Strobe, ModelEr
         .collect::<Result<_, _>>()?;
     Ok(Strobe::with_tangents(&model, tangents))
 }
+
+impl From<UnknownKey> for crate::Error {
+    fn from(error: UnknownKey) -> Self {
+        Self::input(
+            error.to_string(),
+            "name a parameter of the dimensionless model",
+        )
+    }
+}

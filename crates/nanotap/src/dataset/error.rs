@@ -77,3 +77,20 @@ impl StoreError {
         }
     }
 }
+
+impl From<StoreError> for crate::Error {
+    fn from(error: StoreError) -> Self {
+        let input = |remedy| Self::input(error.to_string(), remedy);
+        match &error {
+            StoreError::Occupied { .. } => input("name another folder with {out}"),
+            StoreError::NotAStore { .. } => input("name a folder that nanotap wrote"),
+            StoreError::Mismatch { .. } => {
+                input("name another folder with {out}, or remove what is there")
+            }
+            StoreError::Io { .. } => Self::files(error.to_string()),
+            StoreError::Unfinished { .. } | StoreError::Damaged { .. } => {
+                Self::numerics(error.to_string())
+            }
+        }
+    }
+}

@@ -122,6 +122,12 @@ fn extent(values: &[f64], axis: &'static str) -> Result<(f64, f64), FieldError> 
     }
 }
 
+impl From<FieldError> for crate::Error {
+    fn from(error: FieldError) -> Self {
+        Self::new(crate::ErrorKind::BadInput, error.to_string())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

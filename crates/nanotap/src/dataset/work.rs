@@ -167,3 +167,12 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
+
+impl From<WorkError> for crate::Error {
+    fn from(error: WorkError) -> Self {
+        match error {
+            WorkError::Store(error) => error.into(),
+            WorkError::Cancelled { .. } => Self::new(crate::ErrorKind::Stopped, error.to_string()),
+        }
+    }
+}

@@ -332,6 +332,12 @@ impl fmt::Display for Reason {
     }
 }
 
+impl From<CantileverError> for crate::Error {
+    fn from(error: CantileverError) -> Self {
+        Self::input(error.to_string(), "change it in the case")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

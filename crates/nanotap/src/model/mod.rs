@@ -300,3 +300,16 @@ pub fn cantilever_tangent(
     }
     Ok(tangent)
 }
+
+impl From<ModelError> for crate::Error {
+    fn from(error: ModelError) -> Self {
+        match error {
+            ModelError::Case(error) => error.into(),
+            ModelError::Physical(error) => (*error).into(),
+            ModelError::Oscillator(_) | ModelError::Flow(FlowError::Resonance { .. }) => {
+                Self::input(error.to_string(), "change it in the case")
+            }
+            ModelError::Flow(error) => error.into(),
+        }
+    }
+}

@@ -461,3 +461,18 @@ fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Opti
         || (periodic && amplitudes > DIFFERENT * free_amplitude);
     differ.then_some(amplitudes)
 }
+
+impl From<ApproachError> for crate::Error {
+    fn from(error: ApproachError) -> Self {
+        let input = |remedy| Self::input(error.to_string(), remedy);
+        match &error {
+            ApproachError::Points { .. } => input("give 2 or more {points}"),
+            ApproachError::Range { .. } => input("change {from} or {to}"),
+            ApproachError::NoDrive => input("give {from}"),
+            ApproachError::NoPeriod => input("give a {max_period} of 1 or more"),
+            ApproachError::NoPeriods => input("give 1 or more {periods}"),
+            ApproachError::Model(error) => error.clone().into(),
+            ApproachError::Branch(error) => error.clone().into(),
+        }
+    }
+}

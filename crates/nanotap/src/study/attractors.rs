@@ -456,3 +456,19 @@ fn unstable_orbits(
         .map(|orbit| Ok(report(model, orbit, options.harmonics)?))
         .collect()
 }
+
+impl From<AttractorsError> for crate::Error {
+    fn from(error: AttractorsError) -> Self {
+        match error {
+            AttractorsError::NoStarts => Self::input(error.to_string(), "give 1 or more {starts}"),
+            AttractorsError::TooManyStarts { .. } => {
+                Self::input(error.to_string(), "give fewer {starts}")
+            }
+            AttractorsError::Box(_) | AttractorsError::Dimension { .. } => {
+                Self::input(error.to_string(), "change it with {box}")
+            }
+            AttractorsError::Motion(error) => error.into(),
+            AttractorsError::Orbit(error) => error.into(),
+        }
+    }
+}

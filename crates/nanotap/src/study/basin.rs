@@ -741,3 +741,22 @@ fn symbol(name: &str) -> String {
         format!("${letter}_{{{number}}}$")
     }
 }
+
+impl From<BasinError> for crate::Error {
+    fn from(error: BasinError) -> Self {
+        match error {
+            BasinError::State(error) => error.into(),
+            BasinError::Model(error) => error.into(),
+            BasinError::NoAttractor { .. } => Self::numerics(error.to_string()),
+            BasinError::Cancelled => Self::new(
+                crate::ErrorKind::Stopped,
+                format!("{error}; nothing was written"),
+            )
+            .remedy("run it again"),
+            BasinError::TooManyStarts { .. } => {
+                Self::input(error.to_string(), "give fewer {starts}")
+            }
+            _ => Self::input(error.to_string(), "change {x} or {y}"),
+        }
+    }
+}

@@ -823,3 +823,28 @@ fn crossings(curve: &LocusReport, second: f64) -> impl Iterator<Item = f64> {
             (0.0..=1.0).contains(&t).then(|| x[0] + t * (x[1] - x[0]))
         })
 }
+
+impl From<BranchError> for crate::Error {
+    fn from(error: BranchError) -> Self {
+        match error {
+            BranchError::Range { .. } => Self::input(error.to_string(), "change {from} or {to}"),
+            BranchError::Step { .. } => Self::input(error.to_string(), "give a {max_step} of 0.01"),
+            BranchError::SameParameter { .. } => {
+                Self::input(error.to_string(), "change {second} or {parameter}")
+            }
+            BranchError::Model { .. } => Self::input(
+                error.to_string(),
+                "keep {from}, {to} and {second} where the model makes sense",
+            ),
+            BranchError::Start {
+                error: OrbitError::Start(_) | OrbitError::NoPeriod,
+                ..
+            } => Self::input(error.to_string(), "change {state} or {period}"),
+            BranchError::Start { .. } | BranchError::NoSeeds { .. } => {
+                Self::numerics(error.to_string())
+                    .remedy("begin elsewhere with {from}, or give a {state} near an orbit")
+            }
+            other => Self::numerics(other.to_string()),
+        }
+    }
+}

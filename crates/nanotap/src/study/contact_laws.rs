@@ -257,6 +257,19 @@ fn force_loop(height: &PiecewiseSignal, force: &PiecewiseSignal) -> Vec<[f64; 2]
         .collect()
 }
 
+impl From<ComparisonError> for crate::Error {
+    fn from(error: ComparisonError) -> Self {
+        match error {
+            ComparisonError::Arm { .. } => {
+                Self::input(error.to_string(), "give {arm} a stiffness above 0")
+            }
+            ComparisonError::Model(error) => error.into(),
+            ComparisonError::Orbit(error) => error.into(),
+            ComparisonError::Branch(error) => error.into(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

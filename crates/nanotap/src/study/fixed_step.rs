@@ -315,6 +315,22 @@ fn apparent_period(strobes: &[Vec<f64>]) -> (Option<usize>, f64) {
     (None, nearest)
 }
 
+impl From<FixedStepError> for crate::Error {
+    fn from(error: FixedStepError) -> Self {
+        match error {
+            FixedStepError::Simulate(SimulateError::Flow(nanotap_flow::FlowError::Shape {
+                ..
+            })) => Self::input(error.to_string(), "give 1 or more {steps}"),
+            FixedStepError::Simulate(error) => error.into(),
+            FixedStepError::Rigid => Self::input(
+                error.to_string(),
+                "leave {method} out: the exact flow runs it",
+            ),
+            FixedStepError::Overflow { .. } => Self::numerics(error.to_string()),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

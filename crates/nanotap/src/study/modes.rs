@@ -105,6 +105,15 @@ pub fn shapes_figure(beam: &Modes) -> Figure {
     Figure::single(panel)
 }
 
+impl From<ModeTableError> for crate::Error {
+    fn from(error: ModeTableError) -> Self {
+        match error {
+            ModeTableError::Case(error) => error.into(),
+            ModeTableError::Spectrum(error) => Self::numerics(error.to_string()),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

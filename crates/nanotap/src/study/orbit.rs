@@ -65,16 +65,14 @@ pub enum OrbitError {
     /// There may be none.
     #[error(
         "no orbit of period {period} was found, neither near the motion nor from starts all over the box \
-         of states; say --state to look near one"
+         of states"
     )]
     NotFound {
         /// The period asked for.
         period: usize,
     },
     /// The run settles on something that is not periodic.
-    #[error(
-        "the run from this start is not periodic ({evidence}); say --period to look for an orbit of that period"
-    )]
+    #[error("the run from this start is not periodic ({evidence})")]
     NotPeriodic {
         /// What it is.
         evidence: String,
@@ -369,4 +367,22 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
         })
         .sum();
     flow + impacts
+}
+
+impl From<OrbitError> for crate::Error {
+    fn from(error: OrbitError) -> Self {
+        match error {
+            OrbitError::NoPeriod => Self::input(error.to_string(), "give a {period} of 1 or more"),
+            OrbitError::TooManyHarmonics { .. } => {
+                Self::input(error.to_string(), "give fewer {harmonics}")
+            }
+            OrbitError::Start(error) => error.into(),
+            OrbitError::NotFound { .. } => {
+                Self::numerics(error.to_string()).remedy("give a {state} near one")
+            }
+            OrbitError::NotPeriodic { .. } => Self::numerics(error.to_string())
+                .remedy("give the {period} of an orbit to look for"),
+            other => Self::numerics(other.to_string()),
+        }
+    }
 }

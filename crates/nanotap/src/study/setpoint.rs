@@ -355,3 +355,13 @@ fn orbit_between(
     let sight = Sight::of(&model, &orbit).ok()?;
     (orbit.period == a.period).then_some((gap, orbit, sight))
 }
+
+impl From<SetpointError> for crate::Error {
+    fn from(error: SetpointError) -> Self {
+        match error {
+            SetpointError::Approach(error) => error.into(),
+            SetpointError::None => Self::input(error.to_string(), "give drive.setpoint"),
+            other => Self::numerics(other.to_string()),
+        }
+    }
+}

@@ -512,3 +512,15 @@ impl Named {
         }
     }
 }
+
+impl From<SimulateError> for crate::Error {
+    fn from(error: SimulateError) -> Self {
+        match error {
+            SimulateError::State { .. } | SimulateError::StateValue { .. } => {
+                Self::input(error.to_string(), "count the numbers of {state}")
+            }
+            SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
+            SimulateError::Flow(error) => error.into(),
+        }
+    }
+}

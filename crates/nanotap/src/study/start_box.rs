@@ -145,6 +145,12 @@ pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox,
     Ok(StartBox::new(lower, upper)?)
 }
 
+impl From<SideError> for crate::Error {
+    fn from(error: SideError) -> Self {
+        Self::option("box", error.to_string(), "name coordinates, as in a1=-1:1")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

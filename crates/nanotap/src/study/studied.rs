@@ -270,3 +270,12 @@ impl Studied {
         }
     }
 }
+
+impl From<ParameterValueError> for crate::Error {
+    fn from(error: ParameterValueError) -> Self {
+        Self::input(
+            error.to_string(),
+            "give a number, or of a physical case a quantity with its unit",
+        )
+    }
+}

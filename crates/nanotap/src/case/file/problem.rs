@@ -131,6 +131,31 @@ impl fmt::Display for CaseFileError {
 
 impl std::error::Error for CaseFileError {}
 
+impl From<CaseFileError> for crate::Error {
+    fn from(error: CaseFileError) -> Self {
+        use crate::error::{ErrorPlace, ErrorProblem, SourceText};
+        let place = |place| match place {
+            Place::Span(span) => ErrorPlace::Span(span),
+            Place::Override(written) => ErrorPlace::Override(written),
+            Place::Whole => ErrorPlace::Whole,
+        };
+        let problems = error.problems.into_iter().map(|problem| ErrorProblem {
+            place: place(problem.place),
+            message: problem.message,
+            label: problem.label,
+            remedy: problem.help,
+        });
+        Self {
+            problems: problems.collect(),
+            source: error.source.map(|source| SourceText {
+                name: source.name,
+                text: source.text,
+            }),
+            kind: crate::ErrorKind::BadInput,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

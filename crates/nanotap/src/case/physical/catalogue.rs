@@ -390,3 +390,9 @@ impl MaterialText {
         })
     }
 }
+
+impl From<CatalogueError> for crate::Error {
+    fn from(error: CatalogueError) -> Self {
+        Self::input(error.to_string(), "mend the catalogue, or do without it")
+    }
+}

@@ -174,9 +174,9 @@ pub(super) fn check_size(bytes: usize, follow: Follow) -> Result<(), SweepError>
         return Ok(());
     }
     let remedy = if follow == Follow::Off {
-        "record fewer --periods, or keep fewer states with --strobe"
+        "record fewer {periods}, or keep fewer states with {strobe}"
     } else {
-        "a followed line is one chunk: record fewer --periods, keep fewer states with --strobe, \
+        "a followed line is one chunk: record fewer {periods}, keep fewer states with {strobe}, \
          or take fewer values"
     };
     let what = format!(
@@ -185,4 +185,21 @@ pub(super) fn check_size(bytes: usize, follow: Follow) -> Result<(), SweepError>
         LARGEST_CHUNK >> 30
     );
     Err(SweepError::TooMuch { what })
+}
+
+impl From<SweepError> for crate::Error {
+    fn from(error: SweepError) -> Self {
+        let remedy = match &error {
+            SweepError::Count { .. } | SweepError::Twice { .. } | SweepError::Range { .. } => {
+                "change {over}"
+            }
+            SweepError::Model { .. } => "keep {over} where the model makes sense",
+            SweepError::Start(_) => "count the numbers of {state}",
+            SweepError::Box(_) => "name coordinates of the {box}, as in a1=-1:1",
+            SweepError::StateWithModes => "leave {state} out: every run starts from rest",
+            SweepError::Zero { .. } => "give 1 or more",
+            SweepError::TooMuch { .. } => "take less at a time",
+        };
+        Self::input(error.to_string(), remedy)
+    }
 }

@@ -298,6 +298,16 @@ fn key(given: &str, name: &str, subject: &Subject) -> Result<SweepKey, OverError
         })
 }
 
+impl From<OverError> for crate::Error {
+    fn from(error: OverError) -> Self {
+        Self::option(
+            "over",
+            error.to_string(),
+            "write omega=2:4:400: parameter, first value, last value, how many",
+        )
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,0 +1,254 @@
+//! Why something could not be done: one type for every front end.
+//!
+//! Inside the library each part has typed errors of its own; where they leave it they become an
+//! [`Error`] by one conversion each, which stands beside the typed error. An error has a
+//! [kind](ErrorKind), from which the terminal takes its exit code and Python its exception, and
+//! problems, each with its place and with what would be right.
+//!
+//! A message names an option of a study in braces: "look near a {state}". [`Error::written`]
+//! puts it as the reader types it, `--state` at the terminal and `state=` in Python.
+
+use std::fmt;
+use std::ops::Range;
+
+/// What kind of error it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// What was asked for is not right.
+    BadInput,
+    /// It was right, and the computation did not succeed.
+    Numerics,
+    /// The file system refused.
+    Files,
+    /// The work was stopped from outside.
+    Stopped,
+}
+
+/// A text that problems point into.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceText {
+    /// What the reader calls it: the path as it was given.
+    pub name: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// Where a problem lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ErrorPlace {
+    /// Nowhere in particular, or all of the file.
+    Whole,
+    /// An option of a study.
+    Option(String),
+    /// A `key=value` that was set beside the case file, as it was written.
+    Override(String),
+    /// These bytes of the file.
+    Span(Range<usize>),
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorProblem {
+    /// Where.
+    pub place: ErrorPlace,
+    /// What is wrong.
+    pub message: String,
+    /// A few words to stand under the place in the file; may be empty.
+    pub label: String,
+    /// What would be right.
+    pub remedy: Option<String>,
+}
+
+/// Why something could not be done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Error {
+    /// What kind of error it is.
+    pub kind: ErrorKind,
+    /// The file that the problems point into, where there is one.
+    pub source: Option<SourceText>,
+    /// What is wrong: at least one problem.
+    pub problems: Vec<ErrorProblem>,
+}
+
+impl Error {
+    /// An error of one problem.
+    pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
+        Self {
+            kind,
+            source: None,
+            problems: vec![ErrorProblem {
+                place: ErrorPlace::Whole,
+                message: message.into(),
+                label: String::new(),
+                remedy: None,
+            }],
+        }
+    }
+
+    /// Something asked for that is not right, and what would be.
+    pub fn input(message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::new(ErrorKind::BadInput, message).remedy(remedy)
+    }
+
+    /// An option of a study with a value that is not right, and what would be.
+    pub fn option(name: &str, message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::input(message, remedy).at(name)
+    }
+
+    /// A computation that did not succeed.
+    pub fn numerics(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Numerics, message)
+    }
+
+    /// What the file system refused.
+    pub fn files(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Files, message)
+    }
+
+    /// The same, at an option of a study.
+    #[must_use]
+    pub fn at(mut self, option: &str) -> Self {
+        for problem in &mut self.problems {
+            problem.place = ErrorPlace::Option(option.to_owned());
+        }
+        self
+    }
+
+    /// The same, with what would be right.
+    #[must_use]
+    pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
+        if let Some(problem) = self.problems.last_mut() {
+            problem.remedy = Some(remedy.into());
+        }
+        self
+    }
+
+    /// The same, its first message behind `words`.
+    #[must_use]
+    pub fn context(mut self, words: impl fmt::Display) -> Self {
+        if let Some(problem) = self.problems.first_mut() {
+            problem.message = format!("{words}: {}", problem.message);
+        }
+        self
+    }
+
+    /// The same, with the options in messages and remedies written as `option` writes them.
+    #[must_use]
+    pub fn written(mut self, option: impl Fn(&str) -> String) -> Self {
+        for problem in &mut self.problems {
+            problem.message = replaced(&problem.message, &option);
+            problem.remedy = problem.remedy.as_ref().map(|text| replaced(text, &option));
+        }
+        self
+    }
+}
+
+/// Options in braces, as `option` writes them.
+fn replaced(text: &str, option: &impl Fn(&str) -> String) -> String {
+    let is_name =
+        |name: &str| !name.is_empty() && name.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+    let mut written = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('{') {
+        written.push_str(before);
+        match after.split_once('}') {
+            Some((name, tail)) if is_name(name) => {
+                written.push_str(&option(name));
+                rest = tail;
+            }
+            _ => {
+                written.push('{');
+                rest = after;
+            }
+        }
+    }
+    written.push_str(rest);
+    written
+}
+
+impl fmt::Display for Error {
+    /// Problem by problem: place, message, remedy.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plain = self.clone().written(str::to_owned);
+        for (index, problem) in plain.problems.iter().enumerate() {
+            if index > 0 {
+                writeln!(formatter)?;
+            }
+            match (&problem.place, &self.source) {
+                (ErrorPlace::Span(span), Some(source)) => {
+                    let (line, column) = source.line_and_column(span.start);
+                    write!(formatter, "{}:{line}:{column}: ", source.name)?;
+                }
+                (ErrorPlace::Option(name), _) => write!(formatter, "{name}: ")?,
+                (ErrorPlace::Override(written), _) => write!(formatter, "{written}: ")?,
+                (_, Some(source)) => write!(formatter, "{}: ", source.name)?,
+                (_, None) => {}
+            }
+            write!(formatter, "{}", problem.message)?;
+            if let Some(remedy) = &problem.remedy {
+                write!(formatter, "; {remedy}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl SourceText {
+    /// Line and column, both from 1, of a byte offset; columns count characters.
+    pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+        let before = self.text.get(..offset).unwrap_or(&self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = before.matches('\n').count() + 1;
+        (line, before[line_start..].chars().count() + 1)
+    }
+}
+
+impl From<nanotap_flow::FlowError> for Error {
+    fn from(error: nanotap_flow::FlowError) -> Self {
+        Self::numerics(error.to_string())
+    }
+}
+
+impl From<nanotap_figures::FigureError> for Error {
+    fn from(error: nanotap_figures::FigureError) -> Self {
+        use nanotap_figures::FigureError;
+        match error {
+            FigureError::UnknownEnding { path } => Self::input(
+                format!(
+                    "{}: the ending says no format that can be drawn",
+                    path.display()
+                ),
+                "end the name in .svg, .png or .pdf",
+            ),
+            error @ FigureError::Write { .. } => Self::files(error.to_string()),
+            other => Self::numerics(other.to_string()),
+        }
+    }
+}
+
+impl From<serde_json::Error> for Error {
+    fn from(error: serde_json::Error) -> Self {
+        Self::numerics(format!("no JSON of the result: {error}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_in_braces_are_written_as_the_reader_types_them() {
+        let error = Error::option("starts", "0 is too few", "give 1 or {max_starts}, not {1}");
+        assert_eq!(
+            error.to_string(),
+            "starts: 0 is too few; give 1 or max_starts, not {1}"
+        );
+        let terminal = error.written(|name| format!("--{}", name.replace('_', "-")));
+        assert_eq!(
+            terminal.problems[0].remedy.as_deref(),
+            Some("give 1 or --max-starts, not {1}")
+        );
+    }
+}

@@ -466,7 +466,7 @@ impl From<ApproachError> for crate::Error {
     fn from(error: ApproachError) -> Self {
         let input = |remedy| Self::input(error.to_string(), remedy);
         match &error {
-            ApproachError::Points { .. } => input("give 2 or more {points}"),
+            ApproachError::Points { .. } => input("give {points} 80"),
             ApproachError::Range { .. } => input("change {from} or {to}"),
             ApproachError::NoDrive => input("give {from}"),
             ApproachError::NoPeriod => input("give a {max_period} of 1 or more"),

@@ -372,7 +372,7 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
 impl From<OrbitError> for crate::Error {
     fn from(error: OrbitError) -> Self {
         match error {
-            OrbitError::NoPeriod => Self::input(error.to_string(), "give a {period} of 1 or more"),
+            OrbitError::NoPeriod => Self::input(error.to_string(), "give {period} 1 or more"),
             OrbitError::TooManyHarmonics { .. } => {
                 Self::input(error.to_string(), "give fewer {harmonics}")
             }

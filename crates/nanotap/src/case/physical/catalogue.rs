@@ -393,6 +393,6 @@ impl MaterialText {
 
 impl From<CatalogueError> for crate::Error {
     fn from(error: CatalogueError) -> Self {
-        Self::input(error.to_string(), "mend the catalogue, or do without it")
+        Self::input(error.to_string(), "mend it, or leave {catalogue} out")
     }
 }

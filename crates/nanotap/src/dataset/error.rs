@@ -83,7 +83,9 @@ impl From<StoreError> for crate::Error {
         let input = |remedy| Self::input(error.to_string(), remedy);
         match &error {
             StoreError::Occupied { .. } => input("name another folder with {out}"),
-            StoreError::NotAStore { .. } => input("name a folder that a sweep or basin wrote"),
+            StoreError::NotAStore { .. } => {
+                input("name a folder that `nanotap sweep` or `basin` wrote")
+            }
             StoreError::Mismatch { .. } => {
                 input("name another folder with {out}, or remove what is there")
             }

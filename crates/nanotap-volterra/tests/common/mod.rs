@@ -119,31 +119,15 @@ pub(crate) fn beam(
     zc: f64,
     nodes: usize,
 ) -> System {
-    // Roots of cos β cosh β = −1; beyond the fourth (n − ½)π to rounding.
-    let root = |n: usize| -> f64 {
-        const FIRST: [f64; 4] = [
-            1.875_104_068_711_961,
-            4.694_091_132_974_175,
-            7.854_757_438_237_613,
-            10.995_540_734_875_467,
-        ];
-        FIRST
-            .get(n)
-            .copied()
-            .unwrap_or((n as f64 + 0.5) * std::f64::consts::PI)
-    };
-    let oscillators: Vec<(f64, f64)> = (0..count)
-        .map(|n| {
-            let ratio = (root(n) / root(0)).powi(2);
-            (ratio * ratio, ratio / q)
-        })
+    let oscillators: Vec<(f64, f64)> = beam_modes(count, q)
+        .into_iter()
+        .map(|(stiffness, damping, _)| (stiffness, damping))
         .collect();
     let modes = Modes::from_oscillators(&oscillators).unwrap();
     let mut row = RowDVector::zeros(2 * count);
     let mut column = DVector::zeros(2 * count);
     let mut forcing = DVector::from_element(2 * count, Complex::new(0.0, 0.0));
     for n in 0..count {
-        // Every mode's modal mass at the tip is the same, a quarter of the beam's.
         let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
         row[n] = sign;
         column[count + n] = sign / k;
@@ -214,4 +198,29 @@ pub(crate) fn table_law(index: usize, change: Option<(usize, f64)>) -> Arc<dyn F
     let hertz = laws::law("hertz").unwrap();
     let elastic = hertz.with(&of(hertz.entry)).unwrap();
     laws::build_sum(&[(table.entry, law), (hertz.entry, elastic)]).unwrap()
+}
+
+/// Stiffness and damping over mass, and sign at the tip, of the modes of [`beam`].
+pub(crate) fn beam_modes(count: usize, q: f64) -> Vec<(f64, f64, f64)> {
+    // Roots of cos β cosh β = −1; beyond the fourth (n − ½)π to rounding.
+    let root = |n: usize| -> f64 {
+        const FIRST: [f64; 4] = [
+            1.875_104_068_711_961,
+            4.694_091_132_974_175,
+            7.854_757_438_237_613,
+            10.995_540_734_875_467,
+        ];
+        FIRST
+            .get(n)
+            .copied()
+            .unwrap_or((n as f64 + 0.5) * std::f64::consts::PI)
+    };
+    (0..count)
+        .map(|n| {
+            let ratio = (root(n) / root(0)).powi(2);
+            // Every mode's modal mass at the tip is the same, a quarter of the beam's.
+            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+            (ratio * ratio, ratio / q, sign)
+        })
+        .collect()
 }

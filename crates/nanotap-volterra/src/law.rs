@@ -98,6 +98,18 @@ pub trait ForceLaw: Debug + Send + Sync {
     /// The force on a branch, also a little beyond where it is left.
     fn force(&self, branch: usize, gap: f64, rate: f64) -> Force;
 
+    /// Whether the force depends on the gap's rate.
+    fn depends_on_rate(&self) -> bool {
+        true
+    }
+
+    /// The force at the nodes of a step, as [`ForceLaw::force`] at each.
+    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
+        for ((out, gap), rate) in out.iter_mut().zip(gaps).zip(rates) {
+            *out = self.force(branch, *gap, *rate);
+        }
+    }
+
     /// The ways out of a branch.
     fn exits(&self, branch: usize) -> Vec<Exit>;
 

@@ -3,7 +3,7 @@
 use crate::error::Refusal;
 use crate::kernel::{CHECKS, MAX_NODES, Table, TimeMap};
 use crate::law::Force;
-use crate::linear::{add_product, factor, solve};
+use crate::linear::{add_product, add_rows, factor, solve};
 use crate::quadrature::series;
 use crate::system::System;
 
@@ -13,6 +13,8 @@ const MAX_ITERATIONS: usize = 20;
 const CONTRACTION: f64 = 0.1;
 /// How much the force may amplify an error on one step, as `∫|G| |∂F|`: by `cosh √(2κ)`, 27.
 const STEEPEST: f64 = 8.0;
+/// A tail of the law, along a guess of the motion, that no iteration will mend.
+const HOPELESS: f64 = 1e4;
 
 /// A step with its forces. Points are the nodes, then the check points.
 #[derive(Clone, Debug)]
@@ -148,6 +150,11 @@ pub(crate) struct Solver {
     pivots: Vec<usize>,
     column: Vec<f64>,
     slope: Vec<f64>,
+    evaluated: Vec<Force>,
+    /// Whether the law needs the rate.
+    rates: bool,
+    /// Bounds of the gap and its rate on the present step.
+    scale: (f64, f64),
     /// The law's derivative by the gap at a pinned end.
     end_slope: f64,
     pub(crate) statistics: Statistics,
@@ -184,6 +191,9 @@ impl Solver {
             pivots: vec![0; n],
             column: vec![0.0; n],
             slope: vec![0.0; system.dimension()],
+            evaluated: vec![Force::default(); n],
+            rates: system.law().depends_on_rate(),
+            scale: (0.0, 0.0),
             end_slope: 0.0,
             statistics: Statistics::default(),
         }
@@ -218,11 +228,13 @@ impl Solver {
     /// values less the forces go to `residual`. Returns the gap's excess over the pinned end.
     fn evaluate(&mut self, system: &System, table: &Table, step: &mut Step) -> f64 {
         let n = step.forces.len();
-        step.gap.copy_from_slice(&self.base_gap);
-        step.rate.copy_from_slice(&self.base_rate);
-        if step.forces.iter().any(|f| *f != 0.0) {
-            add_product(&table.gap_force, &step.forces, &mut step.gap);
-            add_product(&table.rate_force, &step.forces, &mut step.rate);
+        let rows = n + CHECKS;
+        let law = system.law();
+        step.gap[..n].copy_from_slice(&self.base_gap[..n]);
+        add_rows(&table.gap_force, rows, &step.forces, &mut step.gap[..n]);
+        if self.rates {
+            step.rate[..n].copy_from_slice(&self.base_rate[..n]);
+            add_rows(&table.rate_force, rows, &step.forces, &mut step.rate[..n]);
         }
         let mut excess = 0.0;
         if let Some(level) = step.pinned_end {
@@ -232,16 +244,16 @@ impl Solver {
         if let Some(level) = step.pinned_start {
             step.gap[0] = level;
         }
-        let law = system.law();
-        for i in 0..n {
-            let Force {
-                value,
-                by_gap,
-                by_rate,
-            } = law.force(step.branch, step.gap[i], step.rate[i]);
-            self.residual[i] = value - step.forces[i];
-            step.by_gap[i] = by_gap;
-            step.by_rate[i] = by_rate;
+        law.forces(
+            step.branch,
+            &step.gap[..n],
+            &step.rate[..n],
+            &mut self.evaluated,
+        );
+        for (i, force) in self.evaluated.iter().enumerate() {
+            self.residual[i] = force.value - step.forces[i];
+            step.by_gap[i] = force.by_gap;
+            step.by_rate[i] = force.by_rate;
         }
         // Where the gap is held its slope is of no use to Newton, and may be infinite.
         if step.pinned_end.is_some() {
@@ -252,6 +264,18 @@ impl Solver {
         }
         self.statistics.evaluations += n as u64;
         excess
+    }
+
+    /// Completes gap and rate at all points for forces that have been found.
+    fn complete(&mut self, table: &Table, step: &mut Step) {
+        let n = step.forces.len();
+        step.gap[n..].copy_from_slice(&self.base_gap[n..]);
+        for (k, gap) in step.gap[n..].iter_mut().enumerate() {
+            let row = table.gap_force[n + k..].iter().step_by(n + CHECKS);
+            *gap += row.zip(&step.forces).map(|(w, f)| w * f).sum::<f64>();
+        }
+        step.rate.copy_from_slice(&self.base_rate);
+        add_product(&table.rate_force, &step.forces, &mut step.rate);
     }
 
     /// Factors `1 − ∂F_d W − ∂F_v W'` at the present point.
@@ -303,23 +327,32 @@ impl Solver {
             .force(step.branch, first, self.base_rate[0])
             .value;
         step.forces.fill(start);
+        self.scale = gap_scale(system, &step.modal);
         let mut factored = false;
         let mut last = f64::INFINITY;
-        for _ in 0..MAX_ITERATIONS {
+        for round in 0..MAX_ITERATIONS {
             self.statistics.iterations += 1;
             self.evaluate(system, table, step);
             let size = largest(&self.residual);
             if !size.is_finite() {
                 return Err(Refusal::Newton);
             }
-            if size <= 0.1 * Self::allowed(system, table, step).0 {
-                for (force, r) in step.forces.iter_mut().zip(&self.residual) {
-                    *force += r;
-                }
-                return self.assess(system, table, step);
+            let (allowed, rounding) = self.allowed(system, table, step);
+            if size <= 0.1 * allowed {
+                self.add_residual(step);
+                return self.assess(system, table, step, allowed, rounding);
             }
-            let contraction = steepness(table, step);
-            if contraction > CONTRACTION {
+            // Where the law along the first guesses is far from resolved, so is its solution.
+            if round == 1 {
+                let error = self.tail_of_law(system) / allowed;
+                if error > HOPELESS {
+                    return Ok(Quality {
+                        error,
+                        rounding: false,
+                    });
+                }
+            }
+            if steepness(table, step) > CONTRACTION {
                 if !factored || size > 0.02 * last {
                     if !self.factor(table, step) {
                         return Err(Refusal::Newton);
@@ -334,11 +367,31 @@ impl Solver {
                 );
             }
             last = size;
-            for (force, r) in step.forces.iter_mut().zip(&self.residual) {
-                *force += r;
-            }
+            self.add_residual(step);
         }
         Err(Refusal::Newton)
+    }
+
+    fn add_residual(&self, step: &mut Step) {
+        for (force, r) in step.forces.iter_mut().zip(&self.residual) {
+            *force += r;
+        }
+    }
+
+    /// The size of the last two coefficients of the law's values at the nodes.
+    fn tail_of_law(&self, system: &System) -> f64 {
+        let n = self.evaluated.len();
+        let mut last = [0.0; 2];
+        for (column, force) in system
+            .kernel()
+            .coefficients
+            .chunks_exact(n)
+            .zip(&self.evaluated)
+        {
+            last[0] += column[n - 2] * force.value;
+            last[1] += column[n - 1] * force.value;
+        }
+        last[0].abs() + last[1].abs()
     }
 
     /// Solves a step that ends where the gap reaches `step.pinned_end`, by moving its start
@@ -356,7 +409,8 @@ impl Solver {
         let n = step.forces.len();
         let rows = n + CHECKS;
         let (earliest, latest) = (before.start, before.time(1.0));
-        let scale = gap_scale(system, &before.modal).0;
+        self.scale = gap_scale(system, &before.modal);
+        let scale = self.scale.0;
         let mut first = true;
         for _ in 0..MAX_ITERATIONS {
             self.statistics.iterations += 1;
@@ -375,15 +429,14 @@ impl Solver {
                 return Err(Refusal::Newton);
             }
             let floor = 8.0 * f64::EPSILON * scale;
-            if size <= 0.1 * Self::allowed(system, table, step).0 && excess.abs() <= floor {
-                for (force, r) in step.forces.iter_mut().zip(&self.residual) {
-                    *force += r;
-                }
+            let (allowed, rounding) = self.allowed(system, table, step);
+            if size <= 0.1 * allowed && excess.abs() <= floor {
+                self.add_residual(step);
                 if !step.moving_end {
                     // A variation at fixed time changes the gap at the end.
                     step.by_gap[n - 1] = self.end_slope;
                 }
-                return self.assess(system, table, step);
+                return self.assess(system, table, step, allowed, rounding);
             }
             if !self.factor(table, step) {
                 return Err(Refusal::Newton);
@@ -445,9 +498,9 @@ impl Solver {
 
     /// What an error of the force may be: what the tolerance allows or what rounding makes,
     /// and the latter alone.
-    fn allowed(system: &System, table: &Table, step: &Step) -> (f64, f64) {
+    fn allowed(&self, system: &System, table: &Table, step: &Step) -> (f64, f64) {
         let wanted = system.options().tolerance / (table.length * system.kernel().reach);
-        let (gap, rate) = gap_scale(system, &step.modal);
+        let (gap, rate) = self.scale;
         let n = step.forces.len();
         let mut rounding: f64 = 0.0;
         for i in 0..n {
@@ -465,8 +518,11 @@ impl Solver {
         system: &System,
         table: &Table,
         step: &mut Step,
+        allowed: f64,
+        rounding: f64,
     ) -> Result<Quality, Refusal> {
         let n = step.forces.len();
+        self.complete(table, step);
         step.coefficients.fill(0.0);
         add_product(
             &system.kernel().coefficients,
@@ -484,7 +540,6 @@ impl Solver {
             defect = defect.max((force - law.value).abs());
         }
         self.statistics.evaluations += CHECKS as u64;
-        let (allowed, rounding) = Self::allowed(system, table, step);
         let steepness = steepness(table, step);
         if steepness > STEEPEST || steepness.is_nan() {
             return Err(Refusal::Steep);

@@ -6,9 +6,8 @@
 mod common;
 
 use common::{EV, Lever, Strobe};
-use nanotap_dynamics::map::StroboscopicMap;
-use nanotap_dynamics::orbit::PeriodicOrbit;
-use nanotap_dynamics::shooting::{ShootingOptions, close_orbit};
+use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{PeriodicOrbit, ShootingOptions, close_orbit};
 use nanotap_volterra::{Flow, ForceLaw, Output, Trajectory, laws};
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -76,6 +76,10 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
     }
     /// The force.
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, rate: S) -> S;
+    /// Whether it depends on the rate.
+    fn depends_on_rate(&self) -> bool {
+        false
+    }
     /// The ways out.
     fn ways(&self, branch: usize) -> Vec<Way>;
     /// A guard of the law's own.
@@ -174,6 +178,21 @@ impl<F: Formula> ForceLaw for Law<F> {
             Dual::variable(gap, 0),
             Dual::variable(rate, 1),
         ))
+    }
+
+    fn depends_on_rate(&self) -> bool {
+        self.formula.depends_on_rate()
+    }
+
+    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
+        for ((out, gap), rate) in out.iter_mut().zip(gaps).zip(rates) {
+            *out = force_of(self.formula.force(
+                &self.lifted,
+                branch,
+                Dual::variable(*gap, 0),
+                Dual::variable(*rate, 1),
+            ));
+        }
     }
 
     fn exits(&self, branch: usize) -> Vec<Exit> {

@@ -140,6 +140,10 @@ impl Formula for KelvinVoigt {
         self.slope(delta) * (c[1] * delta - c[2] * rate)
     }
 
+    fn depends_on_rate(&self) -> bool {
+        true
+    }
+
     fn ways(&self, branch: usize) -> Vec<Way> {
         let approach = match self.shape {
             Shape::Sphere => Approach::Half,

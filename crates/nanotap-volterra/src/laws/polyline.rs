@@ -98,6 +98,10 @@ impl ForceLaw for Polyline {
         }
     }
 
+    fn depends_on_rate(&self) -> bool {
+        false
+    }
+
     fn exits(&self, branch: usize) -> Vec<Exit> {
         let mut exits = Vec::new();
         if branch > 0 {

@@ -56,6 +56,10 @@ impl Formula for SpringDamper {
         c[1] * (c[0] - gap) - c[2] * rate
     }
 
+    fn depends_on_rate(&self) -> bool {
+        true
+    }
+
     fn ways(&self, branch: usize) -> Vec<Way> {
         contact_ways(branch, Approach::Analytic)
     }

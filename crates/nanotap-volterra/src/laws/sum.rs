@@ -1,5 +1,6 @@
 //! Laws that act together.
 
+use crate::kernel::MAX_NODES;
 use crate::law::{Exit, Force, ForceLaw, Guard, Remark};
 use std::sync::Arc;
 
@@ -102,6 +103,27 @@ impl ForceLaw for Sum {
             sum.by_rate += force.by_rate;
         }
         sum
+    }
+
+    fn depends_on_rate(&self) -> bool {
+        self.terms.iter().any(|t| t.depends_on_rate())
+    }
+
+    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
+        out.fill(Force::default());
+        let mut own_forces = [Force::default(); MAX_NODES];
+        let own_forces = &mut own_forces[..out.len().min(MAX_NODES)];
+        for (_, term, own) in self.split(branch) {
+            if term.vanishes(own) {
+                continue;
+            }
+            term.forces(own, gaps, rates, own_forces);
+            for (sum, force) in out.iter_mut().zip(own_forces.iter()) {
+                sum.value += force.value;
+                sum.by_gap += force.by_gap;
+                sum.by_rate += force.by_rate;
+            }
+        }
     }
 
     fn exits(&self, branch: usize) -> Vec<Exit> {

@@ -41,6 +41,10 @@ impl Formula for RootViscosity {
         -c[1] * (c[0] - gap).sqrt() * rate
     }
 
+    fn depends_on_rate(&self) -> bool {
+        true
+    }
+
     fn ways(&self, branch: usize) -> Vec<Way> {
         contact_ways(branch, Approach::Half)
     }
@@ -99,6 +103,10 @@ impl Formula for ExponentialDamping {
 
     fn force<S: Scalar>(&self, c: &[S], _branch: usize, gap: S, rate: S) -> S {
         -c[0] * (c[1] * gap).exp() * rate
+    }
+
+    fn depends_on_rate(&self) -> bool {
+        true
     }
 
     fn ways(&self, _branch: usize) -> Vec<Way> {

@@ -78,13 +78,11 @@ impl Plain<'_> {
                 }
             }
             if j + 1 == COLUMNS {
-                let difference = |a: &[f64], b: &[f64]| {
-                    a.iter()
-                        .zip(b)
-                        .map(|(a, b)| (a - b).abs())
-                        .fold(0.0, f64::max)
-                };
-                error = difference(&table[0], &table[1]);
+                error = table[0]
+                    .iter()
+                    .zip(&table[1])
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max);
             }
         }
         (table.swap_remove(0), error)

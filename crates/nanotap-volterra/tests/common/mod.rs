@@ -3,7 +3,7 @@
 #![allow(dead_code)]
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_dynamics::map::StroboscopicMap;
+use nanotap_dynamics::StroboscopicMap;
 use nanotap_volterra::laws;
 use nanotap_volterra::laws::entry::{Entry, Part};
 use nanotap_volterra::{

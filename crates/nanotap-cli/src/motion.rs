@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
+use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Spectrum};
 use nanotap::study::simulate::Classification;
 
@@ -47,6 +48,11 @@ pub(crate) fn paragraph(words: &str) -> String {
     }
     let _ = writeln!(text, "{line}");
     text
+}
+
+/// A phase in degrees.
+fn degrees(phase: f64) -> String {
+    number::significant(shown_phase(phase), 4)
 }
 
 /// Tip, gap, contact and force.
@@ -95,14 +101,14 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
         "at the drive's frequency",
         &number::significant(o.first_harmonic, 6),
         &si(Kind::Length, o.first_harmonic),
-        &format!("{}° behind the drive", number::significant(o.phase, 4)),
+        &format!("{}° behind the drive", degrees(o.phase)),
     ]);
-    if let Some(second) = &o.second_tone {
+    if let Some((amplitude, lag)) = o.tone2_response.zip(o.tone2_lag) {
         table.row([
             "at the second tone",
-            &number::significant(second.amplitude, 6),
-            &si(Kind::Length, second.amplitude),
-            &format!("{}° behind that tone", number::significant(second.phase, 4)),
+            &number::significant(amplitude, 6),
+            &si(Kind::Length, amplitude),
+            &format!("{}° behind that tone", degrees(lag)),
         ]);
     }
     table.row([
@@ -112,7 +118,7 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
         "",
     ]);
     if o.contacts_per_period > 0.0 || o.contact_fraction > 0.0 {
-        let grazing = match o.grazing_contacts {
+        let grazing = match o.grazing_contacts.unwrap_or(0) {
             0 => String::new(),
             n => format!(", {n} of them grazing"),
         };
@@ -145,8 +151,7 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
                 &si(Kind::Force, o.peak_force),
                 &format!("mean {}", number::significant(o.mean_force, 4)),
             ]);
-            // What is not above rounding is no pull.
-            if o.least_force < -1e-10 * o.peak_force {
+            if o.least_force < 0.0 {
                 table.row([
                     "pull of the sample",
                     &format!("up to {}", number::significant(-o.least_force, 6)),
@@ -172,30 +177,30 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
     } else {
         table.row(["contact", "none", "", ""]);
     }
-    if let Some(clearance) = &o.beam_clearance {
-        let place = if clearance.xi > 0.999 {
+    if let Some((height, xi)) = o.beam_clearance.zip(o.beam_clearance_xi) {
+        let place = if xi > 0.999 {
             "at the tip".to_owned()
         } else {
-            format!("at ξ = {}", number::significant(clearance.xi, 3))
+            format!("at ξ = {}", number::significant(xi, 3))
         };
         table.row([
             "beam clearance",
-            &number::significant(clearance.height, 5),
-            &si(Kind::Length, clearance.height),
+            &number::significant(height, 5),
+            &si(Kind::Length, height),
             &format!("least height of the beam, {place}"),
         ]);
     }
     if let Some([low, high]) = o.slope_range {
         table.row(["slope at the tip", &range(low, high), "", ""]);
     }
-    if let Some(lever) = &o.optical_lever {
+    if let Some((amplitude, lag)) = o.optical_amplitude.zip(o.optical_phase) {
         table.row([
             "an optical lever reads",
-            &number::significant(lever.amplitude, 6),
-            &si(Kind::Length, lever.amplitude),
+            &number::significant(amplitude, 6),
+            &si(Kind::Length, amplitude),
             &format!(
                 "{}° behind the drive, calibrated by a static force",
-                number::significant(lever.phase, 4)
+                degrees(lag)
             ),
         ]);
     }
@@ -221,7 +226,10 @@ pub(crate) fn energy(o: &Observables, units: &Units) -> String {
     row("drive work", balance.drive_work, String::new());
     row("beam damping", -balance.beam_damping, String::new());
     let electronvolts = units.si(Kind::Energy).map_or_else(String::new, |u| {
-        format!(" = {}", format_electronvolts(u * -o.dissipation + 0.0))
+        format!(
+            " = {}",
+            format_electronvolts(u * -balance.sample_damping / o.periods + 0.0)
+        )
     });
     row("sample damping", -balance.sample_damping, electronvolts);
     row("stored", -balance.stored, String::new());
@@ -244,7 +252,7 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
     let mut text = format!(
         "  {}\n  phase {}° behind the drive, distortion (THD) {} %\n",
         style::bold("harmonics of the tip deflection and of the force"),
-        number::significant(spectrum.phase, 6),
+        number::significant(shown_phase(spectrum.phase), 6),
         number::significant(100.0 * spectrum.thd, 4),
     );
     let symbol = if matches!(units, Units::Si(_)) {
@@ -338,20 +346,21 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
 /// Says what puts the motion in doubt: another part of the beam than the tip would touch, in
 /// `which` motion, if there are several.
 pub(crate) fn warn(o: &Observables, which: &str, output: &Output) {
-    let Some(clearance) = o.beam_clearance.as_ref().filter(|c| c.touches()) else {
+    let lowest = o.beam_clearance.zip(o.beam_clearance_xi);
+    let Some((height, xi)) = lowest.filter(|(height, _)| *height <= 0.0) else {
         return;
     };
-    let place = if clearance.xi > 0.999 {
+    let place = if xi > 0.999 {
         "the end of the beam itself".to_owned()
     } else {
         format!(
             "the beam at ξ = {} of its length",
-            number::significant(clearance.xi, 3)
+            number::significant(xi, 3)
         )
     };
     output.warning(&format!(
         "{which}{place} would pass through the sample (height {} g₀): the model, in which only the tip touches, \
          does not hold for this motion (the paper's Fig. 2f)",
-        number::significant(clearance.height, 4)
+        number::significant(height, 4)
     ));
 }

@@ -10,7 +10,6 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::Clearance;
-use nanotap_flow::Trajectory;
 
 /// Drive periods of a motion that never repeats.
 const WATCHED: usize = 400;
@@ -162,12 +161,10 @@ fn row(
     state: &[f64],
     periods: usize,
 ) -> Result<Option<Row>, PaperError> {
-    let trajectory =
-        Trajectory::record(&model.system, state, periods).map_err(|error| PaperError::Failed {
-            what: motion.clone(),
-            why: error.to_string(),
-        })?;
-    let clearance = Clearance::of(model, &trajectory);
+    let clearance = Clearance::of(model, state, periods).map_err(|error| PaperError::Failed {
+        what: motion.clone(),
+        why: error.to_string(),
+    })?;
     Ok(clearance.map(|clearance| Row {
         figure,
         motion,

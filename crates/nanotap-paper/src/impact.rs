@@ -18,7 +18,7 @@ use nanotap::case::subject::{Family, Key, Subject};
 use nanotap::model::Model;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::model::strobe::Strobe;
-use nanotap::observe::Observables;
+use nanotap::observe::{Set, measure};
 use nanotap::study::start_box::default_box;
 
 /// The coefficient of restitution.
@@ -252,10 +252,8 @@ impl Orbit {
             what: "the orbit's extrema".into(),
             why,
         };
-        let trajectory = nanotap_flow::Trajectory::record(&model.system, &orbit.states[0], 1)
+        let o = measure(model, &orbit.states[0], 1, Set::ALL)
             .map_err(|error| failed(error.to_string()))?;
-        let o = Observables::of(model, &trajectory)
-            .ok_or_else(|| failed("nothing was recorded".into()))?;
         Ok(Self {
             oscillator,
             closed: orbit,

@@ -9,14 +9,12 @@ use nanotap_dynamics::{
     LyapunovSpectrum, OrbitSearch, PeriodicOrbit, SettleOptions, StartBox, census, find_orbits,
 };
 
-use nanotap_flow::Trajectory;
-
 use super::check::digits;
 use super::{PaperError, rerun};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
-use nanotap::observe::Observables;
+use nanotap::observe::{Observables, Set, measure};
 use nanotap::study::orbit::{OrbitReport, report};
 use nanotap::study::start_box::default_box;
 
@@ -236,10 +234,7 @@ impl Counted {
             what: "a run to observe".into(),
             why,
         };
-        let trajectory = Trajectory::record(&self.model.system, state, WATCHED)
-            .map_err(|e| failed(e.to_string()))?;
-        Observables::of(&self.model, &trajectory)
-            .ok_or_else(|| failed("nothing was recorded".into()))
+        measure(&self.model, state, WATCHED, Set::ALL).map_err(|e| failed(e.to_string()))
     }
 
     /// What a closed orbit of this case looks like.

@@ -36,7 +36,7 @@ fn run_document(run: &Simulation, studied: &Studied) -> Result<String, Failure> 
     let physical = studied
         .resolved
         .as_ref()
-        .map(|resolved| PhysicalMotion::of(&run.observables, None, resolved));
+        .map(|resolved| PhysicalMotion::alone(&run.observables, None, resolved));
     Ok(serde_json::to_string(&Document {
         result: run,
         physical,
@@ -48,7 +48,7 @@ pub(crate) fn orbit_document(orbit: &OrbitReport, studied: &Studied) -> Result<S
     let physical = studied
         .resolved
         .as_ref()
-        .map(|resolved| PhysicalMotion::of(&orbit.observables, Some(&orbit.spectrum), resolved));
+        .map(|resolved| PhysicalMotion::alone(&orbit.observables, Some(&orbit.spectrum), resolved));
     Ok(serde_json::to_string(&Document {
         result: orbit,
         physical,
@@ -143,6 +143,7 @@ pub(crate) fn simulate<'py>(
         state: numbers(state),
         strobe,
         settle: settle(max_period),
+        ..SimulateOptions::default()
     };
     let done = watched(py, None, move |_| {
         let model = studied.model()?;
@@ -289,6 +290,7 @@ pub(crate) fn observe(
             state,
             strobe,
             settle: settle(max_period),
+            ..SimulateOptions::default()
         })
     };
     let done = watched(py, progress, move |control| {

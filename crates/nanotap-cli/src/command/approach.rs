@@ -6,9 +6,11 @@ use std::path::PathBuf;
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::dataset::table::shortest;
 use nanotap::figure::approach::approach_figure;
+use nanotap::observe::table::shown_phase;
+use nanotap::observe::{Observables, Set, columns};
 use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, approach, gap_key};
-use nanotap::study::branch::Sight;
 use nanotap::study::studied::ParameterUnit;
 use serde::Serialize;
 
@@ -126,64 +128,38 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 
 /// A row a distance, there and back; of a physical case the SI columns follow.
 fn csv(report: &ApproachReport) -> String {
-    let mut csv = format!(
-        "way,{},classification,period,spectral_radius,first_harmonic,phase,amplitude,mean_deflection,\
-         peak_force,mean_force,indentation,contact_time,dissipation,virial",
-        report.parameter
-    );
     let physical = report.table.iter().any(|p| p.zc.is_some());
+    let mut header: Vec<String> = [
+        "way",
+        report.parameter,
+        "classification",
+        "period",
+        "spectral_radius",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    header.extend(columns::columns(Set::COMMON, physical));
     if physical {
-        csv.push_str(
-            ",zc_m,A_m,A_ratio,amplitude_m,mean_deflection_m,F_max_N,mean_force_N,indentation_m,\
-             contact_time_s,E_dis_J,E_dis_eV,virial_J",
-        );
+        header.push("zc (m)".to_owned());
     }
-    csv.push('\n');
+    let mut csv = header.join(",") + "\n";
     for p in &report.table {
-        let of = |value: fn(&Sight) -> f64| p.sight.as_ref().map(value);
-        let mut row = vec![
-            p.spectral_radius,
-            of(|s| s.first_harmonic),
-            of(|s| s.phase),
-            of(|s| s.amplitude),
-            of(|s| s.mean_deflection),
-            of(|s| s.peak_force),
-            of(|s| s.mean_force),
-            of(|s| s.indentation),
-            of(|s| s.contact_time),
-            of(|s| s.dissipation),
-            of(|s| s.virial),
-        ];
+        let si = physical.then_some(p.physical.as_ref());
+        let mut row = vec![p.spectral_radius];
+        row.extend(columns::cells(Set::COMMON, p.observables.as_ref(), si));
         if physical {
-            let si = p.physical.as_ref();
             row.push(p.zc);
-            row.extend([
-                si.map(|s| s.first_harmonic),
-                si.map(|s| s.amplitude_ratio),
-                si.map(|s| s.amplitude),
-                si.map(|s| s.mean_deflection),
-                si.map(|s| s.peak_force),
-                si.map(|s| s.mean_force),
-                si.map(|s| s.indentation),
-                si.map(|s| s.contact_time),
-                si.map(|s| s.dissipation),
-                si.map(|s| s.dissipation_ev),
-                si.map(|s| s.virial),
-            ]);
         }
         let period = p.period.map_or_else(String::new, |n| n.to_string());
         let _ = write!(
             csv,
             "{},{},{},{period}",
             p.way.name(),
-            p.gap,
+            shortest(p.gap),
             p.classification.name()
         );
         for value in row {
-            csv.push(',');
-            if let Some(value) = value {
-                let _ = write!(csv, "{value}");
-            }
+            let _ = write!(csv, ",{}", value.map_or_else(String::new, shortest));
         }
         csv.push('\n');
     }
@@ -212,7 +188,7 @@ fn text(studied: &Studied, report: &ApproachReport) -> String {
     text.push_str(&motion::paragraph(&format!(
         "free: amplitude {}, {}° behind the drive; it touches from {} on",
         shown(Kind::Length, report.free_amplitude),
-        number::significant(report.free_phase, 4),
+        number::significant(shown_phase(report.free_phase), 4),
         shown(Kind::Length, report.free_reach)
     )));
     let mut table = Table::new([
@@ -232,15 +208,16 @@ fn text(studied: &Studied, report: &ApproachReport) -> String {
             || p.classification.name().to_owned(),
             |n| format!("period {n}"),
         );
-        let of =
-            |value: &dyn Fn(&Sight) -> String| p.sight.as_ref().map_or_else(String::new, value);
+        let of = |value: &dyn Fn(&Observables) -> String| {
+            p.observables.as_ref().map_or_else(String::new, value)
+        };
         [
             p.way.name().to_owned(),
             shown(Kind::Length, p.gap),
             what,
             of(&|s| shown(Kind::Length, s.first_harmonic)),
             of(&|s| number::significant(s.first_harmonic / report.free_amplitude, 4)),
-            of(&|s| number::significant(s.phase, 4)),
+            of(&|s| number::significant(shown_phase(s.phase), 4)),
             of(&|s| {
                 units.si(Kind::Energy).map_or_else(
                     || number::significant(s.dissipation, 4),
@@ -296,8 +273,8 @@ fn text(studied: &Studied, report: &ApproachReport) -> String {
                 b.kind.to_owned(),
                 shown(Kind::Length, b.parameter),
                 b.period.to_string(),
-                shown(Kind::Length, b.sight.first_harmonic),
-                number::significant(b.sight.phase, 4),
+                shown(Kind::Length, b.observables.first_harmonic),
+                number::significant(shown_phase(b.observables.phase), 4),
             ]);
         }
         text.push_str(&table.render());

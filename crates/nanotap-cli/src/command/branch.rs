@@ -2,11 +2,13 @@
 
 use std::fmt::Write as _;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::subject::Key;
 use nanotap::case::units;
+use nanotap::dataset::table::shortest;
 use nanotap::figure::branch::{ParameterAxis, Shown, branch_figure};
-use nanotap::observe::time_series;
+use nanotap::observe::{Set, columns, time_series};
 use nanotap::study::branch::{BranchOptions, BranchReport, PointReport, SeedOptions, branch};
 use serde::Serialize;
 
@@ -81,8 +83,8 @@ pub(crate) struct Arguments {
     max_step: f64,
 
     /// What --plot shows against the parameter
-    #[arg(long, value_enum)]
-    show: Option<Show>,
+    #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
+    show: Option<Shown>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -92,40 +94,11 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// What a picture shows against the parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
-enum Show {
-    TipMax,
-    TipMin,
-    Amplitude,
-    FirstHarmonic,
-    Phase,
-    ContactFraction,
-    PeakForce,
-    Dissipation,
-    Indentation,
-    ImpactSpeed,
-    /// Largest modulus of a multiplier
-    SpectralRadius,
-}
-
-impl From<Show> for Shown {
-    fn from(show: Show) -> Self {
-        match show {
-            Show::TipMax => Self::TipMax,
-            Show::TipMin => Self::TipMin,
-            Show::Amplitude => Self::Amplitude,
-            Show::FirstHarmonic => Self::FirstHarmonic,
-            Show::Phase => Self::Phase,
-            Show::ContactFraction => Self::ContactFraction,
-            Show::PeakForce => Self::PeakForce,
-            Show::Dissipation => Self::Dissipation,
-            Show::Indentation => Self::Indentation,
-            Show::ImpactSpeed => Self::ImpactSpeed,
-            Show::SpectralRadius => Self::SpectralRadius,
-        }
-    }
+/// The names of what can be shown.
+fn shown() -> impl TypedValueParser<Value = Shown> {
+    let choices = Shown::choices().map(|(name, what)| PossibleValue::new(name).help(what));
+    PossibleValuesParser::new(choices)
+        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("nothing is called {name}")))
 }
 
 /// The JSON document.
@@ -162,17 +135,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let model = studied.model()?;
     if let Some(path) = &arguments.out.out {
         let names = time_series::state_names(&model);
-        file::write(path, csv(&report, &names).as_bytes())?;
+        file::write(path, csv(&report, options.observables, &names).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
-        let rigid = studied.subject.has_rigid_stop();
-        // The greatest displacement of an oscillator with a wall is where the wall stands.
-        let default = if rigid {
-            Shown::ImpactSpeed
-        } else {
-            Shown::TipMax
-        };
-        let shown = arguments.show.map_or(default, Shown::from);
+        let shown = arguments.show.unwrap_or_else(|| default_shown(&studied));
         let size = report.from.abs().max(report.to.abs());
         let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
             (loci.key, loci.range[0].abs().max(loci.range[1].abs()))
@@ -195,6 +161,17 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         parameter_unit: studied.parameter_unit(report.key),
     };
     output.result(&document, |_| text(&studied, &report))
+}
+
+/// What is shown if nobody says: the greatest displacement of an oscillator with a wall is
+/// where the wall stands.
+fn default_shown(studied: &Studied) -> Shown {
+    let name = if studied.subject.has_rigid_stop() {
+        "impact_speed"
+    } else {
+        "tip_max"
+    };
+    Shown::named(name).unwrap_or(Shown::SpectralRadius)
 }
 
 fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Failure> {
@@ -231,6 +208,10 @@ fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Fa
         census,
         second,
         max_step: arguments.max_step,
+        observables: arguments
+            .show
+            .and_then(Shown::observable)
+            .map_or(Set::COMMON, |shown| Set::COMMON.with(shown)),
         ..BranchOptions::over(key, from, to)
     })
 }
@@ -267,41 +248,34 @@ fn axis(studied: &Studied, key: Key, size: f64) -> ParameterAxis {
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
 /// points of their branch.
-fn csv(report: &BranchReport, names: &[String]) -> String {
-    let mut csv = format!(
-        "branch,kind,period,{},stable,spectral_radius,tip_max,tip_min,amplitude,contact_fraction,\
-         contacts_per_period,peak_force,impact_speed,first_harmonic,phase,mean_deflection,mean_force,\
-         indentation,contact_time,dissipation,virial,{}\n",
+fn csv(report: &BranchReport, observed: Set, names: &[String]) -> String {
+    let physical = report.points.iter().any(|p| p.physical.is_some());
+    let mut header: Vec<String> = [
+        "branch",
+        "kind",
+        "period",
         report.parameter,
-        names.join(",")
-    );
+        "stable",
+        "spectral_radius",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    header.extend(columns::columns(observed, physical));
+    header.extend_from_slice(names);
+    let mut csv = header.join(",") + "\n";
     let mut row = |branch: usize, kind: &str, p: &PointReport| {
-        let s = &p.sight;
         let _ = write!(
             csv,
-            "{branch},{kind},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{branch},{kind},{},{},{},{}",
             p.period,
-            p.parameter,
+            shortest(p.parameter),
             p.stable,
-            spectral_radius(&p.multipliers),
-            s.tip_max,
-            s.tip_min,
-            s.amplitude,
-            s.contact_fraction,
-            s.contacts_per_period,
-            s.peak_force,
-            s.impact_speed,
-            s.first_harmonic,
-            s.phase,
-            s.mean_deflection,
-            s.mean_force,
-            s.indentation,
-            s.contact_time,
-            s.dissipation,
-            s.virial
+            shortest(spectral_radius(&p.multipliers)),
         );
-        for value in &p.state {
-            let _ = write!(csv, ",{value}");
+        let si = physical.then_some(p.physical.as_ref());
+        let cells = columns::cells(observed, Some(&p.observables), si);
+        for cell in cells.into_iter().chain(p.state.iter().copied().map(Some)) {
+            let _ = write!(csv, ",{}", cell.map_or_else(String::new, shortest));
         }
         csv.push('\n');
     };
@@ -317,8 +291,8 @@ fn csv(report: &BranchReport, names: &[String]) -> String {
                 state: b.state.clone(),
                 multipliers: b.multipliers.clone(),
                 stable: false,
-                sight: b.sight,
-                physical: b.physical,
+                observables: b.observables,
+                physical: b.physical.clone(),
             };
             row(branch, b.kind, &point);
         }
@@ -406,10 +380,10 @@ fn text(studied: &Studied, report: &BranchReport) -> String {
                 b.period.to_string(),
                 format!(
                     "{} … {}",
-                    number::significant(b.sight.tip_min, 5),
-                    number::significant(b.sight.tip_max, 5)
+                    number::significant(b.observables.tip_min, 5),
+                    number::significant(b.observables.tip_max, 5)
                 ),
-                number::significant(100.0 * b.sight.contact_fraction, 4),
+                number::significant(100.0 * b.observables.contact_fraction, 4),
                 extra,
             ]);
         }

@@ -9,6 +9,7 @@ use nanotap::case::physical::{Kind, Resolved, Severity};
 use nanotap::case::subject::Subject;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use nanotap::observe::table::shown_phase;
 use nanotap::study::setpoint::SetpointReport;
 
 use crate::arguments::{CaseArguments, OutArgument};
@@ -235,9 +236,9 @@ fn setpoint(report: &SetpointReport) -> String {
         table.row([
             Kind::Length.format_digits(s.zc, 5),
             s.period.to_string(),
-            number::significant(s.sight.phase, 4),
-            format_electronvolts(s.physical.dissipation),
-            Kind::Force.format(s.physical.peak_force),
+            number::significant(shown_phase(s.observables.phase), 4),
+            format_electronvolts(s.physical.observables.dissipation),
+            Kind::Force.format(s.physical.observables.peak_force),
             format!("{stability}{reached}"),
         ]);
     }

@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let physical = studied
         .resolved
         .as_ref()
-        .map(|resolved| PhysicalMotion::of(&found.observables, Some(&found.spectrum), resolved));
+        .map(|resolved| PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved));
     let document = Document {
         orbit: &found,
         physical,

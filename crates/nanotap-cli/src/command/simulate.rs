@@ -144,6 +144,7 @@ fn exact(
         state: arguments.state.clone(),
         strobe: arguments.strobe,
         settle,
+        ..SimulateOptions::default()
     };
     let run = simulate(model, &options)?;
     if let Some(path) = &arguments.out.out {
@@ -163,7 +164,7 @@ fn exact(
     let physical = studied
         .resolved
         .as_ref()
-        .map(|resolved| PhysicalMotion::of(&run.observables, None, resolved));
+        .map(|resolved| PhysicalMotion::alone(&run.observables, None, resolved));
     let document = Document {
         run: &run,
         physical,

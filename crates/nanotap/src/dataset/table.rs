@@ -86,10 +86,20 @@ fn named(variable: &Variable, values: &Values, index: usize) -> String {
     }
 }
 
+/// The shortest decimal number that reads back as `value`, without zeros to be counted.
+pub fn shortest(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-5..1e16).contains(&size) {
+        return format!("{value:e}");
+    }
+    // Zero has no sign.
+    (value + 0.0).to_string()
+}
+
 fn cell(values: &Values, index: usize) -> String {
     match values {
         Values::Real(v) if v[index].is_nan() => String::new(),
-        Values::Real(v) => v[index].to_string(),
+        Values::Real(v) => shortest(v[index]),
         Values::Whole(v) => v[index].to_string(),
         Values::Code(v) => v[index].to_string(),
         Values::Text(v) => v[index].clone(),

@@ -5,24 +5,20 @@ use nanotap_figures::{
 };
 
 use crate::case::physical::Kind;
-use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
-use crate::case::units::{Units, prefixed};
+use crate::case::units::Units;
 use crate::figure::branch::{MARKS, Shown, runs, word};
+use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
-use crate::study::branch::{PointReport, Sight};
+use crate::study::branch::PointReport;
 
 /// Amplitude, phase, dissipation and greatest force against the distance: what was met on the
 /// way there and back as marks in two colours, the branches as lines, dashed where unstable,
 /// with their bifurcations.
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
-    let shown = [
-        Shown::FirstHarmonic,
-        Shown::Phase,
-        Shown::Dissipation,
-        Shown::PeakForce,
-    ];
-    shown
+    const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
+    SHOWN
         .into_iter()
+        .filter_map(Shown::named)
         .enumerate()
         .fold(
             Figure::new(2, 2).width(DOUBLE_COLUMN).height(130.0),
@@ -39,37 +35,15 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
         .share_x()
 }
 
-/// The label of an axis, and what the model's numbers are to be multiplied with.
-fn scale(shown: Shown, units: &Units, size: f64) -> (String, f64) {
-    let axis = |name: &str, kind| {
-        let (factor, unit) = units.axis(kind, size);
-        (format!("{name}{unit}"), factor)
-    };
-    match shown {
-        Shown::Phase => ("phase behind the drive (°)".into(), 1.0),
-        Shown::PeakForce => axis("greatest force $F_{max}$", Kind::Force),
-        Shown::Dissipation => match units.si(Kind::Energy) {
-            None => ("dissipation $E_{dis}$ a period".into(), 1.0),
-            Some(joules) => {
-                // Electronvolts with the prefix that fits; the joule's stands for it.
-                let (factor, unit) = prefixed(Kind::Energy, joules / JOULES_PER_ELECTRONVOLT, size);
-                let unit = unit.replace('J', "eV");
-                (format!("dissipation $E_{{dis}}$ ({unit})"), factor)
-            }
-        },
-        _ => axis("amplitude $A$", Kind::Length),
-    }
-}
-
 fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
-    let of_sight = |sight: &Sight| shown.of(sight, &[]);
-    let met = || report.table.iter().filter_map(|p| p.sight.as_ref());
+    let value = |observables: &Observables| shown.of(observables, &[]);
+    let met = || report.table.iter().filter_map(|p| p.observables.as_ref());
     let points = || report.branches.iter().flat_map(|b| &b.points);
     let size = met()
-        .chain(points().map(|p| &p.sight))
-        .map(|sight| of_sight(sight).abs())
+        .chain(points().map(|p| &p.observables))
+        .map(|observables| value(observables).abs())
         .fold(0.0, f64::max);
-    let (label, factor) = scale(shown, units, size);
+    let (label, factor) = shown.axis(true, |kind| units.si(kind), size);
     let (x_factor, x_unit) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
     let symbol = if matches!(units, Units::Si(_)) {
         "distance $z_c$"
@@ -88,9 +62,12 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
         let curve: Vec<&PointReport> = points().filter(|p| p.branch == branch).collect();
         for (stable, run) in runs(&curve) {
             let line = Line::new(
-                unwrapped(shown, run.iter().map(|p| (p.parameter, of_sight(&p.sight))))
-                    .into_iter()
-                    .map(|(gap, value)| place(gap, value)),
+                unwrapped(
+                    shown,
+                    run.iter().map(|p| (p.parameter, value(&p.observables))),
+                )
+                .into_iter()
+                .map(|(gap, value)| place(gap, value)),
             )
             .colour(Colour::GREY)
             .width(0.7);
@@ -117,7 +94,7 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
             .table
             .iter()
             .filter(|p| p.way == way)
-            .filter_map(|p| Some(place(p.gap, of_sight(p.sight.as_ref()?))))
+            .filter_map(|p| Some(place(p.gap, value(p.observables.as_ref()?))))
             .collect();
         panel = panel.with(
             Markers::new(marks)
@@ -138,7 +115,7 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
         let marks: Vec<(f64, f64)> = bifurcations
             .clone()
             .filter(|b| b.kind == kind)
-            .map(|b| place(b.parameter, of_sight(&b.sight)))
+            .map(|b| place(b.parameter, value(&b.observables)))
             .collect();
         if !marks.is_empty() {
             panel = panel.with(
@@ -154,11 +131,11 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
     panel
 }
 
-/// A curve; of a phase broken where it passes from 180° to −180°.
+/// A curve; of a phase broken where it comes round.
 fn unwrapped(shown: Shown, curve: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (x, y) in curve {
-        if shown == Shown::Phase && points.last().is_some_and(|last| (last.1 - y).abs() > 180.0) {
+        if shown.is_phase() && points.last().is_some_and(|last| (last.1 - y).abs() > 180.0) {
             points.push((f64::NAN, f64::NAN));
         }
         points.push((x, y));

@@ -7,78 +7,11 @@ use nanotap_figures::{
     ONE_AND_A_HALF_COLUMNS, Panel, Shape,
 };
 
-use crate::case::physical::Kind;
 use crate::case::subject::Key;
-use crate::case::units::{Units, prefixed};
-use crate::observe::PhysicalSight;
-use crate::study::branch::{BranchReport, Loci, PointReport, Sight};
-
-/// What of an orbit is drawn against the parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shown {
-    /// Greatest tip displacement.
-    TipMax,
-    /// Least tip displacement.
-    TipMin,
-    /// Half of peak to peak.
-    Amplitude,
-    /// Amplitude at the drive's frequency.
-    FirstHarmonic,
-    /// Phase at the drive's frequency.
-    Phase,
-    /// Part of the time in contact.
-    ContactFraction,
-    /// Greatest force.
-    PeakForce,
-    /// Energy that the sample takes in one drive period.
-    Dissipation,
-    /// Greatest depth below the resting surface.
-    Indentation,
-    /// Greatest speed of approach.
-    ImpactSpeed,
-    /// Largest modulus of a multiplier.
-    SpectralRadius,
-}
-
-impl Shown {
-    /// Axis label and the kind of quantity.
-    pub(crate) const fn label(self, beam: bool) -> (&'static str, Kind) {
-        match self {
-            Self::TipMax if beam => ("greatest tip deflection $W_{max}$", Kind::Length),
-            Self::TipMin if beam => ("least tip deflection $W_{min}$", Kind::Length),
-            Self::TipMax => ("greatest displacement $x_{max}$", Kind::Length),
-            Self::TipMin => ("least displacement $x_{min}$", Kind::Length),
-            Self::Amplitude => ("amplitude (half of peak to peak)", Kind::Length),
-            Self::FirstHarmonic => ("amplitude at the drive frequency", Kind::Length),
-            Self::Phase => ("phase (°)", Kind::Number),
-            Self::ContactFraction => ("part of the time in contact", Kind::Number),
-            Self::PeakForce => ("greatest force", Kind::Force),
-            Self::Dissipation => ("dissipation $E_{dis}$", Kind::Energy),
-            Self::Indentation => ("indentation", Kind::Length),
-            Self::ImpactSpeed => ("speed of approach", Kind::Velocity),
-            Self::SpectralRadius => ("largest |$μ$|", Kind::Number),
-        }
-    }
-
-    pub(crate) fn of(self, sight: &Sight, multipliers: &[[f64; 2]]) -> f64 {
-        match self {
-            Self::TipMax => sight.tip_max,
-            Self::TipMin => sight.tip_min,
-            Self::Amplitude => sight.amplitude,
-            Self::FirstHarmonic => sight.first_harmonic,
-            Self::Phase => sight.phase,
-            Self::ContactFraction => sight.contact_fraction,
-            Self::PeakForce => sight.peak_force,
-            Self::Dissipation => sight.dissipation,
-            Self::Indentation => sight.indentation,
-            Self::ImpactSpeed => sight.impact_speed,
-            Self::SpectralRadius => multipliers
-                .iter()
-                .map(|[re, im]| re.hypot(*im))
-                .fold(0.0, f64::max),
-        }
-    }
-}
+use crate::case::units::Units;
+pub use crate::figure::shown::Shown;
+use crate::observe::{Observables, PhysicalMotion};
+use crate::study::branch::{BranchReport, Loci, PointReport};
 
 /// The parameter's axis: its label and what its values are multiplied with.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,28 +75,24 @@ fn branches_panel(
 ) -> Panel {
     // Where physical quantities vary, the model's units may vary with them: SI then.
     let si = report.points.iter().any(|p| p.physical.is_some());
-    let of = |sight: &Sight, physical: Option<&PhysicalSight>, multipliers: &[[f64; 2]]| {
-        physical
-            .and_then(|physical| physical.shown(shown))
-            .unwrap_or_else(|| shown.of(sight, multipliers))
+    let of = |model: &Observables, physical: Option<&PhysicalMotion>, multipliers: &[[f64; 2]]| {
+        shown.of(physical.map_or(model, |p| &p.observables), multipliers)
     };
-    let value = |p: &PointReport| of(&p.sight, p.physical.as_ref(), &p.multipliers);
-    let (label, kind) = shown.label(beam);
+    let value = |p: &PointReport| of(&p.observables, p.physical.as_ref(), &p.multipliers);
     let size = report
         .points
         .iter()
         .map(|p| value(p).abs())
         .fold(0.0, f64::max);
-    let (factor, unit) = if si && kind != Kind::Number {
-        let (factor, unit) = prefixed(kind, 1.0, size);
-        (factor, format!(" ({unit})"))
-    } else {
-        units.axis(kind, size)
-    };
+    let (label, factor) = shown.axis(
+        beam,
+        |kind| if si { Some(1.0) } else { units.si(kind) },
+        size,
+    );
     let periods: BTreeSet<usize> = report.points.iter().map(|p| p.period).collect();
     let mut panel = Panel::new(
         Axis::linear(axis.label.clone()).tight(),
-        Axis::linear(format!("{label}{unit}")),
+        Axis::linear(label),
     )
     .legend(Legend::Above);
     for (k, period) in periods.iter().enumerate() {
@@ -211,7 +140,7 @@ fn branches_panel(
             .map(|b| {
                 (
                     axis.factor * b.parameter,
-                    factor * of(&b.sight, b.physical.as_ref(), &b.multipliers),
+                    factor * of(&b.observables, b.physical.as_ref(), &b.multipliers),
                 )
             })
             .collect();

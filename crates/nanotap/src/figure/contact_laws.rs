@@ -20,8 +20,8 @@ pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
         .width(DOUBLE_COLUMN)
         .height(72.0)
         .with(loops)
-        .with(followed_panel(comparison, Shown::Dissipation, units))
-        .with(followed_panel(comparison, Shown::FirstHarmonic, units))
+        .with(followed_panel(comparison, "dissipation", units))
+        .with(followed_panel(comparison, "first_harmonic", units))
 }
 
 /// The largest size of some numbers.
@@ -62,21 +62,21 @@ fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
     panel
 }
 
-fn followed_panel(comparison: &Comparison, shown: Shown, units: &Units) -> Panel {
-    let value = |p: &PointReport| shown.of(&p.sight, &p.multipliers);
+fn followed_panel(comparison: &Comparison, shown: &str, units: &Units) -> Panel {
+    let shown = Shown::named(shown).unwrap_or(Shown::SpectralRadius);
+    let value = |p: &PointReport| shown.of(&p.observables, &p.multipliers);
     let points = |s: &SampleMotion| -> Vec<PointReport> {
         s.branch
             .as_ref()
             .map_or_else(Vec::new, |b| b.points.clone())
     };
     let all: Vec<PointReport> = comparison.samples.iter().flat_map(points).collect();
-    let (label, kind) = shown.label(true);
-    let (factor, unit) = units.axis(kind, largest(all.iter().map(value)));
+    let (label, factor) = shown.axis(true, |kind| units.si(kind), largest(all.iter().map(value)));
     let (frequency, frequency_unit) =
         units.axis(Kind::Frequency, largest(all.iter().map(|p| p.parameter)));
     let mut panel = Panel::new(
         Axis::linear(format!("drive frequency $Ω${frequency_unit}")).tight(),
-        Axis::linear(format!("{label}{unit}")),
+        Axis::linear(label),
     );
     for (k, sample) in comparison.samples.iter().enumerate() {
         let Some(branch) = &sample.branch else {

@@ -5,3 +5,4 @@ pub mod attractors;
 pub mod branch;
 pub mod contact_laws;
 pub mod motion;
+pub mod shown;

@@ -2,152 +2,205 @@
 //! and what is stored. Over a period of a periodic orbit it closes to rounding, a
 //! check of the whole computation.
 
-use nanotap_flow::Trajectory;
-use nanotap_flow::trajectory::Segment;
+use nanotap_flow::flow::{Observer as _, SegmentView};
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Complex, Output};
 use serde::Serialize;
 
-use crate::model::{Model, Product};
+use crate::model::{Model, Powers, Product};
 
-/// Energies over a recording, in the model's own units.
+/// Energies over a recording, in the model's own units or in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EnergyBalance {
     /// Work of the drive.
     pub drive_work: f64,
     /// Taken by the beam's own damping.
     pub beam_damping: f64,
-    /// Taken by the sample: its damping, or the impacts of a rigid stop.
+    /// Taken by the sample's damping, or by the impacts of a rigid stop; what the sample
+    /// stores and gives back is not in it.
     pub sample_damping: f64,
     /// Gain of stored (kinetic and elastic) energy; zero over a period of an orbit.
     pub stored: f64,
     /// What does not add up, as a part of the energy that was moved.
     pub residual: f64,
-    #[serde(skip)]
-    moved: f64,
 }
 
 impl EnergyBalance {
-    /// The balance of `trajectory`, a recording of `model`.
-    pub fn of(model: &Model, trajectory: &Trajectory) -> Self {
-        let work = |select| work(model, trajectory, select);
-        let drive_work = work(|p| &p.drive);
-        let beam_damping = work(|p| &p.beam);
-        let sample_damping = Self::sample_work(model, trajectory);
-        let ends = trajectory
-            .segments()
-            .first()
-            .zip(trajectory.segments().last());
-        let (start, end) = ends.map_or((0.0, 0.0), |(first, last)| {
-            (
-                stored(model, trajectory, first, first.start),
-                stored(model, trajectory, last, last.start + last.length),
-            )
-        });
-        // Signed works cancel; the damping and the stored energy say how much moved.
-        let moved = drive_work.abs() + beam_damping + sample_damping + (end - start).abs();
-        Self::closed(drive_work, beam_damping, sample_damping, end - start, moved)
-    }
+    /// Nothing is known.
+    pub(super) const UNKNOWN: Self = Self {
+        drive_work: f64::NAN,
+        beam_damping: f64::NAN,
+        sample_damping: f64::NAN,
+        stored: f64::NAN,
+        residual: f64::NAN,
+    };
 
-    /// What the sample alone takes: its damping, and the impacts of a rigid stop.
-    pub fn sample_work(model: &Model, trajectory: &Trajectory) -> f64 {
-        let impacts: f64 = trajectory
-            .events()
-            .iter()
-            .filter(|e| e.from == 0)
-            .map(|e| e.rate * e.rate)
-            .sum();
-        work(model, trajectory, |p| &p.sample) + model.impact_loss * impacts
-    }
-
-    fn closed(
+    /// Of these energies, the last one the gain of stored energy.
+    pub(super) fn new(
         drive_work: f64,
         beam_damping: f64,
         sample_damping: f64,
         stored: f64,
-        moved: f64,
     ) -> Self {
+        // Signed works cancel; the damping and the stored energy say how much moved.
+        let moved = drive_work.abs() + beam_damping + sample_damping + stored.abs();
         let rest = drive_work - beam_damping - sample_damping - stored;
-        let residual = if moved > 0.0 { rest / moved } else { 0.0 };
         Self {
             drive_work,
             beam_damping,
             sample_damping,
             stored,
-            residual,
-            moved,
+            residual: if moved > 0.0 { rest / moved } else { 0.0 },
         }
     }
 
-    /// The balance of this stretch and the next together.
-    #[must_use]
-    pub fn joined(&self, next: &Self) -> Self {
-        Self::closed(
-            self.drive_work + next.drive_work,
-            self.beam_damping + next.beam_damping,
-            self.sample_damping + next.sample_damping,
-            self.stored + next.stored,
-            self.moved + next.moved,
-        )
+    /// The same, told in a unit of which 1 is `unit`.
+    pub(super) fn in_units(self, unit: f64) -> Self {
+        Self {
+            drive_work: self.drive_work * unit,
+            beam_damping: self.beam_damping * unit,
+            sample_damping: self.sample_damping * unit,
+            stored: self.stored * unit,
+            residual: self.residual,
+        }
     }
 }
 
-/// The integral of a sum of products.
-fn work(
-    model: &Model,
-    trajectory: &Trajectory,
-    select: fn(&crate::model::Powers) -> &[Product],
-) -> f64 {
-    let count = model
-        .power()
-        .iter()
-        .map(|p| select(p).len())
-        .max()
-        .unwrap_or(0);
-    (0..count)
-        .map(|i| product_work(model, trajectory, select, i))
-        .sum()
+/// A factor of one product in a sum that is a power.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PowerTerm {
+    sum: Sum,
+    index: usize,
+    second: bool,
 }
 
-/// The integral of the `i`-th product of a sum, which may differ from regime to regime
-/// (and be missing in some).
-fn product_work(
-    model: &Model,
-    trajectory: &Trajectory,
-    select: fn(&crate::model::Powers) -> &[Product],
-    i: usize,
-) -> f64 {
-    let zero = model.tip.scaled(0.0);
-    let weighted: Vec<_> = model
-        .power()
-        .iter()
-        .map(|p| {
-            select(p)
-                .get(i)
-                .map_or_else(|| zero.clone(), |p| p.a.scaled(p.weight))
-        })
-        .collect();
-    let other: Vec<_> = model
-        .power()
-        .iter()
-        .map(|p| {
-            select(p)
-                .get(i)
-                .map_or_else(|| zero.clone(), |p| p.b.clone())
-        })
-        .collect();
-    trajectory
-        .signal_by_regime(&weighted)
-        .product_integral(&trajectory.signal_by_regime(&other))
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sum {
+    Drive,
+    Beam,
+    Sample,
 }
 
-fn stored(model: &Model, trajectory: &Trajectory, segment: &Segment, time: f64) -> f64 {
-    let drive = model.system.drive();
-    let phase = segment.phase + (time - segment.start);
-    let Some(state) = trajectory.state_at(time) else {
-        return 0.0;
-    };
-    model.power()[segment.regime]
-        .stored
-        .iter()
-        .map(|p| p.weight * p.a.at(drive, &state, phase) * p.b.at(drive, &state, phase))
-        .sum()
+impl Sum {
+    fn products(self, powers: &Powers) -> &[Product] {
+        match self {
+            Self::Drive => &powers.drive,
+            Self::Beam => &powers.beam,
+            Self::Sample => &powers.sample,
+        }
+    }
+}
+
+impl PowerTerm {
+    /// What the drive delivers.
+    pub(super) fn of_drive(model: &Model) -> Vec<Self> {
+        Self::all(model, Sum::Drive)
+    }
+
+    /// What the beam's own damping takes.
+    pub(super) fn of_beam(model: &Model) -> Vec<Self> {
+        Self::all(model, Sum::Beam)
+    }
+
+    /// What the sample's damping takes.
+    pub(super) fn of_sample(model: &Model) -> Vec<Self> {
+        Self::all(model, Sum::Sample)
+    }
+
+    /// The first factors of a sum; the sums of regimes may differ in length.
+    fn all(model: &Model, sum: Sum) -> Vec<Self> {
+        let lengths = model.power().iter().map(|p| sum.products(p).len());
+        let first = |index| Self {
+            sum,
+            index,
+            second: false,
+        };
+        (0..lengths.max().unwrap_or(0)).map(first).collect()
+    }
+
+    /// The other factor.
+    pub(super) const fn other(self) -> Self {
+        Self {
+            second: !self.second,
+            ..self
+        }
+    }
+
+    /// The factor, an entry a regime; zero where the regime has no such product. The first one
+    /// carries the weight.
+    pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
+        let factor = |powers: &Powers| match self.sum.products(powers).get(self.index) {
+            None => model.tip.scaled(0.0),
+            Some(product) if self.second => product.b.clone(),
+            Some(product) => product.a.scaled(product.weight),
+        };
+        model.power().iter().map(factor).collect()
+    }
+}
+
+/// Where a motion began and where it is: the stretch it began with, and the last one.
+#[derive(Default)]
+pub(super) struct Ends {
+    first: Option<Stretch>,
+    last: Stretch,
+}
+
+#[derive(Clone, Default)]
+struct Stretch {
+    regime: usize,
+    phase: f64,
+    length: f64,
+    modal: Vec<Complex>,
+}
+
+impl Stretch {
+    fn take(&mut self, segment: &SegmentView<'_>) {
+        self.regime = segment.regime;
+        self.phase = segment.phase;
+        self.length = segment.length;
+        self.modal.clear();
+        self.modal.extend_from_slice(segment.modal);
+    }
+
+    /// Energy stored after a time `s` of it.
+    fn stored(&self, model: &Model, s: f64) -> f64 {
+        let drive = model.system.drive();
+        let mut recorder = Recorder::default();
+        recorder.segment(&SegmentView {
+            system: &model.system,
+            regime: self.regime,
+            phase: self.phase,
+            length: self.length,
+            modal: &self.modal,
+            factors: &[],
+        });
+        let stretch = recorder.finish(std::sync::Arc::clone(&model.system));
+        let Some(state) = stretch.state_at(self.phase + s) else {
+            return 0.0;
+        };
+        let at = |output: &Output| output.at(drive, &state, self.phase + s);
+        model.power()[self.regime]
+            .stored
+            .iter()
+            .map(|p| p.weight * at(&p.a) * at(&p.b))
+            .sum()
+    }
+}
+
+impl Ends {
+    pub(super) fn segment(&mut self, segment: &SegmentView<'_>) {
+        if segment.length > 0.0 {
+            self.last.take(segment);
+            if self.first.is_none() {
+                self.first = Some(self.last.clone());
+            }
+        }
+    }
+
+    /// Gain of stored energy from one end to the other.
+    pub(super) fn gain(&self, model: &Model) -> f64 {
+        self.first.as_ref().map_or(0.0, |first| {
+            self.last.stored(model, self.last.length) - first.stored(model, 0.0)
+        })
+    }
 }

@@ -1,69 +1,33 @@
-//! A motion in SI units, in the words of the laboratory.
+//! A motion in SI units, in the words of experimenters.
 
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 
-use super::{Harmonic, Observables, Spectrum};
+use super::table::{OBSERVABLES, Observables};
+use super::value::Value;
+use super::{Dimension, Harmonic, Spectrum};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::physical::{Resolved, Scales};
 
-/// What an experimenter would measure of a motion; SI units, angles in degrees.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// What an experimenter would measure of a motion; SI units, angles in degrees. Written out
+/// by the observables' names in SI, energies in electronvolts too.
+#[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMotion {
-    /// Greatest tip deflection, m.
-    pub tip_max: f64,
-    /// Least tip deflection, m.
-    pub tip_min: f64,
-    /// Half of peak to peak of the tip deflection, m.
-    pub amplitude: f64,
-    /// Amplitude A at the drive's frequency, m: what a lock-in amplifier reads.
-    #[serde(rename = "A")]
-    pub first_harmonic: f64,
+    /// The observables in SI.
+    pub observables: Observables,
     /// A over the free amplitude A₀: the setpoint ratio of this motion.
-    #[serde(rename = "A_ratio")]
     pub amplitude_ratio: f64,
-    /// Lag of the deflection at the drive's frequency behind `phase_reference`, degrees in
-    /// (−180, 180]: 90 at the free resonance.
-    pub phase: f64,
+    /// What stands beside them where one motion is told alone.
+    pub setting: Option<Setting>,
+}
+
+/// What belongs to the case and not to the motion, and the motion's harmonics.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Setting {
     /// What the phase is counted from.
     pub phase_reference: &'static str,
-    /// Time mean of the deflection, m.
-    pub mean_deflection: f64,
-    /// Greatest force of the sample on the tip, N.
-    #[serde(rename = "F_max")]
-    pub peak_force: f64,
-    /// Mean force, N.
-    pub mean_force: f64,
-    /// Greatest depth of the tip below the resting surface, m.
-    pub indentation: f64,
-    /// Time in contact in one drive period, s.
-    pub contact_time: f64,
-    /// Energy that the sample takes in one drive period, J.
-    #[serde(rename = "E_dis")]
-    pub dissipation: f64,
-    /// The same, eV.
-    #[serde(rename = "E_dis_eV")]
-    pub dissipation_ev: f64,
-    /// Virial ⟨F W⟩, J.
-    pub virial: f64,
-    /// The same, eV.
-    #[serde(rename = "virial_eV")]
-    pub virial_ev: f64,
-    /// Mean power of the drive, W.
-    pub drive_power: f64,
-    /// Mean power that the sample takes, W.
-    pub sample_power: f64,
-    /// Greatest speed at which a contact begins, m/s.
-    pub impact_speed: f64,
     /// Drive frequency, Hz.
     pub frequency: f64,
-    /// Amplitude that an optical lever, calibrated by a static force, reads at the drive's
-    /// frequency, m.
-    pub optical_amplitude: Option<f64>,
-    /// Its phase, degrees.
-    pub optical_phase: Option<f64>,
-    /// Least and greatest slope dw/dx at the tip; where the lever's length is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub slope_range: Option<[f64; 2]>,
     /// Harmonics of the drive's frequency; of a periodic motion.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<PhysicalHarmonic>,
@@ -90,47 +54,64 @@ pub struct PhysicalHarmonic {
 }
 
 impl PhysicalMotion {
-    /// `o`, a motion of the case `resolved`, in SI; with `spectrum` its harmonics too.
-    pub fn of(o: &Observables, spectrum: Option<&Spectrum>, resolved: &Resolved) -> Self {
-        let scales = &resolved.scales;
-        let dissipation = o.dissipation * scales.energy;
-        let virial = o.virial * scales.energy;
-        let first_harmonic = o.first_harmonic * scales.length;
+    /// `observables`, of a motion of the case `resolved`, in SI.
+    pub fn of(observables: &Observables, resolved: &Resolved) -> Self {
+        let observables = observables.in_si(&resolved.scales);
         Self {
-            tip_max: o.tip_max * scales.length,
-            tip_min: o.tip_min * scales.length,
-            amplitude: o.amplitude * scales.length,
-            first_harmonic,
-            amplitude_ratio: first_harmonic / resolved.free_amplitude,
-            phase: o.phase,
-            phase_reference: resolved.phase_reference(),
-            mean_deflection: o.mean_deflection * scales.length,
-            peak_force: o.peak_force * scales.force,
-            mean_force: o.mean_force * scales.force,
-            indentation: o.indentation * scales.length,
-            contact_time: o.contact_time * scales.time,
-            dissipation,
-            dissipation_ev: dissipation / JOULES_PER_ELECTRONVOLT,
-            virial,
-            virial_ev: virial / JOULES_PER_ELECTRONVOLT,
-            drive_power: o.drive_power * scales.power,
-            sample_power: o.sample_power * scales.power,
-            impact_speed: o.impact_speed * scales.velocity,
-            frequency: resolved.case.omega * scales.frequency,
-            optical_amplitude: o.optical_lever.map(|l| l.amplitude * scales.length),
-            optical_phase: o.optical_lever.map(|l| l.phase),
-            slope_range: o
-                .slope_range
-                .zip(scales.slope)
-                .map(|(range, unit)| range.map(|s| s * unit)),
-            harmonics: spectrum.map_or_else(Vec::new, |spectrum| {
-                spectrum
-                    .harmonics
-                    .iter()
-                    .map(|h| PhysicalHarmonic::of(h, resolved.case.omega, scales))
-                    .collect()
-            }),
+            amplitude_ratio: observables.first_harmonic / resolved.free_amplitude,
+            observables,
+            setting: None,
         }
+    }
+
+    /// The same of one motion alone: with its setting, and with `spectrum` its harmonics.
+    pub fn alone(
+        observables: &Observables,
+        spectrum: Option<&Spectrum>,
+        resolved: &Resolved,
+    ) -> Self {
+        let scales = &resolved.scales;
+        let omega = resolved.case.omega;
+        let harmonics = spectrum.map_or(&[][..], |spectrum| &spectrum.harmonics);
+        Self {
+            setting: Some(Setting {
+                phase_reference: resolved.phase_reference(),
+                frequency: omega * scales.frequency,
+                harmonics: harmonics
+                    .iter()
+                    .map(|h| PhysicalHarmonic::of(h, omega, scales))
+                    .collect(),
+            }),
+            ..Self::of(observables, resolved)
+        }
+    }
+}
+
+impl Serialize for PhysicalMotion {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for observable in OBSERVABLES {
+            let value = (observable.of)(&self.observables);
+            if value == Value::Absent {
+                continue;
+            }
+            map.serialize_entry(observable.si_name, &value)?;
+            if observable.name == "first_harmonic" {
+                map.serialize_entry("A_ratio", &self.amplitude_ratio)?;
+            }
+            if let (Dimension::Energy, Value::Number(joules)) = (observable.dimension, value) {
+                let name = format!("{}_eV", observable.si_name);
+                map.serialize_entry(&name, &(joules / JOULES_PER_ELECTRONVOLT))?;
+            }
+        }
+        if let Some(setting) = &self.setting {
+            map.serialize_entry("phase_reference", setting.phase_reference)?;
+            map.serialize_entry("frequency", &setting.frequency)?;
+            if !setting.harmonics.is_empty() {
+                map.serialize_entry("harmonics", &setting.harmonics)?;
+            }
+        }
+        map.end()
     }
 }
 

@@ -16,18 +16,16 @@
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
 
 use nanotap_dynamics::{Control, PeriodicOrbit, SettleOptions, settle};
-use nanotap_flow::Trajectory;
 use serde::Serialize;
 
 use super::FreeMotion;
 use crate::case::subject::{Key, Subject};
+use crate::model::ModelError;
 use crate::model::oscillator::OscillatorParameter;
 use crate::model::parameter::Parameter;
 use crate::model::strobe::Strobe;
-use crate::model::{FlowError, Model, ModelError};
-use crate::observe::Clearance;
-use crate::observe::PhysicalSight;
-use crate::study::branch::{BranchError, BranchOptions, BranchReport, Sight, branches_through};
+use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
+use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
 use crate::study::simulate::{Classification, Named};
 use crate::study::studied::Studied;
 use crate::study::sweep::{SweepOptions, nearest};
@@ -147,10 +145,10 @@ pub struct ApproachPoint {
     pub spectral_radius: Option<f64>,
     /// What it looks like; nothing if undecided or unbounded.
     #[serde(flatten)]
-    pub sight: Option<Sight>,
+    pub observables: Option<Observables>,
     /// The same in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub physical: Option<PhysicalSight>,
+    pub physical: Option<PhysicalMotion>,
     /// Why it is undecided, if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
@@ -332,12 +330,17 @@ impl Walk<'_> {
         let settled = settle(&mut Strobe::new(&model), &start, &self.settle);
         let named = Named::of(&settled.verdict);
         let seen = match (&named.orbit, named.classification) {
-            (Some(orbit), _) => Sight::of(&model, orbit).map(Some),
+            (Some(orbit), _) => {
+                let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+                measure(&model, start, orbit.period, Set::COMMON).map(Some)
+            }
             (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
-            (None, _) => self.recorded(&model, &settled.state).map(Some),
+            (None, _) => {
+                measure(&model, &settled.state, self.options.periods, Set::COMMON).map(Some)
+            }
         };
-        let (classification, sight, reason) = match seen {
-            Ok(Some(sight)) => (named.classification, Some(sight), None),
+        let (classification, observables, reason) = match seen {
+            Ok(Some(seen)) => (named.classification, Some(seen), None),
             Ok(None) => (named.classification, None, Some(named.evidence)),
             Err(error) => (Classification::Undecided, None, Some(error.to_string())),
         };
@@ -355,20 +358,14 @@ impl Walk<'_> {
             classification,
             period: named.orbit.as_ref().map(|orbit| orbit.period),
             spectral_radius: named.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
-            physical: sight
+            physical: observables
                 .as_ref()
                 .zip(resolved)
-                .map(|(sight, resolved)| PhysicalSight::of(sight, resolved)),
-            sight,
+                .map(|(seen, resolved)| PhysicalMotion::of(seen, resolved)),
+            observables,
             reason,
             orbit: named.orbit,
         })
-    }
-
-    fn recorded(&self, model: &Model, state: &[f64]) -> Result<Sight, FlowError> {
-        let periods = self.options.periods;
-        let trajectory = Trajectory::record(&model.system, state, periods)?;
-        Ok(Sight::of_recording(model, &trajectory, periods))
     }
 }
 
@@ -432,8 +429,7 @@ fn beam_clearance(studied: &Studied, table: &[ApproachPoint]) -> Option<f64> {
     let subject = &studied.subject;
     let model = subject.with(gap_key(subject), nearest.gap).model().ok()?;
     let start = orbit.states.first()?;
-    let trajectory = Trajectory::record(&model.system, start, orbit.period).ok()?;
-    let clearance = Clearance::of(&model, &trajectory)?;
+    let clearance = Clearance::of(&model, start, orbit.period).ok()??;
     // The sample moves towards the whole lever; the model's beam stands where the case has it.
     let moved = studied
         .resolved
@@ -453,7 +449,7 @@ fn returned(table: &[ApproachPoint], free_amplitude: f64) -> bool {
 /// Recordings of one chaotic band never agree to the digit, so that only what both periodic
 /// motions are, or the class, counts.
 fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Option<f64> {
-    let (x, y) = (a.sight.as_ref()?, b.sight.as_ref()?);
+    let (x, y) = (a.observables.as_ref()?, b.observables.as_ref()?);
     let amplitudes = (x.first_harmonic - y.first_harmonic).abs();
     let periodic = a.period.is_some() && b.period.is_some();
     let differ = a.classification != b.classification

@@ -11,9 +11,9 @@ use crate::case::physical::Resolved;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
-use crate::observe::{Observables, PhysicalMotion};
+use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::orbit::{OrbitError, OrbitReport, report};
-use crate::study::simulate::{Classification, SimulateError, largest_exponent, observe};
+use crate::study::simulate::{Classification, SimulateError, largest_exponent};
 use crate::study::start_box::default_box;
 
 /// How to look for attractors.
@@ -172,12 +172,14 @@ impl Attractors {
     pub fn in_si(mut self, resolved: &Resolved) -> Self {
         for attractor in &mut self.attractors {
             attractor.physical = match (&attractor.orbit, &attractor.wandering) {
-                (Some(orbit), _) => Some(PhysicalMotion::of(
+                (Some(orbit), _) => Some(PhysicalMotion::alone(
                     &orbit.observables,
                     Some(&orbit.spectrum),
                     resolved,
                 )),
-                (None, Some(seen)) => Some(PhysicalMotion::of(&seen.observables, None, resolved)),
+                (None, Some(seen)) => {
+                    Some(PhysicalMotion::alone(&seen.observables, None, resolved))
+                }
                 (None, None) => None,
             };
         }
@@ -362,7 +364,8 @@ fn one(
     harmonics: usize,
 ) -> Result<AttractorReport, AttractorsError> {
     let wandering = || -> Result<Option<Wandering>, AttractorsError> {
-        let observables = observe(model, state, OBSERVED_PERIODS)?;
+        let observables =
+            measure(model, state, OBSERVED_PERIODS, Set::ALL).map_err(SimulateError::from)?;
         Ok(Some(Wandering {
             period: None,
             state: state.to_vec(),

@@ -7,14 +7,13 @@ use nanotap_dynamics::{
     PeriodicOrbit, SettleOptions, StartBoxError, assemble_diagram, census, continue_orbit,
     trace_locus,
 };
-use nanotap_flow::{FlowError, Trajectory};
+use nanotap_flow::FlowError;
 use serde::Serialize;
 
 use crate::case::subject::{Family, Key, PlaneFamily, Subject};
 use crate::model::strobe::Strobe;
 use crate::model::{Model, ModelError};
-use crate::observe::PhysicalSight;
-use crate::observe::{above_rounding, begins_contact, contact_work, lag, virial};
+use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
 use crate::study::start_box::default_box;
 
@@ -43,6 +42,8 @@ pub struct BranchOptions {
     pub max_points: usize,
     /// Branches after which no more are followed.
     pub max_branches: usize,
+    /// What is measured of every orbit.
+    pub observables: Set,
 }
 
 /// A census at several parameter values.
@@ -85,6 +86,7 @@ impl BranchOptions {
             max_step: continuation.max_step,
             max_points: 20_000,
             max_branches: 64,
+            observables: Set::COMMON,
         }
     }
 
@@ -236,103 +238,10 @@ pub struct PointReport {
     pub stable: bool,
     /// What it looks like.
     #[serde(flatten)]
-    pub sight: Sight,
+    pub observables: Observables,
     /// The same in SI, where the parameter is a quantity of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub physical: Option<PhysicalSight>,
-}
-
-/// What an orbit of a branch looks like.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Sight {
-    /// Greatest tip displacement.
-    pub tip_max: f64,
-    /// Least tip displacement.
-    pub tip_min: f64,
-    /// Half of peak to peak.
-    pub amplitude: f64,
-    /// Part of the time in contact.
-    pub contact_fraction: f64,
-    /// Contacts begun a drive period.
-    pub contacts_per_period: f64,
-    /// Greatest force of the sample on the tip.
-    pub peak_force: f64,
-    /// Greatest speed of approach at which a contact begins.
-    pub impact_speed: f64,
-    /// Amplitude of the tip deflection at the drive's frequency.
-    pub first_harmonic: f64,
-    /// Its phase behind the drive, degrees.
-    pub phase: f64,
-    /// Time mean of the tip deflection.
-    pub mean_deflection: f64,
-    /// Time mean of the force of the sample on the tip.
-    pub mean_force: f64,
-    /// Greatest depth of the tip below the resting surface.
-    pub indentation: f64,
-    /// Time in contact in one drive period.
-    pub contact_time: f64,
-    /// Energy that the sample takes in one drive period.
-    pub dissipation: f64,
-    /// Mean of force times deflection, ⟨F W⟩.
-    pub virial: f64,
-}
-
-impl Sight {
-    /// Of an orbit of `model`.
-    ///
-    /// # Errors
-    /// When the flow along it fails.
-    pub fn of(model: &Model, orbit: &PeriodicOrbit) -> Result<Self, FlowError> {
-        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-        let trajectory = Trajectory::record(&model.system, start, orbit.period)?;
-        Ok(Self::of_recording(model, &trajectory, orbit.period))
-    }
-
-    /// Of `trajectory`, a recording of `periods` drive periods of any motion.
-    pub fn of_recording(model: &Model, trajectory: &Trajectory, periods: usize) -> Self {
-        let tip = trajectory.signal(&model.tip);
-        let range = |s: &nanotap_flow::trajectory::PiecewiseSignal| {
-            s.range()
-                .map_or((0.0, 0.0), |(low, high)| (low.value, high.value))
-        };
-        let (tip_min, tip_max) = range(&tip);
-        let (gap_min, _) = range(&trajectory.signal(&model.height));
-        let force = trajectory.signal_by_regime(&model.force);
-        let (_, peak) = range(&force);
-        let contact: f64 = (0..model.contact.len())
-            .filter(|&r| model.contact[r])
-            .map(|r| trajectory.time_in(r))
-            .sum();
-        let begins = || {
-            trajectory
-                .events()
-                .iter()
-                .filter(|e| begins_contact(model, e.from, e.to))
-        };
-        let first = tip.fourier(model.frequency());
-        let periods = periods as f64;
-        Self {
-            tip_max,
-            tip_min,
-            amplitude: 0.5 * (tip_max - tip_min),
-            contact_fraction: contact / trajectory.end(),
-            contacts_per_period: begins().count() as f64 / periods,
-            peak_force: peak.max(0.0),
-            impact_speed: begins().map(|e| -e.rate).fold(0.0, f64::max),
-            first_harmonic: first.norm(),
-            phase: lag(first),
-            mean_deflection: tip.mean(),
-            mean_force: force.mean(),
-            indentation: (-gap_min).max(0.0),
-            contact_time: contact / periods,
-            dissipation: above_rounding(
-                contact_work(model, trajectory, &force) / periods,
-                peak,
-                -gap_min,
-            ),
-            virial: virial(model, &force, &tip),
-        }
-    }
+    pub physical: Option<PhysicalMotion>,
 }
 
 /// A bifurcation.
@@ -360,10 +269,10 @@ pub struct BifurcationReport {
     pub time: Option<f64>,
     /// What it looks like.
     #[serde(flatten)]
-    pub sight: Sight,
+    pub observables: Observables,
     /// The same in SI, where the parameter is a quantity of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub physical: Option<PhysicalSight>,
+    pub physical: Option<PhysicalMotion>,
 }
 
 /// Loci of bifurcations in two parameters.
@@ -640,12 +549,12 @@ fn described(
         let parent = parent.and_then(|p| kept.iter().position(|&k| k == p));
         report.branches.push(summary(branch, parent, *depth));
         for p in &branch.points {
-            report.points.push(point(subject, key, index, p)?);
+            report.points.push(point(subject, options, index, p)?);
         }
         for b in &branch.bifurcations {
             report
                 .bifurcations
-                .push(bifurcation(subject, key, index, b)?);
+                .push(bifurcation(subject, options, index, b)?);
         }
     }
     Ok(report)
@@ -686,30 +595,31 @@ fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
 /// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.
 fn seen(
     subject: &Subject,
-    key: Key,
+    options: &BranchOptions,
     parameter: f64,
     orbit: &PeriodicOrbit,
-) -> Result<(Sight, Option<PhysicalSight>), BranchError> {
-    let here = subject.with(key, parameter);
+) -> Result<(Observables, Option<PhysicalMotion>), BranchError> {
+    let here = subject.with(options.key, parameter);
     let model = here.model().map_err(|error| BranchError::Model {
-        name: key.name(),
+        name: options.key.name(),
         value: parameter,
         error,
     })?;
-    let sight = Sight::of(&model, orbit)?;
+    let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+    let observables = measure(&model, start, orbit.period, options.observables)?;
     let physical = here
         .resolved()
-        .map(|resolved| PhysicalSight::of(&sight, resolved));
-    Ok((sight, physical))
+        .map(|resolved| PhysicalMotion::of(&observables, resolved));
+    Ok((observables, physical))
 }
 
 fn point(
     subject: &Subject,
-    key: Key,
+    options: &BranchOptions,
     branch: usize,
     p: &BranchPoint,
 ) -> Result<PointReport, BranchError> {
-    let (sight, physical) = seen(subject, key, p.parameter, &p.orbit)?;
+    let (observables, physical) = seen(subject, options, p.parameter, &p.orbit)?;
     Ok(PointReport {
         branch,
         period: p.orbit.period,
@@ -717,18 +627,18 @@ fn point(
         state: p.orbit.states.first().cloned().unwrap_or_default(),
         multipliers: pairs(&p.orbit.multipliers),
         stable: p.orbit.is_stable(),
-        sight,
+        observables,
         physical,
     })
 }
 
 fn bifurcation(
     subject: &Subject,
-    key: Key,
+    options: &BranchOptions,
     branch: usize,
     b: &Bifurcation,
 ) -> Result<BifurcationReport, BranchError> {
-    let (sight, physical) = seen(subject, key, b.parameter, &b.orbit)?;
+    let (observables, physical) = seen(subject, options, b.parameter, &b.orbit)?;
     let (angle, time) = match b.kind {
         BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
         BifurcationKind::Grazing { time } => (None, Some(time)),
@@ -744,7 +654,7 @@ fn bifurcation(
         multipliers: pairs(&b.orbit.multipliers),
         angle,
         time,
-        sight,
+        observables,
         physical,
     })
 }

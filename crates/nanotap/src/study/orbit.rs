@@ -1,17 +1,20 @@
 //! A periodic orbit by Newton, with its stability and what can be read off it.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 use nanotap_dynamics::{
     Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
     Stability, Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
 };
-use nanotap_flow::{FlowError, Trajectory};
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Flow, FlowError, Trajectory};
 use serde::Serialize;
 
 use crate::model::strobe::Strobe;
 use crate::model::{Forgetting, Model};
-use crate::observe::{Observables, Spectrum};
-use crate::study::simulate::{ContactEvent, Named, SimulateError, contact_events, starting_state};
+use crate::observe::{ContactEvent, Contacts, Measurement, Observables, Set, Spectrum};
+use crate::study::simulate::{Named, SimulateError, starting_state};
 use crate::study::start_box::default_box;
 
 /// How to look for an orbit.
@@ -248,8 +251,16 @@ pub fn report(
     harmonics: usize,
 ) -> Result<OrbitReport, OrbitError> {
     let start = orbit.states.first().cloned().unwrap_or_default();
-    let trajectory = Trajectory::record(&model.system, &start, orbit.period)?;
-    let observables = Observables::of(model, &trajectory).ok_or(OrbitError::NoPeriod)?;
+    let mut measurement = Measurement::new(model, Set::ALL)?;
+    let mut contacts = Contacts::of(model);
+    let mut recorder = Recorder::default();
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(&start, 0.0)?;
+    for _ in 0..orbit.period {
+        flow.run_period(&mut (&mut measurement, &mut (&mut contacts, &mut recorder)))?;
+    }
+    let trajectory = recorder.finish(Arc::clone(&model.system));
+    let observables = measurement.observables()?;
     Ok(OrbitReport {
         period: orbit.period,
         state: start,
@@ -268,7 +279,7 @@ pub fn report(
             Stability::Marginal => "marginal",
         },
         determinant_defect: determinant_defect(model, orbit, &trajectory),
-        events: contact_events(model, &trajectory, 0.0),
+        events: contacts.events(),
         spectrum: Spectrum::of(model, &trajectory, orbit.period, harmonics),
         observables,
         trajectory,

@@ -17,8 +17,8 @@ use super::approach::{
 };
 use crate::case::physical::{Kind, Remark};
 use crate::model::strobe::Strobe;
-use crate::observe::PhysicalSight;
-use crate::study::branch::{PointReport, Sight};
+use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::branch::PointReport;
 use crate::study::studied::Studied;
 
 /// Why no distance was chosen.
@@ -95,9 +95,9 @@ pub struct SetpointSolution {
     pub state: Vec<f64>,
     /// What it looks like.
     #[serde(flatten)]
-    pub sight: Sight,
+    pub observables: Observables,
     /// The same in SI.
-    pub physical: PhysicalSight,
+    pub physical: PhysicalMotion,
 }
 
 /// The setpoint solved for the distance.
@@ -187,7 +187,7 @@ pub fn solve_setpoint(
         .max_by(|a, b| a.1.gap.total_cmp(&b.1.gap))
         .map(|(k, _)| k);
     let amplitude = |p: &ApproachPoint| {
-        p.sight
+        p.observables
             .map_or(f64::NAN, |s| s.first_harmonic / curve.free_amplitude)
     };
     let Some(chosen) = reached else {
@@ -229,15 +229,15 @@ fn bracket(
     let mut least = f64::INFINITY;
     for pair in there.windows(2) {
         let (before, after) = (pair[0], pair[1]);
-        let Some(sight) = after.sight.filter(|_| after.period.is_some()) else {
+        let Some(observables) = after.observables.filter(|_| after.period.is_some()) else {
             return Err(SetpointError::NotPeriodic {
                 what: after.classification.name(),
                 at: told(after),
                 ratio,
             });
         };
-        least = least.min(sight.first_harmonic);
-        if sight.first_harmonic <= target {
+        least = least.min(observables.first_harmonic);
+        if observables.first_harmonic <= target {
             return Ok((before, after));
         }
     }
@@ -255,7 +255,7 @@ fn all_solutions(studied: &Studied, curve: &ApproachReport, target: f64) -> Vec<
     let mut found: Vec<SetpointSolution> = Vec::new();
     for pair in branches.points.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);
-        let excess = |p: &PointReport| p.sight.first_harmonic - target;
+        let excess = |p: &PointReport| p.observables.first_harmonic - target;
         if a.branch != b.branch || (excess(a) > 0.0) == (excess(b) > 0.0) {
             continue;
         }
@@ -264,7 +264,7 @@ fn all_solutions(studied: &Studied, curve: &ApproachReport, target: f64) -> Vec<
             let known = |s: &SetpointSolution| {
                 s.period == solution.period
                     && (s.gap - solution.gap).abs() <= near
-                    && (s.sight.phase - solution.sight.phase).abs() < 1e-4
+                    && (s.observables.phase - solution.observables.phase).abs() < 1e-4
             };
             if !found.iter().any(known) {
                 found.push(solution);
@@ -286,8 +286,11 @@ fn crossing(
     target: f64,
 ) -> Option<SetpointSolution> {
     let resolved = studied.resolved.as_ref()?;
-    let (mut low, mut high) = ((0.0, a.sight.first_harmonic), (1.0, b.sight.first_harmonic));
-    let mut closed: Option<(f64, PeriodicOrbit, Sight)> = None;
+    let (mut low, mut high) = (
+        (0.0, a.observables.first_harmonic),
+        (1.0, b.observables.first_harmonic),
+    );
+    let mut closed: Option<(f64, PeriodicOrbit, Observables)> = None;
     for _ in 0..STEPS {
         // The curve is nearly straight between two points of a branch.
         let slope = (high.1 - low.1) / (high.0 - low.0);
@@ -297,9 +300,9 @@ fn crossing(
         } else {
             0.5 * (low.0 + high.0)
         };
-        let (gap, orbit, sight) = orbit_between(studied, a, b, t)?;
-        let value = sight.first_harmonic;
-        closed = Some((gap, orbit, sight));
+        let (gap, orbit, observables) = orbit_between(studied, a, b, t)?;
+        let value = observables.first_harmonic;
+        closed = Some((gap, orbit, observables));
         if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
             break;
         }
@@ -309,9 +312,9 @@ fn crossing(
             high = (t, value);
         }
     }
-    let (gap, orbit, sight) = closed?;
+    let (gap, orbit, observables) = closed?;
     // Where a fold lies between the points, Newton may have closed the other orbit.
-    if (sight.first_harmonic - target).abs() > 1e-6 * target.abs() {
+    if (observables.first_harmonic - target).abs() > 1e-6 * target.abs() {
         return None;
     }
     Some(SetpointSolution {
@@ -322,8 +325,8 @@ fn crossing(
         spectral_radius: orbit.spectral_radius(),
         reached: false,
         state: orbit.states.first().cloned().unwrap_or_default(),
-        physical: PhysicalSight::of(&sight, resolved),
-        sight,
+        physical: PhysicalMotion::of(&observables, resolved),
+        observables,
     })
 }
 
@@ -333,7 +336,7 @@ fn orbit_between(
     a: &PointReport,
     b: &PointReport,
     t: f64,
-) -> Option<(f64, PeriodicOrbit, Sight)> {
+) -> Option<(f64, PeriodicOrbit, Observables)> {
     use nanotap_dynamics::StroboscopicMap as _;
     let gap = a.parameter + t * (b.parameter - a.parameter);
     let subject = &studied.subject;
@@ -352,8 +355,9 @@ fn orbit_between(
     }
     let orbit =
         close_orbit_from_points(&mut map, &points, a.period, &ShootingOptions::default()).ok()?;
-    let sight = Sight::of(&model, &orbit).ok()?;
-    (orbit.period == a.period).then_some((gap, orbit, sight))
+    let start = orbit.states.first()?;
+    let observables = measure(&model, start, orbit.period, Set::COMMON).ok()?;
+    (orbit.period == a.period).then_some((gap, orbit, observables))
 }
 
 impl From<SetpointError> for crate::Error {

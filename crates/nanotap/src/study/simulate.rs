@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::model::Model;
 use crate::model::strobe::Strobe;
-use crate::observe::{Observables, begins_contact};
+use crate::observe::{ContactEvent, Contacts, Measurement, Observables, Set};
 
 /// How to run.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,8 @@ pub struct SimulateOptions {
     pub state: Option<Vec<f64>>,
     /// How many of the last states at drive phase 0 to keep.
     pub strobe: usize,
+    /// What is measured.
+    pub observables: Set,
     /// Budgets for naming the motion.
     pub settle: SettleOptions,
 }
@@ -35,6 +37,7 @@ impl Default for SimulateOptions {
             transient: None,
             state: None,
             strobe: 1,
+            observables: Set::ALL,
             settle: SettleOptions::default(),
         }
     }
@@ -98,29 +101,6 @@ impl Classification {
     }
 }
 
-/// A switch between flight and contact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ContactEvent {
-    /// When, counted from the end of the transient.
-    pub tau: f64,
-    /// Which way.
-    pub kind: ContactEventKind,
-    /// Rate of the gap just before it.
-    pub gap_rate: f64,
-}
-
-/// Which way a switch goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactEventKind {
-    /// The tip meets the sample.
-    ContactStart,
-    /// The tip leaves it.
-    ContactEnd,
-    /// The tip bounces off a rigid stop.
-    Impact,
-}
-
 /// A finished run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Simulation {
@@ -162,8 +142,8 @@ pub struct Simulation {
     pub trajectory: Trajectory,
 }
 
-/// Periods observed in one piece; bounds the memory of long runs.
-const BLOCK: usize = 512;
+/// Periods recorded for figures; bounds the memory of long runs.
+const SHOWN: usize = 512;
 /// A run this near to a periodic orbit, as a part of its size, has arrived.
 const ARRIVED: f64 = 1e-11;
 
@@ -299,71 +279,34 @@ fn record(
     let (periods_per_second, evaluations_per_period) = speed(model, state, options.periods)?;
     let mut flow = Flow::new(Arc::clone(&model.system));
     flow.start(state, 0.0)?;
+    let mut measurement = Measurement::new(model, options.observables)?;
+    let mut contacts = Contacts::of(model);
+    let mut recorder = Recorder::default();
     let mut strobe = Vec::new();
-    let mut events = Vec::new();
-    let mut first: Option<Trajectory> = None;
-    let mut observables: Option<Observables> = None;
-    let mut done = 0;
-    while done < options.periods {
-        let block = BLOCK.min(options.periods - done);
-        let mut recorder = Recorder::default();
-        for k in 0..block {
-            flow.run_period(&mut recorder)?;
-            if done + k + 1 + options.strobe > options.periods {
-                let mut x = vec![0.0; model.dimension()];
-                flow.state(&mut x);
-                strobe.push(x);
-            }
+    for k in 0..options.periods {
+        let mut both = (&mut measurement, &mut contacts);
+        if k < SHOWN {
+            flow.run_period(&mut (&mut both, &mut recorder))?;
+        } else {
+            flow.run_period(&mut both)?;
         }
-        let trajectory = recorder.finish(Arc::clone(&model.system));
-        let offset = done as f64 * model.period();
-        events.extend(contact_events(model, &trajectory, offset));
-        if let Some(next) = Observables::of(model, &trajectory) {
-            observables = Some(observables.map_or_else(|| next.clone(), |o| o.joined(&next)));
+        if k + 1 + options.strobe > options.periods {
+            let mut x = vec![0.0; model.dimension()];
+            flow.state(&mut x);
+            strobe.push(x);
         }
-        first.get_or_insert(trajectory);
-        done += block;
     }
-    // Both are there: at least one period was recorded.
-    let (Some(trajectory), Some(observables)) = (first, observables) else {
-        return Err(SimulateError::NoPeriods);
-    };
     let mut end = vec![0.0; model.dimension()];
     flow.state(&mut end);
     Ok(Record {
         end,
         strobe,
-        events,
-        observables,
+        events: contacts.events(),
+        observables: measurement.observables()?,
         periods_per_second,
         evaluations_per_period,
-        trajectory,
+        trajectory: recorder.finish(Arc::clone(&model.system)),
     })
-}
-
-/// What can be read off `periods` drive periods from `state` at drive phase 0.
-///
-/// # Errors
-/// When the flow fails or nothing is to be recorded.
-pub fn observe(model: &Model, state: &[f64], periods: usize) -> Result<Observables, SimulateError> {
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(state, 0.0)?;
-    let mut observables: Option<Observables> = None;
-    let mut done = 0;
-    while done < periods {
-        let block = BLOCK.min(periods - done);
-        let mut recorder = Recorder::default();
-        for _ in 0..block {
-            flow.run_period(&mut recorder)?;
-        }
-        let trajectory = recorder.finish(Arc::clone(&model.system));
-        if let Some(next) = Observables::of(model, &trajectory) {
-            observables =
-                Some(observables.map_or_else(|| next.clone(), |so_far| so_far.joined(&next)));
-        }
-        done += block;
-    }
-    observables.ok_or(SimulateError::NoPeriods)
 }
 
 /// Speed of the bare propagation and gap evaluations a period.
@@ -377,38 +320,6 @@ fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), Sim
     let seconds = clock.elapsed().as_secs_f64().max(1e-9);
     let evaluations = flow.statistics().evaluations as f64;
     Ok((periods as f64 / seconds, evaluations / periods as f64))
-}
-
-/// The contacts of a recording, their times shifted by `offset`.
-pub fn contact_events(model: &Model, trajectory: &Trajectory, offset: f64) -> Vec<ContactEvent> {
-    trajectory
-        .events()
-        .iter()
-        .filter_map(|e| {
-            let kind = if begins_contact(model, e.from, e.to) {
-                if e.from == e.to {
-                    ContactEventKind::Impact
-                } else {
-                    ContactEventKind::ContactStart
-                }
-            } else if model.contact[e.from] && !model.contact[e.to] {
-                ContactEventKind::ContactEnd
-            } else {
-                return None;
-            };
-            // The guard's rate points into the regime left; the gap's has one sign.
-            let gap_rate = if model.contact[e.from] {
-                -e.rate
-            } else {
-                e.rate
-            };
-            Some(ContactEvent {
-                tau: offset + e.time,
-                kind,
-                gap_rate,
-            })
-        })
-        .collect()
 }
 
 /// The largest exponent in words.

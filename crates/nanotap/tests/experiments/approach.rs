@@ -59,7 +59,7 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
     assert!(fold > 1.1 * report.free_reach, "{fold}");
     let step = (report.from - report.to) / 79.0;
     for p in &report.table {
-        let sight = p.sight.as_ref().unwrap();
+        let sight = p.observables.as_ref().unwrap();
         let taps = sight.contact_fraction > 0.0;
         let expected = match p.way {
             Way::Approach => p.gap < report.free_reach,
@@ -79,13 +79,13 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
         branches.points.windows(2).any(|pair| {
             let (a, b) = (&pair[0], &pair[1]);
             let t = (gap - a.parameter) / (b.parameter - a.parameter);
-            let between =
-                a.sight.first_harmonic + t * (b.sight.first_harmonic - a.sight.first_harmonic);
+            let between = a.observables.first_harmonic
+                + t * (b.observables.first_harmonic - a.observables.first_harmonic);
             (0.0..=1.0).contains(&t) && (between / amplitude - 1.0).abs() < 1e-2
         })
     };
     for p in &report.table {
-        let amplitude = p.sight.as_ref().unwrap().first_harmonic;
+        let amplitude = p.observables.as_ref().unwrap().first_harmonic;
         assert!(stable(p.gap, amplitude), "{:?} {}", p.way, p.gap);
     }
 }
@@ -103,16 +103,22 @@ fn a_physical_curve_is_told_in_si() {
     let resolved = lever.resolved.as_ref().unwrap();
     assert!((report.free_amplitude * resolved.scales.length / 20e-9 - 1.0).abs() < 1e-9);
     for p in &report.table {
-        let (sight, si) = (p.sight.as_ref().unwrap(), p.physical.as_ref().unwrap());
+        let (sight, si) = (
+            p.observables.as_ref().unwrap(),
+            p.physical.as_ref().unwrap(),
+        );
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
         assert!(near(p.zc.unwrap(), p.gap * resolved.scales.length));
         assert!(near(
-            si.first_harmonic,
+            si.observables.first_harmonic,
             sight.first_harmonic * resolved.scales.length
         ));
-        assert!(near(si.amplitude_ratio, si.first_harmonic / 20e-9));
         assert!(near(
-            si.peak_force,
+            si.amplitude_ratio,
+            si.observables.first_harmonic / 20e-9
+        ));
+        assert!(near(
+            si.observables.peak_force,
             sight.peak_force * resolved.scales.length * 42.0 / 3.0
         ));
     }
@@ -138,7 +144,7 @@ fn what_is_chaotic_is_called_so() {
     let at_zero = report.table.iter().filter(|p| p.gap == 0.0);
     for p in at_zero {
         assert_eq!(p.classification, Classification::Chaotic);
-        assert!(p.period.is_none() && p.sight.unwrap().contact_fraction > 0.0);
+        assert!(p.period.is_none() && p.observables.unwrap().contact_fraction > 0.0);
     }
     assert_eq!(report.table.len(), 8);
 }

@@ -28,7 +28,10 @@ fn greatest_deviation(set: &[&str]) -> f64 {
         ..ApproachOptions::default()
     };
     let curve = approach(&lever, &options, &Control::default()).unwrap();
-    let tapping = curve.table.iter().filter_map(|p| p.physical.as_ref());
+    let tapping = curve
+        .table
+        .iter()
+        .filter_map(|p| Some(p.physical.as_ref()?.observables));
     let mut worst = 0.0_f64;
     let mut count = 0;
     for p in tapping.filter(|p| p.contact_time > 0.0) {
@@ -71,7 +74,7 @@ fn the_amplitude_follows_the_distance() {
         .table
         .iter()
         .filter(|p| p.way == Way::Approach)
-        .filter_map(|p| Some((p.zc?, p.physical?)))
+        .filter_map(|p| Some((p.zc?, p.physical.as_ref()?.observables)))
         .filter(|(zc, p)| p.contact_time > 0.0 && *zc > 2e-9 && *zc < 18e-9)
         .collect();
     assert!(tapping.len() > 10);
@@ -106,7 +109,7 @@ fn the_setpoint_lies_on_the_approach_curve() {
     let amplitudes: Vec<f64> = curve
         .table
         .iter()
-        .map(|p| p.physical.unwrap().amplitude_ratio)
+        .map(|p| p.physical.as_ref().unwrap().amplitude_ratio)
         .collect();
     assert!(amplitudes[0] > 0.6 && amplitudes[2] < 0.6, "{amplitudes:?}");
     assert!((amplitudes[1] - 0.6).abs() < 1e-8, "{amplitudes:?}");

@@ -5,7 +5,7 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::Observables;
+use nanotap::observe::{Set, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
@@ -57,7 +57,7 @@ fn every_law_agrees_with_located_runge_kutta() {
                     independent.beam
                 );
             }
-            let seen = Observables::of(&model, &run).unwrap();
+            let seen = measure(&model, &state, 5, Set::ALL).unwrap();
             let contacts = (seen.contacts_per_period * 5.0).round() as usize;
             assert_eq!(contacts, independent.contacts, "{law} {omega}");
             let lost = seen.energy_balance.sample_damping;
@@ -163,7 +163,7 @@ proptest! {
             state[2 * modes] = memory;
         }
         let run = Trajectory::record(&model.system, &state, 8).unwrap();
-        let seen = Observables::of(&model, &run).unwrap();
+        let seen = measure(&model, &state, 8, Set::ALL).unwrap();
         prop_assert!(seen.energy_balance.sample_damping >= 0.0);
         if law != ContactLaw::SpringDamper {
             let scale = seen.peak_force.max(stiffness * (a.abs() + memory.abs())) + 1e-3;

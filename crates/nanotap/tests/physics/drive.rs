@@ -7,9 +7,9 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::{Observables, Spectrum};
+use nanotap::observe::{Set, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap_flow::{Complex, Flow, Trajectory};
+use nanotap_flow::{Complex, Flow};
 
 use crate::contact_laws::on;
 use crate::derivatives::{advance, worst};
@@ -48,14 +48,13 @@ fn tones_superpose_in_free_flight() {
         let found = orbit(&model, &OrbitOptions::default()).unwrap();
         assert!(found.events.is_empty() && found.period == 1);
         let o = &found.observables;
-        let second = o.second_tone.unwrap();
         let tones = [
             (case.alpha2, case.omega, o.first_harmonic, o.phase),
             (
                 case.tone2_amplitude,
                 6.25 * case.omega,
-                second.amplitude,
-                second.phase,
+                o.tone2_response.unwrap(),
+                o.tone2_lag.unwrap(),
             ),
         ];
         for (drive, frequency, amplitude, phase) in tones {
@@ -68,7 +67,7 @@ fn tones_superpose_in_free_flight() {
             assert!(off.min(360.0 - off) < 1e-8, "{actuation}: {off}");
         }
         // All of the motion is in these two.
-        let power = 0.5 * (o.first_harmonic.powi(2) + second.amplitude.powi(2));
+        let power = 0.5 * (o.first_harmonic.powi(2) + o.tone2_response.unwrap().powi(2));
         assert!((o.rms_deflection.powi(2) / power - 1.0).abs() < 1e-10);
         let spectrum = Spectrum::of(&model, &found.trajectory, 1, 8);
         let at = |order: f64| {
@@ -79,7 +78,7 @@ fn tones_superpose_in_free_flight() {
             found.unwrap().tip
         };
         assert!((at(1.0) - o.first_harmonic).abs() < 1e-12);
-        assert!((at(6.25) - second.amplitude).abs() < 1e-12);
+        assert!((at(6.25) - o.tone2_response.unwrap()).abs() < 1e-12);
         assert!(at(2.0) < 1e-12 && at(0.25) < 1e-12);
     }
 }
@@ -126,8 +125,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
             let model = subject.model().unwrap();
             let mut state = vec![0.0; model.dimension()];
             state[0] = 0.1;
-            let run = Trajectory::record(&model.system, &state, 3).unwrap();
-            let seen = Observables::of(&model, &run).unwrap();
+            let seen = measure(&model, &state, 3, Set::ALL).unwrap();
             assert!(
                 seen.energy_balance.residual.abs() < 1e-11,
                 "{actuation} {law}"

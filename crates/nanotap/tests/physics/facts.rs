@@ -3,6 +3,7 @@
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
+use nanotap::observe::{Set, measure};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
@@ -198,7 +199,7 @@ proptest! {
         let model = Model::cantilever(&case).unwrap();
         let start = vec![0.0; 2 * modes];
         let run = Trajectory::record(&model.system, &start, 12).unwrap();
-        let seen = nanotap::observe::Observables::of(&model, &run).unwrap();
+        let seen = measure(&model, &start, 12, Set::ALL).unwrap();
         prop_assert!(seen.energy_balance.residual.abs() < 1e-11, "{:?}", seen.energy_balance);
 
         let doubled = Model::cantilever(&Cantilever { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
@@ -238,9 +239,9 @@ fn clearance_of_a_long_run_is_the_least_of_its_periods() {
         let model = Model::cantilever(&case).unwrap();
         let seen = |state: &[f64], periods: usize| {
             let run = Trajectory::record(&model.system, state, periods).unwrap();
-            let clearance = nanotap::observe::Observables::of(&model, &run).unwrap();
+            let seen = measure(&model, state, periods, Set::ALL).unwrap();
             (
-                clearance.beam_clearance.unwrap().height,
+                seen.beam_clearance.unwrap(),
                 run.state_at(run.end()).unwrap(),
             )
         };

@@ -2,7 +2,7 @@
 //! sticking, and the soft stop in the limit of infinite stiffness.
 
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::observe::Observables;
+use nanotap::observe::{Set, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 
@@ -147,7 +147,7 @@ fn sticking_ends_when_the_force_changes_sign() {
         (releases[0] - quarter).abs() < 1e-10,
         "{releases:?} {quarter}"
     );
-    let seen = Observables::of(&model, &run).unwrap();
+    let seen = measure(&model, &[0.0, 0.0], 3, Set::ALL).unwrap();
     assert!(seen.tip_max <= 1e-12);
     assert!(
         seen.energy_balance.residual.abs() < 1e-9,

@@ -11,6 +11,7 @@ use crate::case::physical::Kind as QuantityKind;
 use crate::case::subject::Subject;
 use crate::dataset::schema::Kind;
 use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
+use crate::observe::{Dimension, Observable, Set};
 use crate::study::simulate::Classification;
 
 /// Chunks that a large sweep is cut into at least: enough for a job array, few enough
@@ -104,11 +105,14 @@ fn state_names(subject: &Subject, options: &SweepOptions) -> Result<Vec<String>,
 
 /// The variables; in SI where physical quantities vary, else in the model's units.
 fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
-    let [length, force, speed, energy] = if si {
-        ["m", "N", "m/s", "J"]
-    } else {
-        ["g0", "EI g0/L^3", "g0 sqrt(EI/(m L^4))", "EI g0^2/L^3"]
+    let unit = |dimension: Dimension| {
+        if si {
+            dimension.si_unit()
+        } else {
+            dimension.model_unit()
+        }
     };
+    let length = unit(Dimension::Length);
     let real = |name, long_name, units| Variable::new(name, Kind::Real, long_name, units);
     let names: Vec<&str> = CLASSES.iter().map(|c| c.name()).collect();
     let flags: Vec<usize> = (0..=CLASSES.len()).collect();
@@ -129,44 +133,13 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
             "periods before the recording",
             "drive periods",
         ),
-        real("tip_max", "greatest tip deflection W", length),
-        real("tip_min", "least tip deflection W", length),
-        real(
-            "amplitude",
-            "half of peak to peak of the tip deflection",
-            length,
-        ),
-        real("mean_deflection", "mean tip deflection", length),
-        real(
-            "first_harmonic",
-            "amplitude of the tip deflection at the drive frequency",
-            length,
-        ),
-        real("phase", "its lag behind the drive", "degree"),
-        real(
-            "indentation",
-            "greatest depth below the resting surface",
-            length,
-        ),
-        real("mean_force", "mean force of the sample on the tip", force),
-        real(
-            "dissipation",
-            "energy that the sample takes in a drive period",
-            energy,
-        ),
-        real("virial", "mean of force times tip deflection", energy),
-        real("contact_fraction", "part of the time in contact", "1"),
-        real("contacts_per_period", "contacts begun a drive period", "1"),
-        real(
-            "peak_force",
-            "greatest force of the sample on the tip",
-            force,
-        ),
-        real(
-            "impact_speed",
-            "greatest speed at which a contact begins",
-            speed,
-        ),
+    ];
+    variables.extend(
+        Set::COMMON
+            .iter()
+            .map(|o| real(o.name, o.words, unit(o.dimension))),
+    );
+    variables.extend([
         real(
             "multiplier",
             "largest modulus of a Floquet multiplier of the orbit",
@@ -190,7 +163,7 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
             length,
         )
         .along(PERIODS, options.periods),
-    ];
+    ]);
     if strobe > 0 {
         variables.push(
             real(
@@ -299,6 +272,15 @@ pub(super) fn columns(schema: &Schema, outcomes: &[Outcome]) -> Vec<Values> {
         let fits = |o| i32::try_from(value(o)).unwrap_or(i32::MAX);
         Values::Whole(outcomes.iter().map(fits).collect())
     };
+    let observed = |observable: &Observable| {
+        let value = |o: &Outcome| (observable.of)(&o.observables).number();
+        Values::Real(
+            outcomes
+                .iter()
+                .map(|o| value(o).unwrap_or(f64::NAN))
+                .collect(),
+        )
+    };
     let rows = |variable: &Variable, row: &dyn Fn(&Outcome) -> Vec<f64>| {
         let stride = variable.stride();
         let mut all = Vec::with_capacity(outcomes.len() * stride);
@@ -326,26 +308,15 @@ pub(super) fn columns(schema: &Schema, outcomes: &[Outcome]) -> Vec<Values> {
             }
             "period" => whole(|o| o.period),
             "transient" => whole(|o| o.transient),
-            "tip_max" => real(|o| o.observables.tip_max),
-            "tip_min" => real(|o| o.observables.tip_min),
-            "amplitude" => real(|o| o.observables.amplitude),
-            "mean_deflection" => real(|o| o.observables.mean_deflection),
-            "first_harmonic" => real(|o| o.observables.first_harmonic),
-            "phase" => real(|o| o.observables.phase),
-            "indentation" => real(|o| o.observables.indentation),
-            "mean_force" => real(|o| o.observables.mean_force),
-            "dissipation" => real(|o| o.observables.dissipation),
-            "virial" => real(|o| o.observables.virial),
-            "contact_fraction" => real(|o| o.observables.contact_fraction),
-            "contacts_per_period" => real(|o| o.observables.contacts_per_period),
-            "peak_force" => real(|o| o.observables.peak_force),
-            "impact_speed" => real(|o| o.observables.impact_speed),
             "multiplier" => real(|o| o.multiplier),
             "lyapunov" => real(|o| o.lyapunov),
             "lyapunov_error" => real(|o| o.lyapunov_error),
             "period_max" => rows(variable, &|o| o.highs.clone()),
             "period_min" => rows(variable, &|o| o.lows.clone()),
-            _ => rows(variable, &strobe),
+            name => match Observable::named(name) {
+                Some(observable) => observed(observable),
+                None => rows(variable, &strobe),
+            },
         })
         .collect()
 }

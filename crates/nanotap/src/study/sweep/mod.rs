@@ -29,7 +29,6 @@ mod error;
 mod figure;
 mod follow;
 mod over;
-mod record;
 mod run;
 mod summary;
 

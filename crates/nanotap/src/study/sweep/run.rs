@@ -3,7 +3,6 @@
 use nanotap_dynamics::{PeriodicOrbit, SettleOptions, StroboscopicMap, settle};
 use nanotap_flow::{Flow, FlowError};
 
-use super::record::{Observables, Record};
 use super::{Sweep, SweepOptions};
 use crate::case::physical::Scales;
 use crate::case::subject::Subject;
@@ -11,6 +10,7 @@ use crate::dataset::Block;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::with_modes;
+use crate::observe::{Measurement, Observables, Set};
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::box_with;
 
@@ -260,44 +260,55 @@ impl<'a> Runner<'a> {
     ) -> (Outcome, Option<Vec<f64>>) {
         let periods = self.options.periods;
         let turn = period.unwrap_or(periods);
-        let mut record = Record::new(self.model);
-        let states = match self.watch(from, turn, &mut record) {
-            Ok(states) => states,
+        let Watched {
+            observables,
+            states,
+            lows,
+            highs,
+        } = match self.watch(from, turn) {
+            Ok(watched) => watched,
             Err(error) => return (Outcome::unknown(class_of(&error), outcome.transient), None),
         };
-        outcome.observables = record.observables();
-        if let Some(scales) = &self.scales {
-            outcome.observables = outcome.observables.in_si(scales);
-            for extremum in record.highs.iter_mut().chain(&mut record.lows) {
-                *extremum *= scales.length;
-            }
-        }
-        outcome.highs = (0..periods).map(|k| record.highs[k % turn]).collect();
-        outcome.lows = (0..periods).map(|k| record.lows[k % turn]).collect();
+        let scales = self.scales.as_ref();
+        outcome.observables = scales.map_or(observables, |scales| observables.in_si(scales));
+        let length = scales.map_or(1.0, |scales| scales.length);
+        outcome.highs = (0..periods).map(|k| length * highs[k % turn]).collect();
+        outcome.lows = (0..periods).map(|k| length * lows[k % turn]).collect();
         let first = periods - self.options.strobe.min(periods);
         outcome.strobe = (first..periods).map(|k| states[k % turn].clone()).collect();
         let end = states[(periods - 1) % turn].clone();
         (outcome, Some(end))
     }
 
-    /// Runs `periods` periods; the states at their ends.
-    fn watch(
-        &self,
-        from: &[f64],
-        periods: usize,
-        record: &mut Record<'_>,
-    ) -> Result<Vec<Vec<f64>>, FlowError> {
+    /// Runs `periods` periods and measures them.
+    fn watch(&self, from: &[f64], periods: usize) -> Result<Watched, FlowError> {
+        let mut measurement = Measurement::new(self.model, Set::COMMON)?.of_each_period();
         let mut flow = Flow::new(std::sync::Arc::clone(&self.model.system));
         flow.start(from, 0.0)?;
         let mut states = Vec::with_capacity(periods);
         for _ in 0..periods {
-            flow.run_period(record)?;
+            flow.run_period(&mut measurement)?;
             let mut state = vec![0.0; from.len()];
             flow.state(&mut state);
             states.push(state);
         }
-        Ok(states)
+        Ok(Watched {
+            lows: measurement.lows().to_vec(),
+            highs: measurement.highs().to_vec(),
+            observables: measurement.observables()?,
+            states,
+        })
     }
+}
+
+/// What was seen of some periods.
+struct Watched {
+    observables: Observables,
+    /// States at their ends.
+    states: Vec<Vec<f64>>,
+    /// Least and greatest tip deflection of each.
+    lows: Vec<f64>,
+    highs: Vec<f64>,
 }
 
 /// The state of the orbit that is nearest to `state`.

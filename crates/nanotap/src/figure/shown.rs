@@ -1,0 +1,95 @@
+//! What of a motion a figure shows along an axis.
+
+use crate::case::physical::Kind;
+use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use crate::case::units::prefixed;
+use crate::observe::table::shown_phase;
+use crate::observe::{Dimension, Observable, Observables};
+
+/// What of an orbit is drawn: an observable that is one number, or what its multipliers say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// An observable.
+    Observable(&'static Observable),
+    /// Largest modulus of a multiplier.
+    SpectralRadius,
+}
+
+const SPECTRAL_RADIUS: &str = "spectral_radius";
+
+impl Shown {
+    /// The choice of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        if name == SPECTRAL_RADIUS {
+            return Some(Self::SpectralRadius);
+        }
+        let observable = Observable::named(name).filter(|o| o.is_number)?;
+        Some(Self::Observable(observable))
+    }
+
+    /// Every choice by name, and what it is.
+    pub fn choices() -> impl Iterator<Item = (&'static str, &'static str)> {
+        crate::observe::OBSERVABLES
+            .iter()
+            .filter(|o| o.is_number)
+            .map(|o| (o.name, o.words))
+            .chain([(SPECTRAL_RADIUS, "largest modulus of a multiplier")])
+    }
+
+    /// The observable, if it is one.
+    pub const fn observable(self) -> Option<&'static Observable> {
+        match self {
+            Self::Observable(observable) => Some(observable),
+            Self::SpectralRadius => None,
+        }
+    }
+
+    /// Its value; not a number where the motion has none.
+    pub(crate) fn of(self, observables: &Observables, multipliers: &[[f64; 2]]) -> f64 {
+        match self {
+            Self::SpectralRadius => multipliers
+                .iter()
+                .map(|[re, im]| re.hypot(*im))
+                .fold(0.0, f64::max),
+            Self::Observable(observable) => {
+                let value = (observable.of)(observables).number().unwrap_or(f64::NAN);
+                if self.is_phase() {
+                    shown_phase(value)
+                } else {
+                    value
+                }
+            }
+        }
+    }
+
+    /// Whether it is an angle, which comes round.
+    pub(crate) fn is_phase(self) -> bool {
+        self.observable()
+            .is_some_and(|o| o.dimension == Dimension::Angle)
+    }
+
+    /// The label of its axis, of a cantilever or an oscillator, for values up to `size`, and
+    /// what they are to be multiplied with. `si` says what a value of 1 is in SI, if that is
+    /// known. Energies are in electronvolts then.
+    pub(crate) fn axis(
+        self,
+        beam: bool,
+        si: impl Fn(Kind) -> Option<f64>,
+        size: f64,
+    ) -> (String, f64) {
+        let Self::Observable(observable) = self else {
+            return ("largest |$μ$|".to_owned(), 1.0);
+        };
+        let label = observable.axis_label(beam);
+        let Some((kind, si)) = observable.dimension.kind().and_then(|k| Some((k, si(k)?))) else {
+            return (label, 1.0);
+        };
+        if kind == Kind::Energy {
+            // The joule's prefixes stand for the electronvolt's.
+            let (factor, unit) = prefixed(kind, si / JOULES_PER_ELECTRONVOLT, size);
+            return (format!("{label} ({})", unit.replace('J', "eV")), factor);
+        }
+        let (factor, unit) = prefixed(kind, si, size);
+        (format!("{label} ({unit})"), factor)
+    }
+}

@@ -1,0 +1,101 @@
+//! When contacts begin and end.
+
+use nanotap_flow::flow::{Observer, SwitchView};
+use nanotap_flow::regime::ModalOutput;
+use serde::Serialize;
+
+use super::begins_contact;
+use crate::model::Model;
+
+/// A switch between flight and contact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ContactEvent {
+    /// When, counted from the end of the transient.
+    pub tau: f64,
+    /// Which way.
+    pub kind: ContactEventKind,
+    /// Rate of the gap just before it; where contact ends on a surface that recovers, that of
+    /// the tip's height.
+    pub gap_rate: f64,
+}
+
+/// Which way a switch goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactEventKind {
+    /// The tip meets the sample.
+    ContactStart,
+    /// The tip leaves it.
+    ContactEnd,
+    /// The tip bounces off a rigid stop.
+    Impact,
+}
+
+/// Notes the contacts of a motion while it runs.
+pub struct Contacts<'a> {
+    model: &'a Model,
+    /// Rate of the tip's height, an entry a regime. What ends a contact may be the force and
+    /// not the gap.
+    height_rate: Vec<ModalOutput>,
+    periods: usize,
+    events: Vec<ContactEvent>,
+}
+
+impl<'a> Contacts<'a> {
+    /// Of a motion of `model` that is still to run.
+    pub fn of(model: &'a Model) -> Self {
+        let drive = model.system.drive();
+        let rate = |r: &nanotap_flow::Regime| {
+            r.project(&model.height.rate(r.matrix(), r.forcing(), drive))
+        };
+        Self {
+            model,
+            height_rate: model.system.regimes().iter().map(rate).collect(),
+            periods: 0,
+            events: Vec::new(),
+        }
+    }
+
+    /// The contacts.
+    pub fn events(self) -> Vec<ContactEvent> {
+        self.events
+    }
+
+    fn height_rate(&self, view: &SwitchView<'_>) -> f64 {
+        let output = &self.height_rate[view.switch.from];
+        let drive = self.model.system.drive();
+        let phasors = (0..output.tones.len()).map(|k| drive.phasor(k, view.phase));
+        let modes = output.modal.iter().copied().zip(view.modal.iter().copied());
+        let tones = output.tones.iter().copied().zip(phasors);
+        let sum: f64 = modes.chain(tones).map(|(w, q)| (w * q).re).sum();
+        output.constant + sum
+    }
+}
+
+impl Observer for Contacts<'_> {
+    fn switch(&mut self, view: &SwitchView<'_>) {
+        let (from, to) = (view.switch.from, view.switch.to);
+        let contact = &self.model.contact;
+        let (kind, gap_rate) = if begins_contact(self.model, from, to) {
+            let kind = if from == to {
+                ContactEventKind::Impact
+            } else {
+                ContactEventKind::ContactStart
+            };
+            (kind, view.rate)
+        } else if contact[from] && !contact[to] {
+            (ContactEventKind::ContactEnd, self.height_rate(view))
+        } else {
+            return;
+        };
+        self.events.push(ContactEvent {
+            tau: self.periods as f64 * self.model.period() + view.phase,
+            kind,
+            gap_rate,
+        });
+    }
+
+    fn period_end(&mut self) {
+        self.periods += 1;
+    }
+}

@@ -1,0 +1,97 @@
+//! What kind of quantity an observable is, and its units: the model's own and SI.
+
+use crate::case::physical::{Kind, Scales};
+
+/// The dimension of an observable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// Deflection, gap, depth: g₀.
+    Length,
+    /// √(mL⁴/EI).
+    Time,
+    /// Length over time.
+    Velocity,
+    /// EI g₀/L³.
+    Force,
+    /// Force times length.
+    Energy,
+    /// Energy over time.
+    Power,
+    /// Slope dW/dξ: g₀/L.
+    Slope,
+    /// Degrees.
+    Angle,
+    /// A pure number: a part, a ratio.
+    Number,
+    /// A number of things.
+    Count,
+    /// A number of things a drive period.
+    PerPeriod,
+    /// Drive periods.
+    Periods,
+    /// A place along the beam, 0 (clamp) to 1 (tip).
+    Place,
+}
+
+impl Dimension {
+    /// The model's unit.
+    pub const fn model_unit(self) -> &'static str {
+        match self {
+            Self::Length => "g0",
+            Self::Time => "sqrt(m L^4/EI)",
+            Self::Velocity => "g0 sqrt(EI/(m L^4))",
+            Self::Force => "EI g0/L^3",
+            Self::Energy => "EI g0^2/L^3",
+            Self::Power => "EI g0^2/L^3 sqrt(EI/(m L^4))",
+            Self::Slope => "g0/L",
+            Self::Place => "L",
+            _ => self.fixed_unit(),
+        }
+    }
+
+    /// The SI unit.
+    pub const fn si_unit(self) -> &'static str {
+        match self.kind() {
+            Some(kind) => kind.si_unit(),
+            None => self.fixed_unit(),
+        }
+    }
+
+    /// The unit of what is the same in the model and in SI.
+    const fn fixed_unit(self) -> &'static str {
+        match self {
+            Self::Angle => "degree",
+            Self::PerPeriod => "1/drive period",
+            Self::Periods => "drive periods",
+            _ => "1",
+        }
+    }
+
+    /// The kind of quantity that SI prefixes go with; `None` where SI says no more than the
+    /// model.
+    pub const fn kind(self) -> Option<Kind> {
+        Some(match self {
+            Self::Length => Kind::Length,
+            Self::Time => Kind::Time,
+            Self::Velocity => Kind::Velocity,
+            Self::Force => Kind::Force,
+            Self::Energy => Kind::Energy,
+            Self::Power => Kind::Power,
+            _ => return None,
+        })
+    }
+
+    /// SI value of the model's unit; `None` of a slope where the lever's length is not known.
+    pub const fn si(self, scales: &Scales) -> Option<f64> {
+        Some(match self {
+            Self::Length => scales.length,
+            Self::Time => scales.time,
+            Self::Velocity => scales.velocity,
+            Self::Force => scales.force,
+            Self::Energy => scales.energy,
+            Self::Power => scales.power,
+            Self::Slope => return scales.slope,
+            _ => 1.0,
+        })
+    }
+}

@@ -1,0 +1,296 @@
+//! Every observable, once: its name, its dimension, its words, and how it follows from what
+//! was [measured](super::measure). JSON, CSV, datasets, figures, the terminal and Python
+//! read this table; a new observable is one entry here.
+//!
+//! # Phase
+//! Phases are lags: of the tip deflection behind the drive sin Ωτ (of a driven base: behind
+//! the base's displacement), 90° at the free resonance of a lever with high Q. Data hold them
+//! in (−180°, 180°]. People who tap read them from 0° to 180°, and a lever driven through its
+//! base lags by a little more than 180° far above resonance; so text and figures show them
+//! in (−90°, 270°], where a response to tapping never jumps: see [`shown_phase`].
+
+use serde::{Serialize, Serializer, ser::SerializeMap};
+
+use super::measure::{Measured, Signal, Tone};
+use super::value::{Measurable, Value};
+use super::{Dimension, EnergyBalance, lag};
+use crate::case::physical::Scales;
+
+use Signal::{Force, Height, Slope, Tip};
+
+/// One observable.
+#[derive(Debug)]
+pub struct Observable {
+    /// Its name in JSON, in CSV headers, in datasets, at the terminal and in Python.
+    pub name: &'static str,
+    /// Its name among quantities in SI, where experimenters have one of their own.
+    pub si_name: &'static str,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// A few words and its symbol between `$`: the label of an axis.
+    pub label: &'static str,
+    /// What it is.
+    pub words: &'static str,
+    /// Its value.
+    pub of: fn(&Observables) -> Value,
+    /// Whether it is one number, as a curve needs it.
+    pub is_number: bool,
+    row: usize,
+}
+
+impl PartialEq for Observable {
+    fn eq(&self, other: &Self) -> bool {
+        self.row == other.row
+    }
+}
+
+impl Eq for Observable {}
+
+impl Observable {
+    /// The observable of this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        OBSERVABLES.iter().find(|o| o.name == name)
+    }
+
+    /// The label of an axis, of a cantilever or an oscillator.
+    pub fn axis_label(&self, beam: bool) -> String {
+        if beam {
+            return self.label.to_owned();
+        }
+        self.label
+            .replace("tip deflection", "displacement")
+            .replace("$W_", "$x_")
+    }
+}
+
+/// A choice of observables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Set(u64);
+
+impl Set {
+    /// None.
+    pub const NONE: Self = Self(0);
+
+    /// Every one that there is.
+    pub const ALL: Self = Self(u64::MAX >> (64 - OBSERVABLES.len()));
+
+    /// With one more.
+    #[must_use]
+    pub const fn with(self, observable: &Observable) -> Self {
+        Self(self.0 | 1 << observable.row)
+    }
+
+    /// Whether this is one of them.
+    pub const fn contains(self, observable: &Observable) -> bool {
+        self.0 >> observable.row & 1 == 1
+    }
+
+    /// Those of both.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// They, in the order of the table.
+    pub fn iter(self) -> impl Iterator<Item = &'static Observable> {
+        OBSERVABLES.iter().filter(move |o| self.contains(o))
+    }
+}
+
+/// A phase as text and figures show it: in (−90°, 270°].
+pub fn shown_phase(degrees: f64) -> f64 {
+    if degrees <= -90.0 {
+        degrees + 360.0
+    } else {
+        degrees
+    }
+}
+
+macro_rules! observables {
+    ($(
+        $name:ident $(as $si_name:literal)?: $type:ty, $dimension:ident, $where:ident,
+        $label:literal, $words:literal, $read:expr;
+    )*) => {
+        /// The table.
+        pub static OBSERVABLES: &[Observable] = &[$(Observable {
+            name: stringify!($name),
+            si_name: observables!(@si $name $($si_name)?),
+            dimension: Dimension::$dimension,
+            label: $label,
+            words: $words,
+            of: |o| o.$name.value(),
+            is_number: <$type as Measurable>::IS_NUMBER,
+            row: Row::$name as usize,
+        }),*];
+
+        /// The table's rows.
+        #[allow(non_camel_case_types, reason = "the observables' own names")]
+        #[derive(Clone, Copy)]
+        enum Row { $($name),* }
+
+        /// Observables of a motion; in the model's own units, or in SI. What nobody asked for
+        /// is not a number.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Observables {
+            /// Length of time observed, in drive periods.
+            pub periods: f64,
+            $(#[doc = $words] pub $name: $type,)*
+        }
+
+        impl Observables {
+            /// Nothing is known.
+            pub const UNKNOWN: Self = Self {
+                periods: 0.0,
+                $($name: <$type as Measurable>::ABSENT,)*
+            };
+
+            /// As `measured` has them.
+            pub(super) fn read(set: Set, measured: &mut Measured<'_>) -> Self {
+                let mut all = Self { periods: measured.periods(), ..Self::UNKNOWN };
+                $(if set.contains(&OBSERVABLES[Row::$name as usize]) {
+                    let read: fn(&mut Measured<'_>) -> $type = $read;
+                    all.$name = read(measured);
+                })*
+                all
+            }
+
+            /// The same in SI.
+            #[must_use]
+            pub fn in_si(&self, scales: &Scales) -> Self {
+                Self {
+                    periods: self.periods,
+                    $($name: self.$name.scaled(Dimension::$dimension.si(scales)),)*
+                }
+            }
+        }
+
+        impl Set {
+            /// What sweeps, branches and curves record of every motion.
+            pub const COMMON: Self = Self($(observables!(@$where $name))|*);
+
+            /// Where and when the beam is lowest.
+            pub(super) const CLEARANCE: Self = Self(
+                1 << Row::beam_clearance as usize
+                    | 1 << Row::beam_clearance_xi as usize
+                    | 1 << Row::beam_clearance_period as usize,
+            );
+        }
+    };
+    (@si $name:ident) => { stringify!($name) };
+    (@si $name:ident $si_name:literal) => { $si_name };
+    (@common $name:ident) => { 1 << Row::$name as usize };
+    (@rare $name:ident) => { 0 };
+}
+
+observables! {
+    tip_max: f64, Length, common,
+        "greatest tip deflection $W_{max}$", "greatest tip deflection W",
+        |m| m.greatest(Tip);
+    tip_min: f64, Length, common,
+        "least tip deflection $W_{min}$", "least tip deflection W",
+        |m| m.least(Tip);
+    amplitude: f64, Length, common,
+        "amplitude (half of peak to peak)", "half of peak to peak of the tip deflection",
+        |m| 0.5 * (m.greatest(Tip) - m.least(Tip));
+    first_harmonic as "A": f64, Length, common,
+        "amplitude $A$",
+        "amplitude of the tip deflection at the drive frequency: what a lock-in amplifier reads",
+        |m| m.component(Tip, Tone::First).norm();
+    phase: f64, Angle, common,
+        "phase behind the drive (°)",
+        "lag of the tip deflection at the drive frequency behind the drive",
+        |m| lag(m.component(Tip, Tone::First));
+    tone2_response: Option<f64>, Length, rare,
+        "amplitude at the second tone",
+        "amplitude of the tip deflection at the frequency of the second tone",
+        |m| m.second_tone().map(|c| c.norm());
+    tone2_lag: Option<f64>, Angle, rare,
+        "phase behind the second tone (°)",
+        "lag of the tip deflection behind the second tone",
+        |m| m.second_tone().map(lag);
+    mean_deflection: f64, Length, common,
+        "mean tip deflection", "time mean of the tip deflection",
+        |m| m.mean(Tip);
+    rms_deflection: f64, Length, rare,
+        "root mean square of the tip deflection",
+        "root mean square of the tip deflection about its mean",
+        |m| (m.mean_product(Tip, Tip) - m.mean(Tip).powi(2)).max(0.0).sqrt();
+    gap_range: [f64; 2], Length, rare,
+        "gap", "least and greatest height of the tip over the undeformed surface",
+        |m| m.range(Height);
+    contact_fraction: f64, Number, common,
+        "part of the time in contact", "part of the time in contact",
+        |m| m.contact_time() / m.duration();
+    contact_time: f64, Time, common,
+        "contact time", "time in contact in one drive period",
+        |m| m.contact_time() / m.periods();
+    indentation: f64, Length, common,
+        "indentation", "greatest depth of the tip below the resting surface",
+        |m| m.indentation();
+    contacts_per_period: f64, PerPeriod, common,
+        "contacts a drive period", "contacts begun a drive period",
+        |m| m.contacts().count as f64 / m.periods();
+    peak_force as "F_max": f64, Force, common,
+        "greatest force $F_{max}$", "greatest force of the sample on the tip",
+        |m| m.peak_force();
+    least_force: f64, Force, rare,
+        "least force", "least force of the sample on the tip: below zero where it pulls",
+        |m| m.least_force();
+    mean_force: f64, Force, common,
+        "mean force", "time mean of the force of the sample on the tip",
+        |m| m.mean(Force);
+    dissipation as "E_dis": f64, Energy, common,
+        "dissipation $E_{dis}$", "energy that the sample takes in one drive period",
+        |m| m.dissipation();
+    virial: f64, Energy, common,
+        "virial ⟨$F W$⟩", "time mean of force times tip deflection, the force counted along it",
+        |m| m.along_tip() * m.mean_product(Force, Tip);
+    drive_power: f64, Power, rare,
+        "power of the drive", "mean power of the drive",
+        |m| m.energy_balance().drive_work / m.duration();
+    sample_power: f64, Power, rare,
+        "power that the sample takes", "mean power that the sample takes",
+        |m| m.dissipation() * m.periods() / m.duration();
+    impact_speed: f64, Velocity, common,
+        "speed of approach", "greatest speed at which a contact begins",
+        |m| m.contacts().greatest_speed;
+    slope_range: Option<[f64; 2]>, Slope, rare,
+        "slope at the tip", "least and greatest slope at the tip",
+        |m| m.is_beam().then(|| m.range(Slope));
+    optical_amplitude: Option<f64>, Length, rare,
+        "amplitude read by an optical lever",
+        "amplitude that an optical lever, calibrated by a static force, reads at the drive frequency",
+        |m| m.optical_lever().map(|c| c.norm());
+    optical_phase: Option<f64>, Angle, rare,
+        "phase read by an optical lever (°)", "lag that an optical lever reads behind the drive",
+        |m| m.optical_lever().map(lag);
+    energy_balance: EnergyBalance, Energy, rare,
+        "energy", "energies over the recording; the residual as a part of what was moved",
+        |m| m.energy_balance();
+    beam_clearance: Option<f64>, Length, rare,
+        "beam clearance", "least height of the beam above the sample",
+        |m| m.clearance().map(|c| c.height);
+    beam_clearance_xi: Option<f64>, Place, rare,
+        "place of the beam clearance $ξ$", "where the beam is lowest, clamp 0 to tip 1",
+        |m| m.clearance().map(|c| c.xi);
+    beam_clearance_period: Option<f64>, Periods, rare,
+        "time of the beam clearance", "when the beam is lowest",
+        |m| m.clearance().map(|c| c.period);
+    grazing_contacts: Option<usize>, Count, rare,
+        "grazing contacts", "contacts that only graze, within rounding",
+        |m| Some(m.contacts().grazing as usize);
+}
+
+impl Serialize for Observables {
+    /// As a map from names to values; what is absent is left out.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for observable in OBSERVABLES {
+            let value = (observable.of)(self);
+            if value != Value::Absent {
+                map.serialize_entry(observable.name, &value)?;
+            }
+        }
+        map.end()
+    }
+}

@@ -35,6 +35,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(motion::fixed_step, module)?,
         wrap_pyfunction!(motion::orbit, module)?,
         wrap_pyfunction!(motion::observe, module)?,
+        wrap_pyfunction!(motion::glossary, module)?,
         wrap_pyfunction!(study::attractors, module)?,
         wrap_pyfunction!(study::branch, module)?,
         wrap_pyfunction!(study::approach, module)?,

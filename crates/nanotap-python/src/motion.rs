@@ -321,3 +321,9 @@ pub(crate) fn observe(
     });
     Ok((pairs.collect(), done.interrupted))
 }
+
+/// What the entries of results mean, and their units: JSON.
+#[pyfunction]
+pub(crate) fn glossary() -> PyResult<String> {
+    Ok(serde_json::to_string(&nanotap::observe::glossary::glossary()).map_err(Failure::from)?)
+}

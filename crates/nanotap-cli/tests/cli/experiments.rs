@@ -59,7 +59,7 @@ fn an_approach_curve_goes_there_and_back() {
     assert!(folds.iter().any(|b| b["kind"] == "fold"));
     let csv = folder.read("curve.csv");
     assert_eq!(csv.lines().count(), 43);
-    assert!(csv.starts_with("way,alpha5,") && csv.contains(",E_dis_eV,"));
+    assert!(csv.starts_with("way,alpha5,") && csv.contains(",E_dis (eV),"));
     assert!(folder.read("curve.svg").contains("<svg"));
     let text = folder
         .run(&["approach", "lever.toml", "--points", "9"])
@@ -154,7 +154,7 @@ fn quantities_of_the_case_are_swept_in_their_units() {
     let csv = folder.read("f.csv");
     let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
-    let (at, amplitude) = (column("drive.frequency"), column("first_harmonic"));
+    let (at, amplitude) = (column("drive.frequency (Hz)"), column("first_harmonic (m)"));
     let rows: Vec<Vec<f64>> = csv
         .lines()
         .skip(1)
@@ -183,7 +183,7 @@ fn quantities_of_the_case_are_swept_in_their_units() {
         .next()
         .unwrap()
         .split(',')
-        .position(|h| h == "first_harmonic");
+        .position(|h| h == "first_harmonic (m)");
     let values: Vec<f64> = csv
         .lines()
         .skip(1)

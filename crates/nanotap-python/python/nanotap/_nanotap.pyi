@@ -140,6 +140,7 @@ def observe(
     threads: int,
     progress: _Progress,
 ) -> tuple[list[tuple[str | None, str]], bool]: ...
+def glossary() -> str: ...
 def attractors(
     case: CaseCore,
     *,

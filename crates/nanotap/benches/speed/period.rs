@@ -3,6 +3,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::observe::{Set, measure};
 use nanotap_flow::{Ensemble, Flow};
 
 use crate::cases::{self, DAMPINGS, MODES};
@@ -46,6 +47,27 @@ fn in_one_go(bencher: Bencher<'_, '_>, modes: usize) {
         .counter(ItemsCount::new(PERIODS))
         .with_inputs(|| flow.clone())
         .bench_local_refs(|flow| flow.run_periods(PERIODS).expect("a bounded motion"));
+}
+
+/// The same with what sweeps record of every motion measured.
+#[divan::bench(args = MODES)]
+fn measured(bencher: Bencher<'_, '_>, modes: usize) {
+    recorded(bencher, modes, Set::COMMON);
+}
+
+/// The same with all that is known of a motion measured, the beam's clearance too.
+#[divan::bench(args = MODES)]
+fn measured_all(bencher: Bencher<'_, '_>, modes: usize) {
+    recorded(bencher, modes, Set::ALL);
+}
+
+fn recorded(bencher: Bencher<'_, '_>, modes: usize, set: Set) {
+    let model = cases::model(&cases::paper(modes));
+    let mut state = vec![0.0; 2 * modes];
+    damped(modes, DAMPINGS[1]).state(&mut state);
+    bencher
+        .counter(ItemsCount::new(PERIODS))
+        .bench_local(|| measure(&model, &state, PERIODS, set).expect("a bounded motion"));
 }
 
 /// The same for eight motions side by side. Items are periods of any motion.

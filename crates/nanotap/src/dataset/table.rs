@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::error::StoreError;
-use super::schema::{Coordinate, Schema, Values, Variable};
+use super::schema::{Attributes, Coordinate, Schema, Values, Variable};
 use super::store::Store;
 
 /// Hands `sink` the table as CSV, piece by piece: the coordinates, then every variable
@@ -22,8 +22,9 @@ pub fn csv<E: From<StoreError>>(
     let columns: Vec<usize> = (0..schema.variables.len())
         .filter(|v| schema.variables[*v].tail.is_empty())
         .collect();
-    let names = labels.iter().map(|(name, ..)| *name);
-    let variables = columns.iter().map(|v| schema.variables[*v].name.as_str());
+    let names = labels.iter().map(|(label, ..)| label.clone());
+    let variables = columns.iter().map(|v| &schema.variables[*v]);
+    let variables = variables.map(|v| with_unit(&v.name, &v.attributes));
     sink(&(names.chain(variables).collect::<Vec<_>>().join(",") + "\n"))?;
     for chunk in 0..store.chunks() {
         let block = schema.grid.block(chunk);
@@ -52,8 +53,22 @@ pub fn csv<E: From<StoreError>>(
     Ok(())
 }
 
-/// The coordinates along the axes of the grid: name, axis, values.
-fn labels(schema: &Schema) -> Vec<(&str, usize, &Values)> {
+/// The header of a column: where its numbers are in SI it says so. Numbers without a unit, and
+/// those in the model's units, stand under their bare names.
+fn with_unit(name: &str, attributes: &Attributes) -> String {
+    let unit = attributes.get("units").and_then(|unit| unit.as_str());
+    let si = |unit: &&str| unit.split('/').all(|part| SI.contains(&part));
+    match unit.filter(si) {
+        Some(unit) => format!("{name} ({unit})"),
+        None => name.to_owned(),
+    }
+}
+
+/// Symbols of which SI units are made.
+const SI: [&str; 10] = ["m", "s", "kg", "N", "N s", "J", "W", "Hz", "Pa", "rad"];
+
+/// The coordinates along the axes of the grid: header, axis, values.
+fn labels(schema: &Schema) -> Vec<(String, usize, &Values)> {
     let mut labels = Vec::new();
     for (axis, dimension) in schema.grid.axes.iter().enumerate() {
         let mut along: Vec<&Coordinate> = schema
@@ -66,7 +81,7 @@ fn labels(schema: &Schema) -> Vec<(&str, usize, &Values)> {
         labels.extend(
             along
                 .into_iter()
-                .map(|c| (c.name.as_str(), axis, &c.values)),
+                .map(|c| (with_unit(&c.name, &c.attributes), axis, &c.values)),
         );
     }
     labels

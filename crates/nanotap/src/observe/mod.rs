@@ -7,6 +7,7 @@ pub mod columns;
 mod contact_event;
 mod dimension;
 mod energy;
+pub mod glossary;
 mod harmonics;
 mod measure;
 pub mod mode_share;

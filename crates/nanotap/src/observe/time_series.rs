@@ -7,13 +7,14 @@ use nanotap_flow::{Flow, FlowError, Output};
 
 use crate::model::Model;
 
+/// The columns before the state.
+const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];
+
 /// The columns of [`sample`], in order: `tau`, `tip` (W or x), `tip_rate`, `gap`, `force`,
 /// `contact` (1 in contact, else 0), then the state (`a1 … aN, v1 … vN` and `s1` of a sample
 /// with a memory, or `x, v`).
 pub fn columns(model: &Model) -> Vec<String> {
-    let mut names: Vec<String> = ["tau", "tip", "tip_rate", "gap", "force", "contact"]
-        .map(str::to_owned)
-        .to_vec();
+    let mut names: Vec<String> = COLUMNS.map(str::to_owned).to_vec();
     names.extend(state_names(model));
     names
 }
@@ -105,6 +106,11 @@ impl Outputs {
             contact,
         ];
         row.extend_from_slice(state);
+        // In contact the surface is where the tip holds it. A memory that the end of the contact
+        // sets anew knows nothing of that.
+        if model.forgetting.is_some() && model.contact[regime] {
+            row[COLUMNS.len() + model.dimension() - model.memory] = at(&model.height);
+        }
         row
     }
 }

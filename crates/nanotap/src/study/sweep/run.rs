@@ -247,7 +247,15 @@ impl<'a> Runner<'a> {
             return (Outcome::unknown(class_of(&error), transient), None);
         }
         let named = Named::of(&settle(&mut self.map, &state, &self.settle).verdict);
-        self.recorded(Outcome::named(&named, transient), &state, None)
+        let outcome = Outcome::named(&named, transient);
+        match &named.orbit {
+            // What repeats is recorded once.
+            Some(orbit) if is_on(orbit, &state) => {
+                let from = nearest(orbit, &state);
+                self.recorded(outcome, from, Some(orbit.period))
+            }
+            _ => self.recorded(outcome, &state, None),
+        }
     }
 
     /// Records the motion from `from`; with `period`, one turn of that orbit stands for
@@ -309,6 +317,17 @@ struct Watched {
     /// Least and greatest tip deflection of each.
     lows: Vec<f64>,
     highs: Vec<f64>,
+}
+
+/// Distance from an orbit, as a part of its size, at which a motion has come to it: what is
+/// recorded then differs by no more.
+const ARRIVED: f64 = 1e-10;
+
+/// Whether a motion that goes to an orbit has come to it.
+fn is_on(orbit: &PeriodicOrbit, state: &[f64]) -> bool {
+    let apart = nearest(orbit, state).iter().zip(state);
+    let distance = apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    distance <= (ARRIVED * orbit.scale()).max(10.0 * orbit.error)
 }
 
 /// The state of the orbit that is nearest to `state`.

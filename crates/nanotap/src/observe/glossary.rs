@@ -1,0 +1,130 @@
+//! What the entries of results mean, and their units: the observables, and what stands beside
+//! them in documents, time series and datasets. For those who show results with their words.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{Dimension, OBSERVABLES};
+
+/// What an entry is, and its unit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Entry {
+    /// What it is.
+    pub words: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+/// What entries mean, by name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Glossary {
+    /// In the model's own units.
+    pub model: BTreeMap<String, Entry>,
+    /// Under `physical`, in SI.
+    pub physical: BTreeMap<String, Entry>,
+}
+
+/// What stands beside the observables.
+const BESIDE: &[(&str, &str, &str)] = &[
+    ("strobe", "state at drive phase 0", STATE),
+    ("start", "state where the recording starts", STATE),
+    ("state", "state at drive phase 0", STATE),
+    ("states", "modal amplitudes and their rates", STATE),
+    ("residual", "largest entry of P^n(x) - x", STATE),
+    ("error", "estimated distance from the true orbit", STATE),
+    (
+        "events",
+        "time of the switch, from the end of the transient",
+        Dimension::Time.model_unit(),
+    ),
+    ("event_kind", "which way", "1"),
+    (
+        "event_gap_rate",
+        "rate of the gap just before",
+        Dimension::Velocity.model_unit(),
+    ),
+    ("tau", "time", Dimension::Time.model_unit()),
+    ("tip", "tip deflection W", Dimension::Length.model_unit()),
+    (
+        "tip_rate",
+        "rate of the tip deflection",
+        Dimension::Velocity.model_unit(),
+    ),
+    (
+        "gap",
+        "gap between tip and sample",
+        Dimension::Length.model_unit(),
+    ),
+    (
+        "force",
+        "force of the sample on the tip",
+        Dimension::Force.model_unit(),
+    ),
+    ("contact", "1 in contact, else 0", "1"),
+    ("classification", "what the motion is", "1"),
+    ("period", "minimal period", PERIODS),
+    ("periods", "periods recorded", PERIODS),
+    ("transient", "periods before the recording", PERIODS),
+    (
+        "thd",
+        "part of the tip deflection's power outside the drive's frequency",
+        "1",
+    ),
+    (
+        "stable",
+        "whether every multiplier is inside the unit circle",
+        "1",
+    ),
+    ("spectral_radius", "largest modulus of a multiplier", "1"),
+    ("multiplier", "largest modulus of a multiplier", "1"),
+    (
+        "periods_per_second",
+        "speed of the propagation",
+        "drive periods/s",
+    ),
+    (
+        "evaluations_per_period",
+        "evaluations of the gap",
+        Dimension::PerPeriod.model_unit(),
+    ),
+    ("parameter", "the parameter", "1"),
+    ("branch", "index of the branch", "1"),
+];
+
+const STATE: &str = "model units";
+const PERIODS: &str = Dimension::Periods.model_unit();
+
+/// The words.
+pub fn glossary() -> Glossary {
+    let beside = BESIDE
+        .iter()
+        .map(|&(name, words, unit)| (name.to_owned(), Entry { words, unit }));
+    let model = OBSERVABLES.iter().map(|o| {
+        let entry = Entry {
+            words: o.words,
+            unit: o.dimension.model_unit(),
+        };
+        (o.name.to_owned(), entry)
+    });
+    let mut physical = BTreeMap::new();
+    for o in OBSERVABLES {
+        let unit = o.dimension.si_unit();
+        let words = o.words;
+        physical.insert(o.si_name.to_owned(), Entry { words, unit });
+        if o.dimension == Dimension::Energy && o.is_number {
+            let name = format!("{}_eV", o.si_name);
+            physical.insert(name, Entry { words, unit: "eV" });
+        }
+    }
+    for (name, words, unit) in [
+        ("A_ratio", "amplitude over the free amplitude", "1"),
+        ("frequency", "drive frequency", "Hz"),
+    ] {
+        physical.insert(name.to_owned(), Entry { words, unit });
+    }
+    Glossary {
+        model: beside.chain(model).collect(),
+        physical,
+    }
+}

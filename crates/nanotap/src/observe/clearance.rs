@@ -16,9 +16,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nanotap_flow::flow::{Observer as _, SegmentView};
-use nanotap_flow::regime::ModalOutput;
-use nanotap_flow::signal::Signal;
-use nanotap_flow::trajectory::{Piece, PiecewiseSignal, Recorder, Segment};
+use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, FlowError, Output, Trajectory};
 use serde::Serialize;
 
@@ -38,10 +36,10 @@ pub struct Clearance {
     pub period: f64,
 }
 
-/// Positions looked at for each mode; the highest mode has one bulge for each half wave.
-const POSITIONS_PER_MODE: usize = 8;
-/// Segments whose least height is found exactly, after a coarse look at all of them.
-const CANDIDATES: usize = 6;
+/// Places looked at for each mode; the highest mode has one bulge for each half wave.
+const PLACES_PER_MODE: usize = 8;
+/// Width of the interval of places in which the beam is lowest.
+const PLACE: f64 = 1e-9;
 
 impl Clearance {
     /// Over `periods` drive periods from `state` at drive phase 0; `None` if the model is no
@@ -52,46 +50,92 @@ impl Clearance {
     pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, FlowError> {
         measure_clearance(model, state, periods)
     }
+}
 
-    /// The clearance over `trajectory`; `None` if the model is no beam.
+/// The beam over a short recording.
+struct Beam<'a> {
+    model: &'a Model,
+    beam: &'a BeamOutputs,
+    trajectory: &'a Trajectory,
+}
+
+impl Beam<'_> {
+    /// The least height over all places, of which none is lower than its `bound`.
     ///
-    /// Every segment is looked at on a grid of places and times fine enough for the modes
-    /// that take part in it; in the lowest few the least height is then found from roots
-    /// of its rate.
-    fn over(model: &Model, trajectory: &Trajectory) -> Option<Self> {
-        let beam = model.beam.as_ref()?;
-        let count = POSITIONS_PER_MODE * beam.modes.count();
-        let places: Vec<f64> = (0..=count).map(|i| i as f64 / count as f64).collect();
-        let lowest = lowest_segments(model, beam, trajectory, &places);
-        let at = |xi: f64| least_height(model, beam, trajectory, &lowest, xi);
-        let grid: Vec<Self> = places.iter().filter_map(|&xi| at(xi)).collect();
-        let best = (0..grid.len()).min_by(|&a, &b| grid[a].height.total_cmp(&grid[b].height))?;
-        let mut low = grid[best.saturating_sub(1)].xi;
-        let mut high = grid[(best + 1).min(grid.len() - 1)].xi;
-        let mut least = grid[best];
-        // Golden section between the neighbours.
-        let golden = 0.381_966_011_250_105;
-        while high - low > 1e-7 {
-            let (a, b) = (
-                at(low + golden * (high - low))?,
-                at(high - golden * (high - low))?,
-            );
-            let lower = if a.height < b.height { a } else { b };
-            if lower.height < least.height {
-                least = lower;
+    /// Places on a grid first; then, between the neighbours of the best, the place where the
+    /// beam is level at the moment when it is lowest there. For the least height over time
+    /// changes with the place as the height itself does at that moment.
+    fn lowest(&self, bound: impl Fn(f64) -> f64) -> Option<Clearance> {
+        let count = PLACES_PER_MODE * self.beam.modes.count();
+        let place = |i: usize| i as f64 / count as f64;
+        let mut best: Option<(usize, Clearance)> = None;
+        for i in (0..=count).rev() {
+            let known = best.map_or(f64::INFINITY, |(_, known)| known.height);
+            if bound(place(i)) >= known {
+                continue;
             }
-            if a.height < b.height {
-                high = b.xi;
-            } else {
-                low = a.xi;
+            let here = self.least_height(place(i))?;
+            if here.height < known {
+                best = Some((i, here));
             }
         }
-        Some(least)
+        let (i, mut best) = best?;
+        // At the clamp itself every beam is level.
+        let mut low = place(i.saturating_sub(1)).max(1e-6);
+        let mut high = place((i + 1).min(count));
+        // The slopes there point away from each other, or the beam is lowest at an end.
+        let (mut falls, mut rises) = (self.slope_at(low)?, self.slope_at(high)?);
+        if falls >= 0.0 || rises <= 0.0 {
+            return Some(best);
+        }
+        for step in 0..200 {
+            if high - low <= PLACE {
+                break;
+            }
+            let secant = low - falls * (high - low) / (rises - falls);
+            let inside = secant > low && secant < high;
+            let xi = if inside && step % 3 < 2 {
+                secant
+            } else {
+                0.5 * (low + high)
+            };
+            let here = self.least_height(xi)?;
+            if here.height < best.height {
+                best = here;
+            }
+            let slope = self.slope(&here)?;
+            if slope.abs() <= 1e-13 {
+                break;
+            }
+            if slope < 0.0 {
+                (low, falls) = (xi, slope);
+            } else {
+                (high, rises) = (xi, slope);
+            }
+        }
+        Some(best)
     }
 
-    /// Whether another part of the beam than the tip would touch.
-    pub fn touches(&self) -> bool {
-        self.height <= 0.0
+    /// The least height of one place.
+    fn least_height(&self, xi: f64) -> Option<Clearance> {
+        let least = self.trajectory.signal(&self.beam.height(xi)).range()?.0;
+        Some(Clearance {
+            height: least.value,
+            xi,
+            period: least.time / self.model.period(),
+        })
+    }
+
+    /// The slope of the beam where and when it is `lowest`.
+    fn slope(&self, lowest: &Clearance) -> Option<f64> {
+        let time = lowest.period * self.model.period();
+        let state = self.trajectory.state_at(time)?;
+        let slopes = self.beam.modes.iter().map(|mode| mode.slope(lowest.xi));
+        Some(slopes.zip(&state).map(|(slope, a)| slope * a).sum())
+    }
+
+    fn slope_at(&self, xi: f64) -> Option<f64> {
+        self.slope(&self.least_height(xi)?)
     }
 }
 
@@ -135,7 +179,12 @@ struct Start {
 }
 
 struct Candidate {
+    /// No point of the beam was lower.
     bound: f64,
+    /// The least height of the beam's end.
+    end: f64,
+    /// The bound on what modes from the second on contribute.
+    higher: f64,
     period: usize,
     start: Start,
 }
@@ -219,6 +268,8 @@ impl ClearanceSearch {
         {
             self.candidates.push(Candidate {
                 bound,
+                end,
+                higher: self.higher,
                 period: self.periods,
                 start,
             });
@@ -250,6 +301,9 @@ impl ClearanceSearch {
 
     /// The clearance of the periods that have ended.
     pub(super) fn found(mut self, model: &Model) -> Result<Option<Clearance>, FlowError> {
+        let Some(beam) = &model.beam else {
+            return Ok(None);
+        };
         let mut least: Option<Clearance> = None;
         for candidate in self.lowest() {
             if least.is_some_and(|known| known.height <= candidate.bound) {
@@ -259,7 +313,17 @@ impl ClearanceSearch {
                 continue;
             };
             let period = Trajectory::record(&model.system, &state, 1)?;
-            let Some(here) = Clearance::over(model, &period) else {
+            let beam = Beam {
+                model,
+                beam,
+                trajectory: &period,
+            };
+            let first = beam.beam.modes.iter().next();
+            let bound = |xi: f64| {
+                let along = first.map_or(1.0, |mode| mode.shape(xi) / mode.tip());
+                (1.0 - along) * self.clamp + along * candidate.end - candidate.higher
+            };
+            let Some(here) = beam.lowest(bound) else {
                 continue;
             };
             if least.is_none_or(|known| here.height < known.height) {
@@ -316,115 +380,4 @@ fn shares(modes: &Modes) -> Arc<Vec<f64>> {
         Arc::new(shares)
     });
     Arc::clone(shares)
-}
-
-/// The indices of the segments in which a coarse look sees the beam lowest.
-fn lowest_segments(
-    model: &Model,
-    beam: &BeamOutputs,
-    trajectory: &Trajectory,
-    places: &[f64],
-) -> Vec<usize> {
-    let segments = trajectory.segments();
-    if segments.len() <= CANDIDATES {
-        return (0..segments.len()).collect();
-    }
-    let regimes = model.system.regimes();
-    let heights: Vec<Vec<ModalOutput>> = regimes
-        .iter()
-        .map(|regime| {
-            places
-                .iter()
-                .map(|&xi| regime.project(&beam.height(xi)))
-                .collect()
-        })
-        .collect();
-    let mut seen: Vec<(f64, usize)> = segments
-        .iter()
-        .enumerate()
-        .map(|(i, s)| (coarse_height(model, s, &heights[s.regime]), i))
-        .collect();
-    seen.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    seen.truncate(CANDIDATES);
-    seen.into_iter().map(|(_, i)| i).collect()
-}
-
-/// The least height on a grid of places and times of one segment; minus infinity, so
-/// that it is looked at exactly, where eigenvalues coincide.
-fn coarse_height(model: &Model, segment: &Segment, heights: &[ModalOutput]) -> f64 {
-    let drive = model.system.drive();
-    let basis = model.system.regimes()[segment.regime].basis();
-    if !basis.clusters.is_empty() {
-        return f64::NEG_INFINITY;
-    }
-    let size = |k: usize| {
-        heights
-            .iter()
-            .map(|h| h.modal[k].norm())
-            .fold(0.0, f64::max)
-            * segment.modal[k].norm()
-    };
-    let sizes: Vec<f64> = (0..basis.len()).map(size).collect();
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let fastest = (0..basis.len())
-        .filter(|&k| sizes[k] > 1e-3 * largest)
-        .map(|k| basis.eigenvalues[k].norm())
-        .chain(drive.frequencies().iter().copied())
-        .fold(0.0, f64::max);
-    // Twelve looks a turn of the fastest mode that takes part.
-    let steps = (2.0 * segment.length * fastest).ceil().clamp(4.0, 1000.0);
-    let step = segment.length / steps;
-    let factors: Vec<Complex> = basis.eigenvalues.iter().map(|l| (l * step).exp()).collect();
-    let mut modal = segment.modal.clone();
-    let mut least = f64::INFINITY;
-    for i in 0..=steps as usize {
-        let t = segment.phase + step * i as f64;
-        let phasors: Vec<Complex> = (0..drive.frequencies().len())
-            .map(|k| drive.phasor(k, t))
-            .collect();
-        for height in heights {
-            let modes = height.modal.iter().zip(&modal);
-            let tones = height.tones.iter().zip(&phasors);
-            let sum: f64 = modes
-                .chain(tones)
-                .map(|(w, q)| w.re * q.re - w.im * q.im)
-                .sum();
-            least = least.min(height.constant + sum);
-        }
-        for (q, factor) in modal.iter_mut().zip(&factors) {
-            *q *= factor;
-        }
-    }
-    least
-}
-
-/// The least height of one place over the given segments, exactly.
-fn least_height(
-    model: &Model,
-    beam: &BeamOutputs,
-    trajectory: &Trajectory,
-    segments: &[usize],
-    xi: f64,
-) -> Option<Clearance> {
-    let drive = model.system.drive();
-    let height = beam.height(xi);
-    let pieces = segments
-        .iter()
-        .map(|&i| {
-            let s = &trajectory.segments()[i];
-            let regime = &model.system.regimes()[s.regime];
-            let output = regime.project(&height);
-            Piece {
-                start: s.start,
-                length: s.length,
-                signal: Signal::of(regime, drive, &output, &s.modal, s.phase, s.length),
-            }
-        })
-        .collect();
-    let (least, _) = PiecewiseSignal { pieces }.range()?;
-    Some(Clearance {
-        height: least.value,
-        xi,
-        period: least.time / model.period(),
-    })
 }

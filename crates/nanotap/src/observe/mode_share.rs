@@ -50,7 +50,7 @@ pub struct EnoughReadings {
 }
 
 /// The part of one mode in the motion with the most modes. The parts of all modes sum to 1;
-/// those in the tip signal and in the virial may be negative, where a mode works against the
+/// those in the tip signal and in the force may be negative, where a mode works against the
 /// others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModeShare {

@@ -50,6 +50,11 @@ impl Clearance {
     pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, FlowError> {
         measure_clearance(model, state, periods)
     }
+
+    /// Whether another part of the beam than the tip would touch.
+    pub fn touches(&self) -> bool {
+        self.height <= 0.0
+    }
 }
 
 /// The beam over a short recording.

@@ -14,8 +14,8 @@ pub struct ContactEvent {
     pub tau: f64,
     /// Which way.
     pub kind: ContactEventKind,
-    /// Rate of the gap just before it; where contact ends on a surface that recovers, that of
-    /// the tip's height.
+    /// Rate of the gap between tip and surface just before it. A Kelvin–Voigt surface follows
+    /// the tip until it lets go of it: there the rate is 0.
     pub gap_rate: f64,
 }
 
@@ -34,9 +34,9 @@ pub enum ContactEventKind {
 /// Notes the contacts of a motion while it runs.
 pub struct Contacts<'a> {
     model: &'a Model,
-    /// Rate of the tip's height, an entry a regime. What ends a contact may be the force and
-    /// not the gap.
-    height_rate: Vec<ModalOutput>,
+    /// Rates of the gap and of the tip's height, an entry a regime. What ends a contact may be
+    /// the force and not the gap.
+    rates: Vec<[ModalOutput; 2]>,
     periods: usize,
     events: Vec<ContactEvent>,
 }
@@ -46,11 +46,11 @@ impl<'a> Contacts<'a> {
     pub fn of(model: &'a Model) -> Self {
         let drive = model.system.drive();
         let rate = |r: &nanotap_flow::Regime| {
-            r.project(&model.height.rate(r.matrix(), r.forcing(), drive))
+            [&model.gap, &model.height].map(|o| r.project(&o.rate(r.matrix(), r.forcing(), drive)))
         };
         Self {
             model,
-            height_rate: model.system.regimes().iter().map(rate).collect(),
+            rates: model.system.regimes().iter().map(rate).collect(),
             periods: 0,
             events: Vec::new(),
         }
@@ -61,14 +61,20 @@ impl<'a> Contacts<'a> {
         self.events
     }
 
-    fn height_rate(&self, view: &SwitchView<'_>) -> f64 {
-        let output = &self.height_rate[view.switch.from];
+    fn gap_rate(&self, view: &SwitchView<'_>) -> f64 {
+        const ROUNDING: f64 = 1e-11;
         let drive = self.model.system.drive();
-        let phasors = (0..output.tones.len()).map(|k| drive.phasor(k, view.phase));
-        let modes = output.modal.iter().copied().zip(view.modal.iter().copied());
-        let tones = output.tones.iter().copied().zip(phasors);
-        let sum: f64 = modes.chain(tones).map(|(w, q)| (w * q).re).sum();
-        output.constant + sum
+        let [gap, height] = self.rates[view.switch.from].each_ref().map(|rate| {
+            let phasors = (0..rate.tones.len()).map(|k| drive.phasor(k, view.phase));
+            let modes = rate.modal.iter().copied().zip(view.modal.iter().copied());
+            let terms = modes.chain(rate.tones.iter().copied().zip(phasors));
+            rate.constant + terms.map(|(w, q)| (w * q).re).sum::<f64>()
+        });
+        if gap.abs() <= ROUNDING * height.abs() {
+            0.0
+        } else {
+            gap
+        }
     }
 }
 
@@ -84,7 +90,7 @@ impl Observer for Contacts<'_> {
             };
             (kind, view.rate)
         } else if contact[from] && !contact[to] {
-            (ContactEventKind::ContactEnd, self.height_rate(view))
+            (ContactEventKind::ContactEnd, self.gap_rate(view))
         } else {
             return;
         };

@@ -90,6 +90,51 @@ enum Key {
     Fourier(FourierKey),
 }
 
+impl Need {
+    /// Adds it to `request`; `channel` says where its signals are there.
+    fn key(
+        self,
+        request: &mut Request,
+        mut channel: impl FnMut(&mut Request, Signal) -> Channel,
+        model: &Model,
+    ) -> Key {
+        match self {
+            Self::Least(signal) => {
+                let channel = channel(request, signal);
+                Key::Extremum(request.least(channel))
+            }
+            Self::Greatest(signal) => {
+                let channel = channel(request, signal);
+                Key::Extremum(request.greatest(channel))
+            }
+            Self::Integral(signal) => {
+                let channel = channel(request, signal);
+                Key::Integral(request.integral(channel))
+            }
+            Self::Product(a, b) => {
+                let (a, b) = (channel(request, a), channel(request, b));
+                Key::Product(request.product(a, b))
+            }
+            Self::Fourier(signal, tone) => {
+                let channel = channel(request, signal);
+                Key::Fourier(request.fourier(channel, frequency(model, tone)))
+            }
+        }
+    }
+}
+
+impl Key {
+    /// What was gathered.
+    fn value(self, accumulator: &Accumulator) -> Complex {
+        match self {
+            Self::Extremum(key) => accumulator.extremum(key).into(),
+            Self::Integral(key) => accumulator.integral(key).into(),
+            Self::Product(key) => accumulator.product(key).into(),
+            Self::Fourier(key) => accumulator.fourier(key),
+        }
+    }
+}
+
 /// What a choice of observables needs, made ready for one model.
 struct Needs {
     plan: Arc<Plan>,
@@ -101,13 +146,7 @@ struct Needs {
 
 impl Needs {
     fn of(model: &Model, set: Set) -> Result<Self, FlowError> {
-        let mut measured = Measured {
-            model,
-            asked: Vec::new(),
-            asked_ends: false,
-            asked_clearance: false,
-            found: None,
-        };
+        let mut measured = Measured::nothing(model);
         Observables::read(set, &mut measured);
         let mut request = Request::new();
         let mut channels: Vec<(Signal, Channel)> = Vec::new();
@@ -119,32 +158,11 @@ impl Needs {
             channels.push((signal, new));
             new
         };
-        let mut keys = Vec::with_capacity(measured.asked.len());
-        for need in measured.asked {
-            let key = match need {
-                Need::Least(signal) => {
-                    let channel = channel(&mut request, signal);
-                    Key::Extremum(request.least(channel))
-                }
-                Need::Greatest(signal) => {
-                    let channel = channel(&mut request, signal);
-                    Key::Extremum(request.greatest(channel))
-                }
-                Need::Integral(signal) => {
-                    let channel = channel(&mut request, signal);
-                    Key::Integral(request.integral(channel))
-                }
-                Need::Product(a, b) => {
-                    let (a, b) = (channel(&mut request, a), channel(&mut request, b));
-                    Key::Product(request.product(a, b))
-                }
-                Need::Fourier(signal, tone) => {
-                    let channel = channel(&mut request, signal);
-                    Key::Fourier(request.fourier(channel, frequency(model, tone)))
-                }
-            };
-            keys.push((need, key));
-        }
+        let asked = std::mem::take(&mut measured.asked);
+        let keys = asked
+            .into_iter()
+            .map(|need| (need, need.key(&mut request, &mut channel, model)))
+            .collect();
         Ok(Self {
             plan: request.plan(&model.system)?,
             keys,
@@ -153,8 +171,11 @@ impl Needs {
         })
     }
 
-    fn key(&self, need: Need) -> Option<Key> {
-        self.keys.iter().find(|(n, _)| *n == need).map(|(_, k)| *k)
+    fn extremum(&self, need: Need) -> Option<ExtremumKey> {
+        self.keys.iter().find_map(|&(known, key)| match key {
+            Key::Extremum(key) if known == need => Some(key),
+            _ => None,
+        })
     }
 }
 
@@ -256,18 +277,27 @@ impl<'a> Measurement<'a> {
         self
     }
 
+    /// Outputs that are one share an extremum.
     fn take(&mut self, need: Need, keeps_each: bool) {
-        if let Some(Key::Extremum(key)) = self.needs.key(need) {
-            self.taken.push(Taken {
+        let Some(key) = self.needs.extremum(need) else {
+            return;
+        };
+        match self.taken.iter_mut().find(|taken| taken.key == key) {
+            Some(known) => known.keeps_each |= keeps_each,
+            None => self.taken.push(Taken {
                 keeps_each,
                 ..Taken::new(need, key)
-            });
+            }),
         }
     }
 
+    fn taken(&self, need: Need) -> Option<&Taken> {
+        let key = self.needs.extremum(need)?;
+        self.taken.iter().find(|taken| taken.key == key)
+    }
+
     fn each(&self, need: Need) -> &[f64] {
-        let found = self.taken.iter().find(|taken| taken.need == need);
-        found.map_or(&[], |taken| &taken.each)
+        self.taken(need).map_or(&[], |taken| &taken.each)
     }
 
     /// Least tip deflection of each drive period so far.
@@ -292,27 +322,25 @@ impl<'a> Measurement<'a> {
             Some(search) => search.found(self.model)?,
             None => None,
         };
+        let values = self.needs.keys.iter().map(|&(need, key)| {
+            let value = key.value(&self.accumulator);
+            // What was taken at the ends of periods belongs to the whole.
+            let taken = self.taken.iter().find(|taken| taken.need == need);
+            (
+                need,
+                taken.map_or(value, |taken| taken.together(value.re).into()),
+            )
+        });
         let mut measured = Measured {
-            model: self.model,
-            asked: Vec::new(),
-            asked_ends: false,
-            asked_clearance: false,
             found: Some(Found {
-                measurement: &self,
+                values: values.collect(),
+                accumulator: &self.accumulator,
+                stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(self.model)),
                 clearance,
             }),
+            ..Measured::nothing(self.model)
         };
         Ok(Observables::read(self.set, &mut measured))
-    }
-
-    fn extremum(&self, need: Need) -> f64 {
-        let value = match self.needs.key(need) {
-            Some(Key::Extremum(key)) => self.accumulator.extremum(key),
-            _ => f64::NAN,
-        };
-        // What was taken at the ends of periods belongs to the whole.
-        let taken = self.taken.iter().find(|taken| taken.need == need);
-        taken.map_or(value, |taken| taken.together(value))
     }
 }
 
@@ -335,12 +363,11 @@ impl Observer for Measurement<'_> {
         for taken in &mut self.taken {
             taken.take(&mut self.accumulator);
         }
-        let heights = self
-            .taken
-            .iter()
-            .find(|t| t.need == Need::Least(Signal::Height));
-        if let Some((clearance, heights)) = self.clearance.as_mut().zip(heights) {
-            clearance.period_end(heights.last);
+        let lowest = self
+            .taken(Need::Least(Signal::Height))
+            .map(|taken| taken.last);
+        if let Some((clearance, lowest)) = self.clearance.as_mut().zip(lowest) {
+            clearance.period_end(lowest);
         }
         self.accumulator.period_end();
     }
@@ -389,32 +416,49 @@ pub(super) struct Measured<'a> {
 }
 
 struct Found<'a> {
-    measurement: &'a Measurement<'a>,
+    values: Vec<(Need, Complex)>,
+    accumulator: &'a Accumulator,
+    /// Gain of stored energy.
+    stored: f64,
     clearance: Option<Clearance>,
 }
 
-impl Measured<'_> {
-    fn ask(&mut self, need: Need) {
-        if self.found.is_none() && !self.asked.contains(&need) {
-            self.asked.push(need);
+impl<'a> Measured<'a> {
+    /// Before the run.
+    const fn nothing(model: &'a Model) -> Self {
+        Self {
+            model,
+            asked: Vec::new(),
+            asked_ends: false,
+            asked_clearance: false,
+            found: None,
         }
     }
 
-    fn extremum(&mut self, need: Need) -> f64 {
-        self.ask(need);
-        self.found
-            .as_ref()
-            .map_or(0.0, |found| found.measurement.extremum(need))
+    /// What was gathered; 0 before the run.
+    fn value(&mut self, need: Need) -> Complex {
+        match &self.found {
+            Some(found) => {
+                let known = found.values.iter().find(|(known, _)| *known == need);
+                known.map_or(f64::NAN.into(), |(_, value)| *value)
+            }
+            None => {
+                if !self.asked.contains(&need) {
+                    self.asked.push(need);
+                }
+                0.0.into()
+            }
+        }
     }
 
     /// The least value of a signal.
     pub(super) fn least(&mut self, signal: Signal) -> f64 {
-        self.extremum(Need::Least(signal))
+        self.value(Need::Least(signal)).re
     }
 
     /// Its greatest value.
     pub(super) fn greatest(&mut self, signal: Signal) -> f64 {
-        self.extremum(Need::Greatest(signal))
+        self.value(Need::Greatest(signal)).re
     }
 
     /// Both.
@@ -424,28 +468,12 @@ impl Measured<'_> {
 
     /// The time mean of a signal.
     pub(super) fn mean(&mut self, signal: Signal) -> f64 {
-        let need = Need::Integral(signal);
-        self.ask(need);
-        let integral =
-            self.found
-                .as_ref()
-                .map_or(0.0, |found| match found.measurement.needs.key(need) {
-                    Some(Key::Integral(key)) => found.measurement.accumulator.integral(key),
-                    _ => f64::NAN,
-                });
-        integral / self.duration()
+        self.value(Need::Integral(signal)).re / self.duration()
     }
 
     /// `∫ a b dt`.
-    pub(super) fn product(&mut self, a: Signal, b: Signal) -> f64 {
-        let need = Need::Product(a, b);
-        self.ask(need);
-        self.found
-            .as_ref()
-            .map_or(0.0, |found| match found.measurement.needs.key(need) {
-                Some(Key::Product(key)) => found.measurement.accumulator.product(key),
-                _ => f64::NAN,
-            })
+    fn product(&mut self, a: Signal, b: Signal) -> f64 {
+        self.value(Need::Product(a, b)).re
     }
 
     /// The time mean of the product of two signals.
@@ -455,21 +483,13 @@ impl Measured<'_> {
 
     /// The component `Re(c e^{iωt})` of a signal at a frequency of the drive.
     pub(super) fn component(&mut self, signal: Signal, tone: Tone) -> Complex {
-        let need = Need::Fourier(signal, tone);
-        self.ask(need);
-        let integral = self.found.as_ref().map_or(Complex::new(0.0, 0.0), |found| {
-            match found.measurement.needs.key(need) {
-                Some(Key::Fourier(key)) => found.measurement.accumulator.fourier(key),
-                _ => Complex::new(f64::NAN, f64::NAN),
-            }
-        });
-        integral * 2.0 / self.duration()
+        self.value(Need::Fourier(signal, tone)) * 2.0 / self.duration()
     }
 
     /// How long the motion ran.
     pub(super) fn duration(&self) -> f64 {
         let found = self.found.as_ref();
-        found.map_or(1.0, |found| found.measurement.accumulator.duration())
+        found.map_or(1.0, |found| found.accumulator.duration())
     }
 
     /// The same in drive periods.
@@ -483,7 +503,7 @@ impl Measured<'_> {
         self.found.as_ref().map_or(0.0, |found| {
             (0..contact.len())
                 .filter(|&regime| contact[regime])
-                .map(|regime| found.measurement.accumulator.time_in(regime))
+                .map(|regime| found.accumulator.time_in(regime))
                 .sum()
         })
     }
@@ -495,7 +515,7 @@ impl Measured<'_> {
         let regimes = self.model.contact.len();
         for (from, to) in (0..regimes).flat_map(|from| (0..regimes).map(move |to| (from, to))) {
             if begins_contact(self.model, from, to) {
-                let some = found.measurement.accumulator.switches(from, to);
+                let some = found.accumulator.switches(from, to);
                 all.count += some.count;
                 all.grazing += some.grazing;
                 all.greatest_speed = all.greatest_speed.max(some.greatest_speed);
@@ -584,11 +604,7 @@ impl Measured<'_> {
             work(PowerTerm::of_beam(model)),
             work(PowerTerm::of_sample(model)),
         );
-        let ends = self
-            .found
-            .as_ref()
-            .and_then(|f| f.measurement.ends.as_ref());
-        let stored = ends.map_or(0.0, |ends| ends.gain(model));
+        let stored = self.found.as_ref().map_or(0.0, |found| found.stored);
         EnergyBalance::new(drive, beam, sample + self.impacts(), stored)
     }
 

@@ -325,7 +325,7 @@ impl<'a> Measurement<'a> {
         let values = self.needs.keys.iter().map(|&(need, key)| {
             let value = key.value(&self.accumulator);
             // What was taken at the ends of periods belongs to the whole.
-            let taken = self.taken.iter().find(|taken| taken.need == need);
+            let taken = self.taken(need);
             (
                 need,
                 taken.map_or(value, |taken| taken.together(value.re).into()),

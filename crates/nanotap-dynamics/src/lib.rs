@@ -12,6 +12,7 @@
 //! | [`lyapunov`] | how fast neighbouring motions part |
 //! | [`classify`] | what the motion from one start comes to |
 //! | [`census`] | which attractors a set of starts goes to, and what it may have missed |
+//! | [`global`] | which attractors there are all over a grid of parameter values |
 //! | [`basin`] | which points of a slice go to which attractor |
 //! | [`continuation`] | how an orbit goes on in one parameter, and its bifurcations |
 //! | [`curve`] | where a bifurcation goes on in two parameters |
@@ -23,6 +24,7 @@ pub mod continuation;
 pub mod control;
 pub mod curve;
 mod failure;
+pub mod global;
 pub mod lyapunov;
 pub mod map;
 pub mod neighbourhood;
@@ -44,10 +46,11 @@ pub use continuation::{
     assemble_diagram, continue_orbit, switch_at_flip,
 };
 pub use control::Control;
-pub use curve::{Locus, LocusOptions, LocusPoint, TwoParameterFamily, trace_locus};
+pub use curve::{CurveEnd, Locus, LocusOptions, LocusPoint, trace_locus};
 pub use failure::MapFailure;
+pub use global::{GlobalAttractor, GlobalOptions, GlobalValue, attractors_along, attractors_over};
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
-pub use map::{MapFamily, StroboscopicMap, Tangency};
+pub use map::{MapFamily, StroboscopicMap, Tangency, TwoParameterFamily};
 pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
 pub use orbit::{

@@ -118,3 +118,32 @@ pub trait MapFamily: Sync {
         derivative: &mut [f64],
     ) -> Result<(), <Self::Map as StroboscopicMap>::Error>;
 }
+
+/// A two-parameter family of stroboscopic maps.
+pub trait TwoParameterFamily: Sync {
+    /// The map at one pair of values.
+    type Map: StroboscopicMap;
+    /// Why there is no map at a pair of values.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// The map at a pair of values.
+    ///
+    /// # Errors
+    /// When the values make no sense for the system.
+    fn at(&self, first: f64, second: f64) -> Result<Self::Map, Self::Error>;
+
+    /// Replaces `state` by `P(state)`, `jacobian` by `∂P/∂state` and the two
+    /// derivatives (length `dimension` each) by `∂P/∂first` and `∂P/∂second`. `map`
+    /// is `self.at(parameters[0], parameters[1])`.
+    ///
+    /// # Errors
+    /// When the period cannot be computed from this state.
+    fn advance_with_derivatives(
+        &self,
+        parameters: [f64; 2],
+        map: &mut Self::Map,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: [&mut [f64]; 2],
+    ) -> Result<(), <Self::Map as StroboscopicMap>::Error>;
+}

@@ -37,6 +37,7 @@ pub(crate) fn dead_end<F: MapFamily>(
         return BranchEnd::Grazing { parameter };
     }
     BranchEnd::StepTooSmall {
+        parameter: node.parameter,
         reason: why.to_string(),
     }
 }

@@ -1,10 +1,10 @@
 //! From a first point step by step until the branch ends.
 
-use crate::continuation::bifurcation::{Tests, between};
+use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::end::dead_end;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
 use crate::continuation::solver::{BranchSolver, Node};
-use crate::continuation::step::{angle, at_range_end, projection, trial};
+use crate::continuation::step::{Rejected, angle, at_range_end, projection, trial};
 use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions};
 use crate::control::Control;
 use crate::map::MapFamily;
@@ -80,6 +80,7 @@ pub(crate) fn follow<F: MapFamily>(
     options: &ContinuationOptions,
     control: &Control<'_>,
 ) -> Result<Branch, ContinuationError> {
+    let least = norm(&first.points);
     let mut tests = tests_at(solver, &first)?;
     let mut arclength = 0.0;
     let mut branch = Branch {
@@ -103,8 +104,12 @@ pub(crate) fn follow<F: MapFamily>(
             branch.end = BranchEnd::RangeEnd;
             break;
         }
-        let next = match trial(solver, &node, step, options) {
+        let mut next = match trial(solver, &node, step, options) {
             Ok(next) => next,
+            Err(Rejected::Vanished { parameter }) => {
+                branch.end = BranchEnd::Vanished { parameter };
+                break;
+            }
             Err(why) => {
                 step *= 0.5;
                 if step < options.min_step {
@@ -133,6 +138,7 @@ pub(crate) fn follow<F: MapFamily>(
             step *= 0.5;
             if step < options.min_step {
                 branch.end = BranchEnd::StepTooSmall {
+                    parameter: node.parameter,
                     reason: "the multipliers could not be computed".into(),
                 };
                 break;
@@ -150,7 +156,7 @@ pub(crate) fn follow<F: MapFamily>(
                 && let Some(near_tests) = Tests::new(solver, &near)
             {
                 let found = between(solver, &node, &tests, &near_tests, 0.99 * at, index);
-                branch.bifurcations.extend(found);
+                branch.take(found, options.range);
                 branch
                     .points
                     .push(point(solver, &near, &near_tests, arclength + 0.99 * at)?);
@@ -162,7 +168,7 @@ pub(crate) fn follow<F: MapFamily>(
             break;
         }
         let found = between(solver, &node, &tests, &next_tests, taken, index);
-        branch.bifurcations.extend(found);
+        branch.take(found, options.range);
         arclength += taken;
         branch
             .points
@@ -174,6 +180,9 @@ pub(crate) fn follow<F: MapFamily>(
             step *= 0.7;
         }
         let closed = branch.points.len() > 8 && is_return(solver, &start, &next, taken);
+        if options.state_scale.is_none() {
+            solver.rescale(&mut next, least);
+        }
         node = next;
         tests = next_tests;
         if closed {
@@ -182,6 +191,14 @@ pub(crate) fn follow<F: MapFamily>(
         }
     }
     Ok(branch)
+}
+
+impl Branch {
+    /// Adds what was found between two points, as far as it lies in the range.
+    fn take(&mut self, found: Vec<Bifurcation>, (low, high): (f64, f64)) {
+        let inside = |b: &Bifurcation| (low..=high).contains(&b.parameter);
+        self.bifurcations.extend(found.into_iter().filter(inside));
+    }
 }
 
 fn tests_at<F: MapFamily>(

@@ -1,8 +1,10 @@
 //! Branches of periodic orbits in one parameter, stable and unstable, by
 //! pseudo-arclength continuation of all strobe points.
 //!
-//! The arc is measured in (x_0, λ), scaled by the orbit's size and the length of the
-//! parameter range. A step along the tangent is corrected by Newton in the plane
+//! The arc is measured in (x_0, λ), scaled by the size of the orbit *as it is now* and
+//! the length of the parameter range: through a resonance the orbit grows by a factor of
+//! hundreds, and a step that was a per cent of it at the foot would be a hundredth of a
+//! per cent at the top. A step along the tangent is corrected by Newton in the plane
 //! across it; it is halved when Newton is slow, the tangent turns by too much, or the
 //! correction is large (another branch), and lengthened when all is easy. The map
 //! need only be C¹: at a 3/2-power grazing the tangent is continuous but turns fast,
@@ -48,8 +50,8 @@ pub struct ContinuationOptions {
     pub max_points: usize,
     /// A state with an entry above this has left the domain.
     pub bound: f64,
-    /// Unit of the state along the arc; by default the largest entry of the first
-    /// orbit.
+    /// Unit of the state along the arc; by default the largest entry of the orbit as it
+    /// is now, but not below that of the first.
     pub state_scale: Option<f64>,
     /// Unit of the parameter along the arc; by default the length of the range.
     pub parameter_scale: Option<f64>,
@@ -109,7 +111,7 @@ pub struct Branch {
     pub points: Vec<BranchPoint>,
     /// Bifurcations in order along the arc.
     pub bifurcations: Vec<Bifurcation>,
-    /// Why it ends.
+    /// Why it ends; [`BranchEnd::is_failure`] tells whether it should have gone on.
     pub end: BranchEnd,
 }
 
@@ -133,12 +135,21 @@ pub enum BranchEnd {
         /// flip is located exactly.
         parameter: f64,
     },
+    /// The orbit shrank to a point at an end of the range, where the map is not
+    /// differentiable: a drive of amplitude zero on a tip that touches at rest.
+    #[error("the orbit shrinks to a point at {parameter}")]
+    Vanished {
+        /// Where.
+        parameter: f64,
+    },
     /// A state outgrew the bound.
     #[error("a state left the domain")]
     LeftDomain,
     /// No point was found at the shortest step.
-    #[error("no further point at the shortest step: {reason}")]
+    #[error("no further point beyond {parameter} at the shortest step: {reason}")]
     StepTooSmall {
+        /// The last point.
+        parameter: f64,
         /// What failed there.
         reason: String,
     },
@@ -155,6 +166,23 @@ pub enum BranchEnd {
     /// The caller stopped it.
     #[error("stopped by the caller")]
     Cancelled,
+}
+
+impl BranchEnd {
+    /// True if the branch was cut rather than came to an end: what lies beyond is not
+    /// known.
+    pub fn is_failure(&self) -> bool {
+        match self {
+            Self::RangeEnd
+            | Self::Closed
+            | Self::Collapsed { .. }
+            | Self::Vanished { .. }
+            | Self::Grazing { .. } => false,
+            Self::LeftDomain | Self::StepTooSmall { .. } | Self::PointLimit | Self::Cancelled => {
+                true
+            }
+        }
+    }
 }
 
 /// Why a branch could not be begun.

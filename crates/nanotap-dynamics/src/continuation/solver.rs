@@ -180,6 +180,22 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         self.correct(&points, parameter, &plane, 1.0, &row, corner)
     }
 
+    /// Measures the arc in units of this orbit's size from here on, `least` at least: an
+    /// orbit that shrinks to nothing would be reached by no number of steps.
+    pub(crate) fn rescale(&mut self, node: &mut Node, least: f64) {
+        let scale = norm(&node.points).max(least);
+        if scale > 0.0 {
+            self.state_scale = scale;
+            let length = self
+                .product(&node.tangent, node.slope, &node.tangent, node.slope)
+                .sqrt();
+            for t in &mut node.tangent {
+                *t /= length;
+            }
+            node.slope /= length;
+        }
+    }
+
     /// Newton in the plane `row`·(x_0, λ) = its value at the prediction; the tangent
     /// has a positive component along the orientation.
     fn correct(
@@ -192,6 +208,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         orientation_corner: f64,
     ) -> Result<Node, CorrectorFailure> {
         self.points.copy_from_slice(points);
+        // A plane of one parameter value: rounding must not leave it.
+        let fixed = row.iter().all(|r| *r == 0.0);
         let mut parameter = parameter;
         let mut residual = self.evaluate(parameter)?;
         let scale = self.state_scale.max(norm(points));
@@ -210,7 +228,9 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             for (x, s) in self.points.iter_mut().zip(&self.step) {
                 *x += s;
             }
-            parameter += change;
+            if !fixed {
+                parameter += change;
+            }
             if !parameter.is_finite() || self.points.iter().any(|v| !v.is_finite()) {
                 return Err(CorrectorFailure::Singular);
             }

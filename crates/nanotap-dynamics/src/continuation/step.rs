@@ -3,20 +3,30 @@
 use crate::continuation::ContinuationOptions;
 use crate::continuation::solver::{BranchSolver, CorrectorFailure, Node};
 use crate::map::MapFamily;
-use crate::vector::distance;
+use crate::vector::{distance, norm};
 
 /// Why a trial step was not taken.
 pub(crate) enum Rejected {
     Corrector(CorrectorFailure),
     Turn,
     Jump,
+    /// The orbit is a point at the end of the range.
+    Vanished {
+        parameter: f64,
+    },
 }
+
+/// Part of an orbit's size that a prediction of it may keep to be called a point.
+const POINT: f64 = 1e-6;
+/// Part of the Jacobian by which it may jump where an orbit becomes a point.
+const CONTINUOUS: f64 = 0.1;
 
 impl std::fmt::Display for Rejected {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Corrector(failure) => write!(f, "{failure}"),
             Self::Turn => write!(f, "the tangent turns too fast"),
+            Self::Vanished { .. } => write!(f, "the orbit shrinks to a point"),
             Self::Jump => write!(f, "the correction is as large as the step"),
         }
     }
@@ -47,9 +57,13 @@ pub(crate) fn trial<F: MapFamily>(
         }
     };
     let onto = |solver: &mut BranchSolver<'_, F>, end: f64| {
-        solver
+        let next = solver
             .onto_parameter(node, end)
-            .map_err(Rejected::Corrector)
+            .map_err(Rejected::Corrector);
+        if is_point_at(node, end) && !next.as_ref().is_ok_and(|next| goes_on(node, next)) {
+            return Err(Rejected::Vanished { parameter: end });
+        }
+        next
     };
     let next = if let Some(end) = outside(node.parameter + step * node.slope) {
         onto(solver, end)?
@@ -76,6 +90,26 @@ pub(crate) fn trial<F: MapFamily>(
         return Err(Rejected::Jump);
     }
     Ok(next)
+}
+
+/// True if the orbit, going on as its tangent says, has no size left at `end`.
+fn is_point_at(node: &Node, end: f64) -> bool {
+    let step = (end - node.parameter) / node.slope;
+    let left = node
+        .points
+        .iter()
+        .zip(&node.tangent)
+        .fold(0.0, |m: f64, (x, t)| m.max((x + step * t).abs()));
+    left <= POINT * norm(&node.points)
+}
+
+/// True if the map's derivative is continuous from one node to the next: it is not where
+/// a homogeneous map (all motions double with the drive) is taken at zero.
+fn goes_on(node: &Node, next: &Node) -> bool {
+    node.jacobians.iter().zip(&next.jacobians).all(|(a, b)| {
+        let jump = (a - b).amax();
+        jump <= CONTINUOUS * a.amax()
+    })
 }
 
 /// Scaled arclength from one node to the next, along the tangent of the first.

@@ -7,7 +7,8 @@ use nanotap_dynamics::{
 };
 
 use crate::systems::{
-    Cubic, DelayedLogistic, Family, Formula, Grazing, HardGrazing, Henon, Logistic,
+    Cubic, DelayedLogistic, Family, Focus, Formula, Grazing, HardGrazing, Henon, Kinked, Logistic,
+    Resonance,
 };
 
 fn orbit_at<F: MapFamily>(
@@ -367,4 +368,89 @@ fn bad_options_and_starts_are_refused() {
         ),
         Err(ContinuationError::NotAFlip)
     ));
+}
+
+/// Through a resonance the orbit grows ten-thousandfold and shrinks again: the branch
+/// reaches the other end in steps that keep to its size, not to that of its foot.
+#[test]
+fn a_branch_does_not_creep_through_a_resonance() {
+    let radius = 0.9999;
+    let family = Family(|angle| {
+        Resonance(Focus {
+            radius: 0.9999,
+            angle,
+        })
+    });
+    let found = branch(&family, 3.0, &[0.5, 0.0], 1, -2.5, (-2.5, 3.0));
+    assert!(matches!(found.end, BranchEnd::RangeEnd), "{}", found.end);
+    assert!(found.points.len() < 1500, "{}", found.points.len());
+    let largest = found
+        .points
+        .iter()
+        .map(|p| p.orbit.states[0][0].hypot(p.orbit.states[0][1]))
+        .fold(0.0, f64::max);
+    assert!(largest > 0.5 / (1.0 - radius), "{largest}");
+    assert!(found.bifurcations.is_empty());
+    let last = found.points.last().unwrap();
+    assert_eq!(last.parameter, -2.5);
+    let (s, c) = 2.5f64.sin_cos();
+    let size = 1.0 / (1.0 - radius * c).hypot(radius * s);
+    let state = &last.orbit.states[0];
+    assert!((state[0].hypot(state[1]) / size - 1.0).abs() < 1e-12);
+}
+
+/// Towards a drive of zero a homogeneous orbit shrinks to a point: the branch comes to
+/// that end, with no parameter outside its range and no bifurcation made of rounding.
+#[test]
+fn a_homogeneous_branch_comes_to_its_point() {
+    for (a, b) in [(0.3, 0.4), (0.3, -0.9), (-0.5, 0.2)] {
+        for from in [1.0, 1e-3, 7.3e4] {
+            let family = Family(match (a, b) {
+                (0.3, 0.4) => |mu| Kinked { mu, a: 0.3, b: 0.4 },
+                (0.3, _) => |mu| Kinked {
+                    mu,
+                    a: 0.3,
+                    b: -0.9,
+                },
+                _ => |mu| Kinked {
+                    mu,
+                    a: -0.5,
+                    b: 0.2,
+                },
+            });
+            let found = branch(&family, from, &[from / (1.0 - a - b)], 1, 0.0, (0.0, from));
+            assert!(!found.end.is_failure(), "{a} {b}: {}", found.end);
+            assert!(found.bifurcations.is_empty());
+            assert!(found.points.len() < 500, "{}", found.points.len());
+            for p in &found.points {
+                assert!((0.0..=from).contains(&p.parameter));
+                let exact = p.parameter / (1.0 - a - b);
+                assert!((p.orbit.states[0][0] - exact).abs() <= 1e-13 * from);
+            }
+            assert!(found.points.last().unwrap().parameter <= 0.05 * from);
+        }
+    }
+}
+
+/// A branch that is cut says so; one that comes to an end does not.
+#[test]
+fn only_a_cut_branch_is_a_failure() {
+    let family = Family(Logistic);
+    let orbit = orbit_at(&family, 2.0, &[0.5], 1);
+    let options = ContinuationOptions {
+        max_points: 5,
+        ..ContinuationOptions::over(2.0, 3.5)
+    };
+    let control = Control::default();
+    let cut = continue_orbit(
+        &family,
+        2.0,
+        &orbit,
+        Direction::Increasing,
+        &options,
+        &control,
+    );
+    assert!(cut.unwrap().end.is_failure());
+    let whole = branch(&family, 2.0, &[0.5], 1, 3.5, (2.0, 3.5));
+    assert!(!whole.end.is_failure());
 }

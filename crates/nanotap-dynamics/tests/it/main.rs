@@ -10,4 +10,5 @@ mod exponents;
 mod properties;
 mod settling;
 mod slicing;
+mod spreading;
 mod tracing;

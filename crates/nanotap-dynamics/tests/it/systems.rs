@@ -375,3 +375,46 @@ impl Formula for Nested {
         out[0] = if x[0].abs() > 2.0 * self.s { 0.0 } else { x[0] };
     }
 }
+
+/// [`Focus`] with the angle as parameter: the fixed point has the size
+/// 1/|1 − ρ e^{iθ}|, a resonance at θ = 0.
+#[derive(Clone, Debug)]
+pub(crate) struct Resonance(pub Focus);
+
+impl Formula for Resonance {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        self.0.image(x, out);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        self.0.jacobian(x, out);
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = self.0.angle.sin_cos();
+        out[0] = self.0.radius * (-s * x[0] - c * x[1]);
+        out[1] = self.0.radius * (c * x[0] - s * x[1]);
+    }
+}
+
+/// x → a x + b |x| + μ: homogeneous of degree one in (x, μ). Fixed points μ/(1 − a − b)
+/// for μ > 0 where 0 < 1 − a − b, with the multiplier a + b all the way to μ = 0, where
+/// the map has no derivative. The parameter is μ.
+#[derive(Clone, Debug)]
+pub(crate) struct Kinked {
+    pub mu: f64,
+    pub a: f64,
+    pub b: f64,
+}
+
+impl Formula for Kinked {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = self.a * x[0] + self.b * x[0].abs() + self.mu;
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = self.a + if x[0] > 0.0 { self.b } else { -self.b };
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = 1.0;
+    }
+}

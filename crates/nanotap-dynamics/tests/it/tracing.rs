@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, BranchEnd, CensusOptions, ContinuationOptions, Control, DMatrix,
+    Bifurcation, BifurcationKind, CensusOptions, ContinuationOptions, Control, CurveEnd, DMatrix,
     DiagramOptions, Direction, Locus, LocusOptions, MapFamily, ShootingOptions, StartBox,
     TwoParameterFamily, assemble_diagram, census, close_orbit, continue_orbit, trace_locus,
 };
@@ -93,7 +93,7 @@ fn check(locus: &Locus, second: (f64, f64), exact: impl Fn(f64) -> f64, toleranc
             (l.min(p.second), h.max(p.second))
         });
     assert_eq!((low, high), second, "{:?}", locus.ends);
-    assert!(locus.ends.iter().all(|e| matches!(e, BranchEnd::RangeEnd)));
+    assert!(locus.ends.iter().all(|e| *e == CurveEnd::Window));
 }
 
 /// The Hénon map's fold a = −(1−b)²/4 and flip a = 3(1−b)²/4, for all b.

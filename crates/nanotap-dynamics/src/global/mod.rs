@@ -1,0 +1,328 @@
+//! Attractors all over a grid of parameter values: none that is known at one value is
+//! missed at its neighbours.
+//!
+//! A census is taken at every value. Then each attractor is tried at the neighbouring
+//! values: of an orbit Newton looks for the same orbit there; where that fails, or finds
+//! it unstable, the motion from its state is classified; of chaos and tori likewise.
+//! What is new at a value is tried at its neighbours in turn, both ways, until no value
+//! gains an attractor (global continuation, as Datseris, Luiz Rossi and Wagemakers,
+//! Chaos 33, 073151, 2023, with Newton in place of recurrences).
+//!
+//! Attractors at neighbouring values that are one another's continuation (Newton from
+//! either closes the other, with little change of place) form a branch.
+//!
+//! The rounds are taken one after the other over the whole grid, so the result is the
+//! same for any number of threads.
+//!
+//! Fails: an attractor whose whole range lies between two values of the grid, or that no
+//! census meets anywhere in its range, stays unseen; one that moves by more than half
+//! its size from value to value is found but not joined to its branch.
+
+use rayon::prelude::*;
+
+use crate::census::{
+    Attractor, AttractorKind, Census, CensusOptions, Fraction, Lifetime, StartSet, census_of,
+};
+use crate::classify::{SettleOptions, Verdict, settle};
+use crate::control::Control;
+use crate::map::{MapFamily, StroboscopicMap, TwoParameterFamily};
+use crate::orbit::{PeriodicOrbit, close_orbit_from_points};
+
+/// Part of an orbit's size by which it may move from one value to the next and still be
+/// called the same.
+const CONTINUITY: f64 = 0.5;
+
+/// How attractors are sought over a grid.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GlobalOptions {
+    /// The census at every value. What it may leave unseen there, neighbours can show.
+    pub census: CensusOptions,
+}
+
+/// What is known at one value of the grid.
+#[derive(Clone, Debug)]
+pub struct GlobalValue {
+    /// The attractors: those of the census, then those that neighbours showed.
+    pub attractors: Vec<GlobalAttractor>,
+    /// The census; `None` if there is no map at this value or the work was stopped.
+    pub census: Option<Census>,
+    /// Why there is no map at this value.
+    pub failure: Option<String>,
+}
+
+/// An attractor at one value of the grid.
+#[derive(Clone, Debug)]
+pub struct GlobalAttractor {
+    /// The attractor. One that a neighbour showed has a fraction of no starts.
+    pub attractor: Attractor,
+    /// Index of the value whose attractor led to it; `None` if the census found it.
+    pub shown_by: Option<usize>,
+    /// Number of the branch on which it lies, counted from 0 in the order of the grid.
+    pub branch: usize,
+}
+
+/// The attractors of a one-parameter family at each of `values`, in their order.
+/// `starts` gives the starts at the value with this index.
+pub fn attractors_along<F: MapFamily>(
+    family: &F,
+    values: &[f64],
+    starts: impl Fn(usize, &F::Map) -> StartSet + Sync,
+    options: &GlobalOptions,
+    control: &Control<'_>,
+) -> Vec<GlobalValue> {
+    let at = |k: usize| family.at(values[k]).map_err(|e| e.to_string());
+    let neighbours = |k: usize| {
+        let last = values.len() - 1;
+        [k.checked_sub(1), (k < last).then_some(k + 1)]
+            .into_iter()
+            .flatten()
+            .collect()
+    };
+    over_graph(values.len(), at, neighbours, starts, options, control)
+}
+
+/// The attractors of a two-parameter family at each pair of values; the index of a pair
+/// is that of `second` times the number of `first` plus that of `first`.
+pub fn attractors_over<F: TwoParameterFamily>(
+    family: &F,
+    first: &[f64],
+    second: &[f64],
+    starts: impl Fn(usize, &F::Map) -> StartSet + Sync,
+    options: &GlobalOptions,
+    control: &Control<'_>,
+) -> Vec<GlobalValue> {
+    let (columns, rows) = (first.len(), second.len());
+    let at = |k: usize| {
+        family
+            .at(first[k % columns], second[k / columns])
+            .map_err(|e| e.to_string())
+    };
+    let neighbours = |k: usize| {
+        let (x, y) = (k % columns, k / columns);
+        [
+            (x > 0).then(|| k - 1),
+            (x + 1 < columns).then_some(k + 1),
+            (y > 0).then(|| k - columns),
+            (y + 1 < rows).then_some(k + columns),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    };
+    over_graph(columns * rows, at, neighbours, starts, options, control)
+}
+
+/// One attractor of one value.
+type Place = (usize, usize);
+
+/// What came of trying an attractor at a neighbouring value.
+struct Trial {
+    from: Place,
+    at: usize,
+    kind: AttractorKind,
+    state: Vec<f64>,
+    /// Whether it is the same attractor, moved a little.
+    continued: bool,
+}
+
+fn over_graph<M: StroboscopicMap>(
+    count: usize,
+    at: impl Fn(usize) -> Result<M, String> + Sync,
+    neighbours: impl Fn(usize) -> Vec<usize>,
+    starts: impl Fn(usize, &M) -> StartSet + Sync,
+    options: &GlobalOptions,
+    control: &Control<'_>,
+) -> Vec<GlobalValue> {
+    let quiet = Control {
+        cancel: control.cancel,
+        progress: None,
+    };
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let mut values: Vec<GlobalValue> = (0..count)
+        .into_par_iter()
+        .map(|k| {
+            let value = match at(k) {
+                Ok(map) => from_census(census_of(&map, &starts(k, &map), &options.census, &quiet)),
+                Err(failure) => GlobalValue {
+                    attractors: Vec::new(),
+                    census: None,
+                    failure: Some(failure),
+                },
+            };
+            control.report(&done, count);
+            value
+        })
+        .collect();
+    let mut links: Vec<(Place, Place)> = Vec::new();
+    let mut fresh: Vec<Place> = places(&values);
+    while !fresh.is_empty() && !control.is_cancelled() {
+        let tasks: Vec<(Place, usize)> = fresh
+            .iter()
+            .flat_map(|&from| neighbours(from.0).into_iter().map(move |at| (from, at)))
+            .filter(|&(_, at)| values[at].failure.is_none())
+            .collect();
+        let trials: Vec<Option<Trial>> = tasks
+            .par_iter()
+            .map(|&(from, k)| {
+                if control.is_cancelled() {
+                    return None;
+                }
+                let attractor = &values[from.0].attractors[from.1].attractor;
+                let mut map = at(k).ok()?;
+                let (kind, state, continued) = tried(&mut map, attractor, &options.census.settle)?;
+                Some(Trial {
+                    from,
+                    at: k,
+                    kind,
+                    state,
+                    continued,
+                })
+            })
+            .collect();
+        fresh.clear();
+        for trial in trials.into_iter().flatten() {
+            let known = &mut values[trial.at].attractors;
+            let index = known
+                .iter()
+                .position(|a| is_same(&a.attractor.kind, &trial.kind));
+            let index = index.unwrap_or_else(|| {
+                known.push(GlobalAttractor {
+                    attractor: Attractor {
+                        kind: trial.kind,
+                        fraction: Fraction::new(0, 0),
+                        first_start: None,
+                        state: trial.state,
+                    },
+                    shown_by: Some(trial.from.0),
+                    branch: 0,
+                });
+                fresh.push((trial.at, known.len() - 1));
+                known.len() - 1
+            });
+            if trial.continued {
+                links.push((trial.from, (trial.at, index)));
+            }
+        }
+    }
+    number_branches(&mut values, &links);
+    values
+}
+
+fn from_census(census: Census) -> GlobalValue {
+    let attractors = census
+        .attractors
+        .iter()
+        .map(|attractor| GlobalAttractor {
+            attractor: attractor.clone(),
+            shown_by: None,
+            branch: 0,
+        })
+        .collect();
+    GlobalValue {
+        attractors,
+        census: Some(census),
+        failure: None,
+    }
+}
+
+fn places(values: &[GlobalValue]) -> Vec<Place> {
+    values
+        .iter()
+        .enumerate()
+        .flat_map(|(k, v)| (0..v.attractors.len()).map(move |a| (k, a)))
+        .collect()
+}
+
+/// The attractor to which a neighbour's leads, a state on it, and whether it is the
+/// same one.
+fn tried<M: StroboscopicMap>(
+    map: &mut M,
+    attractor: &Attractor,
+    options: &SettleOptions,
+) -> Option<(AttractorKind, Vec<f64>, bool)> {
+    if let AttractorKind::Periodic(orbit) = &attractor.kind
+        && let Ok(closed) =
+            close_orbit_from_points(map, &orbit.flat(), orbit.period, &options.shooting)
+        && closed.is_stable()
+    {
+        let continued = is_continuation(orbit, &closed);
+        let state = closed.states[0].clone();
+        return Some((AttractorKind::Periodic(closed), state, continued));
+    }
+    let settled = settle(map, &attractor.state, options);
+    let (kind, continued) = match settled.verdict {
+        Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } => {
+            (AttractorKind::Periodic(orbit), false)
+        }
+        Verdict::QuasiPeriodic(torus) => (
+            AttractorKind::QuasiPeriodic(torus),
+            matches!(attractor.kind, AttractorKind::QuasiPeriodic(_)),
+        ),
+        Verdict::Chaotic(chaos) => (
+            AttractorKind::Chaotic {
+                spectrum: chaos.spectrum,
+                lifetime: Lifetime::new(0, chaos.observed as f64),
+            },
+            matches!(attractor.kind, AttractorKind::Chaotic { .. }),
+        ),
+        Verdict::Unbounded | Verdict::Undecided { .. } => return None,
+    };
+    Some((kind, settled.state, continued))
+}
+
+/// True if the second orbit is the first moved by little of its size.
+fn is_continuation(orbit: &PeriodicOrbit, closed: &PeriodicOrbit) -> bool {
+    let size = orbit.scale().max(closed.scale());
+    orbit.distance_to(closed).1 <= CONTINUITY * size
+}
+
+fn is_same(a: &AttractorKind, b: &AttractorKind) -> bool {
+    match (a, b) {
+        (AttractorKind::Periodic(a), AttractorKind::Periodic(b)) => a.is_same_as(b),
+        (AttractorKind::QuasiPeriodic(a), AttractorKind::QuasiPeriodic(b)) => {
+            a.spectrum.agrees_with(&b.spectrum)
+        }
+        (
+            AttractorKind::Chaotic { spectrum: a, .. },
+            AttractorKind::Chaotic { spectrum: b, .. },
+        ) => a.agrees_with(b),
+        _ => false,
+    }
+}
+
+/// Gives linked attractors one number, in the order of the grid.
+fn number_branches(values: &mut [GlobalValue], links: &[(Place, Place)]) {
+    let all = places(values);
+    let offset: Vec<usize> = values
+        .iter()
+        .scan(0, |sum, v| {
+            let before = *sum;
+            *sum += v.attractors.len();
+            Some(before)
+        })
+        .collect();
+    let index = |(k, a): Place| offset[k] + a;
+    // Union–find with path halving.
+    let mut parent: Vec<usize> = (0..all.len()).collect();
+    fn root(parent: &mut [usize], mut k: usize) -> usize {
+        while parent[k] != k {
+            parent[k] = parent[parent[k]];
+            k = parent[k];
+        }
+        k
+    }
+    for &(a, b) in links {
+        let (a, b) = (root(&mut parent, index(a)), root(&mut parent, index(b)));
+        parent[a.max(b)] = a.min(b);
+    }
+    let mut numbers: Vec<Option<usize>> = vec![None; all.len()];
+    let mut next = 0;
+    for &place in &all {
+        let r = root(&mut parent, index(place));
+        let number = *numbers[r].get_or_insert_with(|| {
+            next += 1;
+            next - 1
+        });
+        values[place.0].attractors[place.1].branch = number;
+    }
+}

@@ -11,7 +11,7 @@ const LARGEST: f64 = 1e300;
 const PADDING: f64 = 0.04;
 
 /// Data of less than this part of an axis's natural size are rounding.
-const ROUNDING: f64 = 1e-9;
+pub const ROUNDING: f64 = 1e-9;
 
 /// How values are spaced along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

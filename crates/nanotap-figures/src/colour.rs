@@ -177,7 +177,33 @@ pub enum Motion {
     Undecided,
 }
 
+impl fmt::Display for Motion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Motion::Periodic(period) => write!(f, "period {period}"),
+            Motion::QuasiPeriodic => f.write_str("quasi-periodic"),
+            Motion::Chaotic => f.write_str("chaotic"),
+            Motion::Unbounded => f.write_str("unbounded"),
+            Motion::Undecided => f.write_str("undecided"),
+        }
+    }
+}
+
 impl Motion {
+    /// The colours of motions of which several are of one kind, such as two of period 1: the first
+    /// of a kind has its colour, the others have tints of it.
+    pub fn colours(motions: impl IntoIterator<Item = Motion>) -> Vec<Colour> {
+        let mut before: Vec<Motion> = Vec::new();
+        motions
+            .into_iter()
+            .map(|motion| {
+                let alike = before.iter().filter(|other| **other == motion).count();
+                before.push(motion);
+                motion.colour().tint([0.0, 0.4, 0.65][alike.min(2)])
+            })
+            .collect()
+    }
+
     /// The colour of this motion, the same in every figure. Periods from 1 to 16 and the classes are
     /// distinct to every reader; longer periods repeat the colours of the sixteen, mixed with white.
     pub fn colour(self) -> Colour {

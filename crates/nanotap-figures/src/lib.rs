@@ -51,7 +51,7 @@ mod svg;
 mod text;
 pub mod ticks;
 
-pub use axis::{Axis, Range, Scale};
+pub use axis::{Axis, ROUNDING, Range, Scale};
 pub use colour::{Colour, Colourmap, LINES, Motion, category};
 pub use error::FigureError;
 pub use figure::{DOUBLE_COLUMN, DPI, Figure, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
@@ -61,3 +61,4 @@ pub use layer::{
 };
 pub use map::{AxisMap, PanelMap};
 pub use panel::{Legend, Panel};
+pub use text::mathtext;

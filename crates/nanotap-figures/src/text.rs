@@ -214,6 +214,63 @@ impl PlacedWords {
     }
 }
 
+/// A label as matplotlib's mathtext writes it: formulas between dollar signs, with letters that are
+/// not variables upright.
+pub fn mathtext(source: &str) -> String {
+    let mut text = String::new();
+    let mut maths = false;
+    let mut before = Script::Normal;
+    for letter in parse(source) {
+        let needed = letter.italic || letter.script != Script::Normal;
+        if before != Script::Normal && letter.script != before {
+            text.push('}');
+        }
+        if needed != maths {
+            text.push('$');
+            maths = needed;
+        }
+        if letter.script != before {
+            text.push_str(match letter.script {
+                Script::Normal => "",
+                Script::Sub => "_{",
+                Script::Super => "^{",
+            });
+        }
+        before = letter.script;
+        match letter.character {
+            '$' => text.push_str("\\$"),
+            // A mark stands before its letter in formulas.
+            mark @ '\u{300}'..='\u{36f}' => {
+                let command = match mark {
+                    '\u{302}' => "\\hat ",
+                    '\u{304}' => "\\bar ",
+                    '\u{308}' => "\\ddot ",
+                    _ => "\\dot ",
+                };
+                let place = text.char_indices().last().map_or(0, |(place, _)| place);
+                text.insert_str(place, command);
+            }
+            character if maths && !letter.italic && character.is_alphabetic() => {
+                text.push_str("\\mathrm{");
+                text.push(character);
+                text.push('}');
+            }
+            character if maths && matches!(character, '%' | '#' | '_' | '{' | '}') => {
+                text.push('\\');
+                text.push(character);
+            }
+            character => text.push(character),
+        }
+    }
+    if before != Script::Normal {
+        text.push('}');
+    }
+    if maths {
+        text.push('$');
+    }
+    text
+}
+
 fn parse(source: &str) -> Vec<Letter> {
     let mut letters = Vec::new();
     let mut maths = false;
@@ -333,6 +390,30 @@ mod tests {
         assert_eq!(show("$Ω$ / $τ$"), "Ω / *τ");
         assert_eq!(show("$ẆŴȧẋ×5$"), "*Ẇ*Ŵ*ȧ*ẋ×5");
         assert_eq!(show("}{^"), "}{^");
+    }
+
+    #[test]
+    fn matplotlib_reads_the_same() {
+        for (source, expected) in [
+            (
+                "time $τ / T$ (drive periods)",
+                "time $τ$ / $T$ (drive periods)",
+            ),
+            (
+                "$E_{dis}$ (aJ)",
+                "$E_{dis}$ (aJ)"
+                    .replace("dis", "\\mathrm{d}\\mathrm{i}\\mathrm{s}")
+                    .as_str(),
+            ),
+            ("10^{-3}", "10$^{−3}$"),
+            ("$a_1$", "$a_{1}$"),
+            ("a₁", "a$_{1}$"),
+            ("$x\u{302}_n$", "$\\hat x_{n}$"),
+            ("5 \\$", "5 \\$"),
+            ("", ""),
+        ] {
+            assert_eq!(mathtext(source), expected);
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@
 mod case;
 mod dataset;
 mod failure;
+mod figure;
 mod motion;
 mod study;
 mod watch;
@@ -47,6 +48,9 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(dataset::summary, module)?,
         wrap_pyfunction!(dataset::window, module)?,
         wrap_pyfunction!(dataset::figure, module)?,
+        wrap_pyfunction!(figure::mathtext, module)?,
+        wrap_pyfunction!(figure::colours, module)?,
+        wrap_pyfunction!(figure::describe, module)?,
         wrap_pyfunction!(dataset::gsf, module)?,
         wrap_pyfunction!(dataset::write_table, module)?,
     ] {

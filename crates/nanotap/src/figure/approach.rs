@@ -1,49 +1,22 @@
 //! Approach and retract curves as a picture.
 
-use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Shape,
-};
+use std::collections::BTreeSet;
+
+use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel};
+use serde::Deserialize;
 
 use crate::case::physical::Kind;
 use crate::case::units::Units;
-use crate::figure::branch::{MARKS, Shown, runs, word};
+use crate::figure::branch::{
+    BranchMark, BranchPoint, MARKS, Shown, natural_of, runs, scale_of, word,
+};
 use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
-use crate::study::branch::PointReport;
 
 /// Amplitude, phase, dissipation and greatest force against the distance: what was met on the
 /// way there and back as marks in two colours, the branches as lines, dashed where unstable,
 /// with their bifurcations.
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
-    const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
-    SHOWN
-        .into_iter()
-        .filter_map(Shown::named)
-        .enumerate()
-        .fold(
-            Figure::new(2, 2).width(DOUBLE_COLUMN).height(130.0),
-            |figure, (k, shown)| {
-                let panel = panel(report, shown, units);
-                // One legend is enough.
-                figure.with(if k == 0 {
-                    panel.legend(Legend::Above)
-                } else {
-                    panel.legend(Legend::Hidden)
-                })
-            },
-        )
-        .share_x()
-}
-
-fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
-    let value = |observables: &Observables| shown.of(observables, &[]);
-    let met = || report.table.iter().filter_map(|p| p.observables.as_ref());
-    let points = || report.branches.iter().flat_map(|b| &b.points);
-    let size = met()
-        .chain(points().map(|p| &p.observables))
-        .map(|observables| value(observables).abs())
-        .fold(0.0, f64::max);
-    let (label, factor) = shown.axis(true, |kind| units.si(kind), size);
     let (x_factor, x_unit) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
     let symbol = if matches!(units, Units::Si(_)) {
         "distance $z_c$"
@@ -52,90 +25,198 @@ fn panel(report: &ApproachReport, shown: Shown, units: &Units) -> Panel {
     } else {
         "distance $α₅$"
     };
-    let mut panel = Panel::new(
-        Axis::linear(format!("{symbol}{x_unit}"))
-            .range(x_factor * report.to, x_factor * report.from),
-        Axis::linear(label),
-    );
-    let place = |gap: f64, value: f64| (x_factor * gap, factor * value);
-    for branch in report.branches.iter().flat_map(|b| 0..b.branches.len()) {
-        let curve: Vec<&PointReport> = points().filter(|p| p.branch == branch).collect();
-        for (stable, run) in runs(&curve) {
-            let line = Line::new(
-                unwrapped(
-                    shown,
-                    run.iter().map(|p| (p.parameter, value(&p.observables))),
-                )
-                .into_iter()
-                .map(|(gap, value)| place(gap, value)),
-            )
-            .colour(Colour::GREY)
-            .width(0.7);
-            panel = panel.with(if stable {
-                line
+    const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
+    ApproachCurves {
+        x_label: format!("{symbol}{x_unit}"),
+        x_range: [report.to, report.from].map(|gap| x_factor * gap),
+        panels: SHOWN
+            .into_iter()
+            .filter_map(Shown::named)
+            .map(|shown| ApproachPanel::of(report, shown, units, x_factor))
+            .collect(),
+    }
+    .figure()
+}
+
+/// Curves of approach and retract as they are drawn, in the units shown.
+#[derive(Clone, Debug, Deserialize)]
+pub struct ApproachCurves {
+    /// Label of the distance.
+    pub x_label: String,
+    /// Its range.
+    pub x_range: [f64; 2],
+    /// What is drawn against it.
+    pub panels: Vec<ApproachPanel>,
+}
+
+/// One quantity against the distance.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct ApproachPanel {
+    /// Its label.
+    pub label: String,
+    /// What size of it matters, where that is known: see [`Axis::natural`].
+    pub natural: Option<f64>,
+    /// Whether it is a phase, in degrees.
+    pub phase: bool,
+    /// What was met while the lever approached.
+    pub approach: Vec<(f64, f64)>,
+    /// What was met while it was retracted.
+    pub retract: Vec<(f64, f64)>,
+    /// The branches.
+    pub branches: Vec<BranchPoint>,
+    /// Their bifurcations.
+    pub bifurcations: Vec<BranchMark>,
+}
+
+impl ApproachCurves {
+    /// The figure.
+    pub fn figure(&self) -> Figure {
+        let rows = self.panels.len().div_ceil(2).max(1);
+        let mut figure = Figure::new(rows, 2)
+            .width(DOUBLE_COLUMN)
+            .height(65.0 * rows as f64)
+            .share_x();
+        for (k, one) in self.panels.iter().enumerate() {
+            let [from, to] = self.x_range;
+            let x = Axis::linear(&self.x_label).range(from, to);
+            let panel = one.panel(x);
+            // One legend is enough.
+            figure = figure.with(if k == 0 {
+                panel.legend(Legend::Above)
             } else {
-                line.dash(Dash::Dashed)
+                panel.legend(Legend::Hidden)
             });
         }
+        figure
     }
-    if points().any(|p| !p.stable) {
-        let nowhere = Line::new([(f64::NAN, f64::NAN)])
-            .colour(Colour::GREY)
-            .dash(Dash::Dashed)
-            .width(0.7);
-        panel = panel.with(nowhere.label("unstable"));
-    }
-    let ways = [
-        (Way::Approach, Colour::BLUE, Shape::Circle, 1.3),
-        (Way::Retract, Colour::VERMILLION, Shape::Circle, 0.8),
-    ];
-    for (way, colour, shape, diameter) in ways {
-        let marks: Vec<(f64, f64)> = report
-            .table
-            .iter()
-            .filter(|p| p.way == way)
-            .filter_map(|p| Some(place(p.gap, value(p.observables.as_ref()?))))
-            .collect();
-        panel = panel.with(
-            Markers::new(marks)
-                .shape(shape)
-                .colour(colour)
-                .size(diameter)
-                .label(way.name()),
-        );
-    }
-    let bifurcations = report.branches.iter().flat_map(|b| &b.bifurcations);
-    // Where there are many, each is to hide little.
-    let size = if bifurcations.clone().count() > 12 {
-        1.0
-    } else {
-        1.8
-    };
-    for (kind, shape, colour) in MARKS {
-        let marks: Vec<(f64, f64)> = bifurcations
-            .clone()
-            .filter(|b| b.kind == kind)
-            .map(|b| place(b.parameter, value(&b.observables)))
-            .collect();
-        if !marks.is_empty() {
-            panel = panel.with(
-                Markers::new(marks)
-                    .shape(shape)
-                    .colour(colour)
-                    .open()
-                    .size(size)
-                    .label(word(kind)),
-            );
+}
+
+impl ApproachPanel {
+    fn of(report: &ApproachReport, shown: Shown, units: &Units, x_factor: f64) -> Self {
+        let of = |shown: Shown, observables: &Observables| shown.of(observables, &[]);
+        let met = report.table.iter().filter_map(|p| p.observables.as_ref());
+        let points = || report.branches.iter().flat_map(|b| &b.points);
+        let largest = |f: &dyn Fn(&Observables) -> f64| {
+            met.clone()
+                .chain(points().map(|p| &p.observables))
+                .map(|observables| f(observables).abs())
+                .fold(0.0, f64::max)
+        };
+        let size = |shown: Shown| largest(&|observables| of(shown, observables));
+        let natural = natural_of(shown, size);
+        let (label, factor) =
+            shown.axis(true, |kind| units.si(kind), scale_of(size(shown), natural));
+        let place =
+            |gap: f64, observables: &Observables| (x_factor * gap, factor * of(shown, observables));
+        let way = |way: Way| {
+            let on = report.table.iter().filter(|p| p.way == way);
+            on.filter_map(|p| Some(place(p.gap, p.observables.as_ref()?)))
+                .collect()
+        };
+        let bifurcations = report.branches.iter().flat_map(|b| &b.bifurcations);
+        Self {
+            label,
+            natural: natural.map(|size| factor * size),
+            phase: shown.is_phase(),
+            approach: way(Way::Approach),
+            retract: way(Way::Retract),
+            branches: points()
+                .map(|p| {
+                    let (x, y) = place(p.parameter, &p.observables);
+                    BranchPoint {
+                        branch: p.branch,
+                        period: p.period,
+                        stable: p.stable,
+                        x,
+                        y,
+                    }
+                })
+                .collect(),
+            bifurcations: bifurcations
+                .map(|b| {
+                    let (x, y) = place(b.parameter, &b.observables);
+                    BranchMark {
+                        kind: b.kind.to_owned(),
+                        x,
+                        y,
+                    }
+                })
+                .collect(),
         }
     }
-    panel
+
+    fn panel(&self, x: Axis) -> Panel {
+        let y = Axis {
+            natural: self.natural,
+            ..Axis::linear(&self.label)
+        };
+        let mut panel = Panel::new(x, y);
+        let grey = |points: Vec<(f64, f64)>| Line::new(points).colour(Colour::GREY).width(0.7);
+        let branches: BTreeSet<usize> = self.branches.iter().map(|p| p.branch).collect();
+        for branch in branches {
+            let curve: Vec<&BranchPoint> = self
+                .branches
+                .iter()
+                .filter(|p| p.branch == branch)
+                .collect();
+            for (stable, run) in runs(&curve, |p| p.stable) {
+                let line = grey(unwrapped(self.phase, run.iter().map(|p| (p.x, p.y))));
+                panel = panel.with(if stable {
+                    line
+                } else {
+                    line.dash(Dash::Dashed)
+                });
+            }
+        }
+        let nowhere = || grey(vec![(f64::NAN, f64::NAN)]);
+        if self.branches.iter().any(|p| p.stable) {
+            panel = panel.with(nowhere().label("stable"));
+        }
+        if self.branches.iter().any(|p| !p.stable) {
+            panel = panel.with(nowhere().dash(Dash::Dashed).label("unstable"));
+        }
+        let ways = [
+            (&self.approach, Colour::BLUE, 1.3, Way::Approach),
+            (&self.retract, Colour::VERMILLION, 0.8, Way::Retract),
+        ];
+        for (met, colour, size, way) in ways {
+            let markers = Markers::new(met.clone()).colour(colour).size(size);
+            panel = panel.with(markers.label(way.name()));
+        }
+        // Where there are many, each is to hide little.
+        let size = if self.bifurcations.len() > 12 {
+            1.0
+        } else {
+            1.8
+        };
+        for (kind, shape, colour) in MARKS {
+            let marks: Vec<(f64, f64)> = self
+                .bifurcations
+                .iter()
+                .filter(|b| b.kind == kind)
+                .map(|b| (b.x, b.y))
+                .collect();
+            if !marks.is_empty() {
+                panel = panel.with(
+                    Markers::new(marks)
+                        .shape(shape)
+                        .colour(colour)
+                        .open()
+                        .size(size)
+                        .label(word(kind)),
+                );
+            }
+        }
+        panel
+    }
 }
 
 /// A curve; of a phase broken where it comes round.
-fn unwrapped(shown: Shown, curve: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+fn unwrapped(phase: bool, curve: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (x, y) in curve {
-        if shown.is_phase() && points.last().is_some_and(|last| (last.1 - y).abs() > 180.0) {
+        if phase && points.last().is_some_and(|last| (last.1 - y).abs() > 180.0) {
             points.push((f64::NAN, f64::NAN));
         }
         points.push((x, y));

@@ -1,13 +1,12 @@
 //! Figures of all attractors together, and of a Poincaré section.
 
-use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Figure, LINES, Legend, Line, Markers, Panel, Points, Shape,
-};
+use nanotap_figures::Figure;
 use nanotap_flow::Trajectory;
 
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::figure::motion::portrait;
+use crate::figure::panels::{AttractorCurve, AttractorCurves, MotionAxes, SectionCurves};
 use crate::model::Model;
 use crate::study::attractors::{AttractorReport, Attractors};
 use crate::study::lyapunov::{LyapunovReport, Section};
@@ -48,71 +47,34 @@ pub fn attractors_figure(model: &Model, found: &Attractors, units: &Units) -> Fi
             .map(|p| (length * p.0, velocity * p.1))
             .collect()
     };
-    let axes = || {
-        let (tip, rate) = if model.beam.is_some() {
-            ("tip deflection $W$", "tip velocity $dW/dτ$")
-        } else {
-            ("displacement $x$", "velocity $dx/dt$")
-        };
-        (
-            Axis::linear(format!("{tip}{length_unit}")),
-            Axis::linear(format!("{rate}{velocity_unit}")),
-        )
-    };
-    let (x, y) = axes();
-    let mut portraits = Panel::new(x, y).legend(Legend::Above);
-    let (x, y) = axes();
-    let mut strobes = Panel::new(x, y)
-        .legend(Legend::Above)
-        .title("at drive phase 0");
-    // The largest first, so that it hides no other.
-    let mut order: Vec<usize> = (0..curves.len()).collect();
-    let extent = |c: &Curve| c.line.iter().fold(0.0, |m: f64, p| m.max(p.0.abs()));
-    order.sort_by(|&a, &b| extent(&curves[b].1).total_cmp(&extent(&curves[a].1)));
-    for k in order {
-        let (attractor, curve) = &curves[k];
-        let colour = LINES[k % LINES.len()];
-        let width = if attractor.orbit.is_some() { 0.9 } else { 0.25 };
-        portraits = portraits.with(
-            Line::new(scaled(&curve.line))
-                .colour(colour)
-                .width(width)
-                .label(name(attractor)),
-        );
-        strobes = if attractor.orbit.is_some() {
-            strobes.with(Markers::new(scaled(&curve.strobe)).colour(colour).size(1.6))
-        } else {
-            strobes.with(
-                Points::new(scaled(&curve.strobe))
-                    .colour(colour)
-                    .diameter(0.35),
-            )
-        };
-    }
     let unstable: Vec<(f64, f64)> = found
         .unstable
         .iter()
         .flatten()
         .flat_map(|o| o.states.iter().map(|s| at_phase_zero(model, s)))
         .collect();
-    if !unstable.is_empty() {
-        strobes = strobes.with(
-            Markers::new(scaled(&unstable))
-                .open()
-                .shape(Shape::Diamond)
-                .size(1.4)
-                .colour(Colour::GREY)
-                .label("unstable orbits"),
-        );
+    AttractorCurves {
+        axes: MotionAxes {
+            beam: model.beam.is_some(),
+            length: length_unit,
+            velocity: velocity_unit,
+        },
+        attractors: curves
+            .iter()
+            .map(|(attractor, curve)| AttractorCurve {
+                name: name(attractor),
+                classification: attractor.classification.name().to_owned(),
+                period: attractor.orbit.as_ref().map(|orbit| orbit.period),
+                portrait: scaled(&curve.line),
+                strobe: scaled(&curve.strobe),
+            })
+            .collect(),
+        unstable: scaled(&unstable),
     }
-    Figure::new(1, 2)
-        .width(DOUBLE_COLUMN)
-        .height(84.0)
-        .with(portraits)
-        .with(strobes)
+    .figure()
 }
 
-/// "period 4, 37 %".
+/// "period 4 (37 %)".
 fn name(attractor: &AttractorReport) -> String {
     let what = attractor.orbit.as_ref().map_or_else(
         || attractor.classification.name().to_owned(),
@@ -168,92 +130,32 @@ pub fn section_figure(model: &Model, report: &LyapunovReport, units: &Units) -> 
             .iter()
             .fold(0.0, |m: f64, p| m.max(f(p).abs()))
     };
-    let diameter = if report.section.len() > 20_000 {
-        0.15
-    } else {
-        0.3
+    let (length, length_unit) = units.axis(Kind::Length, size(|p| p.tip));
+    let rate = match report.section_at {
+        Section::Phase(_) => size(|p| p.tip_rate),
+        Section::Contact => size(|p| p.gap_rate),
     };
-    let panel = match report.section_at {
-        Section::Phase(phase) => {
-            let (length, length_unit) = units.axis(Kind::Length, size(|p| p.tip));
-            let (velocity, velocity_unit) = units.axis(Kind::Velocity, size(|p| p.tip_rate));
-            let (tip, rate) = if model.beam.is_some() {
-                ("$W$", "$dW/dτ$")
-            } else {
-                ("$x$", "$dx/dt$")
-            };
-            let title = format!("at drive phase {:.0}°", 360.0 * phase);
-            Panel::new(
-                Axis::linear(format!("tip deflection {tip}{length_unit}")),
-                Axis::linear(format!("tip velocity {rate}{velocity_unit}")),
-            )
-            .title(title)
-            .with(
-                Points::new(
-                    report
-                        .section
-                        .iter()
-                        .map(|p| (length * p.tip, velocity * p.tip_rate)),
-                )
-                .diameter(diameter)
-                .colour(Colour::BLUE),
-            )
-        }
-        Section::Contact => {
-            let (velocity, velocity_unit) = units.axis(Kind::Velocity, size(|p| p.gap_rate));
-            Panel::new(
-                Axis::linear("drive phase at contact (°)")
-                    .range(0.0, 360.0)
-                    .marks([0.0, 90.0, 180.0, 270.0, 360.0].map(|d| (d, format!("{d:.0}")))),
-                Axis::linear(format!("speed of approach{velocity_unit}")),
-            )
-            .title("at the beginning of contacts")
-            .with(
-                Points::new(
-                    report
-                        .section
-                        .iter()
-                        .map(|p| (360.0 * p.phase, -velocity * p.gap_rate)),
-                )
-                .diameter(diameter)
-                .colour(Colour::BLUE),
-            )
-        }
-    };
-    let exponents = report
-        .exponents
-        .iter()
-        .enumerate()
-        .map(|(k, e)| ((k + 1) as f64, *e));
-    let bars = report
-        .exponents
-        .iter()
-        .zip(&report.errors)
-        .enumerate()
-        .map(|(k, (e, s))| {
-            Line::new([((k + 1) as f64, e - s), ((k + 1) as f64, e + s)])
-                .colour(Colour::VERMILLION)
-                .width(1.2)
-        });
-    let count = report.exponents.len();
-    let every = count.div_ceil(12);
-    let marks = (1..=count)
-        .filter(|k| (k - 1) % every == 0)
-        .map(|k| (k as f64, k.to_string()));
-    Figure::new(1, 2)
-        .width(DOUBLE_COLUMN)
-        .height(78.0)
-        .column_widths([1.5, 1.0])
-        .with(panel)
-        .with(
-            Panel::new(
-                Axis::linear("number $i$")
-                    .range(0.4, count as f64 + 0.6)
-                    .marks(marks),
-                Axis::linear("exponent $λ_i$ per drive period"),
-            )
-            .with(nanotap_figures::Rule::horizontal(0.0))
-            .with_all(bars)
-            .with(Markers::new(exponents).colour(Colour::VERMILLION)),
-        )
+    let (velocity, velocity_unit) = units.axis(Kind::Velocity, rate);
+    SectionCurves {
+        axes: MotionAxes {
+            beam: model.beam.is_some(),
+            length: length_unit,
+            velocity: velocity_unit,
+        },
+        phase: match report.section_at {
+            Section::Phase(phase) => Some(phase),
+            Section::Contact => None,
+        },
+        points: report
+            .section
+            .iter()
+            .map(|p| match report.section_at {
+                Section::Phase(_) => (length * p.tip, velocity * p.tip_rate),
+                Section::Contact => (360.0 * p.phase, -velocity * p.gap_rate),
+            })
+            .collect(),
+        exponents: report.exponents.clone(),
+        errors: report.errors.clone(),
+    }
+    .figure()
 }

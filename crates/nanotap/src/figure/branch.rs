@@ -1,17 +1,18 @@
 //! Figures of branches, stable solid and unstable dashed, and of loci in two parameters.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, LINES, Legend, Line, Markers,
-    ONE_AND_A_HALF_COLUMNS, Panel, Shape,
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Motion,
+    ONE_AND_A_HALF_COLUMNS, Panel, ROUNDING, Shape,
 };
+use serde::Deserialize;
 
 use crate::case::subject::Key;
 use crate::case::units::Units;
 pub use crate::figure::shown::Shown;
 use crate::observe::{Observables, PhysicalMotion};
-use crate::study::branch::{BranchReport, Loci, PointReport};
+use crate::study::branch::{BranchReport, PointReport};
 
 /// The parameter's axis: its label and what its values are multiplied with.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +46,7 @@ pub(crate) const MARKS: [(&str, Shape, Colour); 5] = [
 ];
 
 /// Branches against the parameter, a colour a period, with their bifurcations; beside
-/// them the loci of these in two parameters, if they were traced.
+/// them the bifurcation curves in two parameters, if they were traced.
 pub fn branch_figure(
     report: &BranchReport,
     shown: Shown,
@@ -53,120 +54,281 @@ pub fn branch_figure(
     axes: &[ParameterAxis; 2],
     units: &Units,
 ) -> Figure {
-    let branches = branches_panel(report, shown, beam, &axes[0], units);
-    match &report.loci {
-        None => Figure::single(branches)
-            .width(ONE_AND_A_HALF_COLUMNS)
-            .height(88.0),
-        Some(loci) => Figure::new(1, 2)
-            .width(DOUBLE_COLUMN)
-            .height(88.0)
-            .with(branches)
-            .with(loci_panel(report, loci, axes)),
-    }
-}
-
-fn branches_panel(
-    report: &BranchReport,
-    shown: Shown,
-    beam: bool,
-    axis: &ParameterAxis,
-    units: &Units,
-) -> Panel {
     // Where physical quantities vary, the model's units may vary with them: SI then.
     let si = report.points.iter().any(|p| p.physical.is_some());
-    let of = |model: &Observables, physical: Option<&PhysicalMotion>, multipliers: &[[f64; 2]]| {
+    let of = |shown: Shown,
+              model: &Observables,
+              physical: Option<&PhysicalMotion>,
+              multipliers: &[[f64; 2]]| {
         shown.of(physical.map_or(model, |p| &p.observables), multipliers)
     };
-    let value = |p: &PointReport| of(&p.observables, p.physical.as_ref(), &p.multipliers);
-    let size = report
-        .points
-        .iter()
-        .map(|p| value(p).abs())
-        .fold(0.0, f64::max);
+    let value =
+        |shown, p: &PointReport| of(shown, &p.observables, p.physical.as_ref(), &p.multipliers);
+    let largest = |f: &dyn Fn(&PointReport) -> f64| {
+        report.points.iter().map(|p| f(p).abs()).fold(0.0, f64::max)
+    };
+    let natural = natural_of(shown, |shown| largest(&|p| value(shown, p)));
+    let size = scale_of(largest(&|p| value(shown, p)), natural);
     let (label, factor) = shown.axis(
         beam,
         |kind| if si { Some(1.0) } else { units.si(kind) },
         size,
     );
-    let periods: BTreeSet<usize> = report.points.iter().map(|p| p.period).collect();
-    let mut panel = Panel::new(
-        Axis::linear(axis.label.clone()).tight(),
-        Axis::linear(label),
-    )
-    .legend(Legend::Above);
-    for (k, period) in periods.iter().enumerate() {
-        let mut named = false;
-        for branch in 0..report.branches.len() {
-            let points: Vec<&PointReport> = report
-                .points
+    let [first, second] = axes;
+    BranchCurves {
+        x_label: first.label.clone(),
+        y_label: label,
+        natural: natural.map(|size| factor * size),
+        points: report
+            .points
+            .iter()
+            .map(|p| BranchPoint {
+                branch: p.branch,
+                period: p.period,
+                stable: p.stable,
+                x: first.factor * p.parameter,
+                y: factor * value(shown, p),
+            })
+            .collect(),
+        bifurcations: report
+            .bifurcations
+            .iter()
+            .map(|b| BranchMark {
+                kind: b.kind.to_owned(),
+                x: first.factor * b.parameter,
+                y: factor * of(shown, &b.observables, b.physical.as_ref(), &b.multipliers),
+            })
+            .collect(),
+        curves: report.loci.as_ref().map(|loci| BifurcationCurves {
+            y_label: second.label.clone(),
+            x_range: [report.from.min(report.to), report.from.max(report.to)]
+                .map(|v| first.factor * v),
+            y_range: loci.range.map(|v| second.factor * v),
+            curves: loci
+                .curves
                 .iter()
-                .filter(|p| p.branch == branch && p.period == *period)
-                .collect();
-            for (stable, run) in runs(&points) {
-                let curve = run
-                    .iter()
-                    .map(|p| (axis.factor * p.parameter, factor * value(p)));
-                let mut line = Line::new(curve).colour(LINES[k % LINES.len()]);
+                .map(|curve| BifurcationCurve {
+                    kind: curve.kind.to_owned(),
+                    period: curve.period,
+                    x: curve.first.iter().map(|v| first.factor * v).collect(),
+                    y: curve.second.iter().map(|v| second.factor * v).collect(),
+                })
+                .collect(),
+        }),
+    }
+    .figure()
+}
+
+/// What size of a quantity matters: of the dissipation the work of the greatest force over the
+/// amplitude, beside which rounding is nothing; of others it is not known.
+pub(crate) fn natural_of(shown: Shown, largest: impl Fn(Shown) -> f64) -> Option<f64> {
+    if shown != Shown::named("dissipation")? {
+        return None;
+    }
+    Some(largest(Shown::named("first_harmonic")?) * largest(Shown::named("peak_force")?))
+}
+
+/// The size that chooses a unit: that of the data or, where these are rounding, what matters.
+pub(crate) fn scale_of(size: f64, natural: Option<f64>) -> f64 {
+    match natural {
+        Some(natural) if size <= ROUNDING * natural => natural,
+        _ => size,
+    }
+}
+
+/// Branches as they are drawn, in the units shown.
+#[derive(Clone, Debug, Deserialize)]
+pub struct BranchCurves {
+    /// Label of the parameter's axis.
+    pub x_label: String,
+    /// Label of what is drawn against it.
+    pub y_label: String,
+    /// What size of it matters, where that is known: see [`Axis::natural`].
+    #[serde(default)]
+    pub natural: Option<f64>,
+    /// The orbits, in the order in which they were followed.
+    pub points: Vec<BranchPoint>,
+    /// The bifurcations.
+    pub bifurcations: Vec<BranchMark>,
+    /// Curves of bifurcations in two parameters.
+    pub curves: Option<BifurcationCurves>,
+}
+
+/// An orbit of a branch.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub struct BranchPoint {
+    /// Number of its branch.
+    pub branch: usize,
+    /// Its period.
+    pub period: usize,
+    /// Whether it attracts.
+    pub stable: bool,
+    /// The parameter.
+    pub x: f64,
+    /// What is drawn.
+    pub y: f64,
+}
+
+/// A bifurcation of a branch.
+#[derive(Clone, Debug, Deserialize)]
+pub struct BranchMark {
+    /// `fold`, `flip` …
+    pub kind: String,
+    /// The parameter.
+    pub x: f64,
+    /// What is drawn.
+    pub y: f64,
+}
+
+/// Curves of bifurcations in the plane of two parameters.
+#[derive(Clone, Debug, Deserialize)]
+pub struct BifurcationCurves {
+    /// Label of the second parameter's axis.
+    pub y_label: String,
+    /// Range of the first parameter.
+    pub x_range: [f64; 2],
+    /// Range of the second parameter.
+    pub y_range: [f64; 2],
+    /// The curves.
+    pub curves: Vec<BifurcationCurve>,
+}
+
+/// A curve of bifurcations.
+#[derive(Clone, Debug, Deserialize)]
+pub struct BifurcationCurve {
+    /// `fold`, `flip` …
+    pub kind: String,
+    /// Period of the orbit that bifurcates.
+    pub period: usize,
+    /// The first parameter along the curve.
+    pub x: Vec<f64>,
+    /// The second parameter along the curve.
+    pub y: Vec<f64>,
+}
+
+impl BranchCurves {
+    /// The figure.
+    pub fn figure(&self) -> Figure {
+        let branches = self.panel();
+        match &self.curves {
+            None => Figure::single(branches)
+                .width(ONE_AND_A_HALF_COLUMNS)
+                .height(88.0),
+            Some(curves) => Figure::new(1, 2)
+                .width(DOUBLE_COLUMN)
+                .height(88.0)
+                .with(branches)
+                .with(curves.panel(&self.x_label)),
+        }
+    }
+
+    fn panel(&self) -> Panel {
+        let y = Axis {
+            natural: self.natural,
+            ..Axis::linear(&self.y_label)
+        };
+        let mut panel = Panel::new(Axis::linear(&self.x_label).tight(), y).legend(Legend::Above);
+        let mut parts: BTreeMap<(usize, usize), Vec<&BranchPoint>> = BTreeMap::new();
+        for point in &self.points {
+            parts
+                .entry((point.period, point.branch))
+                .or_default()
+                .push(point);
+        }
+        let mut named = BTreeSet::new();
+        for ((period, _), points) in &parts {
+            for (stable, run) in runs(points, |p| p.stable) {
+                let motion = Motion::Periodic(*period);
+                let mut line = Line::new(run.iter().map(|p| (p.x, p.y))).colour(motion.colour());
                 if !stable {
                     line = line.dash(Dash::Dashed).width(0.6);
-                } else if !named {
-                    line = line.label(format!("period {period}"));
-                    named = true;
+                } else if named.insert(*period) {
+                    line = line.label(motion.to_string());
                 }
                 panel = panel.with(line);
             }
         }
-    }
-    if report.points.iter().any(|p| !p.stable) {
-        // Only for the legend.
-        let nowhere = Line::new([(f64::NAN, f64::NAN)])
-            .colour(Colour::GREY)
-            .dash(Dash::Dashed)
-            .width(0.6);
-        panel = panel.with(nowhere.label("unstable"));
-    }
-    // Where there are many, each is to hide little.
-    let size = if report.bifurcations.len() > 12 {
-        1.1
-    } else {
-        1.6
-    };
-    for (kind, shape, colour) in MARKS {
-        let marks: Vec<(f64, f64)> = report
-            .bifurcations
-            .iter()
-            .filter(|b| b.kind == kind)
-            .map(|b| {
-                (
-                    axis.factor * b.parameter,
-                    factor * of(&b.observables, b.physical.as_ref(), &b.multipliers),
-                )
-            })
-            .collect();
-        if !marks.is_empty() {
-            panel = panel.with(
-                Markers::new(marks)
-                    .shape(shape)
-                    .colour(colour)
-                    .open()
-                    .size(if kind == "grazing" { 0.7 * size } else { size })
-                    .label(word(kind)),
-            );
+        // Only for the legend: periods that are nowhere stable, and what dashes mean.
+        let nowhere = || Line::new([(f64::NAN, f64::NAN)]);
+        for period in parts.keys().map(|part| part.0).collect::<BTreeSet<_>>() {
+            if !named.contains(&period) {
+                let motion = Motion::Periodic(period);
+                panel = panel.with(nowhere().colour(motion.colour()).label(motion.to_string()));
+            }
         }
+        if self.points.iter().any(|p| !p.stable) {
+            let dashed = nowhere().colour(Colour::GREY).dash(Dash::Dashed).width(0.6);
+            panel = panel.with(dashed.label("unstable"));
+        }
+        // Where there are many, each is to hide little.
+        let size = if self.bifurcations.len() > 12 {
+            1.1
+        } else {
+            1.6
+        };
+        for (kind, shape, colour) in MARKS {
+            let marks: Vec<(f64, f64)> = self
+                .bifurcations
+                .iter()
+                .filter(|b| b.kind == kind)
+                .map(|b| (b.x, b.y))
+                .collect();
+            if !marks.is_empty() {
+                panel = panel.with(
+                    Markers::new(marks)
+                        .shape(shape)
+                        .colour(colour)
+                        .open()
+                        .size(if kind == "grazing" { 0.7 * size } else { size })
+                        .label(word(kind)),
+                );
+            }
+        }
+        panel
     }
-    panel
+}
+
+impl BifurcationCurves {
+    fn panel(&self, x_label: &str) -> Panel {
+        let mut panel = Panel::new(
+            Axis::linear(x_label).range(self.x_range[0], self.x_range[1]),
+            Axis::linear(&self.y_label).range(self.y_range[0], self.y_range[1]),
+        )
+        .legend(Legend::Above);
+        let mut named: BTreeSet<(&str, usize)> = BTreeSet::new();
+        for curve in &self.curves {
+            let (_, _, colour) = MARKS
+                .into_iter()
+                .find(|m| m.0 == curve.kind)
+                .unwrap_or(MARKS[0]);
+            let mut line = Line::new(curve.x.iter().copied().zip(curve.y.iter().copied()))
+                .colour(colour)
+                .dash(match curve.period {
+                    0 | 1 => Dash::Solid,
+                    2 => Dash::Dashed,
+                    _ => Dash::Dotted,
+                });
+            if named.insert((&curve.kind, curve.period)) {
+                line = line.label(format!("{}, period {}", word(&curve.kind), curve.period));
+            }
+            panel = panel.with(line);
+        }
+        panel
+    }
 }
 
 /// Stretches of one stability, each beginning where the last one ended.
-pub(crate) fn runs<'a>(points: &[&'a PointReport]) -> Vec<(bool, Vec<&'a PointReport>)> {
-    let mut runs: Vec<(bool, Vec<&'a PointReport>)> = Vec::new();
+pub(crate) fn runs<'a, P>(
+    points: &[&'a P],
+    stable: impl Fn(&P) -> bool,
+) -> Vec<(bool, Vec<&'a P>)> {
+    let mut runs: Vec<(bool, Vec<&'a P>)> = Vec::new();
     for &p in points {
         match runs.last_mut() {
-            Some((stable, run)) if *stable == p.stable => run.push(p),
+            Some((stability, run)) if *stability == stable(p) => run.push(p),
             other => {
                 let joint = other.and_then(|(_, run)| run.last().copied());
-                runs.push((p.stable, joint.into_iter().chain([p]).collect()));
+                runs.push((stable(p), joint.into_iter().chain([p]).collect()));
             }
         }
     }
@@ -181,44 +343,4 @@ pub(crate) fn word(kind: &str) -> &'static str {
         "grazing" => "grazing",
         _ => "crossing",
     }
-}
-
-/// Loci in the plane of two parameters.
-fn loci_panel(report: &BranchReport, loci: &Loci, axes: &[ParameterAxis; 2]) -> Panel {
-    let [first, second] = axes;
-    let mut panel = Panel::new(
-        Axis::linear(first.label.clone()).range(
-            first.factor * report.from.min(report.to),
-            first.factor * report.from.max(report.to),
-        ),
-        Axis::linear(second.label.clone())
-            .range(second.factor * loci.range[0], second.factor * loci.range[1]),
-    )
-    .legend(Legend::Above);
-    let mut named: BTreeSet<(&str, usize)> = BTreeSet::new();
-    for curve in &loci.curves {
-        let (_, _, colour) = MARKS
-            .iter()
-            .copied()
-            .find(|m| m.0 == curve.kind)
-            .unwrap_or(MARKS[0]);
-        let points = curve
-            .first
-            .iter()
-            .zip(&curve.second)
-            .map(|(x, y)| (first.factor * x, second.factor * y));
-        let mut line = Line::new(points).colour(colour);
-        if curve.period > 1 {
-            line = line.dash(if curve.period == 2 {
-                Dash::Dashed
-            } else {
-                Dash::Dotted
-            });
-        }
-        if named.insert((curve.kind, curve.period)) {
-            line = line.label(format!("{}, period {}", word(curve.kind), curve.period));
-        }
-        panel = panel.with(line);
-    }
-    panel
 }

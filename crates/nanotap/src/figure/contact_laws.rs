@@ -85,7 +85,7 @@ fn followed_panel(comparison: &Comparison, shown: &str, units: &Units) -> Panel 
         for index in 0..branch.branches.len() {
             let own: Vec<&PointReport> =
                 branch.points.iter().filter(|p| p.branch == index).collect();
-            for (stable, run) in runs(&own) {
+            for (stable, run) in runs(&own, |p| p.stable) {
                 let curve = run
                     .iter()
                     .map(|p| (frequency * p.parameter, factor * value(p)));

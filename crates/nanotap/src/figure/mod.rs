@@ -2,7 +2,10 @@
 
 pub mod approach;
 pub mod attractors;
+pub mod basin;
 pub mod branch;
 pub mod contact_laws;
 pub mod motion;
+pub mod panels;
 pub mod shown;
+pub mod sweep;

@@ -2,14 +2,15 @@
 //! multipliers; and of the same motion with different numbers of modes.
 
 use nanotap_figures::{
-    Axis, Band, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Note, Panel, Place,
-    Points, Rule, Shape, Stems,
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Note, Panel, Place, Points,
+    Rule,
 };
 use nanotap_flow::trajectory::{Piece, PiecewiseSignal};
 use nanotap_flow::{Output, Trajectory};
 
 use crate::case::physical::Kind;
 use crate::case::units::Units;
+use crate::figure::panels::{MotionAxes, MotionCurves, OrbitCurves, time_axis};
 use crate::model::Model;
 use crate::study::convergence::Convergence;
 use crate::study::fixed_step::FixedStepRun;
@@ -102,88 +103,27 @@ impl<'a> View<'a> {
             .collect()
     }
 
-    fn tip_axis(&self) -> Axis {
-        Axis::linear(format!("{}{}", tip_label(self.model), self.length.1))
-    }
-
-    fn rate_axis(&self) -> Axis {
-        let label = if self.model.beam.is_some() {
-            "tip velocity $dW/dτ$"
-        } else {
-            "velocity $dx/dt$"
-        };
-        Axis::linear(format!("{label}{}", self.velocity.1))
-    }
-
-    /// Time series with the contacts shaded and what the tip touches.
-    fn time_panel(&self, periods: f64) -> Panel {
-        let contacts = contact_intervals(self.model, self.trajectory, periods);
-        let surface = if self.model.beam.is_some() {
-            "sample, as the base sees it"
-        } else {
-            "stop"
-        };
-        let mut panel = Panel::new(time_axis(), self.tip_axis()).legend(Legend::Above);
-        if !contacts.is_empty() {
-            panel = panel.with(Band::x(contacts).label("contact"));
-        }
-        panel
-            .with(
-                Line::new(self.over_time(&self.model.surface(), periods))
-                    .colour(Colour::GREY)
-                    .dash(Dash::Dashed)
-                    .width(0.6)
-                    .label(surface),
-            )
-            .with(
-                Line::new(self.over_time(&self.model.tip, periods))
-                    .colour(Colour::BLUE)
-                    .label(if self.model.beam.is_some() {
-                        "tip"
-                    } else {
-                        "mass"
-                    }),
-            )
-    }
-
-    fn portrait_panel(&self, periods: f64, strobes: usize) -> Panel {
-        let endless = periods > SHOWN_PERIODS;
-        let line = Line::new(self.portrait(periods))
-            .colour(Colour::BLUE)
-            .width(if endless { 0.3 } else { 0.9 });
-        let panel = Panel::new(self.tip_axis(), self.rate_axis())
-            .legend(Legend::Above)
-            .with(line);
-        let points = self.strobe(strobes);
-        if endless {
-            let size = if strobes > 200 { 0.5 } else { 0.9 };
-            panel.with(
-                Points::new(points)
-                    .diameter(size)
-                    .colour(Colour::VERMILLION)
-                    .label("at drive phase 0"),
-            )
-        } else {
-            panel.with(
-                Markers::new(points)
-                    .size(1.4)
-                    .colour(Colour::VERMILLION)
-                    .label("at drive phase 0"),
-            )
+    fn axes(&self) -> MotionAxes {
+        MotionAxes {
+            beam: self.model.beam.is_some(),
+            length: self.length.1.clone(),
+            velocity: self.velocity.1.clone(),
         }
     }
-}
 
-fn tip_label(model: &Model) -> &'static str {
-    if model.beam.is_some() {
-        "tip deflection $W$"
-    } else {
-        "displacement $x$"
+    /// So many periods against time, and of the phase portrait, and so many strobe points.
+    fn curves(&self, title: String, shown: f64, portrait: f64, strobes: usize) -> MotionCurves {
+        MotionCurves {
+            axes: self.axes(),
+            title,
+            contacts: contact_intervals(self.model, self.trajectory, shown),
+            surface: self.over_time(&self.model.surface(), shown),
+            tip: self.over_time(&self.model.tip, shown),
+            portrait: self.portrait(portrait),
+            strobe: self.strobe(strobes),
+            endless: portrait > SHOWN_PERIODS,
+        }
     }
-}
-
-fn time_axis() -> Axis {
-    Axis::linear("time $τ / T$ (drive periods)").tight()
 }
 
 /// Points that show every turn of every mode on a piece.
@@ -256,103 +196,30 @@ pub fn simulation_figure(model: &Model, run: &Simulation, units: &Units) -> Figu
         .min(recorded);
     let portrait = arrived.unwrap_or(PORTRAIT_PERIODS).min(recorded);
     let strobes = arrived.unwrap_or(recorded).min(recorded) as usize;
-    Figure::new(1, 2)
-        .width(DOUBLE_COLUMN)
-        .height(66.0)
-        .column_widths([1.7, 1.0])
-        .with(
-            view.time_panel(shown)
-                .title(words(run.classification, run.period)),
-        )
-        .with(view.portrait_panel(portrait, strobes))
+    let title = words(run.classification, run.period);
+    view.curves(title, shown, portrait, strobes).figure()
 }
 
 /// An orbit: time series, phase portrait, harmonics, multipliers.
 pub fn orbit_figure(model: &Model, orbit: &OrbitReport, units: &Units) -> Figure {
     let view = View::new(model, &orbit.trajectory, units);
     let title = format!("period {}, {}", orbit.period, orbit.stability);
-    Figure::new(2, 2)
-        .width(DOUBLE_COLUMN)
-        .height(136.0)
-        .column_widths([1.7, 1.0])
-        .with(view.time_panel(orbit.period as f64).title(title))
-        .with(view.portrait_panel(orbit.period as f64, orbit.period))
-        .with(harmonics_panel(model, orbit, units))
-        .with(multipliers_panel(&orbit.multipliers))
-}
-
-/// Harmonics of the tip deflection and, where there is contact, of the force.
-fn harmonics_panel(model: &Model, orbit: &OrbitReport, units: &Units) -> Panel {
-    let tip: Vec<(f64, f64)> = orbit
-        .spectrum
-        .harmonics
-        .iter()
-        .map(|h| (h.order, h.tip))
-        .collect();
-    let size = tip.iter().map(|p| p.1).fold(0.0, f64::max);
+    let periods = orbit.period as f64;
+    let harmonics = &orbit.spectrum.harmonics;
+    let size = harmonics.iter().map(|h| h.tip).fold(0.0, f64::max);
     let (factor, unit) = units.axis(Kind::Length, size);
-    let frequency = if model.beam.is_some() { "Ω" } else { "ω" };
-    // What is smaller is rounding of what is largest.
-    let floor = 1e-8 * size;
-    let stems = tip
-        .into_iter()
-        .filter(|p| p.1 > floor)
-        .map(|(x, y)| (x, factor * y));
-    let symbol = if model.beam.is_some() {
-        "$|Ŵ_n|$"
-    } else {
-        "$|x̂_n|$"
-    };
-    let highest = orbit
-        .spectrum
-        .harmonics
-        .last()
-        .map_or(1.0, |h| h.order)
-        .round();
-    let every = (highest / 10.0).ceil().max(1.0);
-    let marks: Vec<(f64, String)> = (0..=10)
-        .map(|k| f64::from(k) * every)
-        .filter(|m| *m <= highest)
-        .map(|m| (m, m.to_string()))
-        .collect();
-    let axis = Axis::linear(format!("frequency / ${frequency}$"))
-        .range(0.0, highest + 0.5)
-        .marks(marks);
-    Panel::new(axis, Axis::log(format!("amplitude {symbol}{unit}")))
-        .with(Stems::new(stems).colour(Colour::BLUE))
-}
-
-/// The multipliers and the unit circle that they must lie in.
-fn multipliers_panel(multipliers: &[[f64; 2]]) -> Panel {
-    let largest = multipliers
-        .iter()
-        .map(|[re, im]| re.abs().max(im.abs()))
-        .fold(1.0, f64::max);
-    let reach = 1.15 * largest;
-    let circle = (0..=360)
-        .map(|d| f64::from(d).to_radians())
-        .map(|a| (a.cos(), a.sin()));
-    let (inside, outside): (Vec<_>, Vec<_>) = multipliers
-        .iter()
-        .map(|m| (m[0], m[1]))
-        .partition(|(re, im)| re.hypot(*im) <= 1.0);
-    let mut panel = Panel::new(
-        Axis::linear("Re $μ$").range(-reach, reach),
-        Axis::linear("Im $μ$").range(-reach, reach),
-    )
-    .with(Rule::horizontal(0.0).dash(Dash::Solid).width(0.3))
-    .with(Rule::vertical(0.0).dash(Dash::Solid).width(0.3))
-    .with(Line::new(circle).colour(Colour::GREY).width(0.6))
-    .with(Markers::new(inside).colour(Colour::BLUE));
-    if !outside.is_empty() {
-        panel = panel.with(
-            Markers::new(outside)
-                .colour(Colour::VERMILLION)
-                .shape(Shape::Diamond)
-                .size(1.8),
-        );
+    let mut motion = view.curves(title, periods, periods, orbit.period);
+    motion.endless = false;
+    OrbitCurves {
+        motion,
+        harmonics: harmonics
+            .iter()
+            .map(|h| (h.order, factor * h.tip))
+            .collect(),
+        harmonics_unit: unit,
+        multipliers: orbit.multipliers.clone(),
     }
-    panel
+    .figure()
 }
 
 /// The same motion with every number of modes, and how far each is from the best.
@@ -398,40 +265,52 @@ pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
             line.dash(Dash::Dashed)
         });
     }
-    let differences: Vec<(f64, f64)> = convergence
-        .modes
-        .iter()
-        .zip(&convergence.difference)
-        .filter_map(|(n, d)| Some((*n as f64, d.filter(|d| *d > 0.0)?)))
-        .collect();
-    let marks = (1..=count)
-        .filter(|n| count <= 12 || n % 5 == 0 || *n == 1)
-        .map(|n| (n as f64, n.to_string()));
-    let mut difference = Panel::new(
-        Axis::linear("modes $N$")
-            .range(0.5, count as f64 + 0.5)
-            .marks(marks),
-        Axis::log("difference of $W$ / amplitude"),
-    )
-    .with(Rule::horizontal(convergence.tolerance))
-    .with(
-        Line::new(differences.clone())
-            .colour(Colour::BLUE)
-            .width(0.6),
-    )
-    .with(Markers::new(differences).colour(Colour::BLUE));
-    if let Some(n) = convergence.enough {
-        difference = difference.with(Note::new(
-            Place::Panel(0.5, 0.92),
-            format!("$N$ = {n} is enough"),
-        ));
-    }
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .height(66.0)
         .column_widths([1.7, 1.0])
         .with(overlay)
-        .with(difference)
+        .with(difference_panel(
+            &convergence.modes,
+            &convergence.difference,
+            convergence.tolerance,
+            convergence.enough,
+        ))
+}
+
+/// What the tip deflection still differs from that with the most modes, against their number;
+/// none where it is not known.
+pub fn difference_panel(
+    modes: &[usize],
+    differences: &[Option<f64>],
+    tolerance: f64,
+    enough: Option<usize>,
+) -> Panel {
+    let count = modes.len();
+    let points: Vec<(f64, f64)> = modes
+        .iter()
+        .zip(differences)
+        .filter_map(|(n, d)| Some((*n as f64, d.filter(|d| *d > 0.0)?)))
+        .collect();
+    let marks = (1..=count)
+        .filter(|n| count <= 12 || n % 5 == 0 || *n == 1)
+        .map(|n| (n as f64, n.to_string()));
+    let panel = Panel::new(
+        Axis::linear("modes $N$")
+            .range(0.5, count as f64 + 0.5)
+            .marks(marks),
+        Axis::log("difference of $W$ / amplitude"),
+    )
+    .with(Rule::horizontal(tolerance).label("tolerance"))
+    .with(Line::new(points.clone()).colour(Colour::BLUE).width(0.6))
+    .with(Markers::new(points).colour(Colour::BLUE));
+    match enough {
+        Some(n) => panel.with(Note::new(
+            Place::Panel(0.5, 0.92),
+            format!("$N$ = {n} is enough"),
+        )),
+        None => panel,
+    }
 }
 
 /// A fixed-step run: time series and phase portrait.
@@ -458,6 +337,11 @@ pub fn fixed_step_figure(model: &Model, run: &FixedStepRun, units: &Units) -> Fi
         || "no apparent period".to_owned(),
         |n| format!("apparent period {n}"),
     );
+    let axes = MotionAxes {
+        beam: model.beam.is_some(),
+        length: length_unit,
+        velocity: velocity_unit,
+    };
     let title = format!(
         "RK4, {} and {} steps a period: {apparent}",
         run.steps[0], run.steps[1]
@@ -467,25 +351,19 @@ pub fn fixed_step_figure(model: &Model, run: &FixedStepRun, units: &Units) -> Fi
         .height(66.0)
         .column_widths([1.7, 1.0])
         .with(
-            Panel::new(
-                time_axis(),
-                Axis::linear(format!("{}{length_unit}", tip_label(model))),
-            )
-            .title(title)
-            .with(Line::new(series).colour(Colour::PURPLE)),
+            Panel::new(time_axis(), axes.tip())
+                .title(title)
+                .with(Line::new(series).colour(Colour::PURPLE)),
         )
         .with(
-            Panel::new(
-                Axis::linear(format!("{}{length_unit}", tip_label(model))),
-                Axis::linear(format!("tip velocity{velocity_unit}")),
-            )
-            .legend(Legend::Above)
-            .with(Line::new(portrait).colour(Colour::PURPLE).width(0.4))
-            .with(
-                Points::new(strobe)
-                    .diameter(0.9)
-                    .colour(Colour::VERMILLION)
-                    .label("at drive phase 0"),
-            ),
+            Panel::new(axes.tip(), axes.rate())
+                .legend(Legend::Above)
+                .with(Line::new(portrait).colour(Colour::PURPLE).width(0.4))
+                .with(
+                    Points::new(strobe)
+                        .diameter(0.9)
+                        .colour(Colour::VERMILLION)
+                        .label("at drive phase 0"),
+                ),
         )
 }

@@ -12,10 +12,7 @@ use nanotap_dynamics::{
     Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, Control, Label,
     LyapunovOptions, SettleOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
 };
-use nanotap_figures::{
-    Axis as FigureAxis, CategoryMap, Colour, Figure, Legend, Markers, ONE_AND_A_HALF_COLUMNS,
-    Panel, Points, Shape, category,
-};
+use nanotap_figures::Figure;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -25,6 +22,7 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
+use crate::figure::basin::BasinTable;
 use crate::model::ModelError;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
@@ -40,9 +38,9 @@ const CHUNKS: usize = 64;
 /// Strobe points by which an attractor is shown.
 const SHOWN: usize = 512;
 /// Labels of points that go to no attractor.
-const UNSETTLED: i32 = -1;
-const UNBOUNDED: i32 = -2;
-const FAILED: i32 = -3;
+pub(crate) const UNSETTLED: i32 = -1;
+pub(crate) const UNBOUNDED: i32 = -2;
+pub(crate) const FAILED: i32 = -3;
 /// The computed variable, and the attribute with the list of attractors.
 const VARIABLE: &str = "attractor";
 const ATTRACTORS: &str = "attractors";
@@ -632,74 +630,24 @@ pub fn shares(store: &Store) -> Result<Shares, StoreError> {
 /// When a chunk is missing or damaged.
 pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     store.require_all()?;
-    let known = known(store)?;
     let axes = &store.schema().grid.axes;
-    let (rows, columns) = (axes[0].length, axes[1].length);
-    // After the attractors' own categories come those of points without one.
-    let others = [
-        (UNSETTLED, "unsettled", 190),
-        (UNBOUNDED, "unbounded", 60),
-        (FAILED, "not followed", 120),
-    ];
-    let mut present = std::collections::BTreeSet::new();
-    let mut cells: Vec<Option<i32>> = vec![None; rows * columns];
+    let columns = axes[1].length;
+    let mut table = BasinTable {
+        x: axes[1].name.clone(),
+        y: axes[0].name.clone(),
+        x_values: values(store, &axes[1].name),
+        y_values: values(store, &axes[0].name),
+        attractors: known(store)?,
+        entries: names(store),
+        labels: vec![FAILED; axes[0].length * columns],
+    };
     for chunk in 0..store.chunks() {
         let block = store.schema().grid.block(chunk);
-        let labels = labels(store, &block)?;
-        for (entry, label) in block.entries().zip(labels) {
-            present.insert(label);
-            cells[entry[0] * columns + entry[1]] = Some(label);
+        for (entry, label) in block.entries().zip(labels(store, &block)?) {
+            table.labels[entry[0] * columns + entry[1]] = label;
         }
     }
-    let (y, x) = (values(store, &axes[0].name), values(store, &axes[1].name));
-    let shown: Vec<_> = others
-        .iter()
-        .filter(|(label, ..)| present.contains(label))
-        .collect();
-    let cells = cells.into_iter().map(|label| {
-        let label = label?;
-        let other = || Some(known.len() + shown.iter().position(|(l, ..)| *l == label)?);
-        usize::try_from(label)
-            .ok()
-            .filter(|k| *k < known.len())
-            .or_else(other)
-    });
-    let mut layer = CategoryMap::new(columns, rows, cells, edges(&x), edges(&y));
-    for (index, attractor) in known.iter().enumerate() {
-        layer = layer.category_in(attractor.name(), category(index));
-    }
-    for (_, name, grey) in shown {
-        layer = layer.category_in(*name, Colour::rgb(*grey, *grey, *grey));
-    }
-    let mut panel = Panel::new(
-        FigureAxis::linear(symbol(&axes[1].name)),
-        FigureAxis::linear(symbol(&axes[0].name)),
-    )
-    .with(layer)
-    .legend(Legend::Right);
-    let names = names(store);
-    let place = |name: &str| names.iter().position(|n| n == name);
-    if let (Some(kx), Some(ky)) = (place(&axes[1].name), place(&axes[0].name)) {
-        let inside = |p: &(f64, f64)| {
-            let within = |v: f64, (low, high): (f64, f64)| low <= v && v <= high;
-            within(p.0, edges(&x)) && within(p.1, edges(&y))
-        };
-        for (index, attractor) in known.iter().enumerate() {
-            let points: Vec<(f64, f64)> = attractor
-                .states
-                .iter()
-                .filter_map(|s| Some((*s.get(kx)?, *s.get(ky)?)))
-                .filter(inside)
-                .collect();
-            panel = if attractor.period.is_some() {
-                let marks = Markers::new(points).shape(Shape::Circle).size(1.6);
-                panel.with(marks.colour(category(index)).white_edge())
-            } else {
-                panel.with(Points::new(points).diameter(0.3).colour(Colour::BLACK))
-            };
-        }
-    }
-    Ok(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
+    Ok(table.figure().unwrap_or_default())
 }
 
 fn values(store: &Store, name: &str) -> Vec<f64> {
@@ -710,13 +658,6 @@ fn values(store: &Store, name: &str) -> Vec<f64> {
 }
 
 /// The outer edges of cells around evenly spaced values.
-fn edges(values: &[f64]) -> (f64, f64) {
-    let (from, to) = (values[0], values[values.len() - 1]);
-    let half = 0.5 * (to - from) / (values.len() - 1).max(1) as f64;
-    (from - half, to + half)
-}
-
-/// The names of the entries of the attractors' states.
 fn names(store: &Store) -> Vec<String> {
     let text = store
         .schema()
@@ -725,21 +666,6 @@ fn names(store: &Store) -> Vec<String> {
         .and_then(|v| v.as_str())
         .unwrap_or_default();
     text.split(' ').map(Into::into).collect()
-}
-
-/// `$a_1$` of `a1`.
-fn symbol(name: &str) -> String {
-    let (letter, number) = name.split_at(1.min(name.len()));
-    let letter = if letter == "v" && !number.is_empty() {
-        "ȧ"
-    } else {
-        letter
-    };
-    if number.is_empty() {
-        format!("${letter}$")
-    } else {
-        format!("${letter}_{{{number}}}$")
-    }
 }
 
 impl From<BasinError> for crate::Error {

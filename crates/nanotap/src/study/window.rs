@@ -11,8 +11,9 @@ use nanotap_figures::{CategoryMap, Colour, Figure, Legend, ONE_AND_A_HALF_COLUMN
 use serde::Serialize;
 
 use crate::dataset::{Store, StoreError, Values};
+use crate::figure::sweep::GridAxis;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{GridScale, class_of};
+use crate::study::sweep::class_of;
 
 /// What there is at one point, from the safest to the least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -171,11 +172,11 @@ impl Window {
                 (wanted.name(), count as f64 / (rows * columns) as f64)
             })
             .collect();
-        let scale = |axis| GridScale::of(store, axis);
+        let scale = |axis| GridAxis::of(store, axis);
         Ok(Self {
             parameters: [1, 0].map(|axis| schema.grid.axes[axis].name.clone()),
-            x: scale(1).raw,
-            y: scale(0).raw,
+            x: scale(1).values,
+            y: scale(0).values,
             conditions,
             shares,
         })
@@ -187,7 +188,10 @@ impl Window {
     /// As [`Window::of`].
     pub fn figure(&self, store: &Store) -> Result<Figure, StoreError> {
         store.require_all()?;
-        let (y, x) = (GridScale::of(store, 0), GridScale::of(store, 1));
+        let (y, x) = (
+            GridAxis::of(store, 0).shown(),
+            GridAxis::of(store, 1).shown(),
+        );
         let present: Vec<Condition> = Condition::ALL
             .into_iter()
             .filter(|c| self.shares.get(c.name()).is_some_and(|share| *share > 0.0))

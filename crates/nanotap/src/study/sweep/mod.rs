@@ -26,20 +26,18 @@
 
 mod dataset;
 mod error;
-mod figure;
 mod follow;
 mod over;
 mod run;
 mod summary;
 
 pub use error::SweepError;
-pub(crate) use figure::GridScale;
 pub use follow::Follow;
 pub use over::{Over, OverError, Spacing, SweepKey};
 pub use run::Starts;
 pub(crate) use run::nearest;
 pub use summary::Summary;
-pub(crate) use summary::class_of;
+pub(crate) use summary::{Motions, class_of};
 
 use nanotap_dynamics::{Control, LyapunovOptions, SettleOptions};
 use nanotap_figures::Figure;
@@ -48,6 +46,7 @@ use crate::case::subject::Subject;
 use crate::dataset::{
     Block, Schema, Store, StoreError, Values, Work, WorkError, chunk_files, work,
 };
+use crate::figure::sweep::SweepTable;
 
 /// How to sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -230,7 +229,7 @@ pub fn summary(store: &Store) -> Result<Summary, StoreError> {
 /// # Errors
 /// When a chunk is missing or damaged.
 pub fn figure(store: &Store) -> Result<Figure, StoreError> {
-    figure::of(store)
+    Ok(SweepTable::of(store)?.figure().unwrap_or_default())
 }
 
 /// Amplitude and phase at the drive's frequency over one parameter, up and down in two
@@ -239,5 +238,5 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
 /// # Errors
 /// When a chunk is missing or damaged.
 pub fn response_figure(store: &Store) -> Result<Figure, StoreError> {
-    figure::response(store)
+    crate::figure::sweep::response(store)
 }

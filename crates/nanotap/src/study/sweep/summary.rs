@@ -49,13 +49,13 @@ pub(crate) fn class_of(code: u8) -> Option<crate::study::simulate::Classificatio
 }
 
 /// What the motions of a chunk are.
-pub(super) struct Motions {
-    pub(super) codes: Vec<u8>,
-    pub(super) periods: Vec<i32>,
+pub(crate) struct Motions {
+    pub(crate) codes: Vec<u8>,
+    pub(crate) periods: Vec<i32>,
 }
 
 impl Motions {
-    pub(super) fn read(store: &Store, chunk: usize) -> Result<Self, StoreError> {
+    pub(crate) fn read(store: &Store, chunk: usize) -> Result<Self, StoreError> {
         let block = store.schema().grid.block(chunk);
         let of = |name| match store.schema().index_of(name) {
             Some(variable) => store.read_chunk(&block, variable),

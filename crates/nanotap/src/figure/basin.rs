@@ -1,0 +1,127 @@
+//! The figure of basins: a colour an attractor, and where the attractors themselves are.
+
+use std::collections::BTreeSet;
+
+use nanotap_figures::{
+    Axis, CategoryMap, Colour, Figure, Legend, Markers, Motion, ONE_AND_A_HALF_COLUMNS, Panel,
+    Points,
+};
+use serde::Deserialize;
+
+use crate::figure::panels::motion_of;
+use crate::study::basin::{FAILED, Known, UNBOUNDED, UNSETTLED};
+
+/// Where motions from the points of a slice of states go.
+#[derive(Clone, Debug, Deserialize)]
+pub struct BasinTable {
+    /// The entry of the state that is drawn to the right.
+    pub x: String,
+    /// The entry of the state that is drawn upwards.
+    pub y: String,
+    /// Its values.
+    #[serde(default)]
+    pub x_values: Vec<f64>,
+    /// Its values.
+    #[serde(default)]
+    pub y_values: Vec<f64>,
+    /// The attractors.
+    pub attractors: Vec<Known>,
+    /// The names of a state's entries.
+    pub entries: Vec<String>,
+    /// Number of the attractor that is reached from each point, row by row from the smallest y;
+    /// negative where there is none.
+    #[serde(default)]
+    pub labels: Vec<i32>,
+}
+
+impl BasinTable {
+    /// The figure; none if the labels do not fill the slice.
+    pub fn figure(&self) -> Option<Figure> {
+        let (columns, rows) = (self.x_values.len(), self.y_values.len());
+        if columns.checked_mul(rows)? != self.labels.len() || self.labels.is_empty() {
+            return None;
+        }
+        let colours = Motion::colours(self.attractors.iter().map(motion));
+        // After the attractors' own categories come those of points without one.
+        let present: BTreeSet<i32> = self.labels.iter().copied().collect();
+        let others: Vec<(i32, &str, Colour)> = [
+            (UNSETTLED, "unsettled", Motion::Undecided.colour()),
+            (UNBOUNDED, "unbounded", Motion::Unbounded.colour()),
+            (FAILED, "not followed", Colour::rgb(120, 120, 120)),
+        ]
+        .into_iter()
+        .filter(|(label, ..)| present.contains(label))
+        .collect();
+        let known = self.attractors.len();
+        let cells = self.labels.iter().map(|&label| {
+            let other = || Some(known + others.iter().position(|(l, ..)| *l == label)?);
+            usize::try_from(label)
+                .ok()
+                .filter(|k| *k < known)
+                .or_else(other)
+        });
+        let (across, upright) = (edges(&self.x_values), edges(&self.y_values));
+        let mut layer = CategoryMap::new(columns, rows, cells, across, upright);
+        for (attractor, colour) in self.attractors.iter().zip(&colours) {
+            layer = layer.category_in(attractor.name(), *colour);
+        }
+        for (_, name, colour) in others {
+            layer = layer.category_in(name, colour);
+        }
+        let mut panel = Panel::new(
+            Axis::linear(symbol(&self.x)).tight(),
+            Axis::linear(symbol(&self.y)).tight(),
+        )
+        .with(layer)
+        .legend(Legend::Right);
+        let place = |name: &str| self.entries.iter().position(|n| n == name);
+        if let (Some(kx), Some(ky)) = (place(&self.x), place(&self.y)) {
+            let within = |v: f64, (low, high): (f64, f64)| low <= v && v <= high;
+            for (attractor, colour) in self.attractors.iter().zip(colours) {
+                let points: Vec<(f64, f64)> = attractor
+                    .states
+                    .iter()
+                    .filter_map(|s| Some((*s.get(kx)?, *s.get(ky)?)))
+                    .filter(|p| within(p.0, across) && within(p.1, upright))
+                    .collect();
+                panel = if attractor.period.is_some() {
+                    panel.with(Markers::new(points).size(1.6).colour(colour).white_edge())
+                } else {
+                    panel.with(Points::new(points).diameter(0.3).colour(Colour::BLACK))
+                };
+            }
+        }
+        Some(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
+    }
+}
+
+fn motion(attractor: &Known) -> Motion {
+    attractor
+        .period
+        .map_or_else(|| motion_of(&attractor.classification), Motion::Periodic)
+}
+
+/// The outer edges of cells around evenly spaced values.
+fn edges(values: &[f64]) -> (f64, f64) {
+    let (from, to) = (values[0], values[values.len() - 1]);
+    let half = match 0.5 * (to - from) / (values.len() - 1).max(1) as f64 {
+        0.0 => 0.5,
+        half => half,
+    };
+    (from - half, to + half)
+}
+
+/// `$a_1$` of `a1`.
+fn symbol(name: &str) -> String {
+    let (letter, number) = name.split_at(1.min(name.len()));
+    let letter = if letter == "v" && !number.is_empty() {
+        "ȧ"
+    } else {
+        letter
+    };
+    if number.is_empty() {
+        format!("${letter}$")
+    } else {
+        format!("${letter}_{{{number}}}$")
+    }
+}

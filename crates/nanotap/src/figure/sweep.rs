@@ -1,0 +1,453 @@
+//! The figure of a sweep: a bifurcation diagram, or a map of what motions there are.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nanotap_figures::{
+    Axis, CategoryMap, Colour, DOUBLE_COLUMN, Figure, Legend, Motion, ONE_AND_A_HALF_COLUMNS,
+    Panel, Points,
+};
+use serde::Deserialize;
+
+use crate::case::physical::Kind;
+use crate::case::units::prefixed;
+use crate::dataset::{Coordinate, Store, StoreError, Values};
+use crate::study::simulate::Classification;
+use crate::study::sweep::{Motions, class_of};
+
+/// Categories of a map, and periods of a diagram, that get a colour of their own.
+const MOST_CATEGORIES: usize = 12;
+/// What is beyond them.
+const OTHERS: Colour = Colour::rgb(222, 222, 222);
+
+/// An axis of a sweep's grid.
+#[derive(Clone, Debug, Deserialize)]
+pub struct GridAxis {
+    /// The parameter's symbol, or its path in a physical case.
+    pub symbol: String,
+    /// SI unit; empty in the model's own units.
+    #[serde(default)]
+    pub units: String,
+    /// Whether the values are evenly spaced by their logarithms.
+    #[serde(default)]
+    pub log: bool,
+    /// The values of the parameter.
+    #[serde(default)]
+    pub values: Vec<f64>,
+}
+
+/// The motions of a sweep, in the order of the grid with the last index fastest: over the
+/// parameters, then the starts.
+#[derive(Clone, Debug, Deserialize)]
+pub struct SweepTable {
+    /// One parameter, or two of which the first is drawn upwards.
+    pub axes: Vec<GridAxis>,
+    /// Which way each start was followed (`up`, `down`); empty where it was not.
+    pub directions: Vec<String>,
+    /// SI unit of the maxima; empty in the model's own units.
+    #[serde(default)]
+    pub units: String,
+    /// Code of each motion's classification.
+    #[serde(default)]
+    pub classification: Vec<u8>,
+    /// Period of each motion; 0 where it has none.
+    #[serde(default)]
+    pub period: Vec<i32>,
+    /// Maxima of the tip deflection in each of so many drive periods, motion by motion; none of a
+    /// sweep over two parameters.
+    #[serde(default)]
+    pub period_max: Vec<f64>,
+}
+
+impl SweepTable {
+    /// What a finished dataset holds.
+    ///
+    /// # Errors
+    /// If chunks are missing or cannot be read.
+    pub fn of(store: &Store) -> Result<Self, StoreError> {
+        store.require_all()?;
+        let schema = store.schema();
+        let parameters = schema.grid.axes.len() - 1;
+        let starts = schema.grid.axes[parameters].length;
+        let cells: usize = schema.grid.axes.iter().map(|axis| axis.length).product();
+        let maxima = schema.index_of("period_max").filter(|_| parameters == 1);
+        let stride = maxima.map_or(0, |index| schema.variables[index].stride());
+        let mut table = Self {
+            axes: (0..parameters)
+                .map(|axis| GridAxis::of(store, axis))
+                .collect(),
+            directions: match schema.coordinate("direction").map(|c| &c.values) {
+                Some(Values::Text(words)) => words.clone(),
+                _ => vec![String::new(); starts],
+            },
+            units: maxima
+                .and_then(|k| schema.variables[k].attributes.get("units")?.as_str())
+                .unwrap_or_default()
+                .to_owned(),
+            classification: vec![0; cells],
+            period: vec![0; cells],
+            period_max: vec![f64::NAN; cells * stride],
+        };
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            let Motions { codes, periods } = Motions::read(store, chunk)?;
+            let highs = match maxima
+                .map(|index| store.read_chunk(&block, index))
+                .transpose()?
+            {
+                Some(Values::Real(highs)) => highs,
+                _ => Vec::new(),
+            };
+            for (flat, entry) in block.entries().enumerate() {
+                let cell = entry
+                    .iter()
+                    .zip(&schema.grid.axes)
+                    .fold(0, |cell, (index, axis)| cell * axis.length + index);
+                table.classification[cell] = codes[flat];
+                table.period[cell] = periods[flat];
+                if let Some(row) = highs.get(flat * stride..(flat + 1) * stride) {
+                    table.period_max[cell * stride..(cell + 1) * stride].copy_from_slice(row);
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    /// The figure: of one parameter a bifurcation diagram, of two a map of motions. None if the
+    /// columns do not fill the grid.
+    pub fn figure(&self) -> Option<Figure> {
+        let points: usize = self.axes.iter().map(|axis| axis.values.len()).product();
+        let cells = points.checked_mul(self.directions.len())?;
+        let fits = cells > 0
+            && self.classification.len() == cells
+            && self.period.len() == cells
+            && self.period_max.len().is_multiple_of(cells);
+        match self.axes.as_slice() {
+            [x] if fits => Some(self.diagram(&x.shown())),
+            [y, x] if fits => Some(self.map(&x.shown(), &y.shown())),
+            _ => None,
+        }
+    }
+
+    /// What a motion is, as far as its colour goes; none of one that is missing.
+    fn motion(&self, cell: usize) -> Option<Motion> {
+        motion(self.classification[cell], self.period[cell])
+    }
+
+    /// Per-period maxima of the tip deflection over one parameter, a colour a motion, a panel a
+    /// direction of following.
+    fn diagram(&self, x: &GridScale) -> Figure {
+        let starts = self.directions.len();
+        let cells = self.classification.len();
+        let stride = self.period_max.len() / cells;
+        let mut counts: BTreeMap<Motion, usize> = BTreeMap::new();
+        for motion in (0..cells).filter_map(|cell| self.motion(cell)) {
+            *counts.entry(motion).or_default() += 1;
+        }
+        let mut frequent: Vec<Motion> = counts.keys().copied().collect();
+        frequent.sort_by_key(|motion| std::cmp::Reverse(counts[motion]));
+        frequent.truncate(MOST_CATEGORIES);
+        // None of what is too rare to be named.
+        let mut clouds: BTreeMap<(&str, Option<Motion>), Vec<(f64, f64)>> = BTreeMap::new();
+        for cell in 0..cells {
+            let Some(motion) = self.motion(cell) else {
+                continue;
+            };
+            // An orbit repeats after one turn.
+            let turn = match motion {
+                Motion::Periodic(period) => period.min(stride),
+                _ => stride,
+            };
+            let row = &self.period_max[cell * stride..cell * stride + turn];
+            let at = x.values[cell / starts];
+            let cloud = clouds
+                .entry((
+                    &self.directions[cell % starts],
+                    frequent.contains(&motion).then_some(motion),
+                ))
+                .or_default();
+            cloud.extend(row.iter().filter(|y| y.is_finite()).map(|y| (at, *y)));
+        }
+        let (factor, unit) = deflection(&self.units, clouds.values().flatten().map(|p| p.1));
+        let shown: BTreeSet<&str> = self.directions.iter().map(String::as_str).collect();
+        let mut figure = Figure::new(shown.len(), 1).width(DOUBLE_COLUMN).share_x();
+        // "up" before "down".
+        for direction in shown.into_iter().rev() {
+            let title = if direction.is_empty() {
+                String::new()
+            } else {
+                format!("following {direction}")
+            };
+            let mut panel = Panel::new(
+                x.axis(),
+                Axis::linear("max $W$ in a drive period").unit(&unit),
+            )
+            .title(title)
+            .legend(Legend::Above);
+            // Chaos is drawn first: it lies under what is periodic.
+            let own = clouds
+                .iter()
+                .filter(|((d, _), points)| *d == direction && !points.is_empty());
+            let mut layers: Vec<Points> = Vec::new();
+            for ((_, motion), points) in own {
+                let diameter = match points.len() {
+                    0..2_000 => 0.5,
+                    2_000..20_000 => 0.3,
+                    _ => 0.13,
+                };
+                let points = points.iter().map(|(at, y)| (*at, factor * y));
+                layers.push(
+                    Points::new(points)
+                        .diameter(diameter)
+                        .colour(motion.map_or(OTHERS, Motion::colour))
+                        .label(motion.map_or_else(|| "other".to_owned(), |m| m.to_string())),
+                );
+            }
+            panel = panel.with_all(layers.into_iter().rev());
+            figure = figure.with(panel);
+        }
+        figure
+    }
+
+    /// What motions there are over two parameters.
+    fn map(&self, x: &GridScale, y: &GridScale) -> Figure {
+        let starts = self.directions.len();
+        let found: Vec<BTreeSet<Option<Motion>>> = (0..x.values.len() * y.values.len())
+            .map(|place| {
+                (0..starts)
+                    .map(|k| self.motion(place * starts + k))
+                    .collect()
+            })
+            .collect();
+        let mut counts: BTreeMap<&BTreeSet<Option<Motion>>, usize> = BTreeMap::new();
+        for motions in &found {
+            *counts.entry(motions).or_default() += 1;
+        }
+        // The most frequent ones are named, in the order of their motions.
+        let mut frequent: Vec<_> = counts
+            .iter()
+            .map(|(motions, count)| (usize::MAX - count, *motions))
+            .collect();
+        frequent.sort();
+        let mut named: Vec<&BTreeSet<Option<Motion>>> = frequent
+            .iter()
+            .take(MOST_CATEGORIES)
+            .map(|(_, motions)| *motions)
+            .collect();
+        named.sort();
+        let others = frequent.len() > named.len();
+        let index: BTreeMap<_, usize> = named.iter().enumerate().map(|(k, m)| (*m, k)).collect();
+        let cells = found
+            .iter()
+            .map(|motions| Some(index.get(motions).copied().unwrap_or(named.len())));
+        let mut layer =
+            CategoryMap::new(x.values.len(), y.values.len(), cells, x.edges(), y.edges());
+        // Several motions at one place have a colour that none of those alone has.
+        let alone: BTreeSet<Motion> = named
+            .iter()
+            .filter(|motions| motions.len() == 1)
+            .filter_map(|motions| *motions.first()?)
+            .collect();
+        let mut free = (1..=16)
+            .rev()
+            .map(Motion::Periodic)
+            .filter(|motion| !alone.contains(motion))
+            .map(Motion::colour);
+        for motions in named {
+            let colour = match (motions.len(), motions.first()) {
+                (1, Some(Some(motion))) => motion.colour(),
+                (1, _) => Colour::WHITE,
+                _ => free.next().unwrap_or(OTHERS),
+            };
+            let words: Vec<String> = motions
+                .iter()
+                .map(|m| m.map_or_else(|| "missing".to_owned(), |m| m.to_string()))
+                .collect();
+            layer = layer.category_in(words.join(" + "), colour);
+        }
+        if others {
+            layer = layer.category_in("other", OTHERS);
+        }
+        let panel = Panel::new(x.axis(), y.axis())
+            .with(layer)
+            .legend(Legend::Right);
+        Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS)
+    }
+}
+
+/// What a code and a period mean; none of what is missing.
+pub(crate) fn motion(code: u8, period: i32) -> Option<Motion> {
+    Some(match class_of(code)? {
+        Classification::Periodic => Motion::Periodic(usize::try_from(period).unwrap_or(0)),
+        Classification::QuasiPeriodic => Motion::QuasiPeriodic,
+        Classification::Chaotic => Motion::Chaotic,
+        Classification::Unbounded => Motion::Unbounded,
+        Classification::Undecided => Motion::Undecided,
+    })
+}
+
+/// What deflections are multiplied with, and their unit (empty in the model's own units).
+fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
+    if units != "m" {
+        return (1.0, String::new());
+    }
+    let size = values
+        .filter(|v| v.is_finite())
+        .fold(0.0, |size: f64, v| size.max(v.abs()));
+    let (factor, unit) = prefixed(Kind::Length, 1.0, size);
+    (factor, unit.to_string())
+}
+
+/// Amplitude and phase at the drive's frequency over one parameter, a colour a direction of
+/// following: resonance curves; over two parameters a map of motions.
+///
+/// # Errors
+/// If chunks are missing or cannot be read.
+pub fn response(store: &Store) -> Result<Figure, StoreError> {
+    store.require_all()?;
+    let schema = store.schema();
+    if schema.grid.axes.len() > 2 {
+        return Ok(SweepTable::of(store)?.figure().unwrap_or_default());
+    }
+    let x = GridAxis::of(store, 0).shown();
+    let directions: Vec<String> = match schema.coordinate("direction").map(|c| &c.values) {
+        Some(Values::Text(words)) => words.clone(),
+        _ => vec![String::new(); schema.grid.axes[1].length],
+    };
+    let mut figure = Figure::new(2, 1)
+        .width(ONE_AND_A_HALF_COLUMNS)
+        .height(120.0)
+        .share_x();
+    for (name, label) in [
+        ("first_harmonic", "amplitude $A$"),
+        ("phase", "phase behind the drive (°)"),
+    ] {
+        let index = schema.index_of(name).unwrap_or(0);
+        let mut curves: BTreeMap<(String, usize), Vec<(f64, f64)>> = BTreeMap::new();
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            let Values::Real(values) = store.read_chunk(&block, index)? else {
+                continue;
+            };
+            for (value, entry) in values.iter().zip(block.entries()) {
+                curves
+                    .entry((directions[entry[1]].clone(), entry[1]))
+                    .or_default()
+                    .push((x.values[entry[0]], *value));
+            }
+        }
+        let units = schema.variables[index].attributes.get("units");
+        let units = units.and_then(|unit| unit.as_str()).unwrap_or_default();
+        let (factor, unit) = deflection(units, curves.values().flatten().map(|p| p.1));
+        let mut panel =
+            Panel::new(x.axis(), Axis::linear(label).unit(unit)).legend(if name == "phase" {
+                Legend::Hidden
+            } else {
+                Legend::Above
+            });
+        let mut named = BTreeSet::new();
+        // "up" before "down", whose smaller marks lie upon it.
+        for ((direction, _), mut curve) in curves.into_iter().rev() {
+            curve.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let colour = if direction == "down" {
+                Colour::VERMILLION
+            } else {
+                Colour::BLUE
+            };
+            // What was met is a list of motions: marks, so that a jump is not a line.
+            let marks = curve.into_iter().map(|(at, y)| (at, factor * y));
+            let mut layer = Points::new(marks)
+                .diameter(if direction == "down" { 0.6 } else { 0.9 })
+                .colour(colour);
+            if !direction.is_empty() && named.insert(direction.clone()) {
+                layer = layer.label(format!("following {direction}"));
+            }
+            panel = panel.with(layer);
+        }
+        figure = figure.with(panel);
+    }
+    Ok(figure)
+}
+
+impl GridAxis {
+    /// Of an axis of a dataset's grid.
+    pub(crate) fn of(store: &Store, axis: usize) -> Self {
+        let schema = store.schema();
+        let axis = &schema.grid.axes[axis];
+        let coordinate = schema.coordinate(&axis.name);
+        let text = |c: &Coordinate, key: &str| Some(c.attributes.get(key)?.as_str()?.to_owned());
+        let said = |key: &str| coordinate.and_then(|c| text(c, key));
+        Self {
+            symbol: said("symbol").unwrap_or_else(|| axis.name.clone()),
+            units: said("units").unwrap_or_default(),
+            log: said("spacing").as_deref() == Some("log"),
+            values: match coordinate.map(|c| &c.values) {
+                Some(Values::Real(values)) => values.clone(),
+                _ => (0..axis.length).map(|k| k as f64).collect(),
+            },
+        }
+    }
+
+    /// How it is drawn.
+    pub(crate) fn shown(&self) -> GridScale {
+        let kind = Kind::ALL
+            .into_iter()
+            .find(|kind| *kind != Kind::Number && kind.si_unit() == self.units);
+        // A quantity of a physical case is called by its path: drive.frequency.
+        let words = self.symbol.replace(['.', '_'], " ");
+        let (factor, label, unit) = match kind {
+            Some(kind) => {
+                let size = self
+                    .values
+                    .iter()
+                    .fold(0.0, |size: f64, v| size.max(v.abs()));
+                let (factor, unit) = prefixed(kind, 1.0, size);
+                (factor, words, unit.to_string())
+            }
+            None if self.symbol.contains('.') => (1.0, words, String::new()),
+            None => (1.0, format!("${}$", self.symbol), String::new()),
+        };
+        GridScale {
+            values: self.values.iter().map(|v| factor * v).collect(),
+            label,
+            unit,
+            log: self.log,
+        }
+    }
+}
+
+/// The values of a parameter as they are shown.
+pub(crate) struct GridScale {
+    pub(crate) values: Vec<f64>,
+    label: String,
+    unit: String,
+    log: bool,
+}
+
+impl GridScale {
+    /// The axis.
+    pub(crate) fn axis(&self) -> Axis {
+        let axis = if self.log {
+            Axis::log(&self.label)
+        } else {
+            Axis::linear(&self.label)
+        };
+        axis.unit(&self.unit).tight()
+    }
+
+    /// The outer edges of cells around the values.
+    pub(crate) fn edges(&self) -> (f64, f64) {
+        let (from, to) = (self.values[0], self.values[self.values.len() - 1]);
+        let steps = (self.values.len() - 1) as f64;
+        if steps == 0.0 {
+            let half = if from == 0.0 { 0.5 } else { 0.05 * from.abs() };
+            return (from - half, to + half);
+        }
+        if self.log {
+            let ratio = (to / from).powf(0.5 / steps);
+            (from / ratio, to * ratio)
+        } else {
+            let half = 0.5 * (to - from) / steps;
+            (from - half, to + half)
+        }
+    }
+}

@@ -46,7 +46,7 @@ def test_runs_and_orbits_are_drawn(regular):
     orbit = nanotap.orbit(regular)
     assert tip.get_ydata().max() == pytest.approx(orbit.tip_max, abs=1e-4)
     assert harmonics.get_yscale() == "log"
-    assert "drive periods" in time.get_xlabel() and "mu" in multipliers.get_xlabel()
+    assert "drive periods" in time.get_xlabel() and "μ" in multipliers.get_xlabel()
     with pytest.raises(ValueError, match="no time series"):
         plot.run(nanotap.simulate(regular, series=0))
 
@@ -55,9 +55,9 @@ def test_attractors_are_drawn_in_the_order_of_their_colours(bistable):
     found = nanotap.attractors(bistable, starts=24, unstable=1)
     left, right = drawn(found.plot()).axes
     colours = {
-        line.get_label().split(",")[0]: to_hex(line.get_color()) for line in left.lines
+        line.get_label().split(" (")[0]: to_hex(line.get_color()) for line in left.lines
     }
-    assert colours == {one.name: plot.LINES[k] for k, one in enumerate(found)}
+    assert colours == {one.name: plot.PERIODS[one.period - 1] for one in found}
     # Four strobe points of the period 4, one of the period 1.
     marks = sorted(len(line.get_xdata()) for line in right.lines[: len(found)])
     assert marks == [1, 4]
@@ -70,15 +70,31 @@ def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
         cloud.get_label(): to_hex(cloud.get_facecolor()[0])
         for cloud in axes.collections
     }
-    kinds = {meanings[code] for code in np.unique(swept.classification)}
-    assert set(colours) == kinds
-    assert colours["periodic"] == plot.BLUE
-    # A dot for each turn of each orbit.
     periodic = swept.classification.values == meanings.index("periodic")
-    dots = next(c for c in axes.collections if c.get_label() == "periodic")
-    turns = np.minimum(swept.period.values, 12)[periodic].sum()
-    assert len(dots.get_offsets()) == turns
-    assert "Omega" in axes.get_xlabel()
+    kinds = {
+        f"period {period}" if orbit else meanings[code]
+        for code, period, orbit in zip(
+            swept.classification.values.ravel(),
+            swept.period.values.ravel(),
+            periodic.ravel(),
+        )
+    }
+    assert set(colours) == kinds
+    for word, colour in colours.items():
+        known = plot.MOTIONS | {f"period {n + 1}": c for n, c in enumerate(plot.PERIODS)}
+        assert colour == known[word]
+    # A dot for each turn of each orbit.
+    for period in np.unique(swept.period.values[periodic]):
+        dots = next(
+            c for c in axes.collections if c.get_label() == f"period {period:.0f}"
+        )
+        orbits = (swept.period.values == period) & periodic
+        assert len(dots.get_offsets()) == orbits.sum() * min(period, 12)
+    assert "Ω" in axes.get_xlabel()
+    # What the user selects is what is drawn.
+    some = swept.isel(start=0, omega=slice(0, 9))
+    low, high = drawn(plot.sweep(some)).axes[0].get_xlim()
+    assert (low, high) == (some.omega[0], some.omega[-1])
     picture = drawn(plot.show(mapped))
     words = {text.get_text() for text in picture.axes[0].get_legend().get_texts()}
     for code, period in zip(
@@ -101,7 +117,7 @@ def test_basins_branches_and_the_rest_are_drawn(bistable, regular):
         regular, parameter="omega", from_=3.0, to=2.9, second={"alpha4": (18, 22)}
     )
     _, right = drawn(plot.show(branch)).axes
-    assert "alpha" in right.get_ylabel() and len(right.lines) >= 1
+    assert "α" in right.get_ylabel() and len(right.lines) >= 1
     drawn(plot.branch(branch, show="spectral_radius"))
     with pytest.raises(ValueError, match="there are tip_max"):
         plot.branch(branch, show="colour")
@@ -110,6 +126,29 @@ def test_basins_branches_and_the_rest_are_drawn(bistable, regular):
     drawn(plot.show(nanotap.convergence(regular, largest=3)))
     with pytest.raises(TypeError, match="no figure of a dict"):
         plot.show({})
+
+
+def test_figures_are_drawn_into_the_users_own_axes(swept, regular):
+    picture, axes = mpl.figure.Figure(), None
+    axes = picture.subplots()
+    assert plot.sweep(swept, axes=axes) is picture
+    assert axes.collections and axes.get_legend()
+    four = mpl.figure.Figure().subplots(2, 2)
+    nanotap.orbit(regular).plot(axes=four)
+    assert all(one.lines for one in four.flat)
+    with pytest.raises(ValueError, match="4 panels, not 1"):
+        nanotap.orbit(regular).plot(axes=axes)
+
+
+def test_curves_are_the_terminals(regular, tmp_path):
+    """The description is one: what matplotlib draws is where the terminal's SVG says it is."""
+    store = tmp_path / "s.zarr"
+    ds = nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=store)
+    svg = nanotap._nanotap.figure(store, "svg").decode()
+    axes = plot.sweep(ds).axes[0]
+    for cloud in axes.collections:
+        assert f'aria-label="{cloud.get_label()}"' in svg
+        assert f'stroke="{to_hex(cloud.get_facecolor()[0])}"' in svg
 
 
 def test_the_approach_goes_both_ways(physical):

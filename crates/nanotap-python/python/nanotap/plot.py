@@ -1,139 +1,83 @@
-"""Figures in the style of the terminal's: one call a result, each a matplotlib Figure.
+"""Figures of results: the terminal's, drawn with matplotlib.
 
 `nanotap.plot.orbit(orbit)`, `sweep(ds)`, `basin(ds)` …; `show(result)` picks by what the
-result is. Lettering is that of a journal's column at final size, colours are those of Okabe
-and Ito, and what a colour means is the same as at the terminal.
+result is. Each returns a matplotlib Figure; with `axes=` it draws into yours instead. What is
+drawn, its colours and its words are described once, for the terminal and for Python; here
+results only become the columns that are drawn.
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from io import BytesIO
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
-from . import _motions
+from . import _motions, _nanotap
 from ._case import Case
+from ._figure import STYLE, Picture, draw, page
 from ._results import Attractors, Convergence, Lyapunov, Modes, Orbit
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
 
-BLUE = "#0072b2"
-VERMILLION = "#d55e00"
-GREEN = "#009e73"
-PURPLE = "#cc79a7"
-ORANGE = "#e69f00"
-SKY = "#56b4e9"
-YELLOW = "#f0e442"
-GREY = "#808080"
-LIGHT_GREY = "#e2e2e2"
+__all__ = [
+    "LINES",
+    "MOTIONS",
+    "PERIODS",
+    "STYLE",
+    "Picture",
+    "approach",
+    "attractors",
+    "basin",
+    "branch",
+    "convergence",
+    "modes",
+    "orbit",
+    "page",
+    "run",
+    "section",
+    "show",
+    "sweep",
+]
 
-LINES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, "#000000")
-"""Colours of lines, in their order."""
+LINES, PERIODS, MOTIONS = _nanotap.colours()
+"""Colours of lines in their order, of the periods 1 to 16, and of the other motions by name."""
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, _ = LINES
+YELLOW, GREY, LIGHT_GREY = "#f0e442", "#808080", "#e2e2e2"
 
-_FILLS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, YELLOW)
-_CLASSES = {
-    "periodic": BLUE,
-    "quasi-periodic": GREEN,
-    "chaotic": VERMILLION,
-    "unbounded": "#000000",
-    "undecided": GREY,
-}
-_MARKS = {
-    "fold": ("s", "#000000", "fold"),
-    "flip": ("D", VERMILLION, "period doubling"),
-    "neimark-sacker": ("^", PURPLE, "Neimark–Sacker"),
-    "grazing": ("o", GREEN, "grazing"),
-    "crossing": ("x", "#000000", "crossing"),
-}
 _LABELS = {
-    "tip_max": "max $W$",
-    "tip_min": "min $W$",
-    "amplitude": "amplitude of $W$",
-    "first_harmonic": "first harmonic of $W$",
-    "phase": "phase (degrees)",
+    "tip_max": "greatest tip deflection $W_{max}$",
+    "tip_min": "least tip deflection $W_{min}$",
+    "amplitude": "amplitude (half of peak to peak)",
+    "first_harmonic": "amplitude at the drive frequency",
+    "phase": "phase (°)",
     "contact_fraction": "part of the time in contact",
-    "peak_force": "peak force",
-    "impact_speed": "speed of impact",
-    "spectral_radius": "largest multiplier $|\\mu|$",
+    "peak_force": "greatest force",
+    "dissipation": "dissipation $E_{dis}$",
+    "indentation": "indentation",
+    "impact_speed": "speed of approach",
+    "spectral_radius": "largest |$μ$|",
 }
-_MM = 1 / 25.4
-# Widths of a journal's columns, mm.
-_SINGLE, _MIDDLE, _DOUBLE = 85, 120, 175
-
-STYLE: dict[str, Any] = {
-    "font.size": 8,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.linewidth": 0.5,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "xtick.top": True,
-    "ytick.right": True,
-    "xtick.minor.visible": True,
-    "ytick.minor.visible": True,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
-    "xtick.minor.size": 1.4,
-    "ytick.minor.size": 1.4,
-    "xtick.major.width": 0.5,
-    "ytick.major.width": 0.5,
-    "xtick.minor.width": 0.4,
-    "ytick.minor.width": 0.4,
-    "lines.linewidth": 0.9,
-    "lines.markersize": 4,
-    "legend.fontsize": 7,
-    "legend.frameon": False,
-    "legend.handlelength": 1.6,
-    "savefig.dpi": 300,
-    "figure.dpi": 150,
-    "svg.fonttype": "none",
-    "pdf.fonttype": 42,
-}
-"""What the figures set of matplotlib; `matplotlib.rc_context(STYLE)` gives it to yours."""
 
 
-class Picture(Figure):
-    """A matplotlib Figure that a notebook shows without pyplot being set up."""
-
-    def _repr_png_(self) -> bytes:
-        stream = BytesIO()
-        with mpl.rc_context(STYLE):
-            self.savefig(stream, format="png", dpi=150)
-        return stream.getvalue()
-
-
-@contextmanager
-def page(width: float, height: float, **grid: Any) -> Iterator[tuple[Picture, Any]]:
-    """A page of `width` by `height` (mm) in the style of these figures, and its panels.
-
-    `grid` is what `Figure.subplots` takes: `nrows`, `ncols`, `sharex` …
-    """
-    with mpl.rc_context(STYLE):
-        picture = Picture(figsize=(width * _MM, height * _MM), layout="constrained")
-        yield picture, picture.subplots(**grid)
+def _drawn(
+    study: str,
+    facts: Mapping[str, Any],
+    axes: Any,
+    columns: Mapping[str, Any] | None = None,
+) -> Any:
+    """The figure that a study's facts and large columns describe."""
+    arrays = {
+        name: np.require(np.ravel(values), np.float64, ["C", "A"])
+        for name, values in (columns or {}).items()
+    }
+    return draw(_nanotap.describe(study, json.dumps(facts), arrays), axes)
 
 
-def _above(axes: "Axes", **options: Any) -> None:
-    """The legend above the panel, as wide as its entries."""
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        count = len(set(labels))
-        settings = {"ncols": min(count, 4), "columnspacing": 1.2, "borderaxespad": 0.2}
-        axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), **(settings | options)
-        )
+def _points(x: Any, y: Any) -> list[list[float]]:
+    """Points that have a place."""
+    table = np.column_stack([np.asarray(x, float), np.asarray(y, float)])
+    return list(table[np.isfinite(table).all(axis=1)].tolist())
 
 
 def _case_of(ds: "xr.Dataset") -> dict[str, Any]:
@@ -144,730 +88,329 @@ def _period_of(ds: "xr.Dataset") -> float:
     return float(2 * np.pi / _case_of(ds)["omega"])
 
 
-def _time_panel(axes: "Axes", ds: "xr.Dataset", periods: float) -> None:
+def _is_beam(ds: "xr.Dataset") -> bool:
+    return "stiffness" not in _case_of(ds)
+
+
+def _motion(
+    ds: "xr.Dataset", title: str, periods: float, endless: bool = False
+) -> dict[str, Any]:
+    """A time series as curves."""
     time = ds.tau.values / _period_of(ds)
-    inside = time <= periods + 1e-9
-    time = time[inside]
-    tip = ds.tip.values[inside]
-    if "contact" in ds:
-        contact = ds.contact.values[inside]
-        axes.fill_between(
-            time,
-            0,
-            1,
-            where=contact,
-            transform=axes.get_xaxis_transform(),
-            color=LIGHT_GREY,
-            linewidth=0,
-            label="contact",
-        )
-    seen = [tip]
-    if "gap" in ds:
-        surface = tip - ds.gap.values[inside]
-        seen.append(surface)
-        axes.plot(
-            time, surface, color=GREY, linestyle="--", linewidth=0.6, label="sample"
-        )
-    axes.plot(time, tip, color=BLUE, label="tip")
-    axes.set(xlabel="time $\\tau / T$ (drive periods)", ylabel="tip deflection $W$")
-    axes.margins(x=0)
-    # The shading knows no height of its own.
-    low, high = float(np.min(seen)), float(np.max(seen))
-    space = 0.06 * (high - low) or 1.0
-    axes.set_ylim(low - space, high + space)
-    _above(axes)
+    shown = time <= periods + 1e-9
+    tip, rate = ds.tip.values, ds.tip_rate.values
+    contact = np.append(False, np.append(ds.contact.values[shown], False)).astype(int)
+    begun, ended = np.flatnonzero(np.diff(contact) == 1), np.flatnonzero(np.diff(contact) == -1)
+    whole = (np.abs(time - np.round(time)) < 1e-9) & (time < time.max() - 0.5)
+    return {
+        "axes": {"beam": _is_beam(ds)},
+        "title": title,
+        "contacts": _points(time[begun], time[ended - 1]),
+        "surface": _points(time[shown], (tip - ds.gap.values)[shown]) if "gap" in ds else [],
+        "tip": _points(time[shown], tip[shown]),
+        "portrait": _points(tip, rate),
+        "strobe": _points(tip[whole], rate[whole]),
+        "endless": endless,
+    }
 
 
-def _portrait(axes: "Axes", ds: Any, endless: bool, color: str = BLUE) -> None:
-    axes.plot(
-        ds.tip,
-        ds.tip_rate,
-        color=color,
-        linewidth=0.3 if endless else 0.9,
-        rasterized=endless,
-    )
-    axes.set(xlabel="tip deflection $W$", ylabel="tip velocity $dW/d\\tau$")
-
-
-def _strobe(axes: "Axes", ds: Any, **options: Any) -> None:
-    """Where the motion is at drive phase 0."""
-    time = ds.tau.values / _period_of(ds)
-    whole = np.abs(time - np.round(time)) < 1e-9
-    points = whole & (time < time.max() - 0.5)
-    settings: dict[str, Any] = {
-        "color": VERMILLION,
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": 3.5,
-        "label": "at drive phase 0",
-    } | options
-    axes.plot(
-        ds.tip.values[points],
-        ds.tip_rate.values[points],
-        **settings,
-    )
-
-
-def run(ds: "xr.Dataset", *, periods: float | None = None) -> Picture:
+def run(ds: "xr.Dataset", *, periods: float | None = None, axes: Any = None) -> Any:
     """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
         message = "the run has no time series; leave series= away"
         raise ValueError(message)
     recorded = float(ds.tau[-1]) / _period_of(ds)
-    named = ds.get("period")
+    named = ds.get("period", ds.get("apparent_period"))
     period = np.nan if named is None else float(named)
-    if not np.isfinite(period) and "apparent_period" in ds:
-        period = float(ds.apparent_period)
-    settled = np.isfinite(period) and float(ds.get("transient", 0)) > 0
-    shown = np.clip(2 * period, 4, 16) if settled else 16
+    repeats = np.isfinite(period) and float(ds.get("transient", 0)) > 0
+    shown = np.clip(2 * period, 4, 16) if repeats else 16
     shown = min(recorded, shown if periods is None else periods)
-    with page(_DOUBLE, 66, ncols=2, width_ratios=(1.7, 1)) as (figure, (left, right)):
-        _time_panel(left, ds, shown)
-        if "classification" in ds:
-            word = (
-                f"period {period:.0f}"
-                if np.isfinite(period)
-                else ds.classification.item()
-            )
-        else:
-            word = f"Runge–Kutta, {ds.attrs['steps'][0]} steps"
-        left.set_title(str(word))
-        _portrait(right, ds, endless=not settled)
-        small = {} if settled else {"marker": ".", "markersize": 1.5}
-        _strobe(right, ds, **small)
-        _above(right)
-    return figure
+    if "classification" in ds:
+        word = str(ds.classification.item())
+        title = f"period {period:.0f}" if np.isfinite(period) else word
+    else:
+        title = f"Runge–Kutta, {ds.attrs['steps'][0]} steps a period"
+    if "contact" not in ds:
+        ds = ds.assign(contact=("tau", np.zeros(ds.sizes["tau"], bool)))
+    return _drawn("motion", _motion(ds, title, shown, endless=not repeats), axes)
 
 
-def orbit(orbit: Orbit) -> Picture:
+def orbit(orbit: Orbit, *, axes: Any = None) -> Any:
     """An orbit: time series, phase portrait, harmonics, multipliers."""
     ds = orbit.series
     if ds is None:
         message = "only an orbit found by nanotap.orbit has a time series"
         raise ValueError(message)
-    with page(_DOUBLE, 136, nrows=2, ncols=2, width_ratios=(1.7, 1)) as (
-        figure,
-        panels,
-    ):
-        _time_panel(panels[0, 0], ds, orbit.period)
-        panels[0, 0].set_title(f"period {orbit.period}, {orbit.stability}")
-        _portrait(panels[0, 1], ds, endless=False)
-        _strobe(panels[0, 1], ds)
-        _above(panels[0, 1])
-        _harmonics(panels[1, 0], orbit)
-        _multipliers(panels[1, 1], orbit)
-    return figure
+    title = f"period {orbit.period}, {orbit.stability}"
+    spectrum = orbit.spectrum().tip
+    facts = {
+        "motion": _motion(ds, title, orbit.period),
+        "harmonics": _points(spectrum.index, spectrum),
+        "multipliers": _points(orbit.multipliers.real, orbit.multipliers.imag),
+    }
+    return _drawn("orbit", facts, axes)
 
 
-def _harmonics(axes: "Axes", orbit: Orbit) -> None:
-    table = orbit.spectrum()
-    # What is smaller is rounding of what is largest.
-    table = table[table.tip > 1e-8 * table.tip.max()]
-    floor = table.tip.min() / 3
-    axes.vlines(table.index, floor, table.tip, color=BLUE, linewidth=0.9)
-    axes.plot(table.index, table.tip, "o", color=BLUE, markersize=3)
-    axes.set(
-        yscale="log",
-        xlabel="frequency / $\\Omega$",
-        ylabel="amplitude $|\\hat W_n|$",
-        ylim=(floor, None),
-        xlim=(0, None),
-    )
-
-
-def _multipliers(axes: "Axes", orbit: Orbit) -> None:
-    turn = np.linspace(0, 2 * np.pi, 361)
-    axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.6)
-    inside = np.abs(orbit.multipliers) < 1
-    for part, color in ((inside, BLUE), (~inside, VERMILLION)):
-        chosen = orbit.multipliers[part]
-        axes.plot(chosen.real, chosen.imag, "o", color=color, markersize=3.5)
-    axes.set(xlabel="Re $\\mu$", ylabel="Im $\\mu$", aspect="equal")
-
-
-# Attractors that get a portrait, and drive periods of one that never repeats.
+# Attractors that are drawn, and drive periods of one that never repeats.
 _MOST = 8
-_WANDERING_PERIODS = 64
+_ENDLESS_PERIODS = 64
 
 
-def attractors(found: Attractors) -> Picture:
+def attractors(found: Attractors, *, axes: Any = None) -> Any:
     """Phase portraits and strobe points of every attractor, each in its own colour."""
     case = found.case
-    shown = list(found)[:_MOST]
-    series: list[Any] = []
-    for one in shown:
+    curves = []
+    for one in list(found)[:_MOST]:
         if one.period:
-            series.append(
-                _motions.orbit(case, period=one.period, state=one.state).series
-            )
+            series = _motions.orbit(case, period=one.period, state=one.state).series
         else:
-            series.append(
-                _motions.simulate(
-                    case,
-                    state=one.state,
-                    transient=0,
-                    periods=_WANDERING_PERIODS,
-                    max_period=1,
-                )
+            series = _motions.simulate(
+                case, state=one.state, transient=0, periods=_ENDLESS_PERIODS, max_period=1
             )
-    # The largest first, so that it hides no other.
-    order = sorted(range(len(shown)), key=lambda k: -float(np.abs(series[k].tip).max()))
-    with page(_DOUBLE, 84, ncols=2) as (figure, (left, right)):
-        for k in order:
-            endless = not shown[k].period
-            color = LINES[k % len(LINES)]
-            _portrait(left, series[k], endless, color)
-            left.lines[-1].set_label(
-                f"{shown[k].name}, {100 * shown[k].fraction:.3g} %"
-            )
-            size = {"marker": ".", "markersize": 1.5} if endless else {}
-            _strobe(right, series[k], color=color, **size)
-        for unstable in found.unstable:
-            tips = _tips(case, unstable.states)
-            right.plot(
-                *tips,
-                "D",
-                color=GREY,
-                markersize=3.5,
-                fillstyle="none",
-                label="unstable orbits",
-            )
-        right.set(
-            xlabel="tip deflection $W$",
-            ylabel="tip velocity $dW/d\\tau$",
-            title="at drive phase 0",
+        assert series is not None
+        curves.append(
+            {
+                "name": f"{one.name} ({100 * one.fraction:.0f} %)",
+                "classification": one.classification,
+                "period": one.period,
+                **{k: _motion(series, "", 0.0)[k] for k in ("portrait", "strobe")},
+            }
         )
-        _above(left, ncols=2)
-    return figure
+    unstable = [point for one in found.unstable for point in _tips(case, one.states)]
+    facts = {
+        "axes": {"beam": case.kind == "cantilever"},
+        "attractors": curves,
+        "unstable": unstable,
+    }
+    return _drawn("attractors", facts, axes)
 
 
-def _tips(case: Case, states: Any) -> tuple[Any, Any]:
+def _tips(case: Case, states: Any) -> list[list[float]]:
     """Tip deflection and rate of states: φ_j(1) = 2 (−1)^(j+1)."""
     half = states.shape[1] // 2
     if case.kind != "cantilever":
-        return states[:, 0], states[:, half]
+        return _points(states[:, 0], states[:, half])
     ends = 2.0 * (-1.0) ** np.arange(half)
-    return states[:, :half] @ ends, states[:, half : 2 * half] @ ends
+    return _points(states[:, :half] @ ends, states[:, half : 2 * half] @ ends)
 
 
-def _symbol(ds: "xr.Dataset", name: str) -> str:
-    return f"${_plain(str(ds[name].attrs.get('symbol', name)))}$"
+def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
+    said = ds[name].attrs
+    units = str(said.get("units", ""))
+    return {
+        "symbol": str(said.get("symbol", name)),
+        "units": units,
+        "log": said.get("spacing") == "log",
+    }
 
 
-_SUBSCRIPTS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
-
-
-def _plain(symbol: str) -> str:
-    """A symbol or key as matplotlib's formulas write it: α₄ and alpha4 as α_4."""
-    if symbol.startswith("alpha"):
-        symbol = f"α{symbol.removeprefix('alpha')}"
-    elif symbol == "omega":
-        symbol = "Ω"
-    symbol = symbol.translate(_SUBSCRIPTS)
-    head = symbol.rstrip("0123456789")
-    tail = symbol[len(head) :]
-    for letter, word in (("Ω", "\\Omega"), ("ω", "\\omega"), ("α", "\\alpha")):
-        head = head.replace(letter, word)
-    head = head.replace("_", "\\_")
-    return f"{head}_{{{tail}}}" if tail else head
-
-
-def sweep(ds: "xr.Dataset") -> Picture:
+def sweep(ds: "xr.Dataset", *, axes: Any = None) -> Any:
     """A sweep: a bifurcation diagram over one parameter, a map of motions over two."""
-    dims = list(ds.classification.dims)
-    return _diagram(ds) if len(dims) == 2 else _map(ds, dims)
+    if "start" not in ds.dims:
+        ds = ds.expand_dims("start", axis=-1)
+    names = [str(dim) for dim in ds.classification.dims if dim != "start"]
+    order = (*names, "start")
+    directions = np.atleast_1d(ds.direction.values) if "direction" in ds.coords else None
+    facts = {
+        "axes": [_grid_axis(ds, name) for name in names],
+        "directions": [""] * ds.sizes["start"]
+        if directions is None
+        else [str(way) for way in directions],
+        "units": str(ds.period_max.attrs.get("units", "")) if "period_max" in ds else "",
+    }
+    columns = {f"axis{k}": ds[name].values for k, name in enumerate(names)}
+    columns |= {key: ds[key].transpose(*order).values for key in ("classification", "period")}
+    if len(names) == 1:
+        columns["period_max"] = ds.period_max.transpose(*order, ...).values
+    return _drawn("sweep", facts, axes, columns)
 
 
-def _diagram(ds: "xr.Dataset") -> Picture:
-    name = str(ds.classification.dims[0])
-    meanings = ds.classification.attrs["flag_meanings"].split()
-    codes, periods, highs = (
-        ds[key].values for key in ("classification", "period", "period_max")
-    )
-    # An orbit repeats after one turn.
-    turn = np.where(periods > 0, periods, highs.shape[-1])
-    once = np.arange(highs.shape[-1]) < turn[..., None]
-    ways = (
-        ds.direction.values
-        if "direction" in ds.coords
-        else np.full(ds.sizes["start"], "")
-    )
-    shown = [way for way in ("up", "down", "") if way in ways]
-    with page(
-        _DOUBLE, 20 + 58 * len(shown), nrows=len(shown), sharex=True, squeeze=False
-    ) as (figure, panels):
-        for axes, way in zip(panels[:, 0], shown, strict=True):
-            lanes = ways == way
-            # What is chaotic lies under what is periodic.
-            for code in (4, 5, 3, 2, 1):
-                chosen = (codes == code) & lanes
-                points = once & chosen[..., None] & np.isfinite(highs)
-                if not points.any():
-                    continue
-                x = np.broadcast_to(ds[name].values[:, None, None], highs.shape)[points]
-                size = 1.0 if len(x) < 2000 else 0.5 if len(x) < 20_000 else 0.15
-                axes.scatter(
-                    x,
-                    highs[points],
-                    s=size,
-                    color=_CLASSES[meanings[code]],
-                    linewidths=0,
-                    rasterized=True,
-                    label=meanings[code],
-                )
-            axes.set(
-                ylabel="max $W$ in a drive period",
-                title=f"following {way}" if way else "",
-            )
-            if ds[name].attrs.get("spacing") == "log":
-                axes.set_xscale("log")
-            axes.margins(x=0)
-            _above(axes, markerscale=4, handlelength=0.8)
-        panels[-1, 0].set_xlabel(_symbol(ds, name))
-    return figure
-
-
-# Motions of a map that get a colour of their own.
-_MOST_CATEGORIES = 12
-
-
-def _map(ds: "xr.Dataset", dims: Sequence[Any]) -> Picture:
-    y, x = str(dims[0]), str(dims[1])
-    meanings = ds.classification.attrs["flag_meanings"].split()
-    codes = ds.classification.values.astype(int)
-    periods = ds.period.values.astype(int)
-    keys = [
-        [
-            tuple(
-                sorted(
-                    {
-                        (int(c), int(p))
-                        for c, p in zip(codes[j, i], periods[j, i], strict=True)
-                    }
-                )
-            )
-            for i in range(codes.shape[1])
-        ]
-        for j in range(codes.shape[0])
-    ]
-    flat = [key for row in keys for key in row]
-    frequent = sorted(set(flat), key=lambda key: (-flat.count(key), key))
-    named = sorted(frequent[:_MOST_CATEGORIES])
-    free = (
-        color for color in _tints() if color not in {to_rgb(GREEN), to_rgb(VERMILLION)}
-    )
-    colors: list[Any] = []
-    words: list[str] = []
-    for key in named:
-        single = meanings[key[0][0]] if len(key) == 1 else None
-        if single in (None, "periodic"):
-            colors.append(next(free))
-        else:
-            colors.append(_CLASSES.get(str(single), "#ffffff"))
-        words.append(
-            " + ".join(
-                f"period {p}" if meanings[c] == "periodic" else meanings[c]
-                for c, p in key
-            )
-        )
-    if len(frequent) > len(named):
-        colors.append("#c8c8c8")
-        words.append("other")
-    index = {key: k for k, key in enumerate(named)}
-    cells = np.array([[index.get(key, len(named)) for key in row] for row in keys])
-    with page(_MIDDLE, 80) as (figure, axes):
-        _cells(axes, ds, x, y, cells, colors)
-        axes.legend(
-            handles=[
-                Patch(color=color, label=word)
-                for color, word in zip(colors, words, strict=True)
-            ],
-            loc="upper left",
-            bbox_to_anchor=(1.02, 1.0),
-            borderaxespad=0,
-            handlelength=0.9,
-            handleheight=0.9,
-        )
-    return figure
-
-
-def _tints() -> Iterator[tuple[float, float, float]]:
-    """Okabe and Ito's colours, then lighter tints of them."""
-    for share in (0.0, 0.45, 0.7):
-        for fill in _FILLS:
-            red, green, blue = to_rgb(fill)
-            yield (
-                red + (1 - red) * share,
-                green + (1 - green) * share,
-                blue + (1 - blue) * share,
-            )
-
-
-def _edges(ds: "xr.Dataset", name: str) -> Any:
-    """The outer edges of cells around the values of an axis."""
-    values = ds[name].values.astype(float)
-    log = ds[name].attrs.get("spacing") == "log"
-    if len(values) == 1:
-        half = 0.5 if values[0] == 0 else 0.05 * abs(values[0])
-        return np.array([values[0] - half, values[0] + half])
-    shown = np.log(values) if log else values
-    inner = 0.5 * (shown[1:] + shown[:-1])
-    first, last = 2 * shown[0] - inner[0], 2 * shown[-1] - inner[-1]
-    edges = np.concatenate([[first], inner, [last]])
-    return np.exp(edges) if log else edges
-
-
-def _cells(
-    axes: "Axes", ds: "xr.Dataset", x: str, y: str, cells: Any, colors: Sequence[Any]
-) -> None:
-    norm = BoundaryNorm(np.arange(len(colors) + 1) - 0.5, max(len(colors), 1))
-    axes.pcolormesh(
-        _edges(ds, x),
-        _edges(ds, y),
-        cells,
-        cmap=ListedColormap(list(colors)),
-        norm=norm,
-        rasterized=True,
-    )
-    for name, scale, label in (
-        (x, axes.set_xscale, axes.set_xlabel),
-        (y, axes.set_yscale, axes.set_ylabel),
-    ):
-        if ds[name].attrs.get("spacing") == "log":
-            scale("log")
-        label(_symbol(ds, name))
-    axes.tick_params(which="both", direction="out", top=False, right=False)
-
-
-def basin(ds: "xr.Dataset") -> Picture:
+def basin(ds: "xr.Dataset", *, axes: Any = None) -> Any:
     """Basins: a colour an attractor, and where the attractors' own strobe points lie."""
     y, x = (str(dim) for dim in ds.attractor.dims)
-    known = json.loads(ds.attrs["attractors"])
-    cells = ds.attractor.values.astype(int)
-    fills = list(_tints())
-    colors: list[Any] = [fills[k % len(fills)] for k in range(len(known))]
-    words = [
-        f"period {one['period']}" if one["period"] else one["classification"]
-        for one in known
-    ]
-    labels = cells.copy()
-    for label, word, grey in (
-        (-1, "unsettled", 190),
-        (-2, "unbounded", 60),
-        (-3, "not followed", 120),
-    ):
-        if (cells == label).any():
-            labels[cells == label] = len(colors)
-            colors.append((grey / 255,) * 3)
-            words.append(word)
-    names = ds.attrs["state_entries"].split()
-    with page(_MIDDLE, 80) as (figure, axes):
-        _cells(axes, ds, x, y, labels, colors)
-        limits = axes.get_xlim(), axes.get_ylim()
-        for k, one in enumerate(known):
-            states = np.array(one["states"])
-            at = states[:, names.index(x)], states[:, names.index(y)]
-            if one["period"]:
-                axes.plot(
-                    *at,
-                    "o",
-                    color=colors[k],
-                    markersize=4.5,
-                    markeredgecolor="w",
-                    markeredgewidth=0.8,
-                )
-            else:
-                axes.plot(*at, "k.", markersize=0.8)
-        axes.set(xlim=limits[0], ylim=limits[1], xlabel=_entry(x), ylabel=_entry(y))
-        axes.legend(
-            handles=[
-                Patch(color=color, label=word)
-                for color, word in zip(colors, words, strict=True)
-            ],
-            loc="upper left",
-            bbox_to_anchor=(1.02, 1.0),
-            borderaxespad=0,
-            handlelength=0.9,
-            handleheight=0.9,
-        )
-    return figure
+    facts = {
+        "x": x,
+        "y": y,
+        "attractors": json.loads(ds.attrs["attractors"]),
+        "entries": ds.attrs["state_entries"].split(),
+    }
+    columns = {"x": ds[x].values, "y": ds[y].values, "labels": ds.attractor.values}
+    return _drawn("basin", facts, axes, columns)
 
 
-def _entry(name: str) -> str:
-    """How an entry of a state is written: v1 is the rate of a1."""
-    if len(name) < 2:
-        return f"${name}$"
-    letter, number = name[0], name[1:]
-    return f"$a_{{{number}}}$" if letter == "a" else f"$\\dot a_{{{number}}}$"
-
-
-def branch(ds: "xr.Dataset", *, show: str = "tip_max") -> Picture:
+def branch(ds: "xr.Dataset", *, show: str = "tip_max", axes: Any = None) -> Any:
     """Branches against the parameter, a colour a period, with their bifurcations; beside them
-    the loci of these in two parameters, if they were traced."""
-    if show not in _LABELS:
-        message = f"show: `{show}` is none; there are {', '.join(_LABELS)}"
+    the bifurcation curves in two parameters, if they were traced."""
+    if show not in _LABELS or show not in ds:
+        message = f"show: `{show}` is none; there are {', '.join(n for n in _LABELS if n in ds)}"
         raise ValueError(message)
     name = ds.attrs["parameter"]
-    loci = "locus_first" in ds
-    with page(
-        _DOUBLE if loci else _MIDDLE, 88, ncols=2 if loci else 1, squeeze=False
-    ) as (figure, panels):
-        axes = panels[0, 0]
-        _branches(
-            axes, ds, ds[name].values, ds[show].values, ("branch", "period", "stable")
+    marks: list[dict[str, Any]] = []
+    if ds.sizes.get("bifurcation"):
+        marks = _rows(
+            kind=ds.bifurcation_kind,
+            x=ds.bifurcation_parameter,
+            y=ds[f"bifurcation_{show}"],
         )
-        _bifurcations(axes, ds, show)
-        axes.set(
-            xlabel=f"${_plain(ds.attrs['parameter_symbol'])}$", ylabel=_LABELS[show]
-        )
-        axes.margins(x=0)
-        _above(axes, ncols=3)
-        if loci:
-            _loci(panels[0, 1], ds)
-    return figure
+    facts = {
+        "x_label": f"${ds.attrs['parameter_symbol']}$",
+        "y_label": _LABELS[show],
+        "points": _rows(
+            branch=ds.branch, period=ds.period, stable=ds.stable, x=ds[name], y=ds[show]
+        ),
+        "bifurcations": marks,
+        "curves": _curves(ds, name) if "locus_first" in ds else None,
+    }
+    return _drawn("branch", facts, axes)
 
 
-def _branches(
-    axes: "Axes", ds: "xr.Dataset", x: Any, y: Any, names: tuple[str, str, str]
-) -> None:
-    """Curves, solid where they attract."""
-    branch, period, stable = (ds[name].values for name in names)
-    for k, value in enumerate(np.unique(period)):
-        color = LINES[k % len(LINES)]
-        axes.plot([], [], color=color, label=f"period {value:.0f}")
-        for one in np.unique(branch):
-            chosen = np.flatnonzero((branch == one) & (period == value))
-            for run, attracts in _stretches(chosen, stable):
-                style = (
-                    {"linewidth": 0.9}
-                    if attracts
-                    else {"linewidth": 0.6, "linestyle": "--"}
-                )
-                axes.plot(x[run], y[run], color=color, **style)
-    if not stable.all():
-        axes.plot([], [], color=GREY, linestyle="--", linewidth=0.6, label="unstable")
+def _rows(**columns: Any) -> list[dict[str, Any]]:
+    """Columns as rows, where all numbers are."""
+    lists = [column.values.tolist() for column in columns.values()]
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
+    return [row for row in rows if np.isfinite(row["x"]) and np.isfinite(row["y"])]
 
 
-def _stretches(chosen: Any, stable: Any) -> Iterator[tuple[Any, bool]]:
-    """Stretches of one stability, each beginning where the last one ended."""
-    if not len(chosen):
-        return
-    breaks = np.flatnonzero(np.diff(stable[chosen].astype(int))) + 1
-    start = 0
-    for end in [*breaks, len(chosen)]:
-        yield chosen[max(0, start - 1) : end], bool(stable[chosen[end - 1]])
-        start = end
+def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
+    parts = [ds.isel(locus_point=ds.locus.values == one) for one in np.unique(ds.locus.values)]
+    first, second = ds[name].values, ds.locus_second.values
+    return {
+        "y_label": f"${ds.attrs.get('second_symbol', ds.attrs['second'])}$",
+        "x_range": [float(first.min()), float(first.max())],
+        "y_range": [float(second.min()), float(second.max())],
+        "curves": [
+            {
+                "kind": str(part.locus_kind.values[0]),
+                "period": int(part.locus_period.values[0]),
+                "x": part.locus_first.values.tolist(),
+                "y": part.locus_second.values.tolist(),
+            }
+            for part in parts
+        ],
+    }
 
 
-def _bifurcations(axes: "Axes", ds: "xr.Dataset", show: str) -> None:
-    if not ds.sizes.get("bifurcation"):
-        return
-    kinds = ds.bifurcation_kind.values
-    size = 3.2 if len(kinds) > 12 else 4.5
-    for kind, (marker, color, word) in _MARKS.items():
-        chosen = kinds == kind
-        if chosen.any():
-            axes.plot(
-                ds.bifurcation_parameter.values[chosen],
-                ds[f"bifurcation_{show}"].values[chosen],
-                linestyle="none",
-                marker=marker,
-                fillstyle="none",
-                color=color,
-                markersize=0.7 * size if kind == "grazing" else size,
-                clip_on=False,
-                label=word,
-            )
+_PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 
 
-def _loci(axes: "Axes", ds: "xr.Dataset") -> None:
-    named: set[str] = set()
-    for curve in np.unique(ds.locus.values):
-        part = ds.isel(locus_point=ds.locus.values == curve)
-        kind, period = str(part.locus_kind.values[0]), int(part.locus_period.values[0])
-        _, color, word = _MARKS.get(kind, _MARKS["fold"])
-        label = f"{word}, period {period}"
-        axes.plot(
-            part.locus_first,
-            part.locus_second,
-            color=color,
-            linestyle={1: "-", 2: "--"}.get(period, ":"),
-            label=None if label in named else label,
-        )
-        named.add(label)
-    first, second = ds.attrs["parameter"], ds.attrs["second"]
-    axes.set(
-        xlabel=f"${_plain(first)}$",
-        ylabel=f"${_plain(second)}$",
-    )
-    _above(axes, ncols=2)
-
-
-_PREFIXES = {
-    -18: "a",
-    -15: "f",
-    -12: "p",
-    -9: "n",
-    -6: "µ",
-    -3: "m",
-    0: "",
-    3: "k",
-    6: "M",
-}
-
-
-def _prefixed(values: Any, unit: str) -> tuple[float, str]:
-    """What values are to be multiplied with, and the unit with the prefix that fits."""
-    size = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
+def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]:
+    """What values are multiplied with, and their unit in brackets with the prefix that fits."""
+    known = np.abs(values[np.isfinite(values)])
+    size = float(known.max()) if known.size else 0.0
+    if size <= 1e-9 * natural:
+        size = natural
     power = int(np.clip(3 * np.floor(np.log10(size) / 3), -18, 6)) if size > 0 else 0
-    return 10.0**-power, f"{_PREFIXES[power]}{unit}"
+    return 10.0**-power, f" ({_PREFIXES[power]}{unit})"
 
 
-def approach(ds: "xr.Dataset") -> Picture:
-    """Amplitude, phase, peak force and dissipated energy against the distance, both ways."""
-    physical = "physical_A" in ds
+def approach(ds: "xr.Dataset", *, axes: Any = None) -> Any:
+    """Amplitude, phase, dissipated energy and peak force against the distance, both ways."""
     name = ds.attrs["parameter"]
-    rows = (
-        [
-            ("physical_A", "amplitude $A$", "m"),
-            ("physical_phase", "phase (degrees)", ""),
-            ("physical_F_max", "peak force", "N"),
-            ("physical_E_dis_eV", "dissipation", "eV"),
-        ]
-        if physical
-        else [
-            ("first_harmonic", "first harmonic of $W$", ""),
-            ("phase", "phase (degrees)", ""),
-            ("peak_force", "peak force", ""),
-            ("dissipation", "dissipation", ""),
-        ]
-    )
+    physical = "physical_A" in ds
     distance = ds.zc.values if physical else ds[name].values
     factor, unit = _prefixed(distance, "m") if physical else (1.0, "")
-    label = f"distance $z_c$ ({unit})" if physical else _symbol(ds, name)
-    with page(_DOUBLE, 120, nrows=2, ncols=2, sharex=True) as (figure, panels):
-        for axes, (variable, word, base) in zip(panels.flat, rows, strict=True):
-            if variable not in ds:
-                axes.set_visible(False)
-                continue
-            values = ds[variable].values
-            scale, named = _prefixed(values, base) if base else (1.0, "")
-            inner = variable.removeprefix("physical_")
-            unstable = _branch_curve(ds, inner, variable)
-            if unstable is not None and not physical:
-                gaps, heights = unstable
-                axes.plot(
-                    gaps,
-                    heights,
-                    color=GREY,
-                    linestyle="--",
-                    linewidth=0.6,
-                    label="unstable",
-                )
-            for way, color, marker in (
-                ("approach", BLUE, "-"),
-                ("retract", VERMILLION, "--"),
-            ):
-                curve = ds[variable].sel(way=way).values
-                axes.plot(
-                    factor * distance, scale * curve, marker, color=color, label=way
-                )
-            axes.set_ylabel(f"{word} ({named})" if named else word)
-        for axes in panels[-1]:
-            axes.set_xlabel(label)
-        panels[0, 0].margins(x=0)
-        _above(panels[0, 1])
-    return figure
-
-
-def _branch_curve(
-    ds: "xr.Dataset", inner: str, variable: str
-) -> tuple[Any, Any] | None:
-    """The unstable parts of the branches, broken where they are not."""
-    name = f"branch_{variable}" if f"branch_{variable}" in ds else f"branch_{inner}"
-    if name not in ds or "branch_stable" not in ds:
-        return None
-    heights = np.where(ds.branch_stable.values.astype(bool), np.nan, ds[name].values)
-    joints = np.flatnonzero(np.diff(ds.branch_branch.values)) + 1
-    gaps = np.insert(ds.branch_parameter.values, joints, np.nan)
-    return gaps, np.insert(heights, joints, np.nan)
-
-
-def section(found: Lyapunov) -> Picture:
-    """A Poincaré section: tip deflection and rate of its points."""
-    with page(_MIDDLE, 88) as (figure, axes):
-        cut = found.section
-        size = 0.3 if cut.sizes["point"] > 2000 else 1.5
-        axes.scatter(
-            cut.tip,
-            cut.tip_rate,
-            s=size,
-            color=VERMILLION,
-            linewidths=0,
-            rasterized=True,
+    electronvolts = 1.602176634e-19
+    rows = (
+        ("first_harmonic", "physical_A", "amplitude $A$", "m", 1.0),
+        ("phase", "physical_phase", "phase behind the drive (°)", "", 1.0),
+        ("dissipation", "physical_E_dis", "dissipation $E_{dis}$", "eV", electronvolts),
+        ("peak_force", "physical_F_max", "greatest force $F_{max}$", "N", 1.0),
+    )
+    # How many of the unit a model's number is: its ratio where it is largest.
+    panels = []
+    for plain, si, label, base, part in rows:
+        values = ds[plain].values
+        scale = 1.0
+        if physical and base:
+            k = np.nanargmax(np.abs(values))
+            scale = float(ds[si].values.flat[k] / values.flat[k]) / part if values.flat[k] else 1.0
+        natural = None
+        if plain == "dissipation":
+            natural = scale * float(np.nanmax(np.abs(ds.first_harmonic * ds.peak_force)))
+        shown, named = (
+            _prefixed(scale * values, base, natural or 0.0) if physical and base else (1.0, "")
         )
-        axes.set(
-            xlabel="tip deflection $W$",
-            ylabel="tip velocity $dW/d\\tau$",
-            title=f"{found.classification}, $\\lambda_1$ = {found.exponents[0]:.4g} a drive period",
+        shown *= scale
+        x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
+
+        def curve(way: str, values: Any = ds[plain], by: float = shown) -> list[list[float]]:
+            return _points(factor * distance, by * values.sel(way=way).values)
+
+        def branches(prefix: str, by: float = shown, plain: str = plain, **more: Any) -> Any:
+            if f"{prefix}{plain}" not in ds:
+                return []
+            x, y = x_scale * ds[f"{prefix}parameter"], by * ds[f"{prefix}{plain}"]
+            return _rows(x=x, y=y, **{key: ds[f"{prefix}{key}"] for key in more})
+
+        panels.append(
+            {
+                "label": f"{label}{named}",
+                "natural": None if natural is None else natural * shown / scale,
+                "phase": plain == "phase",
+                "approach": curve("approach"),
+                "retract": curve("retract"),
+                "branches": branches("branch_", branch=1, period=1, stable=1),
+                "bifurcations": branches("bifurcation_", kind=1),
+            }
         )
-    return figure
+    symbol = "distance $z_c$" if physical else "distance $α₅$" if name == "alpha5" else name
+    facts = {
+        "x_label": f"{symbol}{unit}",
+        "x_range": [float(factor * distance.min()), float(factor * distance.max())],
+        "panels": panels,
+    }
+    return _drawn("approach", facts, axes)
 
 
-def modes(found: Modes) -> Picture:
+def section(found: Lyapunov, *, axes: Any = None) -> Any:
+    """A Poincaré section, and the exponents with their errors."""
+    cut = found.section
+    phases = np.unique(np.round(cut.phase.values, 9))
+    if len(phases) <= 1:
+        at: float | None = float(phases[0]) / 360 if len(phases) else 0.0
+        points = _points(cut.tip, cut.tip_rate)
+    else:
+        at, points = None, _points(cut.phase, -cut.gap_rate)
+    facts = {
+        "axes": {"beam": _is_beam(cut)},
+        "phase": at,
+        "points": points,
+        "exponents": found.exponents.tolist(),
+        "errors": np.nan_to_num(found.errors).tolist(),
+    }
+    return _drawn("section", facts, axes)
+
+
+def modes(found: Modes, *, axes: Any = None) -> Any:
     """The mode shapes of the bare beam."""
-    with page(_SINGLE, 66) as (figure, axes):
-        for k, mode in enumerate(found.shapes.mode.values):
-            axes.plot(
-                found.shapes.xi,
-                found.shapes.sel(mode=mode),
-                color=LINES[k % len(LINES)],
-                label=f"$\\phi_{{{mode}}}$",
-            )
-        axes.axhline(0, color=GREY, linewidth=0.4)
-        axes.set(xlabel="place along the beam $\\xi$", ylabel="mode shape $\\phi_j$")
-        axes.margins(x=0)
-        _above(axes, ncols=5)
-    return figure
+    return _drawn("modes", {"modes": found.modes}, axes)
 
 
-def convergence(found: Convergence) -> Picture:
+def convergence(found: Convergence, *, axes: Any = None) -> Any:
     """What the tip deflection still changes, against the number of modes."""
-    with page(_SINGLE, 66) as (figure, axes):
-        known = np.isfinite(found.difference) & (found.difference > 0)
-        axes.plot(
-            np.array(found.modes)[known], found.difference[known], "o-", color=BLUE
-        )
-        axes.axhline(
-            found.tolerance,
-            color=GREY,
-            linestyle="--",
-            linewidth=0.6,
-            label="tolerance",
-        )
-        axes.set(
-            xlabel="modes $N$", ylabel="difference of $W$ / amplitude", yscale="log"
-        )
-        axes.xaxis.get_major_locator().set_params(integer=True)
-        axes.minorticks_off()
-        _above(axes)
-    return figure
+    facts = {
+        "modes": list(found.modes),
+        "difference": [float(d) if np.isfinite(d) else None for d in found.difference],
+        "tolerance": found.tolerance,
+        "enough": found.enough,
+    }
+    return _drawn("convergence", facts, axes)
 
 
-def show(result: Any, **options: Any) -> Picture:
+def show(result: Any, **options: Any) -> Any:
     """The figure of any result."""
-    draw: Callable[..., Picture]
-    for kind, draw in _FIGURES.items():
+    draw_it: Callable[..., Any]
+    for kind, draw_it in _FIGURES.items():
         if isinstance(result, kind):
-            return draw(result, **options)
-    for name, draw in _FIGURES_BY_VARIABLE.items():
+            return draw_it(result, **options)
+    for name, draw_it in _FIGURES_BY_VARIABLE.items():
         if name in getattr(result, "variables", ()):
-            return draw(result, **options)
+            return draw_it(result, **options)
     message = f"there is no figure of a {type(result).__name__}"
     raise TypeError(message)
 
 
-_FIGURES: dict[type, Callable[..., Picture]] = {
+_FIGURES: dict[type, Callable[..., Any]] = {
     Orbit: orbit,
     Attractors: attractors,
     Lyapunov: section,
@@ -875,7 +418,7 @@ _FIGURES: dict[type, Callable[..., Picture]] = {
     Convergence: convergence,
 }
 # The first one that a Dataset has says what it is.
-_FIGURES_BY_VARIABLE: dict[str, Callable[..., Picture]] = {
+_FIGURES_BY_VARIABLE: dict[str, Callable[..., Any]] = {
     "branch": branch,
     "attractor": basin,
     "period_max": sweep,

@@ -192,100 +192,54 @@ impl Canvas {
         });
     }
 
-    /// Draws pixels on pixels, each of ours the mean of what it covers: sharp edges stay sharp when
-    /// enlarged, and nothing is skipped when reduced.
+    /// Draws pixels on pixels: each of ours takes the colour at its middle, so that cells keep their
+    /// sharp edges, and a picture of our own resolution is copied.
     fn raster(&mut self, raster: &Raster) {
-        let across = Shares::new(
-            (raster.rect.left - self.corner.x) * self.scale,
-            (raster.rect.right - self.corner.x) * self.scale,
-            raster.columns,
-            self.pixmap.width() as usize,
-        );
-        let down = Shares::new(
-            (raster.rect.top - self.corner.y) * self.scale,
-            (raster.rect.bottom - self.corner.y) * self.scale,
-            raster.rows,
-            self.pixmap.height() as usize,
-        );
         self.prepare_mask(raster.clip);
-        let width = self.pixmap.width() as usize;
-        let mask = self.mask.as_ref().map(|(_, mask)| mask.data().to_vec());
+        let mask = self.mask.as_ref().map(|(_, mask)| mask.data());
+        let (width, height) = (self.pixmap.width() as usize, self.pixmap.height() as usize);
+        let places = |from: f64, to: f64, corner: f64, count: usize, most: usize| {
+            let (from, to) = ((from - corner) * self.scale, (to - corner) * self.scale);
+            let inside = from.round().max(0.0) as usize..(to.round().max(0.0) as usize).min(most);
+            inside.map(move |target| {
+                let share = (target as f64 + 0.5 - from) / (to - from);
+                (target, ((share * count as f64) as usize).min(count - 1))
+            })
+        };
+        let rect = raster.rect;
+        let across: Vec<(usize, usize)> =
+            places(rect.left, rect.right, self.corner.x, raster.columns, width).collect();
+        let down = places(rect.top, rect.bottom, self.corner.y, raster.rows, height);
         let target = self.pixmap.pixels_mut();
-        for (row, rows) in down.targets() {
-            for (column, columns) in across.targets() {
-                let mut sum = [0.0f64; 4];
-                for &(source_row, share_row) in rows {
-                    for &(source_column, share) in columns {
-                        let c = raster.pixels[source_row * raster.columns + source_column];
-                        let weight = share * share_row * c.opacity();
-                        sum[0] += weight * f64::from(c.r);
-                        sum[1] += weight * f64::from(c.g);
-                        sum[2] += weight * f64::from(c.b);
-                        sum[3] += weight * 255.0;
-                    }
-                }
+        for (row, from_row) in down {
+            for &(column, from_column) in &across {
+                let colour = raster.pixels[from_row * raster.columns + from_column];
                 let index = row * width + column;
-                let visible = mask.as_ref().map_or(1.0, |m| f64::from(m[index]) / 255.0);
-                if sum[3] * visible > 0.0 {
-                    target[index] = over(sum.map(|v| v * visible), target[index]);
+                let visible = mask.map_or(1.0, |m| f64::from(m[index]) / 255.0);
+                if colour.a > 0 && visible > 0.0 {
+                    target[index] = over(colour, visible, target[index]);
                 }
             }
         }
     }
 }
 
-/// Lays a premultiplied colour (0 to 255) over a pixel.
-fn over(top: [f64; 4], below: tiny_skia::PremultipliedColorU8) -> tiny_skia::PremultipliedColorU8 {
-    let rest = 1.0 - top[3] / 255.0;
-    let mix = |t: f64, b: u8| (t + rest * f64::from(b)).round().clamp(0.0, 255.0) as u8;
-    let alpha = mix(top[3], below.alpha());
+/// Lays a colour, as far as it is visible, over a pixel.
+fn over(
+    top: Colour,
+    visible: f64,
+    below: tiny_skia::PremultipliedColorU8,
+) -> tiny_skia::PremultipliedColorU8 {
+    let opacity = top.opacity() * visible;
+    let mix = |t: f64, b: u8| (opacity * t + (1.0 - opacity) * f64::from(b)).round() as u8;
+    let alpha = mix(255.0, below.alpha());
     tiny_skia::PremultipliedColorU8::from_rgba(
-        mix(top[0], below.red()).min(alpha),
-        mix(top[1], below.green()).min(alpha),
-        mix(top[2], below.blue()).min(alpha),
+        mix(f64::from(top.r), below.red()).min(alpha),
+        mix(f64::from(top.g), below.green()).min(alpha),
+        mix(f64::from(top.b), below.blue()).min(alpha),
         alpha,
     )
     .unwrap_or(below)
-}
-
-/// Which source pixels each target pixel covers along one direction, and how much of the target
-/// pixel each fills.
-struct Shares {
-    first: usize,
-    shares: Vec<Vec<(usize, f64)>>,
-}
-
-impl Shares {
-    /// `count` source pixels lie evenly between `from` and `to`, in target pixels.
-    fn new(from: f64, to: f64, count: usize, targets: usize) -> Shares {
-        let first = from.max(0.0).floor() as usize;
-        let last = (to.ceil().max(0.0) as usize).min(targets);
-        let size = (to - from) / count as f64;
-        let shares = (first..last)
-            .map(|target| {
-                let (start, stop) = (target as f64, target as f64 + 1.0);
-                let source = |edge: f64| (edge - from) / size;
-                let low = source(start).floor().max(0.0) as usize;
-                let high = (source(stop).ceil().max(0.0) as usize).min(count);
-                (low..high)
-                    .filter_map(|index| {
-                        let left = (from + index as f64 * size).max(start);
-                        let right = (from + (index + 1) as f64 * size).min(stop);
-                        // Grids that agree must not blur by rounding.
-                        (right - left > 1e-6).then_some((index, right - left))
-                    })
-                    .collect()
-            })
-            .collect();
-        Shares { first, shares }
-    }
-
-    fn targets(&self) -> impl Iterator<Item = (usize, &Vec<(usize, f64)>)> {
-        self.shares
-            .iter()
-            .enumerate()
-            .map(|(i, shares)| (self.first + i, shares))
-    }
 }
 
 /// A long line as lines of at most [`LONG_STROKE`] corners.
@@ -334,21 +288,6 @@ fn outline(segments: &[Segment]) -> Option<tiny_skia::Path> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn shares_fill_every_covered_pixel() {
-        for (from, to, count) in [(2.0, 12.0, 10), (1.3, 9.8, 3), (0.25, 7.0, 40)] {
-            let shares = Shares::new(from, to, count, 20);
-            let total: f64 = shares.shares.iter().flatten().map(|s| s.1).sum();
-            assert!((total - (to - from)).abs() < 1e-3, "{total}");
-            assert!(
-                shares
-                    .shares
-                    .iter()
-                    .all(|s| s.iter().map(|x| x.1).sum::<f64>() < 1.0 + 1e-9)
-            );
-        }
-    }
 
     #[test]
     fn a_long_line_in_pieces_looks_like_the_whole() {
@@ -406,12 +345,30 @@ mod tests {
     }
 
     #[test]
-    fn agreeing_grids_are_copied() {
-        let shares = Shares::new(3.0, 8.0, 5, 20);
-        assert!(
-            shares
-                .targets()
-                .all(|(target, s)| s.len() == 1 && s[0].0 == target - 3)
-        );
+    fn cells_are_where_they_belong() {
+        let mut canvas = Canvas::new(20, 20, Point::new(0.0, 0.0), 1.0).unwrap();
+        let rect = Rect {
+            left: 3.0,
+            right: 13.0,
+            top: 5.0,
+            bottom: 9.0,
+        };
+        canvas.raster(&Raster {
+            rect,
+            clip: Rect { right: 12.0, ..rect },
+            columns: 5,
+            rows: 2,
+            pixels: (0..10).map(|i| Colour::rgb(i, 100, 0)).collect(),
+        });
+        let pixels = canvas.colours();
+        for (index, pixel) in pixels.iter().enumerate() {
+            let (column, row) = (index % 20, index / 20);
+            if (3..12).contains(&column) && (5..9).contains(&row) {
+                let cell = (row - 5) / 2 * 5 + (column - 3) / 2;
+                assert_eq!(*pixel, Colour::rgb(cell as u8, 100, 0));
+            } else {
+                assert_eq!(pixel.a, 0, "{column} {row}");
+            }
+        }
     }
 }

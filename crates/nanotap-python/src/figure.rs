@@ -110,13 +110,13 @@ pub(crate) fn describe(
             }
             "modes" => {
                 let Shapes { modes } = read(facts)?;
-                let beam = Modes::new(modes).map_err(|error| Failure::Input(error.to_string()))?;
+                let beam = Modes::new(modes).map_err(|error| Failure::input(error.to_string()))?;
                 Some(shapes_figure(&beam))
             }
             _ => None,
         };
         let figure = figure.ok_or_else(|| {
-            Failure::Input(format!("there is no {study} to draw: columns are missing"))
+            Failure::input(format!("there is no {study} to draw: columns are missing"))
         })?;
         Ok(figure.to_json()?)
     };
@@ -124,5 +124,5 @@ pub(crate) fn describe(
 }
 
 fn read<T: DeserializeOwned>(facts: &str) -> Result<T, Failure> {
-    serde_json::from_str(facts).map_err(|error| Failure::Input(error.to_string()))
+    serde_json::from_str(facts).map_err(|error| Failure::input(error.to_string()))
 }

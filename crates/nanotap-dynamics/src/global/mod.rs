@@ -302,15 +302,7 @@ fn number_branches(values: &mut [GlobalValue], links: &[(Place, Place)]) {
         })
         .collect();
     let index = |(k, a): Place| offset[k] + a;
-    // Union–find with path halving.
     let mut parent: Vec<usize> = (0..all.len()).collect();
-    fn root(parent: &mut [usize], mut k: usize) -> usize {
-        while parent[k] != k {
-            parent[k] = parent[parent[k]];
-            k = parent[k];
-        }
-        k
-    }
     for &(a, b) in links {
         let (a, b) = (root(&mut parent, index(a)), root(&mut parent, index(b)));
         parent[a.max(b)] = a.min(b);
@@ -325,4 +317,13 @@ fn number_branches(values: &mut [GlobalValue], links: &[(Place, Place)]) {
         });
         values[place.0].attractors[place.1].branch = number;
     }
+}
+
+/// The representative of a set of linked attractors (union–find with path halving).
+fn root(parent: &mut [usize], mut k: usize) -> usize {
+    while parent[k] != k {
+        parent[k] = parent[parent[k]];
+        k = parent[k];
+    }
+    k
 }

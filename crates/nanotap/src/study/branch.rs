@@ -2,10 +2,10 @@
 //! bifurcations, and the loci of these in two parameters.
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, BranchPoint, CensusOptions, Complex, ContinuationError,
-    ContinuationOptions, Control, Diagram, DiagramBranch, DiagramOptions, Direction, LocusOptions,
-    PeriodicOrbit, SettleOptions, StartBoxError, assemble_diagram, census, continue_orbit,
-    trace_locus,
+    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions, Complex,
+    ContinuationError, ContinuationOptions, Control, Diagram, DiagramBranch, DiagramOptions,
+    Direction, LocusOptions, PeriodicOrbit, SettleOptions, StartBoxError, assemble_diagram, census,
+    continue_orbit, trace_locus,
 };
 use nanotap_flow::FlowError;
 use serde::Serialize;
@@ -555,6 +555,17 @@ fn described(
             report
                 .bifurcations
                 .push(bifurcation(subject, options, index, b)?);
+        }
+        // What the user stopped is no failure of the branch.
+        let stopped = matches!(branch.end, BranchEnd::Cancelled);
+        if branch.end.is_failure() && !stopped {
+            report.failures.push(FailureReport {
+                parameter: branch.points.last().map_or(f64::NAN, |p| p.parameter),
+                reason: format!(
+                    "the period-{} branch was cut: {}",
+                    branch.period, branch.end
+                ),
+            });
         }
     }
     Ok(report)

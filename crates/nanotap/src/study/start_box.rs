@@ -18,7 +18,7 @@
 //! Of a rigid stop the part beyond the stop is cut off. A sample with a memory starts
 //! relaxed: it would forget within a contact or two.
 
-use nanotap_dynamics::{StartBox, StartBoxError};
+use nanotap_dynamics::{StartBox, StartBoxError, StartSet};
 use nanotap_flow::Regime;
 
 use crate::model::Model;
@@ -70,6 +70,36 @@ pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
         }
     }
     StartBox::new(lower, upper)
+}
+
+/// Sizes of the default set of starts, as parts of the default box: from the resonant
+/// response down to well below the gap.
+const SIZES: [f64; 7] = [1.0, 0.316, 0.1, 0.0316, 0.01, 0.00316, 0.001];
+
+/// The default starts of a census of `model`: rest and the linear response of every regime
+/// that moves, then draws from [`default_box`] at seven sizes, each a root of ten below the
+/// last, around rest (or what of the box is nearest to it).
+///
+/// # Errors
+/// [`StartBoxError`] if the response is beyond the range of floats.
+pub fn default_starts(model: &Model, seed: u64) -> Result<StartSet, StartBoxError> {
+    let sides = default_box(model)?;
+    let centre: Vec<f64> = sides
+        .lower()
+        .iter()
+        .zip(sides.upper())
+        .map(|(&low, &high)| 0.0f64.clamp(low, high))
+        .collect();
+    let drive = model.system.drive();
+    let responses = model
+        .system
+        .regimes()
+        .iter()
+        .filter(|r| r.matrix().amax() > 0.0)
+        .map(|r| r.response().at(drive, 0.0).as_slice().to_vec())
+        .filter(|x| x.iter().all(|v| v.is_finite()));
+    let given = std::iter::once(centre.clone()).chain(responses);
+    Ok(StartSet::spread(&sides, &centre, &SIZES, seed)?.with_given(given))
 }
 
 /// Twice the displacement `j` that brings the tip to the sample by itself; of the first

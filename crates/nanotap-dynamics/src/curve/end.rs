@@ -125,10 +125,12 @@ fn second_condition(kind: BifurcationKind, orbit: &PeriodicOrbit) -> Option<&'st
         BifurcationKind::NeimarkSacker { .. } => None,
         BifurcationKind::Fold | BifurcationKind::Crossing if plus > 1 => Some("double fold"),
         BifurcationKind::Flip if minus > 1 => Some("double flip"),
-        BifurcationKind::Fold | BifurcationKind::Crossing if minus > 0 => Some("flip"),
-        BifurcationKind::Flip if plus > 0 => Some("fold"),
-        BifurcationKind::Grazing { .. } if plus > 0 => Some("fold"),
-        BifurcationKind::Grazing { .. } if minus > 0 => Some("flip"),
+        BifurcationKind::Fold | BifurcationKind::Crossing | BifurcationKind::Grazing { .. }
+            if minus > 0 =>
+        {
+            Some("flip")
+        }
+        BifurcationKind::Flip | BifurcationKind::Grazing { .. } if plus > 0 => Some("fold"),
         _ if pair => Some("Neimark–Sacker point"),
         _ => None,
     }

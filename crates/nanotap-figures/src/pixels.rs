@@ -355,7 +355,10 @@ mod tests {
         };
         canvas.raster(&Raster {
             rect,
-            clip: Rect { right: 12.0, ..rect },
+            clip: Rect {
+                right: 12.0,
+                ..rect
+            },
             columns: 5,
             rows: 2,
             pixels: (0..10).map(|i| Colour::rgb(i, 100, 0)).collect(),

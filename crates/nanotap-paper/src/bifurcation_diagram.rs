@@ -11,7 +11,7 @@ use super::frequency_sweep::{Column, Kind, draw, spaced, stretches, sweep, where
 use super::laboratory::{Laboratory, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
@@ -36,7 +36,7 @@ pub(super) fn section(
 ) -> Result<Section, PaperError> {
     let (count, starts) = (laboratory.either(400, 40), laboratory.either(8, 2));
     let case = Cantilever::paper();
-    let subject = Subject::Cantilever(case.clone());
+    let subject = Case::from(case.clone());
     let wide = sweep(
         laboratory,
         &subject,

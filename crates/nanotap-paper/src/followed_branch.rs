@@ -10,12 +10,11 @@ use super::PaperError;
 use super::frequency_sweep::maxima;
 use super::laboratory::Laboratory;
 use super::section::Table;
-use nanotap::case::subject::{Family, Key, Subject};
-use nanotap::model::parameter::Parameter;
+use nanotap::case::{Case, Key};
 use nanotap::model::strobe::Strobe;
 
 /// The key of the drive frequency.
-pub(super) const OMEGA: Key = Key::Cantilever(Parameter::Omega);
+pub(super) const OMEGA: Key = Key::Omega;
 
 /// A branch in Ω, followed both ways from one orbit.
 pub(super) struct FollowedBranch {
@@ -38,11 +37,11 @@ impl FollowedBranch {
     /// Follows the orbit of `period` on which a run from rest settles at Ω = `entry`.
     pub(super) fn from_rest(
         laboratory: &Laboratory<'_>,
-        subject: &Subject,
+        case: &Case,
         (entry, period): (f64, usize),
         range: (f64, f64),
     ) -> Result<Self, PaperError> {
-        let model = subject.with(OMEGA, entry).model()?;
+        let model = case.with(OMEGA, entry).model()?;
         let settled = settle(
             &mut Strobe::new(&model),
             &vec![0.0; model.dimension()],
@@ -52,7 +51,7 @@ impl FollowedBranch {
             Settled::Periodic(orbit) | Settled::TransientChaos { orbit, .. }
                 if orbit.period == period =>
             {
-                Self::from_orbit(laboratory, subject, entry, &orbit, range)
+                Self::from_orbit(laboratory, case, entry, &orbit, range)
             }
             _ => Err(PaperError::Failed {
                 what: format!("the period-{period} branch"),
@@ -64,15 +63,12 @@ impl FollowedBranch {
     /// Follows `orbit`, which exists at Ω = `entry`.
     pub(super) fn from_orbit(
         laboratory: &Laboratory<'_>,
-        subject: &Subject,
+        case: &Case,
         entry: f64,
         orbit: &PeriodicOrbit,
         range: (f64, f64),
     ) -> Result<Self, PaperError> {
-        let family = Family {
-            subject: subject.clone(),
-            key: OMEGA,
-        };
+        let family = case.family(OMEGA);
         let options = ContinuationOptions::over(range.0, range.1);
         let follow = |direction| -> Result<Branch, PaperError> {
             laboratory
@@ -88,7 +84,7 @@ impl FollowedBranch {
             follow(Direction::Decreasing)?,
             follow(Direction::Increasing)?,
         );
-        let mut points = points_of(&down, subject)?;
+        let mut points = points_of(&down, case)?;
         points.reverse();
         // Reversed, a bifurcation lies before the point that it lay after.
         for k in (1..points.len()).rev() {
@@ -97,7 +93,7 @@ impl FollowedBranch {
         if let Some(first) = points.first_mut() {
             first.since = None;
         }
-        points.extend(points_of(&up, subject)?.into_iter().skip(1));
+        points.extend(points_of(&up, case)?.into_iter().skip(1));
         let mut bifurcations = down.bifurcations;
         bifurcations.reverse();
         bifurcations.extend(up.bifurcations);
@@ -187,14 +183,14 @@ impl FollowedBranch {
 }
 
 /// The points of one way; `since` is the bifurcation between the point before and this one.
-fn points_of(branch: &Branch, subject: &Subject) -> Result<Vec<Point>, PaperError> {
+fn points_of(branch: &Branch, case: &Case) -> Result<Vec<Point>, PaperError> {
     let changes_stability = |b: &&Bifurcation| !matches!(b.kind, BifurcationKind::Grazing { .. });
     branch
         .points
         .iter()
         .enumerate()
         .map(|(k, point)| {
-            let model = subject.with(OMEGA, point.parameter).model()?;
+            let model = case.with(OMEGA, point.parameter).model()?;
             let since = branch
                 .bifurcations
                 .iter()

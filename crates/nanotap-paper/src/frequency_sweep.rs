@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::PaperError;
 use super::laboratory::{Laboratory, SEED};
-use nanotap::case::subject::{Key, Subject};
+use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
@@ -84,7 +84,7 @@ pub(super) fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
 /// The columns at `values` of a parameter, from `starts` starts each.
 pub(super) fn sweep(
     laboratory: &Laboratory<'_>,
-    subject: &Subject,
+    subject: &Case,
     key: Key,
     values: &[f64],
     starts: usize,
@@ -126,7 +126,7 @@ fn budgets() -> SettleOptions {
     }
 }
 
-fn column(subject: &Subject, at: f64, starts: usize) -> Result<Column, PaperError> {
+fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> {
     let model = subject.model()?;
     let area = default_box(&model).map_err(|error| PaperError::Failed {
         what: "the box of starts".into(),

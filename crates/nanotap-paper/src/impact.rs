@@ -14,7 +14,7 @@ use super::frequency_sweep::{Column, Kind, draw, spaced, sweep};
 use super::laboratory::{Laboratory, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
-use nanotap::case::subject::{Family, Key, Subject};
+use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::model::strobe::Strobe;
@@ -36,7 +36,7 @@ const SOFT: f64 = 20.0 / 3.0;
 /// Stiffnesses on the way to the rigid stop.
 const STIFFNESSES: (f64, f64) = (1.0, 1e8);
 /// The key of the drive frequency.
-const OMEGA: Key = Key::Oscillator(OscillatorParameter::Omega);
+const OMEGA: Key = Key::OscillatorOmega;
 
 /// ẍ + x = cos ωt with a stop at x = 0.
 const fn oscillator(stop: Stop) -> Oscillator {
@@ -79,8 +79,7 @@ pub(super) fn section(
 ) -> Result<Section, PaperError> {
     let (count, starts) = (laboratory.either(400, 30), laboratory.either(8, 2));
     let values = spaced(RANGE.0, RANGE.1, count);
-    let columns =
-        |o: Oscillator| sweep(laboratory, &Subject::Oscillator(o), OMEGA, &values, starts);
+    let columns = |o: Oscillator| sweep(laboratory, &Case::from(o), OMEGA, &values, starts);
     let (hard, soft_columns) = (columns(rigid())?, columns(soft(SOFT))?);
     let limit = Orbit::find(rigid())?;
     let flips = laboratory.controlled(|control| limit.flips(control))?;
@@ -264,10 +263,7 @@ impl Orbit {
 
     /// Flips of the branch through it, over [`RANGE`].
     fn flips(&self, control: &nanotap_dynamics::Control<'_>) -> Result<Vec<f64>, PaperError> {
-        let family = Family {
-            subject: Subject::Oscillator(self.oscillator),
-            key: OMEGA,
-        };
+        let family = Case::from(self.oscillator).family(OMEGA);
         let options = ContinuationOptions::over(RANGE.0, RANGE.1);
         let mut flips = Vec::new();
         for direction in [Direction::Decreasing, Direction::Increasing] {

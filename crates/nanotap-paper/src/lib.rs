@@ -30,8 +30,8 @@ mod write;
 
 use nanotap_dynamics::Control;
 
+use nanotap::case::CaseError;
 use nanotap::case::near_name::near_name;
-use nanotap::model::ModelError;
 use nanotap::study::orbit::OrbitError;
 
 pub use check::{About, Check, Verdict};
@@ -66,7 +66,7 @@ pub enum PaperError {
     Cancelled,
     /// A case has no model.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Model(#[from] CaseError),
     /// An orbit was not found.
     #[error("{what}: {source}")]
     Orbit {
@@ -99,6 +99,12 @@ pub enum PaperError {
         /// What the operating system said.
         source: std::io::Error,
     },
+}
+
+impl From<nanotap::model::ModelError> for PaperError {
+    fn from(error: nanotap::model::ModelError) -> Self {
+        Self::Model(error.into())
+    }
 }
 
 /// The whole report.

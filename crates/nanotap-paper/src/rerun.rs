@@ -66,7 +66,7 @@ fn finish(mut line: String, options: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nanotap::case::file::CaseFile;
+    use nanotap::case::Case;
     use nanotap::model::parameter::Parameter;
 
     /// The words behind `--set`, as the terminal hands them on.
@@ -92,8 +92,8 @@ mod tests {
         case.tone2_amplitude = 0.01;
         let line = on_case("simulate", &case, "--periods 4");
         assert!(line.starts_with("nanotap simulate ") && line.ends_with(" --periods 4"));
-        let read = CaseFile::parse(None, &overrides(&line)).unwrap();
-        assert_eq!(read, CaseFile::Dimensionless(case));
+        let read = Case::parse(None, &overrides(&line)).unwrap();
+        assert_eq!(read, Case::from(case));
     }
 
     #[test]
@@ -115,8 +115,8 @@ mod tests {
                 stop,
             };
             let line = on_oscillator("orbit", &oscillator, "");
-            let read = CaseFile::parse(None, &overrides(&line)).unwrap();
-            assert_eq!(read, CaseFile::Oscillator(oscillator));
+            let read = Case::parse(None, &overrides(&line)).unwrap();
+            assert_eq!(read, Case::from(oscillator));
         }
     }
 

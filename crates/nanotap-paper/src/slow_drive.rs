@@ -15,7 +15,7 @@ use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
 use super::section::{Picture, Section, Table};
 use super::time_step::Grid;
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
@@ -88,7 +88,7 @@ impl Slow {
         omega: f64,
         orbit: &PeriodicOrbit,
     ) -> Result<FollowedBranch, PaperError> {
-        let subject = Subject::Cantilever(self.counted.case.clone());
+        let subject = Case::from(self.counted.case.clone());
         FollowedBranch::from_orbit(laboratory, &subject, omega, orbit, BRANCH_RANGE)
     }
 
@@ -286,7 +286,7 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     if !no_three.is_empty() {
         three.evidence = format!("{}; {no_three}", three.evidence);
     }
-    let subject = Subject::Cantilever(slow.counted.case.clone());
+    let subject = Case::from(slow.counted.case.clone());
     if let Some((omega, orbit)) = period_three(&subject)? {
         let branch = slow.branch(laboratory, omega, &orbit)?;
         let (from, to) = branch.extent();
@@ -395,7 +395,7 @@ fn slow_grids(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
 }
 
 /// A stable period-3 orbit near the frequency where the bifurcation diagram shows one.
-fn period_three(subject: &Subject) -> Result<Option<(f64, PeriodicOrbit)>, PaperError> {
+fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperError> {
     let omega = 3.15;
     let model = subject.with(OMEGA, omega).model()?;
     let area = default_box(&model).map_err(|error| PaperError::Failed {

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use nanotap::case::document::{CaseDocument, MappingDocument};
-use nanotap::case::file::{self, CaseFile, PHYSICAL_KEYS, Source};
-use nanotap::case::physical::{Catalogue, Severity};
-use nanotap::model::parameter::Parameter;
+use nanotap::case::file::{self, Source};
+use nanotap::case::key::{ModelKind, Section};
+use nanotap::case::physical::{Catalogue, Physical, Severity};
+use nanotap::case::{Case, Key};
 use nanotap::observe::time_series::state_names;
-use nanotap::study::studied::Studied;
+use nanotap::study::setpoint::{SetpointReport, SolvedCase, at_setpoint};
 use pyo3::prelude::*;
 
 use crate::failure::Failure;
@@ -18,32 +19,40 @@ use crate::watch::watched;
 /// again with changes, and elsewhere.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct CaseCore {
-    studied: Arc<Studied>,
+    case: Arc<Case>,
     source: Option<Source>,
     overrides: Vec<String>,
     catalogues: Vec<(String, String)>,
-    at_setpoint: OnceLock<Arc<Studied>>,
+    at_setpoint: OnceLock<Solved>,
 }
 
+/// A case at its setpoint, and how that was solved if it was.
+type Solved = (Arc<Case>, Option<SetpointReport>);
+
 impl CaseCore {
-    /// What it describes, whether or not its distance is left to the setpoint.
-    pub(crate) fn at_any_distance(&self) -> Arc<Studied> {
-        Arc::clone(&self.studied)
+    /// The case, whether or not its distance is left to the setpoint.
+    pub(crate) fn at_any_distance(&self) -> Arc<Case> {
+        Arc::clone(&self.case)
     }
 
-    /// What it describes; where its distance is left to the setpoint, that is solved for,
-    /// once.
-    pub(crate) fn studied(&self, py: Python<'_>) -> PyResult<Arc<Studied>> {
-        if !self.studied.leaves_distance_to_setpoint() {
-            return Ok(self.at_any_distance());
-        }
+    /// The case; where its distance is left to the setpoint, that is solved for, once.
+    pub(crate) fn studied(&self, py: Python<'_>) -> PyResult<Arc<Case>> {
+        Ok(Arc::clone(&self.solved(py)?.0))
+    }
+
+    fn solved(&self, py: Python<'_>) -> PyResult<&Solved> {
         if let Some(solved) = self.at_setpoint.get() {
-            return Ok(Arc::clone(solved));
+            return Ok(solved);
         }
-        let studied = Studied::clone(&self.studied);
-        let done = watched(py, None, move |control| Ok(studied.at_setpoint(control)?))?;
-        let solved = self.at_setpoint.get_or_init(|| Arc::new(done.result));
-        Ok(Arc::clone(solved))
+        if !self.case.leaves_distance_to_setpoint() {
+            return Ok(self
+                .at_setpoint
+                .get_or_init(|| (self.at_any_distance(), None)));
+        }
+        let case = Case::clone(&self.case);
+        let done = watched(py, None, move |control| Ok(at_setpoint(case, control)?))?;
+        let (case, report) = done.result;
+        Ok(self.at_setpoint.get_or_init(|| (Arc::new(case), report)))
     }
 
     fn make(
@@ -51,16 +60,13 @@ impl CaseCore {
         overrides: Vec<String>,
         catalogues: Vec<(String, String)>,
     ) -> Result<Self, Failure> {
-        let mut catalogue = Catalogue::builtin()?;
+        let mut catalogue = Catalogue::shared();
         for (origin, text) in &catalogues {
-            catalogue.extend(text, origin)?;
+            Arc::make_mut(&mut catalogue).extend(text, origin)?;
         }
-        let title = source
-            .as_ref()
-            .map_or_else(|| "case".to_owned(), |source| source.name.clone());
-        let file = CaseFile::parse(source.clone(), &overrides)?;
+        let case = Case::parse_with(source.clone(), &overrides, &catalogue)?;
         Ok(Self {
-            studied: Arc::new(Studied::resolve(title, file, &catalogue)?),
+            case: Arc::new(case),
             source,
             overrides,
             catalogues,
@@ -116,22 +122,25 @@ impl CaseCore {
     /// The document of the case, JSON.
     #[getter]
     fn document(&self) -> PyResult<String> {
-        Ok(serde_json::to_string(&CaseDocument::of(&self.studied)).map_err(Failure::from)?)
+        Ok(serde_json::to_string(&CaseDocument::of(&self.case)).map_err(Failure::from)?)
     }
 
     /// The document of the case as it is studied, its distance solved for, JSON.
     #[getter]
     fn document_at_setpoint(&self, py: Python<'_>) -> PyResult<String> {
-        let studied = self.studied(py)?;
-        Ok(serde_json::to_string(&CaseDocument::of(&studied)).map_err(Failure::from)?)
+        let (case, report) = self.solved(py)?;
+        let document = SolvedCase {
+            case: CaseDocument::of(case),
+            setpoint_solved: report.clone(),
+        };
+        Ok(serde_json::to_string(&document).map_err(Failure::from)?)
     }
 
     /// Every distance at which an orbit has the setpoint amplitude, JSON; `None` where the
     /// distance is given.
     #[getter]
     fn setpoint(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let studied = self.studied(py)?;
-        let report = studied.setpoint.as_ref().map(serde_json::to_string);
+        let report = self.solved(py)?.1.as_ref().map(serde_json::to_string);
         Ok(report.transpose().map_err(Failure::from)?)
     }
 
@@ -139,10 +148,11 @@ impl CaseCore {
     #[getter]
     fn mapping(&self) -> PyResult<String> {
         let rows: Vec<MappingDocument> = self
-            .studied
-            .resolved
-            .iter()
-            .flat_map(nanotap::case::physical::Resolved::mapping)
+            .case
+            .physical()
+            .map(Physical::mapping)
+            .into_iter()
+            .flatten()
             .map(MappingDocument::from)
             .collect();
         Ok(serde_json::to_string(&rows).map_err(Failure::from)?)
@@ -151,14 +161,15 @@ impl CaseCore {
     /// Assumptions (`note`) and doubts (`warning`) about a physical case.
     #[getter]
     fn remarks(&self) -> Vec<(&'static str, String)> {
-        let remarks = self.studied.resolved.iter().flat_map(|r| &r.remarks);
+        let remarks = self.case.remarks();
         remarks
+            .into_iter()
             .map(|remark| {
                 let severity = match remark.severity {
                     Severity::Note => "note",
                     Severity::Warning => "warning",
                 };
-                (severity, remark.text.clone())
+                (severity, remark.text)
             })
             .collect()
     }
@@ -166,29 +177,28 @@ impl CaseCore {
     /// The dimensionless case file; `None` of an oscillator.
     #[getter]
     fn toml(&self) -> Option<String> {
-        self.studied.subject.case().map(|case| file::to_toml(&case))
+        self.case.cantilever().map(file::to_toml)
     }
 
     /// Whether its parameters were given in physical units.
     #[getter]
     fn is_physical(&self) -> bool {
-        self.studied.resolved.is_some()
+        self.case.is_physical()
     }
 
     /// Keys, symbols and values of the parameters that can be varied.
     #[getter]
     fn parameters(&self) -> Vec<(&'static str, &'static str, f64)> {
-        let subject = &self.studied.subject;
-        let keys = subject.keys();
+        let keys = self.case.keys();
         keys.into_iter()
-            .map(|key| (key.name(), key.symbol(), subject.get(key)))
+            .map(|key| (key.name(), key.symbol(), self.case.get(key)))
             .collect()
     }
 
     /// The names of the entries of a state.
     #[getter]
     fn state_names(&self) -> PyResult<Vec<String>> {
-        Ok(state_names(&self.studied.model().map_err(Failure::from)?))
+        Ok(state_names(&self.case.model().map_err(Failure::from)?))
     }
 }
 
@@ -197,14 +207,29 @@ fn text_of(path: &Path) -> Result<String, Failure> {
         .map_err(|error| Failure::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
-/// The keys of a case file by table, each with the other names that it goes by.
+/// The keys of a case file by table, each with the other name that it goes by and the paths
+/// of the keys that say the same in another way.
 #[pyfunction]
-pub(crate) fn case_keys() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
-    let model = Parameter::ALL.map(|p| (p.name(), p.alias())).to_vec();
-    let physical = PHYSICAL_KEYS
-        .iter()
-        .map(|(table, keys)| (*table, keys.iter().map(|key| (*key, *key)).collect()));
-    std::iter::once(("model", model)).chain(physical).collect()
+#[expect(clippy::type_complexity, reason = "a table for Python, read once")]
+pub(crate) fn case_keys() -> Vec<(
+    &'static str,
+    Vec<(&'static str, &'static str, Vec<&'static str>)>,
+)> {
+    let row = |key: Key| {
+        let others = key.alternatives().map(|(other, _)| other.path());
+        (
+            key.name(),
+            key.alias().unwrap_or(key.name()),
+            others.collect(),
+        )
+    };
+    let of = |section: Section| match section {
+        Section::Model => ModelKind::Cantilever.keys().map(row).collect(),
+        section => section.keys().map(row).collect(),
+    };
+    Section::ALL
+        .map(|section| (section.name(), of(section)))
+        .to_vec()
 }
 
 /// The built-in levers and materials: kind, name, source.

@@ -6,6 +6,7 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Schema, Share, Store, Work, WorkError, table};
@@ -76,11 +77,10 @@ impl Recipe {
         transient: Option<usize>,
         max_period: usize,
     ) -> PyResult<Self> {
-        let names: Vec<&str> = over.iter().map(|given| name_of(given)).collect();
-        let studied = case.studied(py)?.varying(&names).map_err(Failure::from)?;
+        let studied = case.studied(py)?;
         let over = over
             .iter()
-            .map(|given| Over::parse(given, &studied.subject))
+            .map(|given| Over::parse(given, &studied))
             .collect::<Result<Vec<_>, _>>()
             .map_err(Failure::from)?;
         let starts = match (starts, numbers(state)) {
@@ -100,7 +100,7 @@ impl Recipe {
             max_period,
             ..SweepOptions::new(over)
         };
-        let sweep = Sweep::new(studied.subject.clone(), options).map_err(Failure::from)?;
+        let sweep = Sweep::new(Case::clone(&studied), options).map_err(Failure::from)?;
         Ok(Self {
             kind: Arc::new(Kind::Sweep(Box::new(sweep))),
         })
@@ -136,7 +136,7 @@ impl Recipe {
             ..BasinOptions::new(range(x)?, range(y)?)
         };
         let done = watched(py, progress, move |control| {
-            let basin = on_threads(threads, || Basin::new(&studied.subject, &options, control))??;
+            let basin = on_threads(threads, || Basin::new(&studied, &options, control))??;
             Ok(basin)
         })?;
         Ok(Self {
@@ -201,11 +201,6 @@ impl Recipe {
             store: self.store(&path)?,
         })
     }
-}
-
-/// The parameter of an axis as it is written.
-fn name_of(over: &str) -> &str {
-    over.split('=').next().unwrap_or_default().trim()
 }
 
 impl Recipe {

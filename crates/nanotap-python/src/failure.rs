@@ -30,9 +30,12 @@ impl From<Failure> for PyErr {
         let words = error
             .written(|option| match option {
                 "from" => "from_".to_owned(),
+                // A key of the case is set by its name alone.
+                "set" => String::new(),
                 other => other.to_owned(),
             })
-            .to_string();
+            .to_string()
+            .replace("  ", " ");
         match kind {
             ErrorKind::BadInput => PyValueError::new_err(words),
             ErrorKind::Numerics | ErrorKind::Stopped => PyRuntimeError::new_err(words),

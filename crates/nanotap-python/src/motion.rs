@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::ErrorKind;
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
 use nanotap::observe::PhysicalMotion;
@@ -13,7 +13,6 @@ use nanotap::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixe
 use nanotap::study::modes::ModeTable;
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit as find_orbit};
 use nanotap::study::simulate::{SettleOptions, SimulateOptions, Simulation, simulate as run};
-use nanotap::study::studied::Studied;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -32,10 +31,9 @@ struct Document<'a, R: Serialize> {
     physical: Option<PhysicalMotion>,
 }
 
-fn run_document(run: &Simulation, studied: &Studied) -> Result<String, Failure> {
+fn run_document(run: &Simulation, studied: &Case) -> Result<String, Failure> {
     let physical = studied
-        .resolved
-        .as_ref()
+        .physical()
         .map(|resolved| PhysicalMotion::alone(&run.observables, None, resolved));
     Ok(serde_json::to_string(&Document {
         result: run,
@@ -44,10 +42,9 @@ fn run_document(run: &Simulation, studied: &Studied) -> Result<String, Failure> 
 }
 
 /// The document of an orbit.
-pub(crate) fn orbit_document(orbit: &OrbitReport, studied: &Studied) -> Result<String, Failure> {
+pub(crate) fn orbit_document(orbit: &OrbitReport, studied: &Case) -> Result<String, Failure> {
     let physical = studied
-        .resolved
-        .as_ref()
+        .physical()
         .map(|resolved| PhysicalMotion::alone(&orbit.observables, Some(&orbit.spectrum), resolved));
     Ok(serde_json::to_string(&Document {
         result: orbit,
@@ -78,7 +75,7 @@ pub(crate) fn modes<'py>(
     points: usize,
 ) -> PyResult<(String, Row<'py>, Rows<'py>)> {
     let studied = case.studied(py)?;
-    let Subject::Cantilever(case) = &studied.subject else {
+    let Some(case) = studied.cantilever() else {
         return Err(oscillator(&studied, "modes").into());
     };
     let table = ModeTable::new(case).map_err(Failure::from)?;
@@ -95,10 +92,10 @@ pub(crate) fn modes<'py>(
 }
 
 /// A case of the wrong kind.
-pub(crate) fn oscillator(studied: &Studied, command: &str) -> Failure {
+pub(crate) fn oscillator(studied: &Case, command: &str) -> Failure {
     Failure::input(format!(
         "{}: `{command}` needs a cantilever; this is an oscillator",
-        studied.title
+        studied.title()
     ))
 }
 
@@ -242,7 +239,7 @@ enum Observe {
 }
 
 impl Observe {
-    fn one(&self, studied: &Studied) -> Result<String, Failure> {
+    fn one(&self, studied: &Case) -> Result<String, Failure> {
         let model = studied.model()?;
         match self {
             Self::Run(options) => run_document(&run(&model, options)?, studied),
@@ -270,7 +267,7 @@ pub(crate) fn observe(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Vec<Told>, bool)> {
-    let cases: Vec<Arc<Studied>> = cases
+    let cases: Vec<Arc<Case>> = cases
         .iter()
         .map(|case| case.studied(py))
         .collect::<PyResult<_>>()?;
@@ -296,7 +293,7 @@ pub(crate) fn observe(
     let done = watched(py, progress, move |control| {
         let finished = AtomicUsize::new(0);
         let total = cases.len();
-        let one = |studied: &Arc<Studied>| -> Result<Observed, Failure> {
+        let one = |studied: &Arc<Case>| -> Result<Observed, Failure> {
             if control.is_cancelled() {
                 return Ok(Err("stopped before its turn".into()));
             }

@@ -2,10 +2,8 @@
 
 use std::path::PathBuf;
 
-use nanotap::case::subject::Subject;
-use nanotap::study::approach::{
-    ApproachOptions, ApproachReport, approach as approach_curve, gap_key,
-};
+use nanotap::case::ParameterUnit;
+use nanotap::study::approach::{ApproachOptions, ApproachReport, approach as approach_curve};
 use nanotap::study::attractors::{AttractorsOptions, attractors as census};
 use nanotap::study::branch::{BranchOptions, BranchReport, SeedOptions, branch as follow};
 use nanotap::study::convergence::convergence as compare;
@@ -13,7 +11,6 @@ use nanotap::study::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapuno
 use nanotap::study::orbit::OrbitOptions;
 use nanotap::study::simulate::SettleOptions;
 use nanotap::study::start_box::box_with;
-use nanotap::study::studied::ParameterUnit;
 use nanotap_paper::{About, Check, Options as PaperOptions, Verdict, report, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -53,7 +50,7 @@ pub(crate) fn attractors(
             ..AttractorsOptions::default()
         };
         let found = on_threads(threads, || census(&model, &options, control))??;
-        let found = match &studied.resolved {
+        let found = match studied.physical() {
             Some(resolved) => found.in_si(resolved),
             None => found,
         };
@@ -90,20 +87,9 @@ pub(crate) fn branch(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, bool)> {
     let studied = case.studied(py)?;
-    let names: Vec<&str> = std::iter::once(parameter)
-        .chain(second.iter().map(|(name, ..)| name.as_str()))
-        .collect();
-    let studied = studied.varying(&names).map_err(Failure::from)?;
     let ends = |name: &str, from: &str, to: &str| -> Result<_, Failure> {
         let key = studied.key(name)?;
-        let (key, from) = studied.key_and_value(key, from)?;
-        let (other, end) = studied.key_and_value(key, to)?;
-        if other != key {
-            return Err(Failure::input(format!(
-                "{to}: the ends of the range measure different things"
-            )));
-        }
-        Ok((key, from, end))
+        Ok((key, studied.value(key, from)?, studied.value(key, to)?))
     };
     let (key, from, to) = ends(parameter, from_, to)?;
     let second = second
@@ -124,7 +110,7 @@ pub(crate) fn branch(
         ..BranchOptions::over(key, from, to)
     };
     let done = watched(py, progress, move |control| {
-        let report = on_threads(threads, || follow(&studied.subject, &options, control))??;
+        let report = on_threads(threads, || follow(&studied, &options, control))??;
         Ok(serde_json::to_string(&Branches {
             report: &report,
             parameter_unit: studied.parameter_unit(key),
@@ -158,7 +144,7 @@ pub(crate) fn approach(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, bool)> {
     let studied = case.at_any_distance();
-    let key = gap_key(&studied.subject);
+    let key = studied.gap_key();
     let distance = |text: Option<&str>| {
         text.map(|text| studied.value(key, text).map_err(Failure::from))
             .transpose()
@@ -238,7 +224,7 @@ pub(crate) fn convergence(
 ) -> PyResult<String> {
     let studied = case.studied(py)?;
     let done = watched(py, None, move |_| {
-        let Subject::Cantilever(case) = &studied.subject else {
+        let Some(case) = studied.cantilever() else {
             return Err(oscillator(&studied, "convergence"));
         };
         let options = OrbitOptions {

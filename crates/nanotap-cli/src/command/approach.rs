@@ -4,20 +4,20 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use nanotap::case::ParameterUnit;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::dataset::table::shortest;
 use nanotap::figure::approach::approach_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};
-use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, approach, gap_key};
-use nanotap::study::studied::ParameterUnit;
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, approach};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -81,8 +81,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.plot.plot {
         file::ending(path, &["svg", "png", "pdf"])?;
     }
-    let studied = Studied::with_any_distance(&arguments.case, output)?;
-    let key = gap_key(&studied.subject);
+    let studied = GivenCase::with_any_distance(&arguments.case, output)?;
+    let key = studied.gap_key();
     let distance = |option: &str, given: &Option<String>| {
         given
             .as_ref()
@@ -169,7 +169,7 @@ fn csv(report: &ApproachReport) -> String {
 /// Rows of the table that a terminal shows of each way.
 const SHOWN: usize = 16;
 
-fn text(studied: &Studied, report: &ApproachReport) -> String {
+fn text(studied: &GivenCase, report: &ApproachReport) -> String {
     let units = studied.units();
     let shown = |kind: Kind, value: f64| {
         units.si(kind).map_or_else(
@@ -179,7 +179,7 @@ fn text(studied: &Studied, report: &ApproachReport) -> String {
     };
     let heading = format!(
         "{}: {}, distances from {} to {} and back",
-        studied.title,
+        studied.title(),
         studied.summary(),
         shown(Kind::Length, report.from),
         shown(Kind::Length, report.to)

@@ -13,8 +13,8 @@ use nanotap::study::start_box::box_with;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -78,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
     let start_box = box_with(&model, &arguments.sides).map_err(|error| {
         Failure::input(
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             .threads
             .install(|| attractors(&model, &options, control))
     })???;
-    let found = match &studied.resolved {
+    let found = match studied.physical() {
         Some(resolved) => found.in_si(resolved),
         None => found,
     };
@@ -159,11 +159,11 @@ fn csv(model: &Model, found: &Attractors) -> String {
     csv
 }
 
-fn text(studied: &Studied, found: &Attractors) -> String {
+fn text(studied: &GivenCase, found: &Attractors) -> String {
     let units = studied.units();
     let heading = format!(
         "{}: {}, {} from seed {}",
-        studied.title,
+        studied.title(),
         studied.summary(),
         number::counted(found.starts, "start", "starts"),
         found.seed

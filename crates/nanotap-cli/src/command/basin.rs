@@ -9,8 +9,8 @@ use nanotap::study::basin::{Basin, BasinOptions, Shares, SliceRange, figure, sha
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, progress};
 
@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
     let options = arguments.options()?;
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let dataset = &arguments.dataset;
     let name = derived_name(
         arguments.case.file.as_deref(),
@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let basin = progress::watched(output, "starts of the census", |control| {
         dataset
             .threads
-            .install(|| Basin::new(&studied.subject, &options, control))
+            .install(|| Basin::new(&studied, &options, control))
     })???;
     let store = dataset.compute(
         &destination.store,
@@ -156,10 +156,10 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(studied: &Studied, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
+fn text(studied: &GivenCase, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
-        studied.title,
+        studied.title(),
         studied.summary(),
         options.x.count,
         options.y.count,

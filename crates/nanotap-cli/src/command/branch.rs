@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use nanotap::case::subject::Key;
+use nanotap::case::Key;
 use nanotap::case::units;
 use nanotap::dataset::table::shortest;
 use nanotap::figure::branch::{ParameterAxis, Shown, branch_figure};
@@ -14,8 +14,8 @@ use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::{GivenCase, ParameterUnit};
 use crate::output::Output;
-use crate::studied::{ParameterUnit, Studied};
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -115,19 +115,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let second = arguments
-        .second
-        .iter()
-        .filter_map(|text| text.split_once('='));
-    let names: Vec<&str> = std::iter::once(arguments.parameter.as_str())
-        .chain(second.map(|(name, _)| name.trim()))
-        .collect();
-    let studied = Studied::of(&arguments.case, output)?.varying(&names)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let options = options(arguments, &studied)?;
+    studied.say_held(&[options.key], output);
     let report = progress::watched(output, "points", |control| {
         arguments
             .threads
-            .install(|| branch(&studied.subject, &options, control))
+            .install(|| branch(&studied, &options, control))
     })???;
     if report.cancelled {
         output.warning("stopped before it was done");
@@ -165,8 +159,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 
 /// What is shown if nobody says: the greatest displacement of an oscillator with a wall is
 /// where the wall stands.
-fn default_shown(studied: &Studied) -> Shown {
-    let name = if studied.subject.has_rigid_stop() {
+fn default_shown(studied: &GivenCase) -> Shown {
+    let name = if studied.has_rigid_stop() {
         "impact_speed"
     } else {
         "tip_max"
@@ -174,7 +168,7 @@ fn default_shown(studied: &Studied) -> Shown {
     Shown::named(name).unwrap_or(Shown::SpectralRadius)
 }
 
-fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Failure> {
+fn options(arguments: &Arguments, studied: &GivenCase) -> Result<BranchOptions, Failure> {
     let (key, [from, to]) = studied.key_and_values(
         &arguments.parameter,
         [("--from", &arguments.from), ("--to", &arguments.to)],
@@ -216,7 +210,7 @@ fn options(arguments: &Arguments, studied: &Studied) -> Result<BranchOptions, Fa
     })
 }
 
-fn second(studied: &Studied, text: &str) -> Result<(Key, f64, f64), Failure> {
+fn second(studied: &GivenCase, text: &str) -> Result<(Key, f64, f64), Failure> {
     let wrong = || {
         Failure::input(
             format!("--second {text}: not a parameter with its range"),
@@ -231,7 +225,7 @@ fn second(studied: &Studied, text: &str) -> Result<(Key, f64, f64), Failure> {
 }
 
 /// The axis of a parameter that goes up to `size`, in SI where the case has it.
-fn axis(studied: &Studied, key: Key, size: f64) -> ParameterAxis {
+fn axis(studied: &GivenCase, key: Key, size: f64) -> ParameterAxis {
     studied.parameter_unit(key).map_or_else(
         || ParameterAxis::of(key),
         |unit| {
@@ -307,7 +301,7 @@ fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn text(studied: &Studied, report: &BranchReport) -> String {
+fn text(studied: &GivenCase, report: &BranchReport) -> String {
     let unit = studied.parameter_unit(report.key);
     let shown = |value: f64| {
         let plain = number::significant(value, 10);
@@ -317,7 +311,7 @@ fn text(studied: &Studied, report: &BranchReport) -> String {
     };
     let heading = format!(
         "{}: {} from {} to {}",
-        studied.title,
+        studied.title(),
         report.parameter,
         number::significant(report.from, 6),
         number::significant(report.to, 6)

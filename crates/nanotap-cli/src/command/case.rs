@@ -1,25 +1,25 @@
-//! `nanotap case`: the case, checked and resolved.
+//! `nanotap case`: the case, checked and view.
 
 use clap::Args;
 use nanotap::ErrorKind;
 use nanotap::case::document::CaseDocument;
 use nanotap::case::file as case_file;
-use nanotap::case::physical::quantity::format_electronvolts;
-use nanotap::case::physical::{Kind, Resolved, Severity};
-use nanotap::case::subject::Subject;
+use nanotap::case::physical::{Kind, Physical, Severity};
+use nanotap::case::quantity::format_electronvolts;
+use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
-use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::table::shown_phase;
-use nanotap::study::setpoint::SetpointReport;
+use nanotap::study::setpoint::{SetpointReport, SolvedCase};
 
 use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;
+use crate::given_case::at_setpoint;
 use crate::output::Output;
-use crate::studied::at_setpoint;
 use crate::table::{Align, Table};
 use crate::{file, number, style};
 
-/// Check a case and show it resolved.
+/// Check a case and show it view.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -29,41 +29,45 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let read = super::studied(&arguments.case)?;
+    let read = super::case_of(&arguments.case)?;
     // The case is shown also where no distance has the setpoint.
-    let studied = match at_setpoint(read.clone(), output) {
-        Ok(studied) => studied,
+    let (case, setpoint_solved) = match at_setpoint(read.clone(), output) {
+        Ok(solved) => solved,
         Err(error) if error.kind == ErrorKind::Numerics => {
             output.warning(&error.to_string());
-            read
+            (read, None)
         }
         Err(other) => return Err(other),
     };
-    let document = CaseDocument::of(&studied);
-    if let Subject::Oscillator(given) = &studied.subject {
+    let document = SolvedCase {
+        case: CaseDocument::of(&case),
+        setpoint_solved,
+    };
+    if let Some(given) = case.oscillator() {
         if let Some(path) = &arguments.out.out {
             return Err(Failure::input(
                 format!("--out {}: an oscillator is not written out", path.display()),
                 "leave --out away, or take --json",
             ));
         }
-        return output.result(&document, |_| oscillator(&studied.title, given));
+        return output.result(&document, |_| oscillator(&case, given));
     }
-    let case = super::cantilever_of(&studied, "nanotap case")?;
-    write_out(&arguments.out, &case)?;
-    for remark in studied.resolved.iter().flat_map(|r| &r.remarks) {
+    let numbers = super::cantilever_of(&case, "nanotap case")?;
+    write_out(&arguments.out, &numbers)?;
+    for remark in case.remarks() {
         match remark.severity {
             Severity::Note => output.note(&remark.text),
             Severity::Warning => output.warning(&remark.text),
         }
     }
-    remark(&case, output);
-    output.result(&document, |_| {
-        studied.resolved.as_ref().map_or_else(
-            || cantilever(&studied.title, &case),
-            |resolved| {
-                let solved = studied.setpoint.as_ref().map_or_else(String::new, setpoint);
-                format!("{}{solved}", physical(&studied.title, resolved))
+    remark(&numbers, output);
+    output.result(&document, |document| {
+        case.physical().map_or_else(
+            || cantilever(case.title(), &numbers),
+            |view| {
+                let solved = &document.setpoint_solved;
+                let solved = solved.as_ref().map_or_else(String::new, setpoint);
+                format!("{}{solved}", physical(case.title(), view))
             },
         )
     })
@@ -95,12 +99,13 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
     ]);
     table.row(["N", "modes", "", &case.modes.to_string(), "beam modes"]);
     for parameter in case.parameters() {
+        let key = Key::of(parameter);
         table.row([
-            parameter.symbol(),
-            parameter.name(),
-            parameter.alias(),
+            key.symbol(),
+            key.name(),
+            key.alias().unwrap_or(key.name()),
             &number::chosen(case.get(parameter)),
-            parameter.meaning(),
+            key.meaning(),
         ]);
     }
     table.row([
@@ -131,13 +136,13 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
     )
 }
 
-fn physical(title: &str, resolved: &Resolved) -> String {
-    let Resolved {
-        case,
+fn physical(title: &str, view: &Physical) -> String {
+    let Physical {
+        cantilever: case,
         lever,
         scales,
         ..
-    } = resolved;
+    } = view;
     let mut given = Table::new([("", Align::Left), ("", Align::Left), ("", Align::Left)]);
     given.row([
         "k",
@@ -159,14 +164,14 @@ fn physical(title: &str, resolved: &Resolved) -> String {
         &Kind::Mass.format(lever.beam_mass),
         "mass of the beam",
     ]);
-    let free = Kind::Length.format(resolved.free_amplitude);
+    let free = Kind::Length.format(view.free_amplitude);
     let phase = format!(
         "free amplitude of the tip, {:.1}° behind the {}",
-        resolved.free_phase,
-        resolved.phase_reference()
+        view.free_phase,
+        view.phase_reference()
     );
     given.row(["A0", &free, &phase]);
-    if let Some(setpoint) = resolved.setpoint {
+    if let Some(setpoint) = view.setpoint {
         let ratio = number::significant(setpoint, 4);
         given.row(["A/A0", &ratio, "setpoint"]);
     }
@@ -180,7 +185,7 @@ fn physical(title: &str, resolved: &Resolved) -> String {
         &format!("{:.4e} s", scales.time),
         "unit of time, √(mL⁴/(EI))",
     ]);
-    if let (Some(free), Some(ratio)) = (resolved.second_free_amplitude, case.tone2_ratio) {
+    if let (Some(free), Some(ratio)) = (view.second_free_amplitude, case.tone2_ratio) {
         let what = format!("free amplitude at the second tone, {ratio} of the first's frequency");
         given.row(["A02", &Kind::Length.format(free), &what]);
     }
@@ -194,9 +199,9 @@ fn physical(title: &str, resolved: &Resolved) -> String {
         ("of", Align::Left),
         ("", Align::Left),
     ]);
-    for row in resolved.mapping() {
+    for row in view.mapping() {
         mapping.row([
-            row.parameter.symbol(),
+            Key::of(row.parameter).symbol(),
             row.parameter.name(),
             &number::significant(row.value, 6),
             row.formula,
@@ -253,29 +258,16 @@ fn setpoint(report: &SetpointReport) -> String {
     )
 }
 
-fn oscillator(title: &str, oscillator: &Oscillator) -> String {
+fn oscillator(case: &Case, oscillator: &Oscillator) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("key", Align::Left),
         ("value", Align::Point),
         ("meaning", Align::Left),
     ]);
-    for parameter in OscillatorParameter::ALL {
-        let Some(value) = oscillator.get(parameter) else {
-            continue;
-        };
-        let (symbol, meaning) = match parameter {
-            OscillatorParameter::Mass => ("m", "mass"),
-            OscillatorParameter::Stiffness => ("k", "spring"),
-            OscillatorParameter::Damping => ("c", "damper"),
-            OscillatorParameter::Forcing => ("F", "amplitude of the force F cos ωt"),
-            OscillatorParameter::Omega => ("ω", "frequency of the force"),
-            OscillatorParameter::Gap => ("g", "where the stop stands; contact at x ≥ g"),
-            OscillatorParameter::ContactStiffness => ("kc", "spring of the stop"),
-            OscillatorParameter::ContactDamping => ("cc", "damper of the stop"),
-            OscillatorParameter::Restitution => ("r", "speed after an impact over speed before"),
-        };
-        table.row([symbol, parameter.name(), &number::chosen(value), meaning]);
+    for key in case.keys() {
+        let value = number::chosen(case.get(key));
+        table.row([key.symbol(), key.name(), &value, key.meaning()]);
     }
     let what = match oscillator.stop {
         Stop::Soft { .. } => "an oscillator with a soft stop",
@@ -283,7 +275,7 @@ fn oscillator(title: &str, oscillator: &Oscillator) -> String {
     };
     format!(
         "{}\n\n{}",
-        style::bold(&format!("{title}: {what}")),
+        style::bold(&format!("{}: {what}", case.title())),
         table.render()
     )
 }

@@ -12,8 +12,8 @@ use nanotap::study::orbit::OrbitOptions;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let case = super::cantilever_of(&studied, "nanotap convergence")?;
     let options = OrbitOptions {
         period: arguments.period,
@@ -101,10 +101,10 @@ fn csv(result: &Convergence) -> String {
     csv
 }
 
-fn text(studied: &Studied, result: &Convergence) -> String {
+fn text(studied: &GivenCase, result: &Convergence) -> String {
     let heading = format!(
         "{}: how many modes at Ω = {}",
-        studied.title,
+        studied.title(),
         number::significant(studied.omega(), 6)
     );
     let mut table = Table::new([
@@ -153,7 +153,7 @@ fn text(studied: &Studied, result: &Convergence) -> String {
 }
 
 /// What an experimenter reads with each number of modes, and the part of each mode.
-fn readings(studied: &Studied, result: &Convergence) -> String {
+fn readings(studied: &GivenCase, result: &Convergence) -> String {
     let units = studied.units();
     let shown = |kind: Kind, value: f64| {
         units.si(kind).map_or_else(

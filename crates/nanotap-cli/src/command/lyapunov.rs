@@ -10,8 +10,8 @@ use nanotap::study::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapuno
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
     let wanted = arguments.out.out.is_some() || arguments.plot.plot.is_some();
     let options = LyapunovOptions {
@@ -123,8 +123,8 @@ fn csv(model: &Model, report: &LyapunovReport) -> String {
     csv
 }
 
-fn text(studied: &Studied, report: &LyapunovReport) -> String {
-    let heading = format!("{}: {}", studied.title, studied.summary());
+fn text(studied: &GivenCase, report: &LyapunovReport) -> String {
+    let heading = format!("{}: {}", studied.title(), studied.summary());
     let mut table = Table::new([
         ("", Align::Right),
         ("exponent per drive period", Align::Point),

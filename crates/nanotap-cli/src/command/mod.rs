@@ -16,11 +16,12 @@ mod simulate;
 mod sweep;
 mod window;
 
+use std::sync::Arc;
+
 use clap::Subcommand;
-use nanotap::case::file::CaseFile;
+use nanotap::case::Case;
 use nanotap::case::physical::Catalogue;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::studied::Studied;
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -90,14 +91,14 @@ pub(crate) fn title(arguments: &CaseArguments) -> String {
     )
 }
 
-/// The case of the arguments, resolved with the built-in catalogue and those that they add.
-pub(crate) fn studied(arguments: &CaseArguments) -> Result<Studied, Failure> {
-    let mut catalogue = Catalogue::builtin()?;
+/// The case of the arguments, with the built-in catalogue and those that they add.
+pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
+    let mut catalogue = Catalogue::shared();
     for path in &arguments.catalogue {
-        catalogue.extend_from_file(path)?;
+        Arc::make_mut(&mut catalogue).extend_from_file(path)?;
     }
-    let file = CaseFile::load(arguments.file.as_deref(), &arguments.set)?;
-    Ok(Studied::resolve(title(arguments), file, &catalogue)?)
+    let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
+    Ok(case.called(&title(arguments)))
 }
 
 /// The dimensionless cantilever that the arguments describe, for `command`. What puts a
@@ -107,17 +108,17 @@ fn cantilever(
     command: &str,
     output: &Output,
 ) -> Result<Cantilever, Failure> {
-    let studied = crate::studied::Studied::of(arguments, output)?;
-    cantilever_of(&studied, command)
+    let case = crate::given_case::GivenCase::of(arguments, output)?;
+    cantilever_of(&case, command)
 }
 
-/// The dimensionless cantilever that is studied, for `command`.
-fn cantilever_of(studied: &Studied, command: &str) -> Result<Cantilever, Failure> {
-    studied.subject.case().ok_or_else(|| {
+/// The dimensionless cantilever of a case, for `command`.
+fn cantilever_of(case: &Case, command: &str) -> Result<Cantilever, Failure> {
+    case.cantilever().cloned().ok_or_else(|| {
         Failure::input(
             format!(
                 "{}: `{command}` needs a cantilever; this is an oscillator",
-                studied.title
+                case.title()
             ),
             "an oscillator has one degree of freedom and no beam modes",
         )

@@ -12,9 +12,9 @@ use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{file, number, series, style};
 
@@ -69,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for path in arguments.out.out.iter().chain(&arguments.harmonics_out) {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
     let options = OrbitOptions {
         period: arguments.period,
@@ -102,8 +102,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     motion::warn(&found.observables, "", output);
     let physical = studied
-        .resolved
-        .as_ref()
+        .physical()
         .map(|resolved| PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved));
     let document = Document {
         orbit: &found,
@@ -130,9 +129,9 @@ fn harmonics_csv(orbit: &OrbitReport) -> String {
     csv
 }
 
-fn text(studied: &Studied, model: &Model, orbit: &OrbitReport) -> String {
+fn text(studied: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
     let units = studied.units();
-    let heading = format!("{}: {}", studied.title, studied.summary());
+    let heading = format!("{}: {}", studied.title(), studied.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
     let verdict = format!("a period-{} orbit, {}", orbit.period, orbit.stability);
     let _ = writeln!(text, "  {}", style::bold(&verdict));

@@ -3,16 +3,15 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::case::subject::{Key, Subject};
+use nanotap::case::Key;
 use nanotap::control::Control;
 use nanotap::figure::contact_laws::sample_figure;
-use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{Comparison, ComparisonOptions, SampleMotion, compare};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
@@ -48,17 +47,17 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
-    let Subject::Cantilever(case) = &studied.subject else {
+    let studied = GivenCase::of(&arguments.case, output)?;
+    let Some(case) = studied.cantilever() else {
         return Err(Failure::input(
             format!(
                 "{}: `nanotap samples` needs a cantilever; this is an oscillator",
-                studied.title
+                studied.title()
             ),
             "an oscillator's stop is said by its own keys",
         ));
     };
-    let key = Key::Cantilever(Parameter::Omega);
+    let key = Key::Omega;
     let value = |option: &str, text: &Option<String>| {
         text.as_ref()
             .map(|text| studied.value(key, option, text))
@@ -90,10 +89,10 @@ fn csv(result: &Comparison) -> String {
     csv
 }
 
-fn text(studied: &Studied, result: &Comparison) -> String {
+fn text(studied: &GivenCase, result: &Comparison) -> String {
     let heading = format!(
         "{}: the period-{} orbit on each sample at Ω = {}",
-        studied.title,
+        studied.title(),
         result.period,
         number::significant(result.omega, 6)
     );

@@ -15,9 +15,9 @@ use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{file, number, series, style};
 
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
-    let studied = Studied::of(&arguments.case, output)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
     let settle = SettleOptions {
         max_period: arguments.max_period,
@@ -133,7 +133,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 
 fn exact(
     arguments: &Arguments,
-    studied: &Studied,
+    studied: &GivenCase,
     model: &Model,
     settle: SettleOptions,
     output: &Output,
@@ -162,8 +162,7 @@ fn exact(
     }
     motion::warn(&run.observables, "", output);
     let physical = studied
-        .resolved
-        .as_ref()
+        .physical()
         .map(|resolved| PhysicalMotion::alone(&run.observables, None, resolved));
     let document = Document {
         run: &run,
@@ -172,9 +171,9 @@ fn exact(
     output.result(&document, |_| text(studied, model, &run))
 }
 
-fn text(studied: &Studied, model: &Model, run: &Simulation) -> String {
+fn text(studied: &GivenCase, model: &Model, run: &Simulation) -> String {
     let units = studied.units();
-    let heading = format!("{}: {}", studied.title, studied.summary());
+    let heading = format!("{}: {}", studied.title(), studied.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
     let _ = writeln!(
         text,
@@ -239,7 +238,7 @@ fn text(studied: &Studied, model: &Model, run: &Simulation) -> String {
 
 fn rk4(
     arguments: &Arguments,
-    studied: &Studied,
+    studied: &GivenCase,
     model: &Model,
     settle: SettleOptions,
     output: &Output,
@@ -289,11 +288,11 @@ fn curve(run: &FixedStepRun) -> String {
     csv
 }
 
-fn rk4_text(studied: &Studied, run: &FixedStepRun) -> String {
+fn rk4_text(studied: &GivenCase, run: &FixedStepRun) -> String {
     let units: Units = studied.units();
     let heading = format!(
         "{}: {}, Runge–Kutta with {} steps a period in flight and {} in contact",
-        studied.title,
+        studied.title(),
         studied.summary(),
         run.steps[0],
         run.steps[1]

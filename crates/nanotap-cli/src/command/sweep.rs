@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use nanotap::case::physical::Kind;
+use nanotap::case::{Case, Key};
 use nanotap::study::sweep::{
     Follow, Over, Starts, Summary, Sweep, SweepOptions, figure, response_figure, summary,
 };
@@ -12,8 +13,8 @@ use super::attractors::parse_side;
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 use crate::{motion, number};
 
@@ -95,14 +96,11 @@ enum Show {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
-    let names: Vec<&str> = arguments
-        .over
-        .iter()
-        .map(|over| over.split('=').next().unwrap_or_default().trim())
-        .collect();
-    let studied = Studied::of(&arguments.case, output)?.varying(&names)?;
-    let sweep = Sweep::new(studied.subject.clone(), arguments.options(&studied)?)?;
-    let names: Vec<&str> = sweep.options().over.iter().map(|o| o.key.name()).collect();
+    let studied = GivenCase::of(&arguments.case, output)?;
+    let sweep = Sweep::new(Case::clone(&studied), arguments.options(&studied)?)?;
+    let keys: Vec<Key> = sweep.options().over.iter().map(|o| o.key).collect();
+    studied.say_held(&keys, output);
+    let names: Vec<&str> = keys.iter().map(|key| key.path()).collect();
     let name = derived_name(
         arguments.case.file.as_deref(),
         &[&["sweep"], names.as_slice()].concat(),
@@ -143,11 +141,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 impl Arguments {
-    fn options(&self, studied: &Studied) -> Result<SweepOptions, Failure> {
+    fn options(&self, studied: &GivenCase) -> Result<SweepOptions, Failure> {
         let over = self
             .over
             .iter()
-            .map(|given| Over::parse(given, &studied.subject))
+            .map(|given| Over::parse(given, &studied))
             .collect::<Result<Vec<_>, _>>()?;
         let starts = match (self.starts, &self.state) {
             (Some(count), _) => Starts::Seeded {
@@ -170,7 +168,7 @@ impl Arguments {
     }
 }
 
-fn text(studied: &Studied, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
+fn text(studied: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
     let options = sweep.options();
     let ranges: Vec<String> = options
         .over
@@ -187,7 +185,7 @@ fn text(studied: &Studied, sweep: &Sweep, done: &DatasetReport<Summary>) -> Stri
         .collect();
     let heading = format!(
         "{}: {}, {}",
-        studied.title,
+        studied.title(),
         ranges.join(", "),
         number::counted(sweep.runs(), "run", "runs")
     );

@@ -6,6 +6,7 @@
 use std::time::Instant;
 
 use clap::Args;
+use nanotap::case::{Case, Key};
 use nanotap::dataset::StoreError;
 use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
 use nanotap::study::window::{Condition, Window};
@@ -13,9 +14,9 @@ use nanotap::study::window::{Condition, Window};
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
-use crate::studied::Studied;
 use crate::table::{Align, Table};
 
 /// The operating window over two parameters: where there is only one motion, and where a second
@@ -66,12 +67,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             "give --over twice, as in --over gap.tip=5nm:25nm:41 --over drive.frequency=320kHz:340kHz:41",
         ));
     }
-    let studied = Studied::of(&arguments.case, output)?.varying(&names)?;
+    let studied = GivenCase::of(&arguments.case, output)?;
     let over = arguments
         .over
         .iter()
-        .map(|given| Over::parse(given, &studied.subject))
+        .map(|given| Over::parse(given, &studied))
         .collect::<Result<Vec<_>, _>>()?;
+    let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
+    studied.say_held(&keys, output);
     let options = SweepOptions {
         starts: Starts::Seeded {
             count: arguments.starts,
@@ -84,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         max_period: arguments.max_period,
         ..SweepOptions::new(over)
     };
-    let sweep = Sweep::new(studied.subject.clone(), options)?;
+    let sweep = Sweep::new(Case::clone(&studied), options)?;
     let name = derived_name(
         arguments.case.file.as_deref(),
         &[&["window"], names.as_slice()].concat(),
@@ -106,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.result(&done, |done| {
         let heading = format!(
             "{}: operating window over {} and {}, {} at each of {} points",
-            studied.title,
+            studied.title(),
             names[0],
             names[1],
             number::counted(arguments.starts, "start", "starts"),

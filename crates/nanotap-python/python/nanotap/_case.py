@@ -21,7 +21,7 @@ _OTHER_NAMES = {
     alias: name
     for table, keys in _nanotap.case_keys()
     if table == "model"
-    for name, alias in keys
+    for name, alias, _ in keys
 }
 
 

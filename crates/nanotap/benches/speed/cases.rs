@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::Flow;
@@ -37,8 +37,8 @@ pub(crate) fn model(case: &Cantilever) -> Model {
 }
 
 /// What sweeps and basins take.
-pub(crate) fn subject(case: &Cantilever) -> Subject {
-    Subject::Cantilever(case.clone())
+pub(crate) fn subject(case: &Cantilever) -> Case {
+    Case::from(case.clone())
 }
 
 /// A flow at rest.

@@ -2,8 +2,7 @@
 
 use divan::Bencher;
 use nalgebra::DMatrix;
-use nanotap::case::subject::Key;
-use nanotap::model::parameter::Parameter;
+use nanotap::case::Key;
 use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 
@@ -37,7 +36,7 @@ fn map_with_parameter(bencher: Bencher<'_, '_>, modes: usize) {
     let case = cases::paper(modes);
     let model = cases::model(&case);
     let tangent = cases::subject(&case)
-        .tangent(&model, Key::Cantilever(Parameter::Omega))
+        .tangent(&model, Key::Omega)
         .expect("a smooth family");
     let mut map = Strobe::with_tangents(&model, vec![tangent]);
     let (_, state) = on_attractor(modes);

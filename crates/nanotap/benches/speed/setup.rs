@@ -1,9 +1,8 @@
 //! Setting up a model for one value of the parameters.
 
 use divan::{Bencher, black_box};
-use nanotap::case::subject::Key;
+use nanotap::case::Key;
 use nanotap::model::Model;
-use nanotap::model::parameter::Parameter;
 
 use crate::cases::{self, MODES};
 
@@ -19,7 +18,7 @@ fn model(bencher: Bencher<'_, '_>, modes: usize) {
 fn tangent(bencher: Bencher<'_, '_>, modes: usize) {
     let case = cases::paper(modes);
     let (subject, model) = (cases::subject(&case), cases::model(&case));
-    let key = Key::Cantilever(Parameter::Omega);
+    let key = Key::Omega;
     bencher.bench_local(|| {
         black_box(&subject)
             .tangent(&model, key)

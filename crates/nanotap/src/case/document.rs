@@ -5,14 +5,12 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use crate::case::physical::{MappingRow, Resolved};
-use crate::case::subject::Subject;
+use crate::case::Case;
+use crate::case::physical::{MappingRow, Physical};
 use crate::model::cantilever::Cantilever;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
-use crate::study::setpoint::SetpointReport;
-use crate::study::studied::Studied;
 
-/// A case, checked and resolved.
+/// A case, checked and view.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum CaseDocument {
@@ -35,9 +33,6 @@ pub struct CantileverDocument {
     /// What is known of it in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalSummary>,
-    /// How its setpoint was solved for the distance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub setpoint_solved: Option<SetpointReport>,
 }
 
 /// The physical quantities behind a case, in SI, frequencies in Hz.
@@ -98,15 +93,15 @@ pub struct PhysicalSummary {
 }
 
 impl PhysicalSummary {
-    /// What is known of a resolved case.
-    pub fn of(resolved: &Resolved) -> Self {
-        let Resolved {
+    /// What is known of a physical case.
+    pub fn of(view: &Physical) -> Self {
+        let Physical {
             lever,
             parameters,
             scales,
             ..
-        } = resolved;
-        let second = resolved.case.tone2_ratio;
+        } = view;
+        let second = view.cantilever.tone2_ratio;
         Self {
             k: lever.k,
             f0: lever.f0,
@@ -115,13 +110,13 @@ impl PhysicalSummary {
             tip_mass: parameters.tip_mass,
             drive_amplitude: parameters.drive_amplitude,
             drive_frequency: parameters.drive_frequency,
-            free_amplitude: resolved.free_amplitude,
-            free_phase_degrees: resolved.free_phase,
-            phase_reference: resolved.phase_reference(),
-            second_free_amplitude: resolved.second_free_amplitude,
+            free_amplitude: view.free_amplitude,
+            free_phase_degrees: view.free_phase,
+            phase_reference: view.phase_reference(),
+            second_free_amplitude: view.second_free_amplitude,
             second_frequency: second.map(|ratio| ratio.value() * parameters.drive_frequency),
             second_amplitude: second.map(|_| parameters.tone2_amplitude),
-            setpoint: resolved.setpoint,
+            setpoint: view.setpoint,
             contact_stiffness: parameters.contact_stiffness,
             contact_damping: parameters.contact_damping,
             relaxation_stiffness: parameters.relaxation_stiffness,
@@ -165,29 +160,26 @@ impl OscillatorDocument {
 }
 
 impl CaseDocument {
-    /// The document of what is studied.
-    pub fn of(studied: &Studied) -> Self {
-        match &studied.subject {
-            Subject::Oscillator(oscillator) => Self::Oscillator(OscillatorDocument::of(oscillator)),
-            Subject::Cantilever(case) => Self::cantilever(case.clone(), studied),
-            // Where the quantities that vary make no sense, the case as it was read.
-            Subject::Physical(_) => {
-                let read = || studied.resolved.as_ref().map(|r| r.case.clone());
-                let case = studied.subject.case().or_else(read);
-                Self::cantilever(case.unwrap_or_else(Cantilever::paper), studied)
-            }
+    /// The document of a case.
+    pub fn of(case: &Case) -> Self {
+        match case.oscillator() {
+            Some(oscillator) => Self::Oscillator(OscillatorDocument::of(oscillator)),
+            None => Self::Cantilever(Box::new(CantileverDocument::of(case))),
         }
     }
+}
 
-    fn cantilever(case: Cantilever, studied: &Studied) -> Self {
-        let resolved = studied.subject.resolved().or(studied.resolved.as_ref());
-        Self::Cantilever(Box::new(CantileverDocument {
+impl CantileverDocument {
+    fn of(case: &Case) -> Self {
+        // Physical quantities made sense when the case was read.
+        let cantilever = case.cantilever().cloned();
+        let cantilever = cantilever.unwrap_or_else(Cantilever::paper);
+        Self {
             kind: "cantilever",
-            period: case.period(),
-            case,
-            physical: resolved.map(PhysicalSummary::of),
-            setpoint_solved: studied.setpoint.clone(),
-        }))
+            period: cantilever.period(),
+            case: cantilever,
+            physical: case.physical().map(PhysicalSummary::of),
+        }
     }
 }
 

@@ -1,10 +1,653 @@
-//! The case: what a user states, read from files and words, in dimensionless numbers or in
-//! physical quantities, and mapped to the model's parameters.
+//! The case: what a user states, in dimensionless numbers or in physical quantities, read
+//! from files and words, and mapped to the model.
+//!
+//! A [`Case`] has values by [`Key`]; all keys stand in one table. Parsing a file, `key=value`
+//! words, refusals, units, sweeps and branches go through it, and numbers stay numbers all
+//! the way.
+//!
+//! # What is stated, and what varies
+//!
+//! A value that is *stated*, in a file or set beside it, stands in place of whatever says the
+//! same in another way (`drive.amplitude` in place of `drive.free_amplitude`), and all that
+//! else was stated still holds: with a stated free amplitude, another frequency is another
+//! strength of the drive.
+//!
+//! A value that *varies* in a study ([`Case::with`]: a sweep, a branch, a window) is one knob
+//! of one instrument, and the others stay as they are: the drive keeps its own amplitude (a
+//! piezo its voltage), the sample its distance, g₀ its length, and a second tone its place
+//! among the harmonics of the first. [`Case::held`] says which numbers these are. Stated
+//! beside the varied value they give the same point again.
 
 pub mod document;
+mod error;
+mod family;
 pub mod file;
+pub mod key;
+mod keys;
 pub mod near_name;
 pub mod physical;
-pub mod physical_subject;
-pub mod subject;
+pub mod quantity;
+mod stated;
 pub mod units;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nanotap_flow::sensitivity::SystemTangent;
+use serde::ser::SerializeMap as _;
+use serde::{Serialize, Serializer};
+
+pub use error::{CaseError, NoSuchKey, ValueOfKeyError};
+pub use family::{Family, PlaneFamily};
+pub use key::Key;
+pub use stated::{Value, ValueError};
+
+use file::{CaseFileError, Described, Source};
+use key::{ModelKind, Section};
+use near_name::near_name;
+use physical::{Catalogue, Kind, Physical, Reader, Remark};
+use stated::Stated;
+use units::Units;
+
+use crate::model::cantilever::Cantilever;
+use crate::model::oscillator::{Oscillator, Stop};
+use crate::model::parameter::Parameter;
+use crate::model::{Model, cantilever_tangent};
+
+/// How many modes a case has that does not say.
+pub const DEFAULT_MODES: usize = 3;
+
+/// A checked case: a cantilever, dimensionless or in physical quantities, or an oscillator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    title: Arc<str>,
+    what: What,
+}
+
+/// The kinds of case.
+#[derive(Clone, Debug, PartialEq)]
+enum What {
+    Cantilever(Cantilever),
+    Oscillator(Oscillator),
+    Quantities(Box<Quantities>),
+}
+
+/// Physical quantities and what they come to.
+#[derive(Clone, Debug, PartialEq)]
+struct Quantities {
+    stated: Stated,
+    catalogue: Arc<Catalogue>,
+    /// Dimensionless numbers that vary, in place of those mapped.
+    numbers: Vec<(Parameter, f64)>,
+    /// Whether what stays while others vary is said by its own numbers.
+    held: bool,
+    view: Result<Box<Physical>, Box<CaseFileError>>,
+    /// What a study found out about the case.
+    notes: Vec<Remark>,
+}
+
+/// What a key of the dimensionless model is in SI.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ParameterUnit {
+    /// The quantity: "drive frequency f".
+    pub quantity: &'static str,
+    /// Its SI unit.
+    pub unit: &'static str,
+    /// The SI value of 1.
+    pub si: f64,
+    /// What it measures.
+    #[serde(skip)]
+    pub kind: Kind,
+}
+
+impl From<Cantilever> for Case {
+    fn from(cantilever: Cantilever) -> Self {
+        Self::new(What::Cantilever(cantilever))
+    }
+}
+
+impl From<Oscillator> for Case {
+    fn from(oscillator: Oscillator) -> Self {
+        Self::new(What::Oscillator(oscillator))
+    }
+}
+
+impl Case {
+    fn new(what: What) -> Self {
+        Self {
+            title: "case".into(),
+            what,
+        }
+    }
+
+    /// The case of the file at `path`, if one is given, with the `key=value` words of
+    /// `overrides` in place of what it says; levers and materials are those of `catalogue`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the file and the words, each with its place.
+    pub fn load(
+        path: Option<&Path>,
+        overrides: &[String],
+        catalogue: &Arc<Catalogue>,
+    ) -> Result<Self, CaseFileError> {
+        Self::parse_with(path.map(file::read).transpose()?, overrides, catalogue)
+    }
+
+    /// The case of a text and of `key=value` words, with the built-in levers and materials.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), less what can go wrong in reading.
+    pub fn parse(source: Option<Source>, overrides: &[String]) -> Result<Self, CaseFileError> {
+        Self::parse_with(source, overrides, &Catalogue::shared())
+    }
+
+    /// The same with levers and materials of `catalogue`.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_with(
+        source: Option<Source>,
+        overrides: &[String],
+        catalogue: &Arc<Catalogue>,
+    ) -> Result<Self, CaseFileError> {
+        let title = source.as_ref().map(|source| source.name.clone());
+        let what = match file::parse(source, overrides)? {
+            Described::Cantilever(cantilever) => What::Cantilever(cantilever),
+            Described::Oscillator(oscillator) => What::Oscillator(oscillator),
+            Described::Physical(stated) => {
+                let catalogue = Arc::clone(catalogue);
+                let quantities = Quantities::new(stated, catalogue);
+                What::Quantities(Box::new(quantities.possible()?))
+            }
+        };
+        let case = Self::new(what);
+        Ok(match title {
+            Some(title) => case.called(&title),
+            None => case,
+        })
+    }
+
+    /// The same under another name in headings.
+    #[must_use]
+    pub fn called(mut self, title: &str) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// What it is called in a heading.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The dimensionless cantilever that it is; `None` of an oscillator, and where physical
+    /// quantities make no sense.
+    pub fn cantilever(&self) -> Option<&Cantilever> {
+        match &self.what {
+            What::Cantilever(cantilever) => Some(cantilever),
+            What::Oscillator(_) => None,
+            What::Quantities(_) => self.physical().map(|view| &view.cantilever),
+        }
+    }
+
+    /// The oscillator that it is, if it is one.
+    pub const fn oscillator(&self) -> Option<&Oscillator> {
+        match &self.what {
+            What::Oscillator(oscillator) => Some(oscillator),
+            _ => None,
+        }
+    }
+
+    /// What is known of it in SI, if it is a physical case and makes sense.
+    pub fn physical(&self) -> Option<&Physical> {
+        match &self.what {
+            What::Quantities(quantities) => quantities.view.as_deref().ok(),
+            _ => None,
+        }
+    }
+
+    /// Whether it was stated in physical quantities.
+    pub const fn is_physical(&self) -> bool {
+        matches!(self.what, What::Quantities(_))
+    }
+
+    /// What had to be assumed, and what puts it in doubt.
+    pub fn remarks(&self) -> Vec<Remark> {
+        let (What::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
+            return Vec::new();
+        };
+        let mut remarks = view.remarks(quantities.reader());
+        remarks.extend(quantities.notes.iter().cloned());
+        remarks
+    }
+
+    /// The numbers of the equations that it has.
+    pub fn keys(&self) -> Vec<Key> {
+        match &self.what {
+            What::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
+                .into_iter()
+                .filter(|parameter| oscillator.get(*parameter).is_some())
+                .map(Key::of_oscillator)
+                .collect(),
+            _ => self.cantilever().map_or_else(Vec::new, |cantilever| {
+                cantilever.parameters().into_iter().map(Key::of).collect()
+            }),
+        }
+    }
+
+    /// The key that is called `name` and can vary, with or without `model.` before it: a
+    /// number of the equations, or a quantity of a physical case.
+    ///
+    /// # Errors
+    /// [`NoSuchKey`] with what there is and the nearest name.
+    pub fn key(&self, name: &str) -> Result<Key, NoSuchKey> {
+        let plain = name.strip_prefix("model.").unwrap_or(name);
+        let keys = self.keys();
+        if let Some(key) = self.model_kind().key(plain)
+            && keys.contains(&key)
+        {
+            return Ok(key);
+        }
+        if self.is_physical() && name.contains('.') && plain == name {
+            return match Key::find(name) {
+                Some(key) => key
+                    .cannot_vary()
+                    .map_or(Ok(key), |reason| Err(NoSuchKey::Fixed { key, reason })),
+                None => Err(NoSuchKey::unknown(
+                    name,
+                    &Key::all()
+                        .filter(|key| key.is_physical() && key.cannot_vary().is_none())
+                        .collect::<Vec<_>>(),
+                )),
+            };
+        }
+        Err(NoSuchKey::unknown(plain, &keys))
+    }
+
+    fn model_kind(&self) -> ModelKind {
+        match &self.what {
+            What::Oscillator(oscillator) => match oscillator.stop {
+                Stop::Soft { .. } => ModelKind::VibroImpact,
+                Stop::Rigid { .. } => ModelKind::Impact,
+            },
+            _ => ModelKind::Cantilever,
+        }
+    }
+
+    /// The value of a key, in SI of a physical quantity; NaN where the case does not have it.
+    pub fn get(&self, key: Key) -> f64 {
+        let found = match (&self.what, key.entry().means) {
+            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                oscillator.get(parameter)
+            }
+            (What::Oscillator(_), _) => None,
+            (_, key::Means::Cantilever(parameter)) => {
+                self.cantilever().map(|case| case.get(parameter))
+            }
+            (_, _) if key == Key::Modes => self.cantilever().map(|case| case.modes as f64),
+            (What::Quantities(quantities), _) => quantities.get(key),
+            _ => None,
+        };
+        found.unwrap_or(f64::NAN)
+    }
+
+    /// The same case with one value varied (unchanged where it does not have the key). What
+    /// stays is said in the module's documentation; whether the value makes sense, by
+    /// [`model`](Self::model).
+    #[must_use]
+    pub fn with(&self, key: Key, value: f64) -> Self {
+        let what = match (&self.what, key.entry().means) {
+            (What::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
+                What::Cantilever(cantilever.clone().with(parameter, value))
+            }
+            (What::Cantilever(cantilever), _) if key == Key::Modes => {
+                What::Cantilever(cantilever.clone().with_modes(value as usize))
+            }
+            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                What::Oscillator(oscillator.with(parameter, value))
+            }
+            (What::Quantities(quantities), means) => match means {
+                key::Means::Oscillator(_) => return self.clone(),
+                _ => What::Quantities(Box::new(quantities.with(key, value))),
+            },
+            _ => return self.clone(),
+        };
+        Self {
+            title: Arc::clone(&self.title),
+            what,
+        }
+    }
+
+    /// The numbers that stay while a quantity varies though they were not stated as such:
+    /// stated beside the value of `key` they give the same case again. Empty where all that
+    /// was stated simply stays.
+    pub fn held(&self, key: Key) -> Vec<(Key, f64)> {
+        let What::Quantities(quantities) = &self.what else {
+            return Vec::new();
+        };
+        let (true, Ok(view)) = (key.is_physical(), &quantities.view) else {
+            return Vec::new();
+        };
+        let held = view.held(&quantities.stated);
+        held.iter()
+            .filter(|(other, value)| {
+                let same = quantities.stated.get(*other) == Some(*value);
+                let said = same && quantities.stated.said(*other).is_some();
+                !said && *other != key && !key.alternatives().any(|(same, _)| same == *other)
+            })
+            .filter_map(|(other, _)| Some((other, held.number(other)?)))
+            .collect()
+    }
+
+    /// Its model.
+    ///
+    /// # Errors
+    /// When it makes no sense or cannot be solved in closed form.
+    pub fn model(&self) -> Result<Model, CaseError> {
+        Ok(match &self.what {
+            What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
+            What::Oscillator(oscillator) => oscillator.model()?,
+            What::Quantities(quantities) => Model::cantilever(&quantities.view()?.cantilever)?,
+        })
+    }
+
+    /// The derivative of its system with respect to the value of a key.
+    ///
+    /// # Errors
+    /// As [`model`](Self::model).
+    pub fn tangent(&self, model: &Model, key: Key) -> Result<SystemTangent, CaseError> {
+        let quantities = match (&self.what, key.entry().means) {
+            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                return Ok(oscillator.tangent(model, parameter)?);
+            }
+            (What::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
+                return Ok(cantilever_tangent(cantilever, model, parameter)?);
+            }
+            (What::Quantities(quantities), key::Means::Cantilever(parameter)) => {
+                let cantilever = &quantities.view()?.cantilever;
+                return Ok(cantilever_tangent(cantilever, model, parameter)?);
+            }
+            (What::Quantities(quantities), _) if key.is_physical() => quantities,
+            _ => return Ok(SystemTangent::zeros(&model.system)),
+        };
+        let cantilever = &quantities.view()?.cantilever;
+        let mut sum = SystemTangent::zeros(&model.system);
+        for (parameter, slope) in quantities.derivatives(key)? {
+            sum.add(slope, &cantilever_tangent(cantilever, model, parameter)?);
+        }
+        Ok(sum)
+    }
+
+    /// Its maps along one key.
+    pub fn family(&self, key: Key) -> Family {
+        Family {
+            case: self.clone(),
+            key,
+        }
+    }
+
+    /// The units in which to show it.
+    pub fn units(&self) -> Units {
+        Units::of(self.physical().map(|view| &view.scales))
+    }
+
+    /// What a key is in SI, if the case is physical.
+    pub fn parameter_unit(&self, key: Key) -> Option<ParameterUnit> {
+        let view = self.physical()?;
+        let Some(parameter) = key.parameter() else {
+            // Its values are in SI already.
+            return key.is_physical().then(|| ParameterUnit {
+                quantity: key.path(),
+                unit: key.kind().si_unit(),
+                si: 1.0,
+                kind: key.kind(),
+            });
+        };
+        let rows = view.mapping();
+        let row = rows.iter().find(|row| row.parameter == parameter)?;
+        Some(ParameterUnit {
+            quantity: row.quantity,
+            unit: row.kind.si_unit(),
+            si: view.scales.of(parameter, view.cantilever.actuation),
+            kind: row.kind,
+        })
+    }
+
+    /// A value of a key from text: a number of the dimensionless model, of a physical case
+    /// also as a quantity with its unit.
+    ///
+    /// # Errors
+    /// When `text` is neither.
+    pub fn value(&self, key: Key, text: &str) -> Result<f64, ValueOfKeyError> {
+        let of_quantity = |error| ValueOfKeyError::Quantity {
+            text: text.to_owned(),
+            error: Box::new(error),
+        };
+        if key.is_physical() {
+            return key.kind().parse(text).map_err(of_quantity);
+        }
+        if let Ok(value) = text.trim().parse::<f64>() {
+            return Ok(value);
+        }
+        match self.parameter_unit(key) {
+            Some(unit) => unit
+                .kind
+                .parse(text)
+                .map(|si| si / unit.si)
+                .map_err(of_quantity),
+            None => Err(ValueOfKeyError::NotANumber {
+                text: text.to_owned(),
+            }),
+        }
+    }
+
+    /// The key of the distance between tip and sample, in the model's unit of length.
+    pub const fn gap_key(&self) -> Key {
+        match self.what {
+            What::Oscillator(_) => Key::OscillatorGap,
+            _ => Key::Alpha5,
+        }
+    }
+
+    /// Drive frequency, in the model's unit; NaN where physical quantities make no sense.
+    pub fn omega(&self) -> f64 {
+        match &self.what {
+            What::Oscillator(oscillator) => oscillator.omega,
+            _ => self.cantilever().map_or(f64::NAN, |case| case.omega),
+        }
+    }
+
+    /// Whether its stop is rigid: contact is an instant there.
+    pub fn has_rigid_stop(&self) -> bool {
+        self.model_kind() == ModelKind::Impact
+    }
+
+    /// Whether the distance is left to a setpoint: `drive.setpoint` without `gap.tip`.
+    pub fn leaves_distance_to_setpoint(&self) -> bool {
+        match &self.what {
+            What::Quantities(quantities) => {
+                quantities.stated.has(Key::DriveSetpoint) && !quantities.stated.has(Key::GapTip)
+            }
+            _ => false,
+        }
+    }
+
+    /// The same with the tip at `distance` (in m) from the sample, where its setpoint is
+    /// reached, and a note that says so. The unit of length stays; the beam, which moves with
+    /// the tip, is out of place by less than the free amplitude.
+    ///
+    /// # Errors
+    /// When the quantities make no sense there.
+    pub fn at_distance(&self, distance: f64, note: Remark) -> Result<Self, CaseFileError> {
+        let What::Quantities(quantities) = &self.what else {
+            return Ok(self.clone());
+        };
+        let mut quantities = quantities.clone();
+        let beam = quantities.view.as_ref().map(|view| view.scales.length);
+        let tip = Value::Number(distance, Kind::Length);
+        quantities.stated.put(Key::GapTip, tip);
+        if let Ok(beam) = beam {
+            let beam = Value::Number(beam, Kind::Length);
+            quantities.stated.put(Key::GapBeam, beam);
+        }
+        quantities.notes.push(note);
+        Ok(Self {
+            title: Arc::clone(&self.title),
+            what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
+        })
+    }
+}
+
+impl Quantities {
+    fn new(stated: Stated, catalogue: Arc<Catalogue>) -> Self {
+        let empty = CaseFileError::one(None, file::Problem::new(file::Place::Whole, ""));
+        let quantities = Self {
+            stated,
+            catalogue,
+            numbers: Vec::new(),
+            held: false,
+            view: Err(Box::new(empty)),
+            notes: Vec::new(),
+        };
+        quantities.mapped(false)
+    }
+
+    fn reader(&self) -> Reader<'_> {
+        Reader {
+            stated: &self.stated,
+            catalogue: &self.catalogue,
+        }
+    }
+
+    /// The same, its quantities mapped; where neither lever nor tip changed, the lever stays.
+    fn mapped(mut self, same_lever: bool) -> Self {
+        let lever = self.view.as_ref().ok().map(|view| view.lever);
+        let lever = lever.filter(|_| same_lever);
+        let view = Physical::map(self.reader(), lever)
+            .and_then(|view| match self.numbers.as_slice() {
+                [] => Ok(view),
+                numbers => view.with_numbers(numbers),
+            })
+            .map(Box::new)
+            .map_err(|error| Box::new(self.stated.refused(error.key(), error.to_string())));
+        self.view = view;
+        self
+    }
+
+    /// The same, if it makes sense.
+    fn possible(self) -> Result<Self, CaseFileError> {
+        match &self.view {
+            Ok(_) => Ok(self),
+            Err(error) => Err((**error).clone()),
+        }
+    }
+
+    fn view(&self) -> Result<&Physical, Box<CaseFileError>> {
+        self.view.as_deref().map_err(Clone::clone)
+    }
+
+    /// A value that is stated or follows from what is.
+    fn get(&self, key: Key) -> Option<f64> {
+        let inferred = || self.view.as_ref().ok()?.value(key);
+        self.stated.number(key).or_else(inferred)
+    }
+
+    fn with(&self, key: Key, value: f64) -> Self {
+        let mut varied = self.clone();
+        if let Some(parameter) = key.parameter() {
+            varied.numbers.retain(|(other, _)| *other != parameter);
+            varied.numbers.push((parameter, value));
+            return varied.mapped(true);
+        }
+        if key == Key::Modes {
+            varied.stated.put(key, Value::Number(value, Kind::Number));
+            return varied.mapped(true);
+        }
+        if let (false, Ok(view)) = (self.held, &self.view) {
+            varied.stated = view.held(&self.stated);
+            varied.held = true;
+        }
+        varied.stated.set(key, value);
+        varied.mapped(!matches!(key.section(), Section::Cantilever | Section::Tip))
+    }
+
+    /// How the numbers of the equations change with a quantity: those that do, each with its
+    /// derivative, by central differences of the mapping, which is a chain of closed forms.
+    fn derivatives(&self, key: Key) -> Result<Vec<(Parameter, f64)>, Box<CaseFileError>> {
+        let here = self.view()?;
+        let value = self.get(key).unwrap_or(f64::NAN);
+        // Where the mapping is smooth its third derivative is of order 1/value³, so that
+        // this step balances truncation and rounding.
+        let size = if value == 0.0 {
+            scale_of(here, key.kind())
+        } else {
+            value.abs()
+        };
+        let step = 1e-5 * size;
+        let (low, high) = (self.with(key, value - step), self.with(key, value + step));
+        let (low, high, width) = match (&low.view, &high.view) {
+            (Ok(low), Ok(high)) => (&**low, &**high, 2.0 * step),
+            // At the edge of what makes sense, on one side.
+            (Err(_), Ok(high)) => (here, &**high, step),
+            (Ok(low), Err(_)) => (&**low, here, step),
+            (Err(error), Err(_)) => return Err(error.clone()),
+        };
+        let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
+        Ok(Parameter::every()
+            .map(|parameter| (parameter, slope(parameter)))
+            .filter(|(_, slope)| *slope != 0.0)
+            .collect())
+    }
+}
+
+/// A size of a quantity that is zero.
+fn scale_of(view: &Physical, kind: Kind) -> f64 {
+    let scales = &view.scales;
+    match kind {
+        Kind::Length => view.free_amplitude.max(1e-3 * scales.length),
+        Kind::Mass => scales.mass,
+        Kind::Stiffness => scales.stiffness,
+        Kind::Damping => scales.damping,
+        Kind::Frequency => scales.frequency,
+        Kind::Force => scales.force,
+        Kind::Time => scales.time,
+        _ => 1.0,
+    }
+}
+
+impl Serialize for Case {
+    /// The numbers of the equations by key; of a physical case also its quantities as text,
+    /// by `section.key`.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let quantities = match &self.what {
+            What::Cantilever(cantilever) => return cantilever.serialize(serializer),
+            What::Oscillator(oscillator) => return oscillator.serialize(serializer),
+            What::Quantities(quantities) => quantities,
+        };
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("modes", &file::modes(&quantities.stated))?;
+        for (parameter, value) in &quantities.numbers {
+            map.serialize_entry(parameter.name(), value)?;
+        }
+        for (key, value) in quantities
+            .stated
+            .iter()
+            .filter(|(key, _)| key.is_physical())
+        {
+            map.serialize_entry(key.path(), &value.text())?;
+        }
+        map.end()
+    }
+}
+
+impl NoSuchKey {
+    fn unknown(given: &str, keys: &[Key]) -> Self {
+        let names: Vec<&'static str> = keys.iter().map(|key| key.path()).collect();
+        let hint = near_name(given, names.iter().copied())
+            .map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"));
+        Self::Unknown {
+            given: given.to_owned(),
+            known: names.join(", "),
+            hint,
+        }
+    }
+}

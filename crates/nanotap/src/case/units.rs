@@ -86,28 +86,23 @@ pub fn prefixed(kind: Kind, si: f64, size: f64) -> (f64, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::physical::{Catalogue, Resolved};
+    use crate::case::Case;
 
     /// A lever of k = 3 N/m with its beam 1 µm above the sample: EI/L³ = 1 N/m, so the
     /// model's unit of force is 1 µN (see the mapping's own tests for the rest).
-    fn resolved() -> Resolved {
+    fn lever() -> Case {
         let text = "[cantilever]\nk = \"3 N/m\"\nf0 = \"75 kHz\"\nQ = 200\n[sample]\nstiffness = \"20 N/m\"\n\
                     [drive]\nfrequency = \"75 kHz\"\namplitude = \"1 nm\"\n[gap]\ntip = \"1 nm\"\nbeam = \"1 um\"\n";
         let source = crate::case::file::Source {
             name: "case.toml".into(),
             text: text.into(),
         };
-        let Ok(crate::case::file::CaseFile::Physical(tables)) =
-            crate::case::file::CaseFile::parse(Some(source), &[])
-        else {
-            panic!("a physical case");
-        };
-        tables.resolve(&Catalogue::builtin().unwrap()).unwrap()
+        Case::parse(Some(source), &[]).unwrap()
     }
 
     #[test]
     fn axes_take_the_prefix_that_fits() {
-        let units = Units::of(Some(&resolved().scales));
+        let units = lever().units();
         let (factor, unit) = units.axis(Kind::Length, 0.02);
         assert_eq!(unit, " (nm)");
         // 0.02 of 1 µm is 20 nm.

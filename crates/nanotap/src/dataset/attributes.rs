@@ -4,17 +4,17 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::schema::Attributes;
-use crate::case::subject::Subject;
+use crate::case::Case;
 
 /// The attributes that every dataset begins with: what it is, the program's version,
 /// and the case as JSON text (an attribute that every file format can hold).
-pub fn of_case(title: &str, kind: &str, subject: &Subject) -> Attributes {
+pub fn of_case(title: &str, kind: &str, case: &Case) -> Attributes {
     let mut attributes = Attributes::new();
     attributes.insert("Conventions".into(), "CF-1.11".into());
     attributes.insert("title".into(), title.into());
     attributes.insert("kind".into(), kind.into());
     attributes.insert("nanotap_version".into(), env!("CARGO_PKG_VERSION").into());
-    attributes.insert("case".into(), text(subject));
+    attributes.insert("case".into(), text(case));
     attributes
 }
 

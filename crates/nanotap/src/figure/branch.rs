@@ -8,7 +8,7 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
-use crate::case::subject::Key;
+use crate::case::Key;
 use crate::case::units::Units;
 pub use crate::figure::shown::Shown;
 use crate::observe::{Observables, PhysicalMotion};

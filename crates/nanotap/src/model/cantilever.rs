@@ -20,6 +20,19 @@ pub enum CosineTerm {
     Printed,
 }
 
+impl CosineTerm {
+    /// Both forms.
+    pub const ALL: [Self; 2] = [Self::Corrected, Self::Printed];
+
+    /// Its name in case files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Corrected => "corrected",
+            Self::Printed => "printed",
+        }
+    }
+}
+
 /// A dimensionless case. Fields are as given: [`validate`](Self::validate) says
 /// whether they make sense, and whatever is built from a case calls it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -212,6 +225,15 @@ impl Cantilever {
     }
 }
 
+/// The least and the greatest value of a parameter.
+pub const fn range(parameter: Parameter) -> (f64, f64) {
+    match parameter {
+        Parameter::Omega => OMEGA_RANGE,
+        Parameter::Alpha5 | Parameter::Tone2Phase => (-LARGEST_ALPHA, LARGEST_ALPHA),
+        _ => (0.0, LARGEST_ALPHA),
+    }
+}
+
 /// Checks one parameter on its own.
 ///
 /// # Errors
@@ -232,18 +254,17 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
     if !value.is_finite() {
         return Some(Reason::NotFinite);
     }
-    match parameter {
-        Parameter::Omega if value <= 0.0 => Some(Reason::FrequencyNotPositive),
-        Parameter::Omega if !(OMEGA_RANGE.0..=OMEGA_RANGE.1).contains(&value) => {
-            Some(Reason::FrequencyOutOfRange)
-        }
-        Parameter::Omega => None,
-        _ if value.abs() > LARGEST_ALPHA => Some(Reason::TooLarge),
-        Parameter::Alpha5 | Parameter::Tone2Phase => None,
-        Parameter::Alpha2 | Parameter::Tone2Amplitude if value < 0.0 => Some(Reason::NegativeDrive),
-        _ if value < 0.0 => Some(Reason::Negative),
-        _ => None,
+    let (least, greatest) = range(parameter);
+    if (least..=greatest).contains(&value) {
+        return None;
     }
+    Some(match parameter {
+        Parameter::Omega if value <= 0.0 => Reason::FrequencyNotPositive,
+        Parameter::Omega => Reason::FrequencyOutOfRange,
+        _ if value.abs() > LARGEST_ALPHA => Reason::TooLarge,
+        Parameter::Alpha2 | Parameter::Tone2Amplitude => Reason::NegativeDrive,
+        _ => Reason::Negative,
+    })
 }
 
 /// A field of a [`Cantilever`] that makes no sense.

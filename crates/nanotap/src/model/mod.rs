@@ -24,7 +24,6 @@ pub use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
 
-use crate::case::file::CaseFileError;
 use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
@@ -32,18 +31,15 @@ use crate::model::contact::ContactLaw;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::parameter::Parameter;
 
-/// Why a case has no model.
+/// Why a cantilever or an oscillator has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// The case itself makes no sense.
+    /// A number of the cantilever makes no sense.
     #[error(transparent)]
-    Case(#[from] CantileverError),
+    Cantilever(#[from] CantileverError),
     /// The oscillator makes no sense.
     #[error(transparent)]
     Oscillator(#[from] crate::model::oscillator::OscillatorError),
-    /// The quantities of a physical case make no sense.
-    #[error(transparent)]
-    Physical(#[from] Box<CaseFileError>),
     /// Its equations cannot be solved in closed form.
     #[error(transparent)]
     Flow(#[from] FlowError),
@@ -304,8 +300,7 @@ pub fn cantilever_tangent(
 impl From<ModelError> for crate::Error {
     fn from(error: ModelError) -> Self {
         match error {
-            ModelError::Case(error) => error.into(),
-            ModelError::Physical(error) => (*error).into(),
+            ModelError::Cantilever(error) => error.into(),
             ModelError::Oscillator(_) | ModelError::Flow(FlowError::Resonance { .. }) => {
                 Self::input(error.to_string(), "change it in the case")
             }

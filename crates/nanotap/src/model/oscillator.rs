@@ -115,6 +115,20 @@ impl OscillatorParameter {
     }
 }
 
+/// Largest size of a number; beyond it products leave no digits.
+const LARGEST: f64 = 1e12;
+
+/// The least and the greatest value of a parameter.
+pub const fn range(parameter: OscillatorParameter) -> (f64, f64) {
+    use OscillatorParameter as P;
+    match parameter {
+        P::Mass | P::Omega => (f64::MIN_POSITIVE, LARGEST),
+        P::Stiffness | P::Damping | P::ContactStiffness | P::ContactDamping => (0.0, LARGEST),
+        P::Restitution => (0.0, 1.0),
+        P::Forcing | P::Gap => (-LARGEST, LARGEST),
+    }
+}
+
 impl Oscillator {
     /// The value of a parameter, `None` where this stop does not have it.
     pub fn get(&self, parameter: OscillatorParameter) -> Option<f64> {
@@ -163,18 +177,14 @@ impl Oscillator {
             let Some(value) = self.get(parameter) else {
                 continue;
             };
-            let (right, expected) = match parameter {
-                P::Mass | P::Omega => (value > 0.0, "a positive, finite number is needed"),
-                P::Stiffness | P::Damping | P::ContactStiffness | P::ContactDamping => {
-                    (value >= 0.0, "a finite number of at least 0 is needed")
-                }
-                P::Restitution => (
-                    (0.0..=1.0).contains(&value),
-                    "a number from 0 to 1 is needed",
-                ),
-                P::Forcing | P::Gap => (true, "a finite number is needed"),
-            };
-            if !(right && value.is_finite() && value.abs() <= 1e12) {
+            let (least, greatest) = range(parameter);
+            if !(least..=greatest).contains(&value) {
+                let expected = match parameter {
+                    P::Mass | P::Omega => "a positive, finite number is needed",
+                    P::Restitution => "a number from 0 to 1 is needed",
+                    P::Forcing | P::Gap => "a finite number is needed",
+                    _ => "a finite number of at least 0 is needed",
+                };
                 return Err(OscillatorError {
                     key: parameter.name(),
                     value,

@@ -7,7 +7,7 @@ use super::table::{OBSERVABLES, Observables};
 use super::value::Value;
 use super::{Dimension, Harmonic, Spectrum};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
-use crate::case::physical::{Resolved, Scales};
+use crate::case::physical::{Physical, Scales};
 
 /// What an experimenter would measure of a motion; SI units, angles in degrees. Written out
 /// by the observables' names in SI, energies in electronvolts too.
@@ -54,35 +54,31 @@ pub struct PhysicalHarmonic {
 }
 
 impl PhysicalMotion {
-    /// `observables`, of a motion of the case `resolved`, in SI.
-    pub fn of(observables: &Observables, resolved: &Resolved) -> Self {
-        let observables = observables.in_si(&resolved.scales);
+    /// `observables`, of a motion of the case `view`, in SI.
+    pub fn of(observables: &Observables, view: &Physical) -> Self {
+        let observables = observables.in_si(&view.scales);
         Self {
-            amplitude_ratio: observables.first_harmonic / resolved.free_amplitude,
+            amplitude_ratio: observables.first_harmonic / view.free_amplitude,
             observables,
             setting: None,
         }
     }
 
     /// The same of one motion alone: with its setting, and with `spectrum` its harmonics.
-    pub fn alone(
-        observables: &Observables,
-        spectrum: Option<&Spectrum>,
-        resolved: &Resolved,
-    ) -> Self {
-        let scales = &resolved.scales;
-        let omega = resolved.case.omega;
+    pub fn alone(observables: &Observables, spectrum: Option<&Spectrum>, view: &Physical) -> Self {
+        let scales = &view.scales;
+        let omega = view.cantilever.omega;
         let harmonics = spectrum.map_or(&[][..], |spectrum| &spectrum.harmonics);
         Self {
             setting: Some(Setting {
-                phase_reference: resolved.phase_reference(),
+                phase_reference: view.phase_reference(),
                 frequency: omega * scales.frequency,
                 harmonics: harmonics
                     .iter()
                     .map(|h| PhysicalHarmonic::of(h, omega, scales))
                     .collect(),
             }),
-            ..Self::of(observables, resolved)
+            ..Self::of(observables, view)
         }
     }
 }

@@ -19,15 +19,11 @@ use nanotap_dynamics::{Control, PeriodicOrbit, SettleOptions, settle};
 use serde::Serialize;
 
 use super::FreeMotion;
-use crate::case::subject::{Key, Subject};
-use crate::model::ModelError;
-use crate::model::oscillator::OscillatorParameter;
-use crate::model::parameter::Parameter;
+use crate::case::{Case, CaseError, Key};
 use crate::model::strobe::Strobe;
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
 use crate::study::simulate::{Classification, Named};
-use crate::study::studied::Studied;
 use crate::study::sweep::{SweepOptions, nearest};
 
 /// How to approach. Distances are in the model's unit of length.
@@ -101,7 +97,7 @@ pub enum ApproachError {
     NoPeriod,
     /// The case makes no sense.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Model(#[from] CaseError),
     /// The branches could not be followed.
     #[error(transparent)]
     Branch(#[from] BranchError),
@@ -200,31 +196,22 @@ pub struct ApproachReport {
     pub cancelled: bool,
 }
 
-/// The key of the distance between tip and sample.
-pub const fn gap_key(subject: &Subject) -> Key {
-    match subject {
-        Subject::Cantilever(_) | Subject::Physical(_) => Key::Cantilever(Parameter::Alpha5),
-        Subject::Oscillator(_) => Key::Oscillator(OscillatorParameter::Gap),
-    }
-}
-
 /// Brings the sample near and takes it away.
 ///
 /// # Errors
 /// [`ApproachError`] when the options make no sense for the case.
 pub fn approach(
-    studied: &Studied,
+    case: &Case,
     options: &ApproachOptions,
     control: &Control<'_>,
 ) -> Result<ApproachReport, ApproachError> {
-    let subject = &studied.subject;
-    let key = gap_key(subject);
-    let free = FreeMotion::of(&subject.model()?);
+    let key = case.gap_key();
+    let free = FreeMotion::of(&case.model()?);
     let distances = distances(&free, options)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let mut table = Vec::with_capacity(2 * distances.len());
     let mut walk = Walk {
-        studied,
+        case,
         options,
         settle: budgets(options),
         state: None,
@@ -246,18 +233,18 @@ pub fn approach(
             progress: None,
             ..*control
         };
-        branches(subject, key, &table, (from, to), options, &quiet)?
+        branches(case, key, &table, (from, to), options, &quiet)?
     } else {
         None
     };
     Ok(ApproachReport {
-        parameter: key.name(),
+        parameter: key.path(),
         from,
         to,
         free_amplitude: free.amplitude,
         free_phase: free.phase,
         free_reach: free.reach,
-        beam_clearance: beam_clearance(studied, &table),
+        beam_clearance: beam_clearance(case, &table),
         hysteresis: hysteresis(&table, free.amplitude),
         returned: returned(&table, free.amplitude),
         table,
@@ -312,7 +299,7 @@ fn budgets(options: &ApproachOptions) -> SettleOptions {
 
 /// A motion that is followed.
 struct Walk<'a> {
-    studied: &'a Studied,
+    case: &'a Case,
     options: &'a ApproachOptions,
     settle: SettleOptions,
     /// Where the last motion ended.
@@ -320,9 +307,9 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    fn step(&mut self, way: Way, gap: f64) -> Result<ApproachPoint, ModelError> {
-        let subject = &self.studied.subject;
-        let model = subject.with(gap_key(subject), gap).model()?;
+    fn step(&mut self, way: Way, gap: f64) -> Result<ApproachPoint, CaseError> {
+        let case = self.case;
+        let model = case.with(case.gap_key(), gap).model()?;
         let start = self
             .state
             .take()
@@ -350,18 +337,18 @@ impl Walk<'_> {
             Some(orbit) => Some(nearest(orbit, &settled.state).to_vec()),
             None => (classification != Classification::Unbounded).then_some(settled.state),
         };
-        let resolved = self.studied.resolved.as_ref();
+        let view = self.case.physical();
         Ok(ApproachPoint {
             way,
             gap,
-            zc: resolved.map(|resolved| gap * resolved.scales.length),
+            zc: view.map(|view| gap * view.scales.length),
             classification,
             period: named.orbit.as_ref().map(|orbit| orbit.period),
             spectral_radius: named.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
             physical: observables
                 .as_ref()
-                .zip(resolved)
-                .map(|(seen, resolved)| PhysicalMotion::of(seen, resolved)),
+                .zip(view)
+                .map(|(seen, view)| PhysicalMotion::of(seen, view)),
             observables,
             reason,
             orbit: named.orbit,
@@ -371,7 +358,7 @@ impl Walk<'_> {
 
 /// Branches through all periodic motions of the table.
 fn branches(
-    subject: &Subject,
+    case: &Case,
     key: Key,
     table: &[ApproachPoint],
     (from, to): (f64, f64),
@@ -389,7 +376,7 @@ fn branches(
         doublings: options.doublings,
         ..BranchOptions::over(key, from, to)
     };
-    branches_through(subject, &seeds, &how, control).map(Some)
+    branches_through(case, &seeds, &how, control).map(Some)
 }
 
 /// Relative difference of amplitudes that is no longer rounding.
@@ -423,18 +410,16 @@ fn hysteresis(table: &[ApproachPoint], free_amplitude: f64) -> Vec<Hysteresis> {
 }
 
 /// The beam's clearance at the nearest distance on the way there.
-fn beam_clearance(studied: &Studied, table: &[ApproachPoint]) -> Option<f64> {
+fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> Option<f64> {
     let nearest = table.iter().rfind(|p| p.way == Way::Approach)?;
     let orbit = nearest.orbit.as_ref()?;
-    let subject = &studied.subject;
-    let model = subject.with(gap_key(subject), nearest.gap).model().ok()?;
+    let model = case.with(case.gap_key(), nearest.gap).model().ok()?;
     let start = orbit.states.first()?;
     let clearance = Clearance::of(&model, start, orbit.period).ok()??;
     // The sample moves towards the whole lever; the model's beam stands where the case has it.
-    let moved = studied
-        .resolved
-        .as_ref()
-        .map_or(0.0, |resolved| nearest.gap - resolved.case.alpha5);
+    let moved = case
+        .physical()
+        .map_or(0.0, |view| nearest.gap - view.cantilever.alpha5);
     Some(clearance.height + moved)
 }
 

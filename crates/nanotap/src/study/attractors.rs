@@ -7,7 +7,7 @@ use nanotap_dynamics::{
 };
 use serde::Serialize;
 
-use crate::case::physical::Resolved;
+use crate::case::physical::Physical;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
@@ -167,19 +167,17 @@ pub struct AttractorReport {
 }
 
 impl Attractors {
-    /// The same with every attractor told in SI too, of the case `resolved`.
+    /// The same with every attractor told in SI too, of the case `view`.
     #[must_use]
-    pub fn in_si(mut self, resolved: &Resolved) -> Self {
+    pub fn in_si(mut self, view: &Physical) -> Self {
         for attractor in &mut self.attractors {
             attractor.physical = match (&attractor.orbit, &attractor.wandering) {
                 (Some(orbit), _) => Some(PhysicalMotion::alone(
                     &orbit.observables,
                     Some(&orbit.spectrum),
-                    resolved,
+                    view,
                 )),
-                (None, Some(seen)) => {
-                    Some(PhysicalMotion::alone(&seen.observables, None, resolved))
-                }
+                (None, Some(seen)) => Some(PhysicalMotion::alone(&seen.observables, None, view)),
                 (None, None) => None,
             };
         }

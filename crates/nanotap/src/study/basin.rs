@@ -16,14 +16,14 @@ use nanotap_figures::Figure;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::case::subject::Subject;
+use crate::case::Case;
+use crate::case::CaseError;
 use crate::dataset::schema::Kind;
 use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
 use crate::figure::basin::BasinTable;
-use crate::model::ModelError;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
@@ -209,7 +209,7 @@ pub enum BasinError {
     State(#[from] SimulateError),
     /// The case makes no sense.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Model(#[from] CaseError),
     /// Nothing attracts.
     #[error("no attractor was found: {why}")]
     NoAttractor {
@@ -251,7 +251,7 @@ impl Basin {
     /// # Errors
     /// When the options make no sense, nothing attracts, or `control` stopped it.
     pub fn new(
-        subject: &Subject,
+        case: &Case,
         options: &BasinOptions,
         control: &Control<'_>,
     ) -> Result<Self, BasinError> {
@@ -279,7 +279,7 @@ impl Basin {
                 what,
             });
         }
-        let model = subject.model()?;
+        let model = case.model()?;
         let names = state_names(&model);
         let origin = starting_state(&model, options.state.as_deref())?;
         let slice = Slice::new(origin, options.x.axis(&names)?, options.y.axis(&names)?)?;
@@ -324,7 +324,7 @@ impl Basin {
             ..Budget::default()
         };
         let basins = Basins::new(&map, slice, &found.attractors, budget)?;
-        let schema = schema(subject, options, &names, &basins, &known);
+        let schema = schema(case, options, &names, &basins, &known);
         Ok(Self {
             map,
             basins,
@@ -465,7 +465,7 @@ fn number(label: Label) -> i32 {
 }
 
 fn schema(
-    subject: &Subject,
+    case: &Case,
     options: &BasinOptions,
     names: &[String],
     basins: &Basins,
@@ -482,7 +482,7 @@ fn schema(
     let mut all = attributes::of_case(
         &format!("basins over {} and {}", x.name, y.name),
         "basin",
-        subject,
+        case,
     );
     all.insert(ATTRACTORS.into(), attributes::text(&known));
     all.insert(ENTRIES.into(), names.join(" ").into());

@@ -10,9 +10,9 @@ use nanotap_dynamics::{
 use nanotap_flow::FlowError;
 use serde::Serialize;
 
-use crate::case::subject::{Family, Key, PlaneFamily, Subject};
+use crate::case::{Case, CaseError, Key, PlaneFamily};
+use crate::model::Model;
 use crate::model::strobe::Strobe;
-use crate::model::{Model, ModelError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
 use crate::study::start_box::default_box;
@@ -138,7 +138,7 @@ pub enum BranchError {
         /// Its value.
         value: f64,
         /// Why not.
-        error: ModelError,
+        error: CaseError,
     },
     /// No orbit at the start.
     #[error("at {name} = {value}: {error}")]
@@ -331,40 +331,34 @@ pub const fn kind_name(kind: BifurcationKind) -> &'static str {
 /// # Errors
 /// As [`branch`].
 pub fn branches_through(
-    subject: &Subject,
+    case: &Case,
     seeds: &[(f64, PeriodicOrbit)],
     options: &BranchOptions,
     control: &Control<'_>,
 ) -> Result<BranchReport, BranchError> {
-    check(subject, options)?;
-    let family = Family {
-        subject: subject.clone(),
-        key: options.key,
-    };
+    check(case, options)?;
+    let family = case.family(options.key);
     let diagram = assemble_diagram(&family, seeds, &options.diagram(), control);
-    let mut report = described(subject, options, &diagram)?;
+    let mut report = described(case, options, &diagram)?;
     report.cancelled = control.is_cancelled();
     Ok(report)
 }
 
-/// Follows branches of `subject`.
+/// Follows branches of `case`.
 ///
 /// # Errors
 /// [`BranchError`] when the options make no sense or there is nothing to follow.
 pub fn branch(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     control: &Control<'_>,
 ) -> Result<BranchReport, BranchError> {
-    check(subject, options)?;
-    let family = Family {
-        subject: subject.clone(),
-        key: options.key,
-    };
+    check(case, options)?;
+    let family = case.family(options.key);
     let continuation = options.continuation();
     let seeds = match &options.census {
-        Some(census) => census_seeds(subject, options, census, control)?,
-        None => vec![(options.from, first_orbit(subject, options)?)],
+        Some(census) => census_seeds(case, options, census, control)?,
+        None => vec![(options.from, first_orbit(case, options)?)],
     };
     let diagram = if options.doublings == 0 && options.census.is_none() {
         let direction = if options.to > options.from {
@@ -392,10 +386,10 @@ pub fn branch(
     } else {
         assemble_diagram(&family, &seeds, &options.diagram(), control)
     };
-    let mut report = described(subject, options, &diagram)?;
+    let mut report = described(case, options, &diagram)?;
     if let Some((key, low, high)) = options.second {
         report.loci = Some(loci(
-            subject,
+            case,
             options,
             &diagram,
             (key, low, high),
@@ -407,16 +401,15 @@ pub fn branch(
     Ok(report)
 }
 
-fn check(subject: &Subject, options: &BranchOptions) -> Result<(), BranchError> {
+fn check(case: &Case, options: &BranchOptions) -> Result<(), BranchError> {
     let ranges = [(options.key, options.from, options.to)];
     for (key, from, to) in ranges.into_iter().chain(options.second) {
-        let name = key.name();
+        let name = key.path();
         if !(from.is_finite() && to.is_finite() && from != to) {
             return Err(BranchError::Range { name, from, to });
         }
         for value in [from, to] {
-            subject
-                .with(key, value)
+            case.with(key, value)
                 .model()
                 .map_err(|error| BranchError::Model { name, value, error })?;
         }
@@ -428,29 +421,28 @@ fn check(subject: &Subject, options: &BranchOptions) -> Result<(), BranchError> 
     }
     match options.second {
         Some((key, ..)) if key == options.key => {
-            Err(BranchError::SameParameter { name: key.name() })
+            Err(BranchError::SameParameter { name: key.path() })
         }
         _ => Ok(()),
     }
 }
 
-fn model_at(subject: &Subject, key: Key, value: f64) -> Result<Model, BranchError> {
-    let name = key.name();
-    subject
-        .with(key, value)
+fn model_at(case: &Case, key: Key, value: f64) -> Result<Model, BranchError> {
+    let name = key.path();
+    case.with(key, value)
         .model()
         .map_err(|error| BranchError::Model { name, value, error })
 }
 
-fn first_orbit(subject: &Subject, options: &BranchOptions) -> Result<PeriodicOrbit, BranchError> {
-    let model = model_at(subject, options.key, options.from)?;
+fn first_orbit(case: &Case, options: &BranchOptions) -> Result<PeriodicOrbit, BranchError> {
+    let model = model_at(case, options.key, options.from)?;
     let wanted = OrbitOptions {
         period: options.period,
         state: options.state.clone(),
         ..OrbitOptions::default()
     };
     let failed = |error| BranchError::Start {
-        name: options.key.name(),
+        name: options.key.path(),
         value: options.from,
         error,
     };
@@ -467,7 +459,7 @@ fn first_orbit(subject: &Subject, options: &BranchOptions) -> Result<PeriodicOrb
 
 /// Stable orbits at several values of the parameter.
 fn census_seeds(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     seeds: &SeedOptions,
     control: &Control<'_>,
@@ -480,7 +472,7 @@ fn census_seeds(
         }
         let t = k as f64 / (values - 1) as f64;
         let value = options.from + t * (options.to - options.from);
-        let model = model_at(subject, options.key, value)?;
+        let model = model_at(case, options.key, value)?;
         let starts = default_box(&model)?.starts(seeds.seed, seeds.starts);
         let census_options = CensusOptions {
             settle: SettleOptions {
@@ -498,7 +490,7 @@ fn census_seeds(
     }
     if found.is_empty() && !control.is_cancelled() {
         return Err(BranchError::NoSeeds {
-            name: options.key.name(),
+            name: options.key.path(),
             values,
         });
     }
@@ -506,13 +498,13 @@ fn census_seeds(
 }
 
 fn described(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     diagram: &Diagram,
 ) -> Result<BranchReport, BranchError> {
     let key = options.key;
     let mut report = BranchReport {
-        parameter: key.name(),
+        parameter: key.path(),
         from: options.from,
         to: options.to,
         branches: Vec::new(),
@@ -549,12 +541,12 @@ fn described(
         let parent = parent.and_then(|p| kept.iter().position(|&k| k == p));
         report.branches.push(summary(branch, parent, *depth));
         for p in &branch.points {
-            report.points.push(point(subject, options, index, p)?);
+            report.points.push(point(case, options, index, p)?);
         }
         for b in &branch.bifurcations {
             report
                 .bifurcations
-                .push(bifurcation(subject, options, index, b)?);
+                .push(bifurcation(case, options, index, b)?);
         }
         // What the user stopped is no failure of the branch.
         let stopped = matches!(branch.end, BranchEnd::Cancelled);
@@ -605,32 +597,32 @@ fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
 
 /// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.
 fn seen(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     parameter: f64,
     orbit: &PeriodicOrbit,
 ) -> Result<(Observables, Option<PhysicalMotion>), BranchError> {
-    let here = subject.with(options.key, parameter);
+    let here = case.with(options.key, parameter);
     let model = here.model().map_err(|error| BranchError::Model {
-        name: options.key.name(),
+        name: options.key.path(),
         value: parameter,
         error,
     })?;
     let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
     let observables = measure(&model, start, orbit.period, options.observables)?;
     let physical = here
-        .resolved()
-        .map(|resolved| PhysicalMotion::of(&observables, resolved));
+        .physical()
+        .map(|view| PhysicalMotion::of(&observables, view));
     Ok((observables, physical))
 }
 
 fn point(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     branch: usize,
     p: &BranchPoint,
 ) -> Result<PointReport, BranchError> {
-    let (observables, physical) = seen(subject, options, p.parameter, &p.orbit)?;
+    let (observables, physical) = seen(case, options, p.parameter, &p.orbit)?;
     Ok(PointReport {
         branch,
         period: p.orbit.period,
@@ -644,12 +636,12 @@ fn point(
 }
 
 fn bifurcation(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     branch: usize,
     b: &Bifurcation,
 ) -> Result<BifurcationReport, BranchError> {
-    let (observables, physical) = seen(subject, options, b.parameter, &b.orbit)?;
+    let (observables, physical) = seen(case, options, b.parameter, &b.orbit)?;
     let (angle, time) = match b.kind {
         BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
         BifurcationKind::Grazing { time } => (None, Some(time)),
@@ -675,7 +667,7 @@ const LOCUS_POINTS: usize = 6000;
 
 /// Curves of all bifurcations, each once: one that lies on a curve already traced is left.
 fn loci(
-    subject: &Subject,
+    case: &Case,
     options: &BranchOptions,
     diagram: &Diagram,
     (key, low, high): (Key, f64, f64),
@@ -683,22 +675,30 @@ fn loci(
     control: &Control<'_>,
 ) -> Loci {
     let family = PlaneFamily {
-        subject: subject.clone(),
+        case: case.clone(),
         keys: [options.key, key],
     };
-    let here = subject.get(key);
+    // What the second key is where a bifurcation was found: another at each where it follows
+    // from the first (the free amplitude from the frequency).
+    let at = |b: &Bifurcation| case.with(options.key, b.parameter).get(key);
+    let bifurcations = || diagram.branches.iter().flat_map(|b| &b.branch.bifurcations);
     let first = (options.from.min(options.to), options.from.max(options.to));
-    // The value at which the bifurcations were found belongs to the box.
-    let second = (low.min(high).min(here), low.max(high).max(here));
+    // The values at which the bifurcations were found belong to the box.
+    let second = bifurcations()
+        .map(at)
+        .fold((low.min(high), low.max(high)), |(low, high), here| {
+            (low.min(here), high.max(here))
+        });
     let limits = LocusOptions {
         max_points: LOCUS_POINTS,
         ..LocusOptions::over(first, second)
     };
     let mut curves: Vec<LocusReport> = Vec::new();
-    for b in diagram.branches.iter().flat_map(|b| &b.branch.bifurcations) {
+    for b in bifurcations() {
         if control.is_cancelled() {
             break;
         }
+        let here = at(b);
         let near = 1e-6 * (first.1 - first.0);
         let known = |c: &LocusReport| {
             c.kind == kind_name(b.kind)
@@ -723,7 +723,7 @@ fn loci(
         }
     }
     Loci {
-        second: key.name(),
+        second: key.path(),
         range: [second.0, second.1],
         curves,
         key,

@@ -9,12 +9,12 @@ use nanotap_dynamics::{Control, SettleOptions, ShootingOptions, close_orbit, set
 use nanotap_flow::trajectory::PiecewiseSignal;
 use serde::Serialize;
 
-use crate::case::subject::{Key, Subject};
+use crate::case::CaseError;
+use crate::case::{Case, Key};
+use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::parameter::Parameter;
 use crate::model::strobe::Strobe;
-use crate::model::{Model, ModelError};
 use crate::observe::Observables;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
 use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit};
@@ -52,7 +52,7 @@ pub enum ComparisonError {
     },
     /// The case makes no sense.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Model(#[from] CaseError),
     /// There is no such orbit.
     #[error(transparent)]
     Orbit(#[from] OrbitError),
@@ -173,7 +173,7 @@ fn motion(
     options: &ComparisonOptions,
     control: &Control<'_>,
 ) -> Result<SampleMotion, ComparisonError> {
-    let model = Model::cantilever(&case)?;
+    let model = Model::cantilever(&case).map_err(CaseError::from)?;
     let rest = vec![0.0; model.dimension()];
     let mut map = Strobe::new(&model);
     let named = Named::of(&settle(&mut map, &rest, &SettleOptions::default()).verdict);
@@ -209,15 +209,15 @@ fn followed(
     (from, to): (f64, f64),
     control: &Control<'_>,
 ) -> Result<BranchReport, ComparisonError> {
-    let key = Key::Cantilever(Parameter::Omega);
+    let key = Key::Omega;
     let options = BranchOptions::over(key, from, to);
     // Closed already: this only puts it in the form that branches begin with.
     let seed = close_orbit(map, &found.state, found.period, &ShootingOptions::default())
         .map_err(OrbitError::from)?;
-    let subject = Subject::Cantilever(case.clone());
+    let case = Case::from(case.clone());
     Ok(branches_through(
-        &subject,
-        &[(case.omega, seed)],
+        &case,
+        &[(case.omega(), seed)],
         &options,
         control,
     )?)
@@ -273,6 +273,7 @@ impl From<ComparisonError> for crate::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::parameter::Parameter;
 
     /// The loop's area is the energy that the sample takes, less what a surface loses while
     /// it recovers.

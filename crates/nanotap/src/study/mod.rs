@@ -14,7 +14,6 @@ pub mod orbit;
 pub mod setpoint;
 pub mod simulate;
 pub mod start_box;
-pub mod studied;
 pub mod sweep;
 pub mod window;
 

@@ -13,13 +13,14 @@ use nanotap_dynamics::{Control, PeriodicOrbit, ShootingOptions, close_orbit_from
 use serde::Serialize;
 
 use super::approach::{
-    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Way, approach, gap_key,
+    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Way, approach,
 };
+use crate::case::Case;
+use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
 use crate::model::strobe::Strobe;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::branch::PointReport;
-use crate::study::studied::Studied;
 
 /// Why no distance was chosen.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -156,23 +157,20 @@ const POINTS: usize = 60;
 ///
 /// # Errors
 /// [`SetpointError`] when there is none to solve, or none is reached on approach.
-pub fn solve_setpoint(
-    studied: &Studied,
-    control: &Control<'_>,
-) -> Result<SetpointReport, SetpointError> {
-    let resolved = studied.resolved.as_ref().ok_or(SetpointError::None)?;
-    let ratio = resolved.setpoint.ok_or(SetpointError::None)?;
+pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, SetpointError> {
+    let view = case.physical().ok_or(SetpointError::None)?;
+    let ratio = view.setpoint.ok_or(SetpointError::None)?;
     let options = ApproachOptions {
         points: POINTS,
         ..ApproachOptions::default()
     };
-    let curve = approach(studied, &options, control)?;
+    let curve = approach(case, &options, control)?;
     if curve.cancelled {
         return Err(SetpointError::Cancelled);
     }
     let target = ratio * curve.free_amplitude;
     let (before, after) = bracket(&curve, ratio, target)?;
-    let mut solutions = all_solutions(studied, &curve, target);
+    let mut solutions = all_solutions(case, &curve, target);
     // What the approach reaches lies between two of its distances, on a branch that attracts.
     let step = before.gap - after.gap;
     let reached = solutions
@@ -202,10 +200,39 @@ pub fn solve_setpoint(
     solutions[chosen].reached = true;
     Ok(SetpointReport {
         ratio,
-        amplitude: ratio * resolved.free_amplitude,
+        amplitude: ratio * view.free_amplitude,
         solutions,
         chosen,
     })
+}
+
+/// The case at the distance where its setpoint is reached, and how that was found; a case
+/// that does not leave its distance to a setpoint stays as it is.
+///
+/// # Errors
+/// As [`solve_setpoint`].
+pub fn at_setpoint(
+    case: Case,
+    control: &Control<'_>,
+) -> Result<(Case, Option<SetpointReport>), SetpointError> {
+    if !case.leaves_distance_to_setpoint() {
+        return Ok((case, None));
+    }
+    let report = solve_setpoint(&case, control)?;
+    let there = case.at_distance(report.zc(), report.remark());
+    let there = there.map_err(|error| ApproachError::Model(Box::new(error).into()))?;
+    Ok((there, Some(report)))
+}
+
+/// A case as a document, with how its setpoint was solved for the distance.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolvedCase {
+    /// The case.
+    #[serde(flatten)]
+    pub case: CaseDocument,
+    /// How its setpoint was solved, if it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setpoint_solved: Option<SetpointReport>,
 }
 
 /// The distance of a point in words.
@@ -248,7 +275,7 @@ fn bracket(
 }
 
 /// Every crossing of the target on every branch, the farthest first.
-fn all_solutions(studied: &Studied, curve: &ApproachReport, target: f64) -> Vec<SetpointSolution> {
+fn all_solutions(case: &Case, curve: &ApproachReport, target: f64) -> Vec<SetpointSolution> {
     let Some(branches) = &curve.branches else {
         return Vec::new();
     };
@@ -259,7 +286,7 @@ fn all_solutions(studied: &Studied, curve: &ApproachReport, target: f64) -> Vec<
         if a.branch != b.branch || (excess(a) > 0.0) == (excess(b) > 0.0) {
             continue;
         }
-        if let Some(solution) = crossing(studied, a, b, target) {
+        if let Some(solution) = crossing(case, a, b, target) {
             let near = 1e-9 * curve.free_reach.max(solution.gap.abs());
             let known = |s: &SetpointSolution| {
                 s.period == solution.period
@@ -280,12 +307,12 @@ const STEPS: usize = 60;
 
 /// The orbit between two points of a branch that has the target amplitude.
 fn crossing(
-    studied: &Studied,
+    case: &Case,
     a: &PointReport,
     b: &PointReport,
     target: f64,
 ) -> Option<SetpointSolution> {
-    let resolved = studied.resolved.as_ref()?;
+    let view = case.physical()?;
     let (mut low, mut high) = (
         (0.0, a.observables.first_harmonic),
         (1.0, b.observables.first_harmonic),
@@ -300,7 +327,7 @@ fn crossing(
         } else {
             0.5 * (low.0 + high.0)
         };
-        let (gap, orbit, observables) = orbit_between(studied, a, b, t)?;
+        let (gap, orbit, observables) = orbit_between(case, a, b, t)?;
         let value = observables.first_harmonic;
         closed = Some((gap, orbit, observables));
         if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
@@ -319,28 +346,27 @@ fn crossing(
     }
     Some(SetpointSolution {
         gap,
-        zc: gap * resolved.scales.length,
+        zc: gap * view.scales.length,
         period: orbit.period,
         stable: orbit.is_stable(),
         spectral_radius: orbit.spectral_radius(),
         reached: false,
         state: orbit.states.first().cloned().unwrap_or_default(),
-        physical: PhysicalMotion::of(&observables, resolved),
+        physical: PhysicalMotion::of(&observables, view),
         observables,
     })
 }
 
 /// The orbit at a share `t` of the way from one point of a branch to the next.
 fn orbit_between(
-    studied: &Studied,
+    case: &Case,
     a: &PointReport,
     b: &PointReport,
     t: f64,
 ) -> Option<(f64, PeriodicOrbit, Observables)> {
     use nanotap_dynamics::StroboscopicMap as _;
     let gap = a.parameter + t * (b.parameter - a.parameter);
-    let subject = &studied.subject;
-    let model = subject.with(gap_key(subject), gap).model().ok()?;
+    let model = case.with(case.gap_key(), gap).model().ok()?;
     let mut map = Strobe::new(&model);
     let mut state: Vec<f64> = a
         .state

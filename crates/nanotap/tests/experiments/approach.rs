@@ -1,12 +1,11 @@
 //! Approach curves.
 
-use nanotap::case::file::{CaseFile, Source};
-use nanotap::case::physical::Catalogue;
+use nanotap::case::Case;
+use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::approach::{ApproachOptions, ApproachReport, Way, approach};
 use nanotap::study::simulate::Classification;
-use nanotap::study::studied::Studied;
 
 /// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
 pub(crate) const STIFF: &str = "\
@@ -27,17 +26,16 @@ free_amplitude = \"20 nm\"
 tip = \"15 nm\"
 ";
 
-pub(crate) fn studied(text: &str, set: &[&str]) -> Studied {
+pub(crate) fn studied(text: &str, set: &[&str]) -> Case {
     let source = Source {
         name: "case.toml".into(),
         text: text.into(),
     };
     let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
-    let file = CaseFile::parse(Some(source), &set).unwrap();
-    Studied::resolve("case".into(), file, &Catalogue::builtin().unwrap()).unwrap()
+    Case::parse(Some(source), &set).unwrap()
 }
 
-fn curve(studied: &Studied, options: &ApproachOptions) -> ApproachReport {
+fn curve(studied: &Case, options: &ApproachOptions) -> ApproachReport {
     approach(studied, options, &Control::default()).unwrap()
 }
 
@@ -100,7 +98,7 @@ fn a_physical_curve_is_told_in_si() {
         ..ApproachOptions::default()
     };
     let report = curve(&lever, &options);
-    let resolved = lever.resolved.as_ref().unwrap();
+    let resolved = lever.physical().unwrap();
     assert!((report.free_amplitude * resolved.scales.length / 20e-9 - 1.0).abs() < 1e-9);
     for p in &report.table {
         let (sight, si) = (
@@ -129,12 +127,7 @@ fn a_physical_curve_is_told_in_si() {
 /// recording.
 #[test]
 fn what_is_chaotic_is_called_so() {
-    let paper = Studied::resolve(
-        "paper".into(),
-        CaseFile::Dimensionless(Cantilever::paper()),
-        &Catalogue::builtin().unwrap(),
-    )
-    .unwrap();
+    let paper = Case::from(Cantilever::paper());
     let options = ApproachOptions {
         points: 4,
         branches: false,

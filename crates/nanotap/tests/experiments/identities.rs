@@ -13,7 +13,7 @@ use crate::approach::{STIFF, studied};
 /// identity without contact), with every tapping motion on the way to the sample.
 fn greatest_deviation(set: &[&str]) -> f64 {
     let lever = studied(STIFF, set);
-    let resolved = lever.resolved.as_ref().unwrap();
+    let resolved = lever.physical().unwrap();
     let (k, f0, q) = (
         resolved.lever.k,
         resolved.lever.f0,
@@ -97,7 +97,7 @@ fn the_setpoint_lies_on_the_approach_curve() {
     let text = STIFF.replace("[gap]\ntip = \"15 nm\"\n", "");
     let lever = studied(&text, &["drive.setpoint=0.6", "drive.frequency_ratio=1"]);
     let report = solve_setpoint(&lever, &Control::default()).unwrap();
-    let scale = lever.resolved.as_ref().unwrap().scales.length;
+    let scale = lever.physical().unwrap().scales.length;
     let options = ApproachOptions {
         from: Some((report.zc() + 1e-12) / scale),
         to: Some((report.zc() - 1e-12) / scale),

@@ -1,20 +1,16 @@
 //! Quantities of a physical case that vary.
 
-use nanotap::case::subject::{Family, Key, Subject};
+use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::model::parameter::Parameter;
-use nanotap::study::approach::gap_key;
 use nanotap::study::branch::{BranchOptions, branch};
-use nanotap::study::studied::Studied;
 use nanotap_dynamics::{DMatrix, MapFamily as _, StroboscopicMap as _};
 
 use crate::approach::{STIFF, studied};
 
-fn varying(lever: &Studied, key: &str, text: &str) -> (Studied, Key, f64) {
-    let varying = lever.varying(&[key]).unwrap();
-    let plain = varying.key(key).unwrap();
-    let (key, value) = varying.key_and_value(plain, text).unwrap();
-    (varying, key, value)
+fn varied(lever: &Case, key: &str, text: &str) -> (Key, f64) {
+    let key = lever.key(key).unwrap();
+    (key, lever.value(key, text).unwrap())
 }
 
 /// A value set is the value that a case file would set; and what the drive was said by its
@@ -22,7 +18,7 @@ fn varying(lever: &Studied, key: &str, text: &str) -> (Studied, Key, f64) {
 #[test]
 fn a_quantity_set_is_the_case_with_that_quantity() {
     let lever = studied(STIFF, &[]);
-    let base = lever.resolved.as_ref().unwrap();
+    let base = lever.physical().unwrap();
     for (key, text, set) in [
         ("cantilever.Q", "300", "cantilever.Q=300"),
         ("sample.loss_tangent", "0.3", "sample.loss_tangent=0.3"),
@@ -34,10 +30,10 @@ fn a_quantity_set_is_the_case_with_that_quantity() {
             "drive.free_amplitude=30 nm",
         ),
     ] {
-        let (varying, key, value) = varying(&lever, key, text);
-        let found = varying.subject.with(key, value);
+        let (key, value) = varied(&lever, key, text);
+        let found = lever.with(key, value);
         let expected = studied(STIFF, &[set]);
-        let (found, expected) = (found.case().unwrap(), expected.resolved.unwrap().case);
+        let (found, expected) = (found.cantilever().unwrap(), expected.cantilever().unwrap());
         for parameter in [
             Parameter::Alpha1,
             Parameter::Alpha4,
@@ -53,19 +49,23 @@ fn a_quantity_set_is_the_case_with_that_quantity() {
         // In units of g0, which stays; the free amplitude is what the case file says unless
         // the lever itself changes.
         if set.starts_with("cantilever") {
-            assert_eq!(found.alpha2.to_bits(), base.case.alpha2.to_bits());
+            assert_eq!(found.alpha2.to_bits(), base.cantilever.alpha2.to_bits());
         } else {
             let ratio = found.alpha2 / expected.alpha2;
             let gaps = found.alpha5 / expected.alpha5;
             assert!((ratio / gaps - 1.0).abs() < 1e-9, "{set}: {ratio} {gaps}");
         }
     }
-    let (varying, key, value) = varying(&lever, "drive.frequency", "340 kHz");
-    let found = varying.subject.with(key, value).case().unwrap();
-    assert!((found.alpha2 / base.case.alpha2 - 1.0).abs() < 1e-12);
-    assert!((found.omega / base.case.omega - 340.0 / (330.0 * 1.001)).abs() < 1e-9);
+    let (key, value) = varied(&lever, "drive.frequency", "340 kHz");
+    let found = lever.with(key, value);
+    let found = found.cantilever().unwrap();
+    assert!((found.alpha2 / base.cantilever.alpha2 - 1.0).abs() < 1e-12);
+    assert!((found.omega / base.cantilever.omega - 340.0 / (330.0 * 1.001)).abs() < 1e-9);
     // The damper of a loss tangent changes with the frequency.
-    assert!((found.alpha6 * found.omega / (base.case.alpha6 * base.case.omega) - 1.0).abs() < 1e-9);
+    assert!(
+        (found.alpha6 * found.omega / (base.cantilever.alpha6 * base.cantilever.omega) - 1.0).abs()
+            < 1e-9
+    );
 }
 
 /// The derivative of the map with respect to a quantity, through all that it changes, against
@@ -81,11 +81,8 @@ fn derivatives_go_through_everything_that_a_quantity_changes() {
         ("sample.damping", "1e-6 N s/m"),
         ("drive.free_amplitude", "25 nm"),
     ] {
-        let (varying, key, value) = varying(&lever, name, text);
-        let family = Family {
-            subject: varying.subject.clone(),
-            key,
-        };
+        let (key, value) = varied(&lever, name, text);
+        let family = lever.family(key);
         let start = vec![-1.2e-3, 1e-5, 1e-4, 0.0];
         let mut state = start.clone();
         let (mut jacobian, mut found) = (DMatrix::zeros(4, 4), vec![0.0; 4]);
@@ -118,8 +115,8 @@ fn derivatives_go_through_everything_that_a_quantity_changes() {
 #[test]
 fn a_branch_in_metres_is_the_branch_in_the_models_units() {
     let lever = studied(STIFF, &[]);
-    let g0 = lever.resolved.as_ref().unwrap().scales.length;
-    let folds = |subject: &Subject, key: Key, unit: f64| -> Vec<f64> {
+    let g0 = lever.physical().unwrap().scales.length;
+    let folds = |subject: &Case, key: Key, unit: f64| -> Vec<f64> {
         let options = BranchOptions {
             period: Some(1),
             ..BranchOptions::over(key, 24e-9 / unit, 10e-9 / unit)
@@ -132,9 +129,9 @@ fn a_branch_in_metres_is_the_branch_in_the_models_units() {
             .map(|b| b.parameter * unit)
             .collect()
     };
-    let (metres, key, _) = varying(&lever, "gap.tip", "24 nm");
-    let found = folds(&metres.subject, key, 1.0);
-    let expected = folds(&lever.subject, gap_key(&lever.subject), g0);
+    let (key, _) = varied(&lever, "gap.tip", "24 nm");
+    let found = folds(&lever, key, 1.0);
+    let expected = folds(&lever, lever.gap_key(), g0);
     assert_eq!(found.len(), 2);
     for (a, b) in found.iter().zip(&expected) {
         assert!((a / b - 1.0).abs() < 1e-7, "{found:?} {expected:?}");
@@ -150,21 +147,51 @@ fn what_cannot_vary_is_refused_by_name() {
         ("drive.setpoint", "vary gap.tip"),
         ("lever.k", "there are cantilever.k"),
     ] {
-        let error = lever.varying(&[name]).unwrap_err().to_string();
+        let error = lever.key(name).unwrap_err().to_string();
         assert!(error.contains(words) && error.contains(name), "{error}");
     }
-    let (varying, key, value) = varying(&lever, "drive.frequency", "325 nm");
-    let error = varying
-        .subject
-        .with(key, value)
-        .model()
-        .unwrap_err()
-        .to_string();
+    let key = lever.key("drive.frequency").unwrap();
+    let error = lever.value(key, "325 nm").unwrap_err().to_string();
     assert!(
         error.contains("expected a frequency") && error.contains("a length"),
         "{error}"
     );
-    // Beside a quantity there are only quantities.
-    let error = varying.key("omega").unwrap_err().to_string();
-    assert!(error.contains("drive.frequency"), "{error}");
+    // Numbers of the equations vary beside quantities, as numbers.
+    let both = lever.with(key, 340e3).with(Key::Alpha4, 3.0);
+    assert_eq!(both.get(Key::Alpha4), 3.0);
+    assert_eq!(both.physical().unwrap().parameters.drive_frequency, 340e3);
+    let none = lever.with(key, -1.0).model().unwrap_err().to_string();
+    assert!(
+        none.contains("drive.frequency") && none.contains("above zero"),
+        "{none}"
+    );
+}
+
+/// A varied value and the numbers that were held, set beside the case file, are the same case.
+#[test]
+fn what_was_held_makes_a_point_again() {
+    let lever = studied(STIFF, &[]);
+    for (name, text) in [
+        ("drive.frequency", "340 kHz"),
+        ("cantilever.k", "30 N/m"),
+        ("gap.tip", "12 nm"),
+        ("drive.free_amplitude", "25 nm"),
+    ] {
+        let (key, value) = varied(&lever, name, text);
+        let found = lever.with(key, value);
+        let mut words = vec![format!("{name}={text}")];
+        for (held, value) in lever.held(key) {
+            words.push(format!("{held}={}", held.kind().format_exact(value)));
+        }
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let again = studied(STIFF, &words);
+        for parameter in Parameter::every() {
+            let at = |case: &Case| case.cantilever().unwrap().get(parameter);
+            let (a, b) = (at(&found), at(&again));
+            assert!(
+                (a - b).abs() <= 1e-12 * b.abs(),
+                "{words:?}: {parameter} {a} {b}"
+            );
+        }
+    }
 }

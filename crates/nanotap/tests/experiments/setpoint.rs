@@ -1,14 +1,15 @@
 //! Setpoints solved for the distance.
 
+use nanotap::case::Case;
+use nanotap::case::file::Source;
 use nanotap::control::Control;
-use nanotap::study::approach::gap_key;
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap::study::setpoint::{SetpointError, solve_setpoint};
+use nanotap::study::setpoint::{SetpointError, at_setpoint, solve_setpoint};
 
 use crate::approach::{STIFF, studied};
 
 /// Without `gap.tip`, the setpoint decides.
-fn held(set: &[&str]) -> nanotap::study::studied::Studied {
+fn held(set: &[&str]) -> nanotap::case::Case {
     studied(&STIFF.replace("[gap]\ntip = \"15 nm\"\n", ""), set)
 }
 
@@ -21,27 +22,22 @@ fn every_solution_has_the_amplitude_of_the_setpoint() {
     let report = solve_setpoint(&lever, &Control::default()).unwrap();
     assert!((report.amplitude / 16e-9 - 1.0).abs() < 1e-12);
     for solution in &report.solutions {
-        let model = lever
-            .subject
-            .with(gap_key(&lever.subject), solution.gap)
-            .model()
-            .unwrap();
+        let model = lever.with(lever.gap_key(), solution.gap).model().unwrap();
         let options = OrbitOptions {
             period: Some(solution.period),
             state: Some(solution.state.clone()),
             ..OrbitOptions::default()
         };
         let found = orbit(&model, &options).unwrap();
-        let amplitude =
-            found.observables.first_harmonic * lever.resolved.as_ref().unwrap().scales.length;
+        let amplitude = found.observables.first_harmonic * lever.physical().unwrap().scales.length;
         assert!((amplitude / 16e-9 - 1.0).abs() < 1e-9, "{amplitude}");
         assert_eq!(found.stable, solution.stable);
     }
     let zc = report.zc();
     // The tip taps on the surface: the distance is a little less than the amplitude.
     assert!(zc > 14e-9 && zc < 16e-9, "{zc}");
-    let at = lever.at_setpoint(&Control::default()).unwrap();
-    let resolved = at.resolved.as_ref().unwrap();
+    let (at, _) = at_setpoint(lever, &Control::default()).unwrap();
+    let resolved = at.physical().unwrap();
     assert!((resolved.parameters.tip_gap / zc - 1.0).abs() < 1e-12);
     let found = orbit(&at.model().unwrap(), &OrbitOptions::default()).unwrap();
     let ratio = found.observables.first_harmonic * resolved.scales.length / 20e-9;
@@ -62,12 +58,24 @@ fn a_setpoint_that_is_not_reached_is_refused() {
     ));
 }
 
-/// A distance that is given is not overruled.
+/// A distance that is given is not overruled, and a setpoint set beside the file takes its
+/// place; a case that states both is refused.
 #[test]
-fn a_given_distance_stays() {
-    let lever = studied(STIFF, &["drive.setpoint=0.8"]);
-    assert!(!lever.leaves_distance_to_setpoint());
-    let same = lever.clone().at_setpoint(&Control::default()).unwrap();
-    assert!(same.setpoint.is_none());
-    assert_eq!(same.subject, lever.subject);
+fn a_distance_and_a_setpoint_are_two_ways_to_say_one_thing() {
+    let lever = studied(STIFF, &[]);
+    let (same, report) = at_setpoint(lever.clone(), &Control::default()).unwrap();
+    assert!(report.is_none());
+    assert_eq!(same, lever);
+    assert!(studied(STIFF, &["drive.setpoint=0.8"]).leaves_distance_to_setpoint());
+    let both = STIFF.replace("[drive]", "[drive]\nsetpoint = 0.8");
+    assert_ne!(both, STIFF);
+    let source = Source {
+        name: "case.toml".into(),
+        text: both,
+    };
+    let refused = Case::parse(Some(source), &[]).unwrap_err().to_string();
+    assert!(
+        refused.contains("drive.setpoint and gap.tip cannot both be given"),
+        "{refused}"
+    );
 }

@@ -1,6 +1,6 @@
 //! What must hold of every contact law.
 
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
@@ -91,7 +91,7 @@ fn derivatives_of_every_law() {
                 alpha5: 0.02,
                 ..on(law, 2.6)
             };
-            let subject = Subject::Cantilever(case.with_modes(modes));
+            let subject = Case::from(case.with_modes(modes));
             let model = subject.model().unwrap();
             let mut state = vec![0.0; model.dimension()];
             for _ in 0..5 {
@@ -202,7 +202,7 @@ fn without_a_damper_every_law_is_the_papers_spring() {
         ..spring.clone()
     };
     let [expected, recovered, relaxed] = [spring, recovers, solid].map(|case| {
-        let subject = Subject::Cantilever(case);
+        let subject = Case::from(case);
         let mut state = vec![0.0; subject.model().unwrap().dimension()];
         (0..20).for_each(|_| state = advance(&subject, &state));
         state
@@ -216,7 +216,7 @@ fn without_a_damper_every_law_is_the_papers_spring() {
 /// A law's further parameters can be varied like the paper's.
 #[test]
 fn a_case_has_the_parameters_of_its_law() {
-    let of = |law| Subject::Cantilever(on(law, 2.6));
+    let of = |law| Case::from(on(law, 2.6));
     let names = |law| -> Vec<&str> { of(law).keys().iter().map(|k| k.name()).collect() };
     assert!(names(ContactLaw::KelvinVoigt).contains(&"alpha6"));
     let solid = names(ContactLaw::StandardLinearSolid);

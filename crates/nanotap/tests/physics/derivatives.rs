@@ -2,7 +2,7 @@
 //! at grazing.
 
 use nalgebra::DMatrix;
-use nanotap::case::subject::{Key, Subject};
+use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
@@ -10,7 +10,7 @@ use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 use nanotap_flow::Flow;
 
-pub(crate) fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
+pub(crate) fn advance(subject: &Case, state: &[f64]) -> Vec<f64> {
     let mut x = state.to_vec();
     Strobe::new(&subject.model().unwrap())
         .advance(&mut x)
@@ -20,7 +20,7 @@ pub(crate) fn advance(subject: &Subject, state: &[f64]) -> Vec<f64> {
 
 /// Largest relative difference between the exact derivative and a fourth-order central
 /// difference, over the Jacobian and every parameter.
-pub(crate) fn worst(subject: &Subject, state: &[f64]) -> f64 {
+pub(crate) fn worst(subject: &Case, state: &[f64]) -> f64 {
     let model = subject.model().unwrap();
     let keys: Vec<Key> = subject.keys();
     let tangents: Vec<_> = keys
@@ -73,7 +73,7 @@ fn cantilever_with_contacts() {
         ..Cantilever::paper()
     };
     for modes in [1, 3, 5] {
-        let subject = Subject::Cantilever(case.clone().with_modes(modes));
+        let subject = Case::from(case.clone().with_modes(modes));
         let mut state = vec![0.0; 2 * modes];
         for _ in 0..5 {
             state = advance(&subject, &state);
@@ -91,7 +91,7 @@ fn oscillators_with_soft_and_rigid_stops() {
     };
     let rigid = Stop::Rigid { restitution: 0.8 };
     for stop in [soft, rigid] {
-        let subject = Subject::Oscillator(Oscillator {
+        let subject = Case::from(Oscillator {
             mass: 1.3,
             stiffness: 1.1,
             damping: 0.15,
@@ -110,7 +110,7 @@ fn oscillators_with_soft_and_rigid_stops() {
 #[test]
 fn critically_damped_contact() {
     // m = 1, k + k₁ = 16, c + c₁ = 8: a double eigenvalue −4.
-    let subject = Subject::Oscillator(Oscillator {
+    let subject = Case::from(Oscillator {
         mass: 1.0,
         stiffness: 1.0,
         damping: 0.2,
@@ -155,7 +155,7 @@ fn grazing_is_of_the_three_halves_type() {
             alpha5: 1.0 - lowest.value - depth,
             ..free.clone()
         };
-        let state = advance(&Subject::Cantilever(case), &start);
+        let state = advance(&Case::from(case), &start);
         state
             .iter()
             .zip(&unhindered)

@@ -1,7 +1,7 @@
 //! Drives through the base and on the lever itself, with one tone and two.
 
+use nanotap::case::Case;
 use nanotap::case::physical::free_response::response_at;
-use nanotap::case::subject::Subject;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
@@ -121,7 +121,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
                 relaxation_time: sample.relaxation_time,
                 ..two_tones(actuation)
             };
-            let subject = Subject::Cantilever(case);
+            let subject = Case::from(case);
             let model = subject.model().unwrap();
             let mut state = vec![0.0; model.dimension()];
             state[0] = 0.1;

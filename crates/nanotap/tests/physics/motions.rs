@@ -1,10 +1,10 @@
 //! Which motions there are, and where they change: the analysis joined to the model.
 
-use nanotap::case::subject::{Key, PlaneFamily, Subject};
+use nanotap::case::{Case, Key, PlaneFamily};
 use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
@@ -27,7 +27,7 @@ fn over(key: Key, from: f64, to: f64) -> BranchOptions {
     }
 }
 
-fn flips(subject: &Subject, options: &BranchOptions) -> Vec<f64> {
+fn flips(subject: &Case, options: &BranchOptions) -> Vec<f64> {
     branch(subject, options, &Control::default())
         .unwrap()
         .bifurcations
@@ -41,8 +41,8 @@ fn flips(subject: &Subject, options: &BranchOptions) -> Vec<f64> {
 /// side, and with the period asked for or found.
 #[test]
 fn the_period_1_orbit_doubles_at_the_same_points_from_either_side() {
-    let subject = Subject::Cantilever(at(3.0));
-    let key = Key::Cantilever(Parameter::Omega);
+    let subject = Case::from(at(3.0));
+    let key = Key::Omega;
     let down = flips(&subject, &over(key, 3.0, 2.45));
     let mut up = flips(&subject, &over(key, 2.45, 3.0));
     up.reverse();
@@ -70,10 +70,10 @@ fn the_rigid_stop_is_the_limit_of_stiff_ones() {
         gap: 0.0,
         stop: Stop::Rigid { restitution: 0.8 },
     };
-    let key = Key::Oscillator(OscillatorParameter::Omega);
-    let limit = flips(&Subject::Oscillator(rigid), &over(key, 2.0, 2.9));
+    let key = Key::OscillatorOmega;
+    let limit = flips(&Case::from(rigid), &over(key, 2.0, 2.9));
     assert!((limit[0] - 2.653_347_7).abs() < 1e-7, "{limit:?}");
-    let low = flips(&Subject::Oscillator(rigid), &over(key, 2.0, 1.1));
+    let low = flips(&Case::from(rigid), &over(key, 2.0, 1.1));
     assert!((low[0] - 1.260_676_6).abs() < 1e-7, "{low:?}");
     // r = e^{−πζ/√(1 − ζ²)} of the contact's own half swing.
     let ratio = -0.8f64.ln() / std::f64::consts::PI;
@@ -86,7 +86,7 @@ fn the_rigid_stop_is_the_limit_of_stiff_ones() {
                 stop: Stop::Soft { stiffness, damping },
                 ..rigid
             };
-            let found = flips(&Subject::Oscillator(soft), &over(key, 2.0, 2.9));
+            let found = flips(&Case::from(soft), &over(key, 2.0, 2.9));
             (found[0] - limit[0]).abs()
         })
         .collect();
@@ -244,12 +244,9 @@ fn sections_are_of_the_motion() {
 /// Derivatives to both parameters of a plane against central differences.
 #[test]
 fn a_plane_of_parameters_has_the_derivatives_of_its_map() {
-    let keys = [
-        Key::Cantilever(Parameter::Omega),
-        Key::Cantilever(Parameter::Alpha4),
-    ];
+    let keys = [Key::Omega, Key::Alpha4];
     let family = PlaneFamily {
-        subject: Subject::Cantilever(at(3.0)),
+        case: Case::from(at(3.0)),
         keys,
     };
     let values = [3.0, 20.0];

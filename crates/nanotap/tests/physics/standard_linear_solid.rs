@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
@@ -19,7 +19,7 @@ fn solid() -> Cantilever {
 }
 
 fn after(case: &Cantilever, periods: usize) -> Vec<f64> {
-    let subject = Subject::Cantilever(case.clone());
+    let subject = Case::from(case.clone());
     let mut state = vec![0.0; subject.model().unwrap().dimension()];
     (0..periods).for_each(|_| state = advance(&subject, &state));
     state

@@ -1,6 +1,6 @@
 //! Basins on slices.
 
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
@@ -10,8 +10,8 @@ use std::sync::atomic::AtomicBool;
 
 use crate::folder::{Folder, assert_same};
 
-fn bistable() -> Subject {
-    Subject::Cantilever(Cantilever {
+fn bistable() -> Case {
+    Case::from(Cantilever {
         omega: 20.0,
         alpha1: 0.0,
         ..Cantilever::paper()
@@ -28,7 +28,7 @@ fn slice(nx: usize, ny: usize) -> BasinOptions {
 }
 
 fn computed(
-    subject: &Subject,
+    subject: &Case,
     options: &BasinOptions,
     path: &std::path::Path,
     threads: usize,

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
@@ -13,7 +13,7 @@ use crate::folder::{Folder, assert_same, bytes};
 
 /// 24 values of Ω × 3 starts, cut into 24 chunks.
 fn sweep(follow: Follow) -> Sweep {
-    let subject = Subject::Cantilever(Cantilever::paper());
+    let subject = Case::from(Cantilever::paper());
     let over = vec![Over::parse("omega=2.8:3.2:24", &subject).unwrap()];
     let options = SweepOptions {
         starts: Starts::Seeded {
@@ -205,7 +205,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
             starts,
             ..sweep.options().clone()
         };
-        let other = Sweep::new(Subject::Cantilever(case), options).unwrap();
+        let other = Sweep::new(Case::from(case), options).unwrap();
         Store::create_or_resume(&path, other.schema().clone())
             .unwrap_err()
             .to_string()
@@ -247,7 +247,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
 
     // The case's own value of the parameter that varies does not matter.
     let same = Sweep::new(
-        Subject::Cantilever(Cantilever {
+        Case::from(Cantilever {
             omega: 9.0,
             ..Cantilever::paper()
         }),
@@ -261,7 +261,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         periods: 9,
         ..sweep.options().clone()
     };
-    let longer = Sweep::new(Subject::Cantilever(Cantilever::paper()), options).unwrap();
+    let longer = Sweep::new(Case::from(Cantilever::paper()), options).unwrap();
     Store::create_or_resume(&second, longer.schema().clone()).unwrap();
     let message = merge(&[path.clone(), second], &folder.join("m"))
         .unwrap_err()

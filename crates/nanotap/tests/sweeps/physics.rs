@@ -1,6 +1,6 @@
 //! What sweeps find, against what is known of the model.
 
-use nanotap::case::subject::Subject;
+use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
@@ -19,7 +19,7 @@ struct Swept {
 }
 
 impl Swept {
-    fn of(subject: &Subject, over: &[&str], change: impl FnOnce(&mut SweepOptions)) -> Self {
+    fn of(subject: &Case, over: &[&str], change: impl FnOnce(&mut SweepOptions)) -> Self {
         let over = over
             .iter()
             .map(|o| Over::parse(o, subject).unwrap())
@@ -94,8 +94,8 @@ impl Swept {
     }
 }
 
-fn paper(omega: f64, alpha1: f64) -> Subject {
-    Subject::Cantilever(Cantilever {
+fn paper(omega: f64, alpha1: f64) -> Case {
+    Case::from(Cantilever {
         omega,
         alpha1,
         ..Cantilever::paper()
@@ -315,11 +315,7 @@ fn the_impact_oscillator_flips_where_it_should() {
         gap: 0.0,
         stop: Stop::Rigid { restitution: 0.8 },
     };
-    let swept = Swept::of(
-        &Subject::Oscillator(oscillator),
-        &["omega=2.64:2.665:6"],
-        |_| {},
-    );
+    let swept = Swept::of(&Case::from(oscillator), &["omega=2.64:2.665:6"], |_| {});
     for (k, period) in swept.column("period").iter().enumerate() {
         let omega = 2.64 + 0.005 * k as f64;
         let expected = if omega < 2.653_347_7 { 1.0 } else { 2.0 };

@@ -128,7 +128,7 @@ impl Document {
     /// There is no `=`, no key or no value.
     pub fn set(&mut self, written: &str) -> Result<(), Problem> {
         let place = Place::Override(written.to_owned());
-        let shape = "write a key and a value, as in --set omega=2.6";
+        let shape = "write a key and a value, as in omega=2.6";
         let Some((name, value)) = written.split_once('=') else {
             return Err(Problem::new(place, "no `=` in it").help(shape));
         };
@@ -141,7 +141,11 @@ impl Document {
             return Err(Problem::new(place, "no value after the `=`").help(shape));
         }
         let parsed = DeValue::parse(value).map_or_else(
-            |_| Value::Text(value.to_owned()),
+            // Shorter ways to write a number than TOML's: .1, 1.
+            |_| {
+                let number = value.parse().map(Value::Number);
+                number.unwrap_or_else(|_| Value::Text(value.to_owned()))
+            },
             |value| judge(value.get_ref()),
         );
         self.entries.push(Entry {
@@ -238,6 +242,8 @@ mod tests {
     fn set_reads_numbers_quantities_and_bare_words() {
         assert_eq!(value_of("3"), Value::Integer(3));
         assert_eq!(value_of("2.6"), Value::Number(2.6));
+        assert_eq!(value_of(".1"), Value::Number(0.1));
+        assert_eq!(value_of("-2."), Value::Number(-2.0));
         assert_eq!(value_of("1e999"), Value::Number(f64::INFINITY));
         assert_eq!(value_of("99999999999999999999"), Value::Number(1e20));
         assert!(matches!(value_of("nan"), Value::Number(number) if number.is_nan()));

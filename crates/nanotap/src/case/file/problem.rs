@@ -47,6 +47,10 @@ pub struct Problem {
     pub label: String,
     /// What would be right.
     pub help: Option<String>,
+    /// The key that it is about, as `section.key` of a physical case.
+    pub key: Option<&'static str>,
+    /// `key=value` words that would do, after the help.
+    pub words: Vec<String>,
 }
 
 impl Problem {
@@ -57,7 +61,23 @@ impl Problem {
             message: message.into(),
             label: String::new(),
             help: None,
+            key: None,
+            words: Vec::new(),
         }
+    }
+
+    /// The same about a key.
+    #[must_use]
+    pub const fn key(mut self, key: Option<&'static str>) -> Self {
+        self.key = key;
+        self
+    }
+
+    /// The same, with `key=value` words that would do after the help.
+    #[must_use]
+    pub fn words(mut self, words: Vec<String>) -> Self {
+        self.words = words;
+        self
     }
 
     /// The same, with words that stand under the place.
@@ -75,14 +95,41 @@ impl Problem {
     }
 }
 
-/// A case that cannot be used: everything that is wrong with it, in the order in
-/// which it stands in the file.
+/// Most problems that are shown of one case: whoever mends these sees the others next.
+pub const SHOWN: usize = 20;
+
+/// A case that cannot be used: what is wrong with it, in the order in which it stands in
+/// the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CaseFileError {
     /// The case file, where there is one and it could be read.
     pub source: Option<Source>,
-    /// At least one problem.
+    /// From one to [`SHOWN`] problems.
     pub problems: Vec<Problem>,
+    /// How many more there are.
+    pub more: usize,
+}
+
+/// Problems as they are found; of those beyond [`SHOWN`] only the number is kept.
+#[derive(Debug, Default)]
+pub(super) struct Problems {
+    pub(super) found: Vec<Problem>,
+    pub(super) more: usize,
+}
+
+impl Problems {
+    /// Adds one, worked out only where it will be shown.
+    pub(super) fn add(&mut self, problem: impl FnOnce() -> Problem) {
+        if self.found.len() < SHOWN {
+            self.found.push(problem());
+        } else {
+            self.more += 1;
+        }
+    }
+
+    pub(super) const fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
 }
 
 impl CaseFileError {
@@ -91,17 +138,33 @@ impl CaseFileError {
         Self {
             source,
             problems: vec![problem],
+            more: 0,
         }
     }
 
     /// All of `problems`, sorted by where they stand.
     pub fn all(source: Option<Source>, mut problems: Vec<Problem>) -> Self {
+        let more = problems.len().saturating_sub(SHOWN);
         problems.sort_by_key(|problem| match &problem.place {
             Place::Span(span) => span.start,
             Place::Override(_) => usize::MAX - 1,
             Place::Whole => usize::MAX,
         });
-        Self { source, problems }
+        problems.truncate(SHOWN);
+        Self {
+            source,
+            problems,
+            more,
+        }
+    }
+
+    /// Those that were collected.
+    pub(super) fn of(source: Option<Source>, problems: Problems) -> Self {
+        let error = Self::all(source, problems.found);
+        Self {
+            more: error.more + problems.more,
+            ..error
+        }
     }
 }
 
@@ -116,14 +179,20 @@ impl fmt::Display for CaseFileError {
                     let (line, column) = source.line_and_column(span.start);
                     write!(formatter, "{}:{line}:{column}: ", source.name)?;
                 }
-                (Place::Override(written), _) => write!(formatter, "--set {written}: ")?,
+                (Place::Override(written), _) => write!(formatter, "{written}: ")?,
                 (_, Some(source)) => write!(formatter, "{}: ", source.name)?,
                 (_, None) => {}
             }
             write!(formatter, "{}", problem.message)?;
             if let Some(help) = &problem.help {
                 write!(formatter, "; {help}")?;
+                if !problem.words.is_empty() {
+                    write!(formatter, " {}", problem.words.join(", "))?;
+                }
             }
+        }
+        if self.more > 0 {
+            write!(formatter, "\nand {} more", self.more)?;
         }
         Ok(())
     }
@@ -139,14 +208,32 @@ impl From<CaseFileError> for crate::Error {
             Place::Override(written) => ErrorPlace::Override(written),
             Place::Whole => ErrorPlace::Whole,
         };
-        let problems = error.problems.into_iter().map(|problem| ErrorProblem {
-            place: place(problem.place),
-            message: problem.message,
-            label: problem.label,
-            remedy: problem.help,
-        });
+        let in_file = error.source.is_some();
+        let remedy = |help: String, words: &[String]| match words {
+            [] => help,
+            words if in_file => format!("{help} {}", words.join(", ")),
+            words => format!("{help} {{set}} {}", words.join(" {set} ")),
+        };
+        let mut problems: Vec<ErrorProblem> = error
+            .problems
+            .into_iter()
+            .map(|problem| ErrorProblem {
+                place: place(problem.place),
+                message: problem.message,
+                label: problem.label,
+                remedy: problem.help.map(|help| remedy(help, &problem.words)),
+            })
+            .collect();
+        if error.more > 0 {
+            problems.push(ErrorProblem {
+                place: ErrorPlace::Whole,
+                message: format!("and {} more problems", error.more),
+                label: String::new(),
+                remedy: None,
+            });
+        }
         Self {
-            problems: problems.collect(),
+            problems,
             source: error.source.map(|source| SourceText {
                 name: source.name,
                 text: source.text,

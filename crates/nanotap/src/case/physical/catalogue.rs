@@ -16,14 +16,16 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::{Arc, LazyLock};
 
 use serde::Deserialize;
 
 use super::error::PhysicalError;
 use super::lever::BeamGeometry;
-use super::quantity::{Kind, QuantityError};
 use super::sample::Elastic;
+use crate::case::key::Key;
 use crate::case::near_name::near_names;
+use crate::case::quantity::{Kind, QuantityError};
 
 /// A lever as its box describes it. No quality factor: that depends on what surrounds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -162,6 +164,13 @@ impl Catalogue {
         Ok(catalogue)
     }
 
+    /// The same, read once.
+    pub fn shared() -> Arc<Self> {
+        static BUILTIN: LazyLock<Arc<Catalogue>> =
+            LazyLock::new(|| Arc::new(Catalogue::builtin().unwrap_or_default()));
+        Arc::clone(&BUILTIN)
+    }
+
     /// Adds the entries of a TOML text; entries of the same name are replaced. `origin` names
     /// it in messages.
     ///
@@ -214,7 +223,7 @@ impl Catalogue {
     ///
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
-    pub fn lever(&self, key: &str, name: &str) -> Result<&Lever, PhysicalError> {
+    pub fn lever(&self, key: Key, name: &str) -> Result<&Lever, PhysicalError> {
         let wanted = folded(name);
         self.levers
             .get(&wanted)
@@ -233,7 +242,7 @@ impl Catalogue {
     ///
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
-    pub fn material(&self, key: &str, name: &str) -> Result<&Material, PhysicalError> {
+    pub fn material(&self, key: Key, name: &str) -> Result<&Material, PhysicalError> {
         let wanted = folded(name);
         self.materials
             .get(&wanted)
@@ -255,7 +264,7 @@ fn answers(aliases: &[String], wanted: &str) -> bool {
 }
 
 fn unknown<'a>(
-    key: &str,
+    key: Key,
     name: &str,
     what: &'static str,
     known: impl Iterator<Item = (&'a String, &'a Vec<String>)>,
@@ -272,7 +281,7 @@ fn unknown<'a>(
         None => format!("known are {}", names.join(", ")),
     };
     PhysicalError::UnknownName {
-        key: key.to_owned(),
+        key,
         name: name.to_owned(),
         what,
         suggestion,

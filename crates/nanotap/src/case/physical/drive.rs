@@ -1,9 +1,11 @@
 //! The drive, at the clamped end or on the lever itself, and the gaps to the sample.
 
 use super::error::PhysicalError;
-use super::quantity::{Kind, Quantity};
-use super::section::{Reader, Sections};
-use crate::model::drive_form::{Actuation, FrequencyRatio, RatioError, UnknownActuation};
+use super::reader::Reader;
+use crate::case::key::Key;
+use crate::case::quantity::Kind;
+use crate::case::stated::Value;
+use crate::model::drive_form::{Actuation, FrequencyRatio, RatioError};
 
 /// Frequency of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +85,7 @@ impl SecondFrequency {
                     _ => String::new(),
                 };
                 PhysicalError::impossible(
-                    "drive.second_frequency",
+                    Key::SecondFrequency,
                     Kind::Frequency.format_digits(second, 12),
                     format!("{error}; say that by drive.second_ratio{nearest}"),
                 )
@@ -92,136 +94,95 @@ impl SecondFrequency {
     }
 }
 
-pub(crate) const DRIVE_KEYS: &[&str] = &[
-    "frequency",
-    "frequency_ratio",
-    "amplitude",
-    "force",
-    "free_amplitude",
-    "setpoint",
-    "actuation",
-    "second_frequency",
-    "second_ratio",
-    "second_amplitude",
-    "second_force",
-    "second_free_amplitude",
-    "second_phase",
-];
-
-pub(crate) const GAP_KEYS: &[&str] = &["tip", "beam"];
-
 impl Drive {
-    /// The section `[drive]`.
-    pub(crate) fn read(sections: &Sections) -> Result<Self, PhysicalError> {
-        let reader = Reader::new(sections, "drive", DRIVE_KEYS)?;
-        reader.not_both("frequency", "frequency_ratio", "each gives the frequency")?;
-        let frequency = reader.positive("frequency", Kind::Frequency)?;
-        let ratio = reader.positive("frequency_ratio", Kind::Number)?;
+    /// What `[drive]` says.
+    pub(crate) fn read(reader: Reader<'_>) -> Result<Self, PhysicalError> {
+        let frequency = reader.number(Key::DriveFrequency)?;
+        let ratio = reader.number(Key::DriveFrequencyRatio)?;
         let frequency = frequency
             .map(DriveFrequency::Absolute)
             .or(ratio.map(DriveFrequency::Ratio))
             .ok_or_else(|| {
                 PhysicalError::missing(
-                    reader.path("frequency"),
+                    Key::DriveFrequency,
                     "give it, or drive.frequency_ratio in units of f0",
                 )
             })?;
-        let actuation = read_actuation(&reader)?;
-        let strength = read_strength(&reader, actuation, ["amplitude", "force", "free_amplitude"])?
-            .ok_or_else(|| {
-                let (key, what) = match actuation {
-                    Actuation::Base => ("amplitude", "the amplitude of the clamped end"),
-                    _ => ("force", "the amplitude of the force on the lever"),
-                };
-                PhysicalError::missing(
-                    reader.path(key),
-                    format!("give {what}, or drive.free_amplitude of the tip"),
-                )
-            })?;
+        let actuation =
+            crate::case::file::word(reader.stated, Key::DriveActuation).unwrap_or_default();
+        let strength = read_strength(reader, actuation, FIRST)?.ok_or_else(|| {
+            let (key, what) = match actuation {
+                Actuation::Base => (Key::DriveAmplitude, "the amplitude of the clamped end"),
+                _ => (Key::DriveForce, "the amplitude of the force on the lever"),
+            };
+            PhysicalError::missing(
+                key,
+                format!("give {what}, or drive.free_amplitude of the tip"),
+            )
+        })?;
         Ok(Self {
             frequency,
             strength,
-            setpoint: read_setpoint(&reader)?,
+            setpoint: read_setpoint(reader)?,
             actuation,
-            second: read_second(&reader, actuation)?,
+            second: read_second(reader, actuation)?,
         })
     }
 }
 
-fn read_actuation(reader: &Reader<'_>) -> Result<Actuation, PhysicalError> {
-    reader
-        .text("actuation")
-        .map_or(Ok(Actuation::default()), |name| {
-            name.parse().map_err(|error: UnknownActuation| {
-                PhysicalError::impossible(reader.path("actuation"), name, error.to_string())
-            })
-        })
-}
+/// How the strength of a tone is stated: as the base's motion, as a force on the lever, as a
+/// free amplitude of the tip.
+pub(crate) const FIRST: [Key; 3] = [
+    Key::DriveAmplitude,
+    Key::DriveForce,
+    Key::DriveFreeAmplitude,
+];
+
+/// The same of a second tone.
+pub(crate) const SECOND: [Key; 3] = [
+    Key::SecondAmplitude,
+    Key::SecondForce,
+    Key::SecondFreeAmplitude,
+];
 
 /// A motion of the base, a force on the lever, or a free amplitude of the tip, under these
 /// keys.
 fn read_strength(
-    reader: &Reader<'_>,
+    reader: Reader<'_>,
     actuation: Actuation,
-    [motion, force, free]: [&'static str; 3],
+    [motion, force, free]: [Key; 3],
 ) -> Result<Option<DriveStrength>, PhysicalError> {
-    let (key, kind, other, why) = match actuation {
+    let (key, other, why) = match actuation {
         Actuation::Base => (
             motion,
-            Kind::Length,
             force,
             "a drive through the base has an amplitude, not a force; say drive.actuation = \
              \"tip\" or \"distributed\" for one on the lever itself",
         ),
         Actuation::Tip | Actuation::Distributed => (
             force,
-            Kind::Force,
             motion,
             "a drive on the lever itself has a force; the base is at rest",
         ),
     };
-    if let Some(text) = reader.text(other) {
-        return Err(PhysicalError::impossible(reader.path(other), text, why));
+    if reader.has(other) {
+        return Err(reader.impossible(other, why));
     }
-    reader.not_both(
-        key,
-        free,
-        "one follows from the other through the lever's free response",
-    )?;
-    let applied = reader.not_negative(key, kind)?;
-    let free = reader.not_negative(free, Kind::Length)?;
-    Ok(applied
-        .map(DriveStrength::Applied)
-        .or(free.map(DriveStrength::Free)))
+    let applied = reader.number(key)?.map(DriveStrength::Applied);
+    let free = reader.number(free)?.map(DriveStrength::Free);
+    Ok(applied.or(free))
 }
 
 fn read_second(
-    reader: &Reader<'_>,
+    reader: Reader<'_>,
     actuation: Actuation,
 ) -> Result<Option<SecondTone>, PhysicalError> {
-    reader.not_both(
-        "second_frequency",
-        "second_ratio",
-        "each gives the frequency",
-    )?;
-    let absolute = reader.positive("second_frequency", Kind::Frequency)?;
-    let ratio = reader
-        .text("second_ratio")
-        .map(|text| {
-            text.parse().map_err(|error: RatioError| {
-                PhysicalError::impossible(reader.path("second_ratio"), text, error.to_string())
-            })
-        })
-        .transpose()?;
-    let strength = read_strength(
-        reader,
-        actuation,
-        ["second_amplitude", "second_force", "second_free_amplitude"],
-    )?;
-    let phase = reader.quantity("second_phase", Kind::Angle)?;
+    let absolute = reader.number(Key::SecondFrequency)?;
+    let strength = read_strength(reader, actuation, SECOND)?;
+    let phase = reader.number(Key::SecondPhase)?;
     let frequency = absolute
         .map(SecondFrequency::Absolute)
-        .or(ratio.map(SecondFrequency::Ratio));
+        .or(reader.ratio(Key::SecondRatio).map(SecondFrequency::Ratio));
     match (frequency, strength) {
         (Some(frequency), Some(strength)) => Ok(Some(SecondTone {
             frequency,
@@ -230,54 +191,24 @@ fn read_second(
         })),
         (None, None) if phase.is_none() => Ok(None),
         (None, _) => Err(PhysicalError::missing(
-            reader.path("second_frequency"),
+            Key::SecondFrequency,
             "the second tone needs a frequency, or drive.second_ratio as in \"25/4\"",
         )),
         (Some(_), None) => Err(PhysicalError::missing(
-            reader.path("second_free_amplitude"),
+            Key::SecondFreeAmplitude,
             "the second tone needs a strength: its free amplitude, or second_amplitude of the \
              base or second_force on the lever",
         )),
     }
 }
 
-/// A ratio ("0.8", "80 %") or an amplitude ("8 nm").
-fn read_setpoint(reader: &Reader<'_>) -> Result<Option<Setpoint>, PhysicalError> {
-    let Some(text) = reader.text("setpoint") else {
+/// A fraction ("0.8", "80 %") or an amplitude ("8 nm").
+fn read_setpoint(reader: Reader<'_>) -> Result<Option<Setpoint>, PhysicalError> {
+    let Some(value) = reader.number(Key::DriveSetpoint)? else {
         return Ok(None);
     };
-    let is_length = |read: Quantity| read.dimension == Kind::Length.dimension();
-    if text.parse::<Quantity>().is_ok_and(is_length) {
-        let amplitude = reader.positive("setpoint", Kind::Length)?;
-        return Ok(amplitude.map(Setpoint::Amplitude));
-    }
-    let ratio = reader.within(
-        "setpoint",
-        Kind::Number,
-        |ratio| ratio > 0.0 && ratio < 1.0,
-        "a setpoint is a fraction of the free amplitude between 0 and 1, or an amplitude \
-         such as \"8 nm\"",
-    )?;
-    Ok(ratio.map(Setpoint::Ratio))
-}
-
-/// The section `[gap]`: distances at rest, in m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gaps {
-    /// Between tip and sample, g₁; negative where the sample stands beyond the tip's rest
-    /// position.
-    pub tip: Option<f64>,
-    /// Between beam and sample, g₀.
-    pub beam: Option<f64>,
-}
-
-impl Gaps {
-    /// The section `[gap]`.
-    pub(crate) fn read(sections: &Sections) -> Result<Self, PhysicalError> {
-        let reader = Reader::new(sections, "gap", GAP_KEYS)?;
-        Ok(Self {
-            tip: reader.quantity("tip", Kind::Length)?,
-            beam: reader.positive("beam", Kind::Length)?,
-        })
-    }
+    Ok(Some(match reader.stated.get(Key::DriveSetpoint) {
+        Some(Value::Number(_, Kind::Length)) => Setpoint::Amplitude(value),
+        _ => Setpoint::Ratio(value),
+    }))
 }

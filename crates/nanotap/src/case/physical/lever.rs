@@ -11,10 +11,11 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use super::error::PhysicalError;
-use super::quantity::Kind;
+use super::reader::Reader;
 use super::remark::Remark;
-use super::section::Reader;
 use super::tip::TipMass;
+use crate::case::key::Key;
+use crate::case::quantity::Kind;
 use crate::model::exact_beam;
 
 /// Dimensions of a beam of rectangular cross-section, in m.
@@ -59,6 +60,18 @@ pub struct LeverData {
     pub tip_mass: TipMass,
 }
 
+impl LeverData {
+    /// The spring constant that dimensions and modulus give.
+    fn bending(&self) -> Option<f64> {
+        Some(self.geometry?.stiffness(self.modulus?))
+    }
+
+    /// The beam's mass that dimensions and density give.
+    fn weight(&self) -> Option<f64> {
+        Some(self.geometry?.mass(self.density?))
+    }
+}
+
 /// A lever with all that the model needs; SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lever {
@@ -81,36 +94,19 @@ pub struct Lever {
 const LARGEST_RATIO: f64 = 1e6;
 
 impl Lever {
-    /// The lever that the data describe, with remarks on what had to be assumed.
+    /// The lever that the data describe.
     ///
     /// # Errors
     /// [`PhysicalError`] if the data do not determine a lever or describe an impossible one;
     /// it says in which range the value would have to lie.
-    pub fn resolve(data: &LeverData) -> Result<(Self, Vec<Remark>), PhysicalError> {
+    pub fn resolve(data: &LeverData) -> Result<Self, PhysicalError> {
         check(data)?;
-        let mut remarks = Vec::new();
-        let from_geometry = |material: Option<f64>, property: fn(BeamGeometry, f64) -> f64| {
-            Some(property(data.geometry?, material?))
-        };
-        let bending = from_geometry(data.modulus, BeamGeometry::stiffness);
-        let weight = from_geometry(data.density, BeamGeometry::mass);
-        if let (Some(measured), Some(computed)) = (data.k, bending) {
-            remarks.push(comparison(
-                "spring constant",
-                Kind::Stiffness,
-                measured,
-                computed,
-            ));
-        }
-        let (k, beam_mass, ratio) = match (data.k.or(bending), data.f0, weight) {
-            (Some(k), Some(f0), weight) => {
+        let weight = data.weight();
+        let (k, beam_mass, ratio) = match (data.k.or(data.bending()), data.f0, weight) {
+            (Some(k), Some(f0), _) => {
                 let ratio = ratio_from_resonance(data.tip_mass, k, f0)?;
                 let time = first_frequency(ratio)? / (TAU * f0);
-                let mass = k * time * time / 3.0;
-                if let Some(weight) = weight {
-                    remarks.push(comparison("beam mass", Kind::Mass, mass, weight));
-                }
-                (k, mass, ratio)
+                (k, k * time * time / 3.0, ratio)
             }
             (Some(k), None, Some(mass)) => (k, mass, ratio_to_beam(data.tip_mass, mass)?),
             (None, Some(f0), Some(mass)) => {
@@ -123,30 +119,28 @@ impl Lever {
             }
             (Some(_), None, None) => {
                 return Err(PhysicalError::missing(
-                    "cantilever.f0",
+                    Key::LeverF0,
                     "the beam's mass follows from it; else give length, width, thickness and \
                      density",
                 ));
             }
             (None, _, _) => {
                 return Err(PhysicalError::missing(
-                    "cantilever.k",
+                    Key::LeverK,
                     "give it, or length, width, thickness and modulus, or a lever of the \
                      catalogue",
                 ));
             }
         };
         let time = (3.0 * beam_mass / k).sqrt();
-        let lever = Self {
+        Ok(Self {
             k,
             beam_mass,
             tip_mass_ratio: ratio,
             f0: data.f0.unwrap_or(first_frequency(ratio)? / (TAU * time)),
             quality_factor: data.quality_factor,
             length: data.geometry.map(|geometry| geometry.length),
-        };
-        remarks.extend(lever.remarks(data));
-        Ok((lever, remarks))
+        })
     }
 
     /// Mass of the tip, M = α1 mL, in kg.
@@ -174,8 +168,22 @@ impl Lever {
         omega * modal_mass_factor(omega.sqrt(), self.tip_mass_ratio) / self.quality_factor
     }
 
-    fn remarks(&self, data: &LeverData) -> Vec<Remark> {
+    /// What had to be assumed of the lever, and what puts it in doubt.
+    pub(crate) fn remarks(&self, data: &LeverData) -> Vec<Remark> {
         let mut remarks = Vec::new();
+        if let (Some(measured), Some(computed)) = (data.k, data.bending()) {
+            remarks.push(comparison(
+                "spring constant",
+                Kind::Stiffness,
+                measured,
+                computed,
+            ));
+        }
+        if let (Some(_), Some(_), Some(weight)) =
+            (data.k.or(data.bending()), data.f0, data.weight())
+        {
+            remarks.push(comparison("beam mass", Kind::Mass, self.beam_mass, weight));
+        }
         if let TipMass::SecondMode(f2) = data.tip_mass {
             let error = data.f0.map_or(f64::NAN, |f0| {
                 ratio_from_second_mode(1.01 * f2, f0).unwrap_or(f64::NAN) - self.tip_mass_ratio
@@ -213,28 +221,28 @@ impl Lever {
 }
 
 fn check(data: &LeverData) -> Result<(), PhysicalError> {
-    let positive = |key: &str, kind: Kind, value: Option<f64>| match value {
+    let positive = |key: Key, value: Option<f64>| match value {
         Some(value) if !(value > 0.0 && value.is_finite()) => Err(PhysicalError::impossible(
-            format!("cantilever.{key}"),
-            kind.format(value),
+            key,
+            key.kind().format(value),
             "it must be above zero",
         )),
         _ => Ok(()),
     };
-    positive("k", Kind::Stiffness, data.k)?;
-    positive("f0", Kind::Frequency, data.f0)?;
-    positive("Q", Kind::Number, Some(data.quality_factor))?;
-    positive("modulus", Kind::Pressure, data.modulus)?;
-    positive("density", Kind::Density, data.density)?;
+    positive(Key::LeverK, data.k)?;
+    positive(Key::LeverF0, data.f0)?;
+    positive(Key::LeverQ, Some(data.quality_factor))?;
+    positive(Key::LeverModulus, data.modulus)?;
+    positive(Key::LeverDensity, data.density)?;
     if let Some(geometry) = data.geometry {
-        positive("length", Kind::Length, Some(geometry.length))?;
-        positive("width", Kind::Length, Some(geometry.width))?;
-        positive("thickness", Kind::Length, Some(geometry.thickness))?;
+        positive(Key::LeverLength, Some(geometry.length))?;
+        positive(Key::LeverWidth, Some(geometry.width))?;
+        positive(Key::LeverThickness, Some(geometry.thickness))?;
     }
     let (key, kind, value) = match data.tip_mass {
-        TipMass::Absolute(mass) => ("tip.mass", Kind::Mass, mass),
-        TipMass::Ratio(ratio) => ("tip.mass_ratio", Kind::Number, ratio),
-        TipMass::SecondMode(f2) => ("cantilever.f2", Kind::Frequency, f2),
+        TipMass::Absolute(mass) => (Key::TipMass, Kind::Mass, mass),
+        TipMass::Ratio(ratio) => (Key::TipMassRatio, Kind::Number, ratio),
+        TipMass::SecondMode(f2) => (Key::LeverF2, Kind::Frequency, f2),
     };
     if value >= 0.0 && value.is_finite() {
         return Ok(());
@@ -271,7 +279,7 @@ fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64) -> Result<f64, PhysicalEr
     let wanted = 3.0 * mass / heaviest;
     ratio_where(|ratio| Ok(ratio * first_frequency(ratio)?.powi(2) >= wanted))?.ok_or_else(|| {
         PhysicalError::impossible(
-            "tip.mass",
+            Key::TipMass,
             Kind::Mass.format(mass),
             format!(
                 "with this k and f0 it must be below k/(2 pi f0)^2 = {}, which a beam without \
@@ -288,7 +296,7 @@ fn ratio_to_beam(tip: TipMass, beam_mass: f64) -> Result<f64, PhysicalError> {
         TipMass::Ratio(ratio) => bounded(ratio),
         TipMass::Absolute(mass) => bounded(mass / beam_mass),
         TipMass::SecondMode(_) => Err(PhysicalError::missing(
-            "cantilever.f0",
+            Key::LeverF0,
             "f2 tells the tip's mass only together with f0",
         )),
     }
@@ -299,7 +307,7 @@ fn bounded(ratio: f64) -> Result<f64, PhysicalError> {
         return Ok(ratio);
     }
     Err(PhysicalError::impossible(
-        "tip.mass_ratio",
+        Key::TipMassRatio,
         Kind::Number.format(ratio),
         format!("a tip more than {LARGEST_RATIO:e} times as heavy as the beam is not a lever"),
     ))
@@ -312,7 +320,7 @@ fn ratio_from_second_mode(f2: f64, f0: f64) -> Result<f64, PhysicalError> {
     let bare = frequency_ratio(0.0)?;
     let refused = |reason: String| {
         PhysicalError::impossible(
-            "cantilever.f2",
+            Key::LeverF2,
             format!(
                 "{} (f2/f1 = {})",
                 Kind::Frequency.format(f2),
@@ -393,77 +401,53 @@ fn modal_mass_factor(beta: f64, ratio: f64) -> f64 {
     (1.0 + ratio + 2.0 * ratio * q) / (1.0 - 3.0 * ratio + 2.0 * ratio * q)
 }
 
-pub(crate) const KEYS: &[&str] = &[
-    "lever",
-    "k",
-    "f0",
-    "f2",
-    "Q",
-    "length",
-    "width",
-    "thickness",
-    "modulus",
-    "density",
-];
-
 impl LeverData {
-    /// The section `[cantilever]`; what it does not say comes from a lever of the catalogue.
+    /// What `[cantilever]` and `[tip]` say; what they do not comes from a lever of the
+    /// catalogue.
     pub(crate) fn read(
-        reader: &Reader<'_>,
+        reader: Reader<'_>,
         lever: Option<&super::catalogue::Lever>,
         tip_mass: Option<TipMass>,
     ) -> Result<Self, PhysicalError> {
-        let f2 = reader.positive("f2", Kind::Frequency)?;
-        let tip_mass = match (f2, tip_mass) {
-            (Some(_), Some(_)) => {
-                return Err(PhysicalError::conflict(
-                    reader.path("f2"),
-                    "a tip mass in [tip]",
-                    "f2 tells the tip's mass",
-                ));
-            }
-            (Some(f2), None) => TipMass::SecondMode(f2),
-            (None, Some(mass)) => mass,
-            (None, None) => TipMass::Absolute(0.0),
-        };
+        let f2 = reader.number(Key::LeverF2)?.map(TipMass::SecondMode);
         Ok(Self {
             k: reader
-                .positive("k", Kind::Stiffness)?
+                .number(Key::LeverK)?
                 .or_else(|| lever.map(|lever| lever.k)),
             f0: reader
-                .positive("f0", Kind::Frequency)?
+                .number(Key::LeverF0)?
                 .or_else(|| lever.map(|lever| lever.f0)),
-            quality_factor: reader.positive("Q", Kind::Number)?.ok_or_else(|| {
+            quality_factor: reader.number(Key::LeverQ)?.ok_or_else(|| {
                 PhysicalError::missing(
-                    reader.path("Q"),
+                    Key::LeverQ,
                     "it depends on what surrounds the lever: a few hundred in air, a few in \
                      water, tens of thousands in vacuum; take it from the free resonance",
                 )
             })?,
             geometry: read_geometry(reader)?.or_else(|| lever.and_then(|lever| lever.geometry)),
-            modulus: reader.positive("modulus", Kind::Pressure)?,
-            density: reader.positive("density", Kind::Density)?,
-            tip_mass,
+            modulus: reader.number(Key::LeverModulus)?,
+            density: reader.number(Key::LeverDensity)?,
+            tip_mass: f2.or(tip_mass).unwrap_or(TipMass::Absolute(0.0)),
         })
     }
 }
 
-fn read_geometry(reader: &Reader<'_>) -> Result<Option<BeamGeometry>, PhysicalError> {
-    let keys = ["length", "width", "thickness"];
-    if keys.iter().all(|key| reader.text(key).is_none()) {
+fn read_geometry(reader: Reader<'_>) -> Result<Option<BeamGeometry>, PhysicalError> {
+    let keys = [Key::LeverLength, Key::LeverWidth, Key::LeverThickness];
+    if !keys.into_iter().any(|key| reader.has(key)) {
         return Ok(None);
     }
-    let needed = |key: &str| {
-        reader.positive(key, Kind::Length)?.ok_or_else(|| {
+    let needed = |key: Key| {
+        reader.number(key)?.ok_or_else(|| {
             PhysicalError::missing(
-                reader.path(key),
+                key,
                 "length, width and thickness are given together or not at all",
             )
         })
     };
     Ok(Some(BeamGeometry {
-        length: needed("length")?,
-        width: needed("width")?,
-        thickness: needed("thickness")?,
+        length: needed(Key::LeverLength)?,
+        width: needed(Key::LeverWidth)?,
+        thickness: needed(Key::LeverThickness)?,
     }))
 }

@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::lever::Lever;
-use super::quantity::Kind;
+use crate::case::quantity::Kind;
 use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
 use crate::model::parameter::Parameter;

@@ -1,12 +1,13 @@
 //! The sample under the tip: a spring and a damper, given or from Hertz's contact.
 
-use super::catalogue::{Catalogue, Material};
+use super::catalogue::Material;
 use super::error::PhysicalError;
-use super::quantity::Kind;
+use super::reader::Reader;
 use super::remark::Remark;
-use super::section::{Reader, Sections};
 use super::tip::Tip;
-use crate::model::contact::{ContactLaw, UnknownContactLaw};
+use crate::case::key::Key;
+use crate::case::quantity::Kind;
+use crate::model::contact::ContactLaw;
 
 /// Elastic constants of an isotropic solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,31 +24,27 @@ impl Elastic {
         self.modulus / (1.0 - self.poisson * self.poisson)
     }
 
-    /// `modulus` and `poisson` of a section, with a catalogue's material for what is not given.
+    /// The stated modulus and Poisson's ratio, with a catalogue's material for what is not.
     pub(crate) fn read(
-        reader: &Reader<'_>,
+        reader: Reader<'_>,
+        [modulus_key, poisson_key]: [Key; 2],
         material: Option<&Material>,
     ) -> Result<Option<Self>, PhysicalError> {
         let modulus = reader
-            .positive("modulus", Kind::Pressure)?
+            .number(modulus_key)?
             .or_else(|| material.map(|material| material.elastic.modulus));
         let poisson = reader
-            .within(
-                "poisson",
-                Kind::Number,
-                |ratio| ratio > -1.0 && ratio <= 0.5,
-                "Poisson's ratio of a stable solid lies above -1 and not above 0.5",
-            )?
+            .number(poisson_key)?
             .or_else(|| material.map(|material| material.elastic.poisson));
         match (modulus, poisson) {
             (Some(modulus), Some(poisson)) => Ok(Some(Self { modulus, poisson })),
             (None, None) => Ok(None),
             (Some(_), None) => Err(PhysicalError::missing(
-                reader.path("poisson"),
+                poisson_key,
                 "a contact needs Poisson's ratio beside the modulus (0.3 to 0.5 for polymers)",
             )),
             (None, Some(_)) => Err(PhysicalError::missing(
-                reader.path("modulus"),
+                modulus_key,
                 "Poisson's ratio alone says nothing about the contact",
             )),
         }
@@ -111,55 +108,27 @@ pub struct Sample {
     pub relaxation_stiffness: f64,
     /// Its relaxation time in s.
     pub relaxation_time: f64,
-    /// What had to be assumed.
-    pub remarks: Vec<Remark>,
+    /// Its elastic constants, where they are known.
+    pub elastic: Option<Elastic>,
 }
 
-pub(crate) const KEYS: &[&str] = &[
-    "law",
-    "material",
-    "stiffness",
-    "damping",
-    "loss_tangent",
-    "relaxation_stiffness",
-    "relaxation_time",
-    "modulus",
-    "poisson",
-    "indentation",
-];
-
 impl Sample {
-    /// The section `[sample]`.
-    pub(crate) fn read(
-        sections: &Sections,
-        catalogue: &Catalogue,
-        tip: &Tip,
-    ) -> Result<Self, PhysicalError> {
-        let reader = Reader::new(sections, "sample", KEYS)?;
-        let mut remarks = Vec::new();
-        reader.not_both("damping", "loss_tangent", "each gives the damper C1")?;
-        for key in ["material", "modulus", "poisson", "indentation"] {
-            reader.not_both("stiffness", key, "the stiffness is either given or Hertz's")?;
-        }
-        let given = reader.not_negative("stiffness", Kind::Stiffness)?;
-        let (stiffness, hertz) = if let Some(stiffness) = given {
-            (stiffness, None)
-        } else {
-            let hertz = read_hertz(&reader, catalogue, tip, &mut remarks)?;
-            (hertz.stiffness(), Some(hertz))
+    /// What `[sample]` says.
+    pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Self, PhysicalError> {
+        let (stiffness, hertz, elastic) = match reader.number(Key::SampleStiffness)? {
+            Some(stiffness) => (stiffness, None, None),
+            None => {
+                let (hertz, elastic) = read_hertz(reader, tip)?;
+                (hertz.stiffness(), Some(hertz), Some(elastic))
+            }
         };
-        let damper = reader.not_negative("damping", Kind::Damping)?;
-        let tangent = reader.not_negative("loss_tangent", Kind::Number)?;
+        let damper = reader.number(Key::SampleDamping)?;
+        let tangent = reader.number(Key::SampleLossTangent)?;
         let damping = damper
             .map(SampleDamping::Damper)
             .or(tangent.map(SampleDamping::LossTangent));
-        let law = read_law(&reader)?;
-        let [relaxation_stiffness, relaxation_time] = read_relaxation(&reader, law)?;
-        if damping.is_none() && law != ContactLaw::StandardLinearSolid {
-            remarks.push(Remark::note(
-                "sample.damping is not given: the contact dissipates nothing",
-            ));
-        }
+        let law = crate::case::file::word(reader.stated, Key::SampleLaw).unwrap_or_default();
+        let [relaxation_stiffness, relaxation_time] = read_relaxation(reader, law)?;
         Ok(Self {
             stiffness,
             hertz,
@@ -167,8 +136,49 @@ impl Sample {
             law,
             relaxation_stiffness,
             relaxation_time,
-            remarks,
+            elastic,
         })
+    }
+
+    /// What had to be assumed of the sample, and what puts it in doubt.
+    pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        if let Some(hertz) = self.hertz {
+            if let Ok(Some(material)) = reader.material(Key::SampleMaterial) {
+                remarks.push(Remark::note(format!(
+                    "sample \"{}\" from the catalogue: {}",
+                    material.name, material.source
+                )));
+            }
+            if !reader.has(Key::SampleIndentation) {
+                remarks.push(Remark::note(format!(
+                    "sample.indentation is not given: taken as a ninth of the tip's radius, {}, \
+                     as the paper does",
+                    Kind::Length.format(hertz.indentation)
+                )));
+            }
+            if hertz.indentation > 0.5 * hertz.radius {
+                remarks.push(Remark::warning(format!(
+                    "the indentation of {} is more than half the tip's radius of {}: \
+                     Hertz's parabola is no longer the tip's shape",
+                    Kind::Length.format(hertz.indentation),
+                    Kind::Length.format(hertz.radius)
+                )));
+            }
+            remarks.push(Remark::note(match tip.elastic {
+                None => {
+                    "the tip counts as rigid: give tip.material, or tip.modulus and tip.poisson, \
+                     to include its own compliance"
+                }
+                Some(_) => "the tip's own compliance is included",
+            }));
+        }
+        if self.damping.is_none() && self.law != ContactLaw::StandardLinearSolid {
+            remarks.push(Remark::note(
+                "sample.damping is not given: the contact dissipates nothing",
+            ));
+        }
+        remarks
     }
 
     /// Damper C₁ in N s/m for a drive of angular frequency `omega` in rad/s.
@@ -181,113 +191,55 @@ impl Sample {
     }
 }
 
-fn read_law(reader: &Reader<'_>) -> Result<ContactLaw, PhysicalError> {
-    reader
-        .text("law")
-        .map_or(Ok(ContactLaw::default()), |name| {
-            name.parse().map_err(|error: UnknownContactLaw| {
-                PhysicalError::impossible(reader.path("law"), name, error.to_string())
-            })
-        })
-}
-
 /// Stiffness and time of the relaxing arm, which the standard linear solid has in place of
 /// a damper and no other law has.
-fn read_relaxation(reader: &Reader<'_>, law: ContactLaw) -> Result<[f64; 2], PhysicalError> {
-    let stiffness = reader.not_negative("relaxation_stiffness", Kind::Stiffness)?;
-    let time = reader.not_negative("relaxation_time", Kind::Time)?;
-    let refuse = |keys: [&str; 2], reason: &str| {
-        let given = keys.into_iter().find(|key| reader.text(key).is_some());
-        given.map_or(Ok(()), |key| {
-            Err(PhysicalError::impossible(
-                reader.path(key),
-                reader.text(key).unwrap_or_default(),
-                reason,
-            ))
-        })
+fn read_relaxation(reader: Reader<'_>, law: ContactLaw) -> Result<[f64; 2], PhysicalError> {
+    let arm = [Key::SampleRelaxationStiffness, Key::SampleRelaxationTime];
+    let refuse = |keys: [Key; 2], reason: &str| {
+        let given = keys.into_iter().find(|key| reader.has(*key));
+        given.map_or(Ok(()), |key| Err(reader.impossible(key, reason)))
     };
     if law != ContactLaw::StandardLinearSolid {
-        refuse(
-            ["relaxation_stiffness", "relaxation_time"],
-            "it belongs to sample.law = \"standard-linear-solid\"",
-        )?;
+        refuse(arm, "it belongs to sample.law = \"standard-linear-solid\"")?;
         return Ok([0.0; 2]);
     }
     refuse(
-        ["damping", "loss_tangent"],
+        [Key::SampleDamping, Key::SampleLossTangent],
         "a standard linear solid has its damper in the relaxing arm: give \
          sample.relaxation_stiffness and sample.relaxation_time",
     )?;
-    let needed = |value: Option<f64>, key: &str| {
-        value.ok_or_else(|| {
+    let needed = |key: Key| {
+        reader.number(key)?.ok_or_else(|| {
             PhysicalError::missing(
-                reader.path(key),
+                key,
                 "a standard linear solid has a relaxing arm of this stiffness, as in \
                  relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",
             )
         })
     };
-    Ok([
-        needed(stiffness, "relaxation_stiffness")?,
-        needed(time, "relaxation_time")?,
-    ])
+    Ok([needed(arm[0])?, needed(arm[1])?])
 }
 
-fn read_hertz(
-    reader: &Reader<'_>,
-    catalogue: &Catalogue,
-    tip: &Tip,
-    remarks: &mut Vec<Remark>,
-) -> Result<Hertz, PhysicalError> {
-    let material = reader
-        .text("material")
-        .map(|name| catalogue.material(&reader.path("material"), name))
-        .transpose()?;
-    if let Some(material) = material {
-        remarks.push(Remark::note(format!(
-            "sample \"{}\" from the catalogue: {}",
-            material.name, material.source
-        )));
-    }
-    let elastic = Elastic::read(reader, material)?.ok_or_else(|| {
-        PhysicalError::missing(
-            reader.path("stiffness"),
-            "the contact needs either a stiffness, or modulus and poisson, or a material",
-        )
-    })?;
+fn read_hertz(reader: Reader<'_>, tip: &Tip) -> Result<(Hertz, Elastic), PhysicalError> {
+    let material = reader.material(Key::SampleMaterial)?;
+    let elastic = Elastic::read(reader, [Key::SampleModulus, Key::SamplePoisson], material)?
+        .ok_or_else(|| {
+            PhysicalError::missing(
+                Key::SampleStiffness,
+                "the contact needs either a stiffness, or modulus and poisson, or a material",
+            )
+        })?;
     let radius = tip.radius.ok_or_else(|| {
         PhysicalError::missing(
-            "tip.radius",
+            Key::TipRadius,
             "Hertz's contact needs the tip's radius; give it, or sample.stiffness",
         )
     })?;
-    let given = reader.positive("indentation", Kind::Length)?;
-    let indentation = given.unwrap_or(radius / 9.0);
-    if given.is_none() {
-        remarks.push(Remark::note(format!(
-            "sample.indentation is not given: taken as a ninth of the tip's radius, {}, as the \
-             paper does",
-            Kind::Length.format(indentation)
-        )));
-    }
-    if indentation > 0.5 * radius {
-        remarks.push(Remark::warning(format!(
-            "the indentation of {} is more than half the tip's radius of {}: \
-             Hertz's parabola is no longer the tip's shape",
-            Kind::Length.format(indentation),
-            Kind::Length.format(radius)
-        )));
-    }
-    match tip.elastic {
-        None => remarks.push(Remark::note(
-            "the tip counts as rigid: give tip.material, or tip.modulus and tip.poisson, \
-             to include its own compliance",
-        )),
-        Some(_) => remarks.push(Remark::note("the tip's own compliance is included")),
-    }
-    Ok(Hertz {
+    let indentation = reader.number(Key::SampleIndentation)?;
+    let hertz = Hertz {
         reduced_modulus: reduced_modulus(elastic, tip.elastic),
         radius,
-        indentation,
-    })
+        indentation: indentation.unwrap_or(radius / 9.0),
+    };
+    Ok((hertz, elastic))
 }

@@ -8,28 +8,52 @@ use super::free_response::free_response;
 use super::sample::{Elastic, Hertz, reduced_modulus};
 use super::tip::{TipMass, TipShape};
 use super::*;
+use crate::case::Case;
+use crate::case::file::{CaseFileError, Place};
+use crate::case::key::{Key, Section};
 use crate::model::beam::Modes;
-use crate::model::cantilever::{Cantilever, CosineTerm};
+use crate::model::cantilever::Cantilever;
 use crate::model::exact_beam;
 
-fn sections(text: &[(&str, &str, &str)]) -> Sections {
-    let mut sections = Sections::new();
-    for &(section, key, value) in text {
-        sections
-            .entry(section.to_owned())
-            .or_default()
-            .insert(key.to_owned(), value.to_owned());
+/// A case that was read, with what was remarked.
+#[derive(Debug)]
+struct Read {
+    view: Physical,
+    remarks: Vec<Remark>,
+}
+
+impl std::ops::Deref for Read {
+    type Target = Physical;
+
+    fn deref(&self) -> &Physical {
+        &self.view
     }
-    sections
 }
 
-fn read(text: &[(&str, &str, &str)]) -> Result<PhysicalCase, PhysicalError> {
-    let catalogue = Catalogue::builtin().unwrap();
-    PhysicalCase::from_sections(&sections(text), 5, CosineTerm::Corrected, &catalogue)
+/// The case of these entries, with so many modes.
+fn with_modes(modes: usize, entries: &[(&str, &str, &str)]) -> Result<Read, CaseFileError> {
+    let entry = |(section, key, value): &(&str, &str, &str)| format!("{section}.{key}={value}");
+    let mut words: Vec<String> = entries.iter().map(entry).collect();
+    words.push(format!("modes={modes}"));
+    let case = Case::parse(None, &words)?;
+    Ok(Read {
+        view: case.physical().unwrap().clone(),
+        remarks: case.remarks(),
+    })
 }
 
-fn resolve(text: &[(&str, &str, &str)]) -> Result<Resolved, PhysicalError> {
-    read(text)?.resolve()
+fn resolve(entries: &[(&str, &str, &str)]) -> Result<Read, CaseFileError> {
+    with_modes(5, entries)
+}
+
+/// The key that a refusal is about; of an unknown one, as it was set.
+fn key_of(error: &CaseFileError) -> Option<&str> {
+    let problem = &error.problems[0];
+    let set = || match &problem.place {
+        Place::Override(written) => Some(written.split_once('=')?.0),
+        _ => None,
+    };
+    problem.key.or_else(set)
 }
 
 /// A complete case with a few entries replaced or added; an empty value removes a key.
@@ -76,7 +100,7 @@ fn data(tip_mass: TipMass) -> LeverData {
 }
 
 fn lever(data: &LeverData) -> Lever {
-    Lever::resolve(data).unwrap().0
+    Lever::resolve(data).unwrap()
 }
 
 fn close(value: f64, expected: f64, tolerance: f64) {
@@ -382,7 +406,7 @@ proptest! {
         alphas in prop::array::uniform6(1e-6_f64..1e3),
         omega in 0.1_f64..100.0,
     ) {
-        let (lever, _) = Lever::resolve(&LeverData {
+        let lever = Lever::resolve(&LeverData {
             k: Some(k),
             f0: Some(f0),
             ..data(TipMass::Ratio(ratio))
@@ -408,12 +432,12 @@ proptest! {
 
     #[test]
     fn nonsense_is_refused_without_a_panic(
-        (section, _) in prop::sample::select(SECTIONS.to_vec()),
+        section in prop::sample::select(Section::ALL[1..].to_vec()),
         key in "[a-zA-Z_0-9]{0,12}",
         value in "\\PC{0,12}",
     ) {
         let mut entries: Vec<(&str, &str, &str)> = changed(&[]);
-        entries.push((section, &key, &value));
+        entries.push((section.name(), &key, &value));
         let _ = resolve(&entries);
     }
 
@@ -429,7 +453,7 @@ proptest! {
         let mut entries: Vec<(&str, &str, &str)> = base.clone();
         entries[at] = (section, key, &value);
         if let Ok(resolved) = resolve(&entries) {
-            prop_assert!(resolved.case.validate().is_ok());
+            prop_assert!(resolved.cantilever.validate().is_ok());
         }
     }
 }
@@ -602,24 +626,24 @@ fn an_fm_class_lever_on_polystyrene_has_alpha4_of_about_25_and_65_7_khz_for_2_6(
     };
     let rigid = case("polystyrene", "");
     assert!(
-        (24.0..26.0).contains(&rigid.case.alpha4),
+        (24.0..26.0).contains(&rigid.cantilever.alpha4),
         "{}",
-        rigid.case.alpha4
+        rigid.cantilever.alpha4
     );
     let compliant = case("polystyrene", "silicon");
     assert!(
-        (24.0..26.0).contains(&compliant.case.alpha4),
+        (24.0..26.0).contains(&compliant.cantilever.alpha4),
         "{}",
-        compliant.case.alpha4
+        compliant.cantilever.alpha4
     );
-    assert!(compliant.case.alpha4 < rigid.case.alpha4);
+    assert!(compliant.cantilever.alpha4 < rigid.cantilever.alpha4);
     // α1 = 0.1 is the paper's; f0 is measured with the tip.
-    close(rigid.case.omega, 2.6, 5e-4);
+    close(rigid.cantilever.omega, 2.6, 5e-4);
     assert_eq!(
         Kind::Frequency.format_digits(2.6 * rigid.scales.frequency, 3),
         "65.7 kHz"
     );
-    assert!(rigid.case.alpha1 - 0.1 < 1e-15);
+    assert!(rigid.cantilever.alpha1 - 0.1 < 1e-15);
 }
 
 #[test]
@@ -634,7 +658,7 @@ fn an_nchr_class_lever_is_far_from_the_papers_twenty() {
             ("drive", "setpoint", "0.8"),
         ])
         .unwrap()
-        .case
+        .cantilever
         .alpha4
     };
     assert_eq!(format!("{:.1}", alpha4("polystyrene")), "2.1");
@@ -683,9 +707,9 @@ fn tip_shapes_have_their_textbook_volumes() {
 #[test]
 fn the_example_of_the_documentation_resolves() {
     let resolved = resolve(&changed(&[("gap", "beam", "")])).unwrap();
-    close(resolved.case.alpha4, 60.0 / 2.8, 1e-14);
+    close(resolved.cantilever.alpha4, 60.0 / 2.8, 1e-14);
     close(resolved.parameters.tip_mass, 3e-12, 1e-12);
-    close(resolved.case.alpha2, 10e-9 / 10e-6, 1e-14);
+    close(resolved.cantilever.alpha2, 10e-9 / 10e-6, 1e-14);
     assert!(
         resolved
             .remarks
@@ -703,7 +727,7 @@ fn loss_tangent_is_the_dampers_at_the_drive_frequency() {
     ]))
     .unwrap();
     // tan δ = C₁ω/K₁ = α6Ω/α4.
-    let case = resolved.case;
+    let case = &resolved.cantilever;
     close(case.alpha6 * case.omega / case.alpha4, 0.1, 1e-13);
 }
 
@@ -725,7 +749,7 @@ fn setpoint_is_a_ratio_or_an_amplitude() {
         let mut changes = drive.to_vec();
         changes.push(("drive", "setpoint", text));
         let error = resolve(&changed(&changes)).unwrap_err();
-        assert_eq!(error.key().as_deref(), Some("drive.setpoint"), "{text}");
+        assert_eq!(key_of(&error), Some("drive.setpoint"), "{text}");
     }
 }
 
@@ -744,12 +768,12 @@ fn errors_name_the_key_and_what_would_be_right() {
         ),
         (&[("cantilever", "Q", "")], "cantilever.Q", "air"),
         (&[("cantilever", "Q", "0")], "cantilever.Q", "above zero"),
-        (&[("cantilever", "K", "2 N/m")], "cantilever.K", "\"k\""),
+        (&[("cantilever", "K", "2 N/m")], "cantilever.K", "`k`"),
         (&[("cantilever", "f0", "")], "cantilever.f0", "density"),
         (
             &[("cantilever", "f2", "470 kHz")],
             "cantilever.f2",
-            "tip mass",
+            "tip.mass",
         ),
         (
             &[("cantilever", "lever", "PPP-NCHX")],
@@ -834,16 +858,16 @@ fn errors_name_the_key_and_what_would_be_right() {
         ),
         (&[("gap", "tip", "")], "gap.tip", "setpoint"),
         (&[("gap", "tip", "13 um")], "gap.beam", "touch"),
-        (&[("gap", "beem", "13 um")], "gap.beem", "\"beam\""),
+        (&[("gap", "beem", "13 um")], "gap.beem", "`beam`"),
     ];
     for (changes, key, word) in cases {
         let error = resolve(&changed(changes)).unwrap_err();
-        assert_eq!(error.key().as_deref(), Some(*key), "{changes:?}: {error}");
+        assert_eq!(key_of(&error), Some(*key), "{changes:?}: {error}");
         let message = error.to_string();
         assert!(message.contains(word), "{changes:?}: {message}");
     }
     let stray = resolve(&changed(&[("cantilevr", "k", "1 N/m")])).unwrap_err();
-    assert!(stray.to_string().contains("\"cantilever\""));
+    assert!(stray.to_string().contains("did you mean [cantilever]"));
     let huge = resolve(&changed(&[("sample", "stiffness", "1e12 N/m")])).unwrap_err();
     assert!(huge.to_string().contains("alpha4"), "{huge}");
 }
@@ -879,20 +903,10 @@ fn a_beam_that_would_touch_is_warned_of() {
 #[test]
 fn too_few_modes_for_a_heavy_tip_are_warned_of() {
     let entries = changed(&[("tip", "mass", ""), ("tip", "mass_ratio", "0.5")]);
-    let catalogue = Catalogue::builtin().unwrap();
     let warned = |modes| {
-        PhysicalCase::from_sections(
-            &sections(&entries),
-            modes,
-            CosineTerm::Corrected,
-            &catalogue,
-        )
-        .unwrap()
-        .resolve()
-        .unwrap()
-        .remarks
-        .iter()
-        .any(|remark| remark.text.contains("take more modes"))
+        let read = with_modes(modes, &entries).unwrap();
+        let more = |remark: &Remark| remark.text.contains("take more modes");
+        read.remarks.iter().any(more)
     };
     assert!(warned(1));
     assert!(!warned(30));
@@ -915,19 +929,26 @@ fn catalogued_levers_hang_together() {
                 density: Some(2330.0),
                 ..data(TipMass::Absolute(0.0))
             })
-            .unwrap()
-            .0;
+            .unwrap();
             let ratio = bare.f0 / lever.f0;
             assert!((0.8..1.25).contains(&ratio), "{}: {ratio}", lever.name);
         }
         for alias in &lever.aliases {
-            assert_eq!(catalogue.lever("k", &alias.to_lowercase()).unwrap(), lever);
+            assert_eq!(
+                catalogue
+                    .lever(Key::LeverName, &alias.to_lowercase())
+                    .unwrap(),
+                lever
+            );
         }
     }
     for material in catalogue.materials() {
         assert!(!material.source.is_empty());
         for alias in &material.aliases {
-            assert_eq!(catalogue.material("m", alias).unwrap(), material);
+            assert_eq!(
+                catalogue.material(Key::TipMaterial, alias).unwrap(),
+                material
+            );
         }
     }
 }
@@ -942,8 +963,8 @@ fn a_users_file_adds_and_replaces() {
             "mine.toml",
         )
         .unwrap();
-    assert_eq!(catalogue.lever("k", "My-Lever").unwrap().k, 2.4);
-    let replaced = catalogue.material("m", "polystyrene").unwrap();
+    assert_eq!(catalogue.lever(Key::LeverName, "My-Lever").unwrap().k, 2.4);
+    let replaced = catalogue.material(Key::TipMaterial, "polystyrene").unwrap();
     assert_eq!(replaced.elastic.modulus, 3e9);
     for (faulty, word) in [
         (
@@ -1028,7 +1049,7 @@ fn a_second_tone_has_its_own_free_amplitude() {
         ("drive", "second_phase", "30 deg"),
     ]))
     .unwrap();
-    let case = &resolved.case;
+    let case = &resolved.cantilever;
     let ratio = case.tone2_ratio.unwrap();
     assert_eq!(ratio.to_string(), "25/4");
     close(case.tone2_phase, 30.0, 1e-12);
@@ -1056,13 +1077,17 @@ fn samples_have_their_laws() {
         ("sample", "relaxation_time", "0.5 us"),
     ]))
     .unwrap();
-    close(solid.case.relaxation_stiffness, 3.0 * 50.0 / 2.8, 1e-13);
     close(
-        solid.case.relaxation_time,
+        solid.cantilever.relaxation_stiffness,
+        3.0 * 50.0 / 2.8,
+        1e-13,
+    );
+    close(
+        solid.cantilever.relaxation_time,
         0.5e-6 / solid.scales.time,
         1e-13,
     );
-    assert_eq!(solid.case.alpha6, 0.0);
+    assert_eq!(solid.cantilever.alpha6, 0.0);
     assert!(
         !solid
             .remarks
@@ -1070,8 +1095,8 @@ fn samples_have_their_laws() {
             .any(|r| r.text.contains("dissipates nothing"))
     );
     let recovers = resolve(&changed(&[("sample", "law", "kelvin-voigt")])).unwrap();
-    assert!(recovers.case.alpha6 > 0.0);
-    assert_eq!(recovers.case.contact.name(), "kelvin-voigt");
+    assert!(recovers.cantilever.alpha6 > 0.0);
+    assert_eq!(recovers.cantilever.contact.name(), "kelvin-voigt");
 }
 
 #[test]

@@ -1,11 +1,10 @@
 //! The tip: its mass, given or from its shape, its radius and what it is made of.
 
-use super::catalogue::{Catalogue, Lever as CatalogueLever};
+use super::catalogue::Lever as CatalogueLever;
 use super::error::PhysicalError;
-use super::quantity::Kind;
+use super::reader::Reader;
 use super::sample::Elastic;
-use super::section::{Reader, Sections};
-use crate::case::near_name::suggestion;
+use crate::case::key::Key;
 
 /// A solid tip under the end of the lever.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,46 +70,25 @@ pub struct Tip {
     pub elastic: Option<Elastic>,
 }
 
-pub(crate) const KEYS: &[&str] = &[
-    "mass",
-    "mass_ratio",
-    "shape",
-    "height",
-    "half_angle",
-    "density",
-    "radius",
-    "material",
-    "modulus",
-    "poisson",
-];
-
-const SHAPES: &[&str] = &["cone", "pyramid", "sphere"];
-
 impl Tip {
-    /// The section `[tip]`; a lever from the catalogue lends its tip's radius and height.
+    /// What `[tip]` says; a lever from the catalogue lends its tip's radius and height.
     pub(crate) fn read(
-        sections: &Sections,
-        catalogue: &Catalogue,
+        reader: Reader<'_>,
         lever: Option<&CatalogueLever>,
     ) -> Result<Self, PhysicalError> {
-        let reader = Reader::new(sections, "tip", KEYS)?;
         let radius = reader
-            .positive("radius", Kind::Length)?
+            .number(Key::TipRadius)?
             .or_else(|| lever.and_then(|lever| lever.tip_radius));
         let height = reader
-            .positive("height", Kind::Length)?
+            .number(Key::TipHeight)?
             .or_else(|| lever.and_then(|lever| lever.tip_height));
-        let material = reader
-            .text("material")
-            .map(|name| catalogue.material(&reader.path("material"), name))
-            .transpose()?;
-        let elastic = Elastic::read(&reader, material)?;
+        let material = reader.material(Key::TipMaterial)?;
+        let elastic = Elastic::read(reader, [Key::TipModulus, Key::TipPoisson], material)?;
         let density = reader
-            .positive("density", Kind::Density)?
+            .number(Key::TipDensity)?
             .or_else(|| material.and_then(|material| material.density));
-        let mass = read_mass(&reader, radius, height, density)?;
         Ok(Self {
-            mass,
+            mass: read_mass(reader, radius, height, density)?,
             radius,
             height,
             elastic,
@@ -119,58 +97,42 @@ impl Tip {
 }
 
 fn read_mass(
-    reader: &Reader<'_>,
+    reader: Reader<'_>,
     radius: Option<f64>,
     height: Option<f64>,
     density: Option<f64>,
 ) -> Result<Option<TipMass>, PhysicalError> {
-    let reason = "each gives the tip's mass; keep the one that is known best";
-    reader.not_both("mass", "mass_ratio", reason)?;
-    reader.not_both("mass", "shape", reason)?;
-    reader.not_both("mass_ratio", "shape", reason)?;
-    let half_angle = reader.within(
-        "half_angle",
-        Kind::Angle,
-        |angle| angle > 0.0 && angle < std::f64::consts::FRAC_PI_2,
-        "it must lie between 0 and 90 deg",
-    )?;
-    if let Some(mass) = reader.not_negative("mass", Kind::Mass)? {
+    let half_angle = reader.number(Key::TipHalfAngle)?;
+    if let Some(mass) = reader.number(Key::TipMass)? {
         return Ok(Some(TipMass::Absolute(mass)));
     }
-    if let Some(ratio) = reader.not_negative("mass_ratio", Kind::Number)? {
+    if let Some(ratio) = reader.number(Key::TipMassRatio)? {
         return Ok(Some(TipMass::Ratio(ratio)));
     }
-    let Some(shape) = reader.text("shape") else {
+    let Some(shape) = reader.word(Key::TipShape) else {
         return Ok(None);
     };
-    let needed = |value: Option<f64>, key: &str| {
+    let needed = |value: Option<f64>, key: Key| {
         value.ok_or_else(|| {
             PhysicalError::missing(
-                reader.path(key),
+                key,
                 format!("the mass of a {shape} follows from its shape and density"),
             )
         })
     };
     let shape = match shape {
         "cone" => TipShape::Cone {
-            height: needed(height, "height")?,
-            half_angle: needed(half_angle, "half_angle")?,
+            height: needed(height, Key::TipHeight)?,
+            half_angle: needed(half_angle, Key::TipHalfAngle)?,
         },
         "pyramid" => TipShape::Pyramid {
-            height: needed(height, "height")?,
-            half_angle: needed(half_angle, "half_angle")?,
+            height: needed(height, Key::TipHeight)?,
+            half_angle: needed(half_angle, Key::TipHalfAngle)?,
         },
-        "sphere" => TipShape::Sphere {
-            radius: needed(radius, "radius")?,
+        _ => TipShape::Sphere {
+            radius: needed(radius, Key::TipRadius)?,
         },
-        other => {
-            return Err(PhysicalError::impossible(
-                reader.path("shape"),
-                format!("\"{other}\""),
-                suggestion(other, SHAPES),
-            ));
-        }
     };
-    let mass = shape.volume() * needed(density, "density")?;
+    let mass = shape.volume() * needed(density, Key::TipDensity)?;
     Ok(Some(TipMass::Absolute(mass)))
 }

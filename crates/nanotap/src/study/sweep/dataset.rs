@@ -7,8 +7,8 @@ use super::error::{SweepError, check_size};
 use super::follow::Follow;
 use super::over::Over;
 use super::run::{Outcome, Starts};
+use crate::case::Case;
 use crate::case::physical::Kind as QuantityKind;
-use crate::case::subject::Subject;
 use crate::dataset::schema::Kind;
 use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
 use crate::observe::{Dimension, Observable, Set};
@@ -47,10 +47,10 @@ const STATE: &str = "state";
 pub(super) const START: &str = "start";
 
 /// What the dataset of a sweep holds.
-pub(super) fn schema(subject: &Subject, options: &SweepOptions) -> Result<Schema, SweepError> {
+pub(super) fn schema(case: &Case, options: &SweepOptions) -> Result<Schema, SweepError> {
     let lanes = options.starts.count() * options.follow.directions().len().max(1);
-    let states = state_names(subject, options)?;
-    let si = subject.resolved().is_some();
+    let states = state_names(case, options)?;
+    let si = case.physical().is_some();
     let variables = variables(options, states.len(), si);
     let bytes: usize = variables.iter().map(|v| v.stride() * v.kind.size()).sum();
     let x = &options.over[0];
@@ -59,9 +59,9 @@ pub(super) fn schema(subject: &Subject, options: &SweepOptions) -> Result<Schema
         .over
         .iter()
         .skip(1)
-        .map(|over| Axis::new(over.key.name(), over.count, 1))
+        .map(|over| Axis::new(over.key.path(), over.count, 1))
         .collect();
-    axes.push(Axis::new(x.key.name(), x.count, along_x));
+    axes.push(Axis::new(x.key.path(), x.count, along_x));
     axes.push(Axis::new(START, lanes, along_starts));
     let grid = Grid { axes };
     check_size(grid.chunk_entries().saturating_mul(bytes), options.follow)?;
@@ -69,7 +69,7 @@ pub(super) fn schema(subject: &Subject, options: &SweepOptions) -> Result<Schema
         grid,
         variables,
         coordinates: coordinates(options, lanes, states),
-        attributes: attributes(subject, options),
+        attributes: attributes(case, options),
     })
 }
 
@@ -91,11 +91,11 @@ fn cut(options: &SweepOptions, lanes: usize, bytes: usize) -> (usize, usize) {
 }
 
 /// The names of the entries of a state, of the longest one that occurs.
-fn state_names(subject: &Subject, options: &SweepOptions) -> Result<Vec<String>, SweepError> {
+fn state_names(case: &Case, options: &SweepOptions) -> Result<Vec<String>, SweepError> {
     let last = options
         .over
         .iter()
-        .fold(subject.clone(), |s, over| over.apply(&s, over.count - 1));
+        .fold(case.clone(), |s, over| over.apply(&s, over.count - 1));
     let model = last.model().map_err(|source| SweepError::Model {
         place: "the last values".into(),
         source,
@@ -230,7 +230,7 @@ fn parameter(over: &Over) -> Coordinate {
         QuantityKind::Number => "1",
         kind => kind.si_unit(),
     };
-    let mut coordinate = Coordinate::of(over.key.name(), values, over.key.meaning(), unit);
+    let mut coordinate = Coordinate::of(over.key.path(), values, over.key.meaning(), unit);
     coordinate
         .attributes
         .insert("symbol".into(), over.key.symbol().into());
@@ -240,10 +240,10 @@ fn parameter(over: &Over) -> Coordinate {
     coordinate
 }
 
-fn attributes(subject: &Subject, options: &SweepOptions) -> crate::dataset::schema::Attributes {
-    let names: Vec<&str> = options.over.iter().map(|over| over.key.name()).collect();
+fn attributes(case: &Case, options: &SweepOptions) -> crate::dataset::schema::Attributes {
+    let names: Vec<&str> = options.over.iter().map(|over| over.key.path()).collect();
     let title = format!("sweep over {}", names.join(" and "));
-    let mut all = attributes::of_case(&title, "sweep", subject);
+    let mut all = attributes::of_case(&title, "sweep", case);
     let starts = match &options.starts {
         Starts::Rest => json!("rest"),
         Starts::Given(state) => json!({ "state": state }),

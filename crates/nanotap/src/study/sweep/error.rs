@@ -2,10 +2,10 @@
 
 use super::SweepOptions;
 use super::follow::Follow;
-use super::over::{Over, SweepKey};
+use super::over::Over;
 use super::run::Starts;
-use crate::case::subject::Subject;
-use crate::model::ModelError;
+use crate::case::CaseError;
+use crate::case::{Case, Key};
 use crate::study::simulate::{SimulateError, starting_state};
 use crate::study::start_box::{SideError, box_with};
 
@@ -44,7 +44,7 @@ pub enum SweepError {
         /// The values of the parameters there.
         place: String,
         /// What is wrong.
-        source: ModelError,
+        source: CaseError,
     },
     /// A start that does not fit.
     #[error(transparent)]
@@ -69,19 +69,19 @@ pub enum SweepError {
     },
 }
 
-/// Checks options against the subject.
-pub(super) fn check(subject: &Subject, options: &SweepOptions) -> Result<(), SweepError> {
+/// Checks options against the case.
+pub(super) fn check(case: &Case, options: &SweepOptions) -> Result<(), SweepError> {
     let over = &options.over;
     if !(1..=2).contains(&over.len()) {
         return Err(SweepError::Count { count: over.len() });
     }
     if over.len() == 2 && over[0].key == over[1].key {
         return Err(SweepError::Twice {
-            name: over[0].key.name(),
+            name: over[0].key.path(),
         });
     }
     for range in over {
-        let name = range.key.name();
+        let name = range.key.path();
         range
             .check()
             .map_err(|what| SweepError::Range { name, what })?;
@@ -113,13 +113,13 @@ pub(super) fn check(subject: &Subject, options: &SweepOptions) -> Result<(), Swe
         );
         return Err(SweepError::TooMuch { what });
     }
-    corners(subject, over)?;
-    starts(subject, options)
+    corners(case, over)?;
+    starts(case, options)
 }
 
 /// What a parameter may be is an interval: if the ends of all ranges are right, what lies
 /// between is.
-fn corners(subject: &Subject, over: &[Over]) -> Result<(), SweepError> {
+fn corners(case: &Case, over: &[Over]) -> Result<(), SweepError> {
     let ends = |range: &Over| {
         if range.count > 1 {
             vec![0, range.count - 1]
@@ -130,11 +130,11 @@ fn corners(subject: &Subject, over: &[Over]) -> Result<(), SweepError> {
     let second = over.get(1).map_or(vec![0], ends);
     for first in ends(&over[0]) {
         for &second in &second {
-            let mut place = format!("{} = {}", over[0].key.name(), over[0].value(first));
-            let mut corner = over[0].apply(subject, first);
+            let mut place = format!("{} = {}", over[0].key.path(), over[0].value(first));
+            let mut corner = over[0].apply(case, first);
             if let Some(range) = over.get(1) {
                 corner = range.apply(&corner, second);
-                place = format!("{place}, {} = {}", range.key.name(), range.value(second));
+                place = format!("{place}, {} = {}", range.key.path(), range.value(second));
             }
             corner
                 .model()
@@ -145,18 +145,14 @@ fn corners(subject: &Subject, over: &[Over]) -> Result<(), SweepError> {
 }
 
 /// Starts must fit the models at both ends: the shortest and the longest state.
-fn starts(subject: &Subject, options: &SweepOptions) -> Result<(), SweepError> {
-    let modes_vary = options
-        .over
-        .iter()
-        .any(|range| range.key == SweepKey::Modes);
+fn starts(case: &Case, options: &SweepOptions) -> Result<(), SweepError> {
+    let modes_vary = options.over.iter().any(|range| range.key == Key::Modes);
     if modes_vary && matches!(options.starts, Starts::Given(_)) {
         return Err(SweepError::StateWithModes);
     }
     for last in [false, true] {
-        let end =
-            |subject, range: &Over| range.apply(&subject, if last { range.count - 1 } else { 0 });
-        let model = options.over.iter().fold(subject.clone(), end).model();
+        let end = |case, range: &Over| range.apply(&case, if last { range.count - 1 } else { 0 });
+        let model = options.over.iter().fold(case.clone(), end).model();
         let place = "an end of the ranges".to_owned();
         let model = model.map_err(|source| SweepError::Model { place, source })?;
         match &options.starts {

@@ -33,7 +33,7 @@ mod summary;
 
 pub use error::SweepError;
 pub use follow::Follow;
-pub use over::{Over, OverError, Spacing, SweepKey};
+pub use over::{Over, OverError, Spacing};
 pub use run::Starts;
 pub(crate) use run::nearest;
 pub use summary::Summary;
@@ -42,7 +42,7 @@ pub(crate) use summary::{Motions, class_of};
 use nanotap_dynamics::{Control, LyapunovOptions, SettleOptions};
 use nanotap_figures::Figure;
 
-use crate::case::subject::Subject;
+use crate::case::Case;
 use crate::dataset::{
     Block, Schema, Store, StoreError, Values, Work, WorkError, chunk_files, work,
 };
@@ -103,27 +103,27 @@ impl SweepOptions {
 /// A sweep that was checked: ready to be computed, chunk by chunk.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    subject: Subject,
+    case: Case,
     options: SweepOptions,
     schema: Schema,
 }
 
 impl Sweep {
-    /// Checks that the options make sense for `subject`.
+    /// Checks that the options make sense for `case`.
     ///
     /// # Errors
     /// [`SweepError`] with what was given and what would be right.
-    pub fn new(subject: Subject, options: SweepOptions) -> Result<Self, SweepError> {
-        error::check(&subject, &options)?;
+    pub fn new(case: Case, options: SweepOptions) -> Result<Self, SweepError> {
+        error::check(&case, &options)?;
         // What the case says of a parameter that varies does not matter, and must not
         // make two datasets differ.
-        let subject = options
+        let case = options
             .over
             .iter()
-            .fold(subject, |subject, over| over.apply(&subject, 0));
-        let schema = dataset::schema(&subject, &options)?;
+            .fold(case, |case, over| over.apply(&case, 0));
+        let schema = dataset::schema(&case, &options)?;
         Ok(Self {
-            subject,
+            case,
             options,
             schema,
         })
@@ -201,16 +201,16 @@ impl Sweep {
         self.options.over.len() - 1
     }
 
-    /// The subject at an entry of the grid.
-    fn subject_at(&self, entry: &[usize]) -> Subject {
+    /// The case at an entry of the grid.
+    fn subject_at(&self, entry: &[usize]) -> Case {
         let axis = self.axis();
         self.options
             .over
             .iter()
             .enumerate()
-            .fold(self.subject.clone(), |subject, (k, over)| {
+            .fold(self.case.clone(), |case, (k, over)| {
                 // The first parameter varies fastest.
-                over.apply(&subject, entry[axis - k])
+                over.apply(&case, entry[axis - k])
             })
     }
 }

@@ -1,64 +1,12 @@
 //! A parameter and the values that it takes: `omega=2:4:400`.
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
-use crate::case::physical::{Kind, QuantityError};
-use crate::case::subject::{Key, Subject, UnknownKey};
+use crate::case::{Case, Key, NoSuchKey, ValueOfKeyError};
 use crate::model::beam::MAX_MODES;
 
 /// Most values of one parameter.
 const MOST: usize = 1_000_000;
-
-/// What can be varied.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum SweepKey {
-    /// A parameter of the equations.
-    Parameter(Key),
-    /// The number of beam modes.
-    Modes,
-}
-
-impl SweepKey {
-    /// Its key in a case file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Parameter(key) => key.name(),
-            Self::Modes => "modes",
-        }
-    }
-
-    /// How a figure's axis writes it.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Parameter(key) => key.symbol(),
-            Self::Modes => "N",
-        }
-    }
-
-    /// What it is, in a few words.
-    pub fn meaning(self) -> &'static str {
-        match self {
-            Self::Parameter(Key::Cantilever(parameter)) => parameter.meaning(),
-            Self::Parameter(Key::Oscillator(parameter)) => parameter.name(),
-            Self::Parameter(Key::Physical(key)) => key.path(),
-            Self::Modes => "number of beam modes",
-        }
-    }
-
-    /// What its values measure.
-    pub fn kind(self) -> Kind {
-        match self {
-            Self::Parameter(key) => key.kind(),
-            Self::Modes => Kind::Number,
-        }
-    }
-}
-
-impl Serialize for SweepKey {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
 
 /// How values are spaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -75,7 +23,7 @@ pub enum Spacing {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Over {
     /// The parameter.
-    pub key: SweepKey,
+    pub key: Key,
     /// First and least value.
     pub from: f64,
     /// Last and greatest value.
@@ -103,7 +51,7 @@ pub enum OverError {
         /// What was given.
         given: String,
         /// The name that is none.
-        source: UnknownKey,
+        source: NoSuchKey,
     },
     /// Something that is no number.
     #[error("`{given}`: {which} `{value}` is no {wanted}")]
@@ -125,7 +73,7 @@ pub enum OverError {
         /// Which of the values.
         which: &'static str,
         /// Why not.
-        source: Box<QuantityError>,
+        source: Box<crate::case::quantity::QuantityError>,
     },
     /// Numbers that make no range.
     #[error("`{given}`: {what}")]
@@ -138,12 +86,12 @@ pub enum OverError {
 }
 
 impl Over {
-    /// Reads `key=from:to:count` or `key=from:to:count:log` for `subject`; `model.` before
+    /// Reads `key=from:to:count` or `key=from:to:count:log` for `case`; `model.` before
     /// the key may be left away.
     ///
     /// # Errors
     /// [`OverError`] with what was given and what would be right.
-    pub fn parse(given: &str, subject: &Subject) -> Result<Self, OverError> {
+    pub fn parse(given: &str, case: &Case) -> Result<Self, OverError> {
         let form = |what| OverError::Form {
             given: given.into(),
             what,
@@ -165,38 +113,29 @@ impl Over {
             "log" => Spacing::Log,
             _ => return Err(form("the spacing is `linear` or `log`")),
         };
-        let key = key(given, name.trim(), subject)?;
-        let number = |which, value: &str| {
-            value
-                .parse::<f64>()
-                .ok()
-                .filter(|v| v.is_finite())
-                .ok_or_else(|| OverError::Number {
-                    given: given.into(),
-                    which,
-                    value: value.into(),
-                    wanted: "finite number",
-                })
-        };
-        let quantity = |which, value: &str| match key {
-            SweepKey::Parameter(Key::Physical(physical)) => physical
-                .read(value)
-                .map(|(key, value)| (SweepKey::Parameter(Key::Physical(key)), value))
-                .map_err(|source| OverError::Quantity {
-                    given: given.into(),
-                    which,
-                    source: Box::new(source),
-                }),
-            _ => number(which, value).map(|value| (key, value)),
-        };
-        let (key, from) = quantity("the first value", from)?;
-        let (other, to) = quantity("the last value", to)?;
-        if key != other {
-            return Err(OverError::Range {
+        let key = key(given, name.trim(), case)?;
+        let number = |which, text: &str| {
+            let no_number = |value: &str| OverError::Number {
                 given: given.into(),
-                what: "the first and the last value measure different things".into(),
-            });
-        }
+                which,
+                value: value.into(),
+                wanted: "finite number",
+            };
+            match case.value(key, text) {
+                Ok(value) if value.is_finite() => Ok(value),
+                Ok(_) => Err(no_number(text)),
+                Err(ValueOfKeyError::NotANumber { text }) => Err(no_number(&text)),
+                Err(ValueOfKeyError::Quantity { error: source, .. }) => Err(OverError::Quantity {
+                    given: given.into(),
+                    which,
+                    source,
+                }),
+            }
+        };
+        let (from, to) = (
+            number("the first value", from)?,
+            number("the last value", to)?,
+        );
         let over = Self {
             key,
             from,
@@ -238,7 +177,7 @@ impl Over {
                 "from {from} in equal ratios; both ends must be above 0"
             ));
         }
-        if self.key == SweepKey::Modes {
+        if self.key == Key::Modes {
             let whole = |v: f64| v.fract() == 0.0 && (1.0..=MAX_MODES as f64).contains(&v);
             if !(0..count).all(|k| whole(self.value(k))) {
                 return Err(format!(
@@ -269,33 +208,21 @@ impl Over {
         (0..self.count).map(|k| self.value(k)).collect()
     }
 
-    /// `subject` with the `index`-th value.
-    pub fn apply(&self, subject: &Subject, index: usize) -> Subject {
-        match (self.key, subject) {
-            (SweepKey::Parameter(key), _) => subject.with(key, self.value(index)),
-            (SweepKey::Modes, Subject::Cantilever(case)) => {
-                Subject::Cantilever(case.clone().with_modes(self.value(index) as usize))
-            }
-            (SweepKey::Modes, Subject::Oscillator(_)) => subject.clone(),
-            (SweepKey::Modes, Subject::Physical(physical)) => {
-                Subject::Physical(Box::new(physical.with_modes(self.value(index) as usize)))
-            }
-        }
+    /// `case` with the `index`-th value.
+    pub fn apply(&self, case: &Case, index: usize) -> Case {
+        case.with(self.key, self.value(index))
     }
 }
 
-fn key(given: &str, name: &str, subject: &Subject) -> Result<SweepKey, OverError> {
-    let name = name.strip_prefix("model.").unwrap_or(name);
-    if name == "modes" && matches!(subject, Subject::Cantilever(_) | Subject::Physical(_)) {
-        return Ok(SweepKey::Modes);
+fn key(given: &str, name: &str, case: &Case) -> Result<Key, OverError> {
+    let modes = Key::Modes.name();
+    if name.strip_prefix("model.").unwrap_or(name) == modes && case.cantilever().is_some() {
+        return Ok(Key::Modes);
     }
-    subject
-        .key(name)
-        .map(SweepKey::Parameter)
-        .map_err(|source| OverError::Key {
-            given: given.into(),
-            source,
-        })
+    case.key(name).map_err(|source| OverError::Key {
+        given: given.into(),
+        source,
+    })
 }
 
 impl From<OverError> for crate::Error {
@@ -314,8 +241,8 @@ mod tests {
     use crate::model::cantilever::Cantilever;
     use crate::model::parameter::Parameter;
 
-    fn paper() -> Subject {
-        Subject::Cantilever(Cantilever::paper())
+    fn paper() -> Case {
+        Case::from(Cantilever::paper())
     }
 
     #[test]
@@ -327,14 +254,12 @@ mod tests {
         let over = Over::parse("model.contact_stiffness = 1:100:3:log", &paper()).unwrap();
         let values = over.values();
         assert!(values[0] == 1.0 && (values[1] - 10.0).abs() < 1e-14 && values[2] == 100.0);
-        let Subject::Cantilever(case) = over.apply(&paper(), 2) else {
-            panic!()
-        };
+        let case = over.apply(&paper(), 2);
+        let case = case.cantilever().unwrap();
         assert_eq!(case.get(Parameter::Alpha4), 100.0);
         let over = Over::parse("modes=1:5:5", &paper()).unwrap();
-        let Subject::Cantilever(case) = over.apply(&paper(), 3) else {
-            panic!()
-        };
+        let case = over.apply(&paper(), 3);
+        let case = case.cantilever().unwrap();
         assert_eq!(case.modes, 4);
     }
 

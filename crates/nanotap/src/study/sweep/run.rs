@@ -4,8 +4,8 @@ use nanotap_dynamics::{PeriodicOrbit, SettleOptions, StroboscopicMap, settle};
 use nanotap_flow::{Flow, FlowError};
 
 use super::{Sweep, SweepOptions};
+use crate::case::Case;
 use crate::case::physical::Scales;
-use crate::case::subject::Subject;
 use crate::dataset::Block;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
@@ -120,15 +120,15 @@ pub(super) fn at_value(
     let mut entry: Vec<usize> = block.ranges.iter().map(|r| r.start).collect();
     entry[axis] += item;
     let starts = block.ranges[axis + 1].clone();
-    let subject = sweep.subject_at(&entry);
-    let Ok(model) = subject.model() else {
+    let case = sweep.subject_at(&entry);
+    let Ok(model) = case.model() else {
         // Driven at an undamped resonance: there is no bounded motion to name.
         return Some(vec![
             Outcome::unknown(Classification::Undecided, 0);
             starts.len()
         ]);
     };
-    let mut runner = Runner::new(&subject, &model, &sweep.options);
+    let mut runner = Runner::new(&case, &model, &sweep.options);
     let mut outcomes = Vec::with_capacity(starts.len());
     for start in starts {
         if cancelled() {
@@ -164,8 +164,8 @@ pub(super) fn along_line(
             return None;
         }
         entry[axis] = index;
-        let subject = sweep.subject_at(&entry);
-        let Ok(model) = subject.model() else {
+        let case = sweep.subject_at(&entry);
+        let Ok(model) = case.model() else {
             outcomes[index] = Some(Outcome::unknown(Classification::Undecided, 0));
             continue;
         };
@@ -176,7 +176,7 @@ pub(super) fn along_line(
                 with_modes(&state, model.memory, modes)
             },
         );
-        let (outcome, end) = Runner::new(&subject, &model, &sweep.options).run(&state);
+        let (outcome, end) = Runner::new(&case, &model, &sweep.options).run(&state);
         outcomes[index] = Some(outcome);
         // A motion that ran off is not followed; the next value starts anew.
         last = end;
@@ -207,9 +207,9 @@ struct Runner<'a> {
 }
 
 impl<'a> Runner<'a> {
-    fn new(subject: &Subject, model: &'a Model, options: &'a SweepOptions) -> Self {
+    fn new(case: &Case, model: &'a Model, options: &'a SweepOptions) -> Self {
         Self {
-            scales: subject.resolved().map(|resolved| resolved.scales),
+            scales: case.physical().map(|view| view.scales),
             model,
             options,
             settle: options.settle(),

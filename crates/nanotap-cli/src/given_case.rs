@@ -1,0 +1,156 @@
+//! The case of a command at the terminal: remarks are said, wrong names and values become
+//! failures with advice.
+
+use std::ops::Deref;
+
+pub(crate) use nanotap::case::ParameterUnit;
+use nanotap::case::physical::Severity;
+use nanotap::case::{Case, Key};
+use nanotap::model::Model;
+use nanotap::study::setpoint::{self, SetpointReport};
+
+use crate::arguments::CaseArguments;
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::{command, number, progress};
+
+/// The case of a command.
+pub(crate) struct GivenCase(Case);
+
+impl Deref for GivenCase {
+    type Target = Case;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+/// The case at its setpoint and how that was solved, if it leaves the distance to one.
+pub(crate) fn at_setpoint(
+    case: Case,
+    output: &Output,
+) -> Result<(Case, Option<SetpointReport>), Failure> {
+    if !case.leaves_distance_to_setpoint() {
+        return Ok((case, None));
+    }
+    Ok(progress::watched(output, "distances", |control| {
+        setpoint::at_setpoint(case, control)
+    })??)
+}
+
+impl GivenCase {
+    /// The case of the arguments. What puts a physical case in doubt is said; its notes
+    /// are `nanotap case`'s.
+    pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
+        let (case, setpoint) = at_setpoint(command::case_of(arguments)?, output)?;
+        if let Some(setpoint) = &setpoint {
+            output.note(&setpoint.remark().text);
+        }
+        Ok(Self::warned(case, output))
+    }
+
+    /// The same, but a setpoint is not solved for: for experiments that vary the distance.
+    pub(crate) fn with_any_distance(
+        arguments: &CaseArguments,
+        output: &Output,
+    ) -> Result<Self, Failure> {
+        Ok(Self::warned(command::case_of(arguments)?, output))
+    }
+
+    fn warned(case: Case, output: &Output) -> Self {
+        for remark in case.remarks() {
+            if remark.severity == Severity::Warning {
+                output.warning(&remark.text);
+            }
+        }
+        Self(case)
+    }
+
+    /// Says what stays while these keys vary, as the words that make one of the points again.
+    pub(crate) fn say_held(&self, keys: &[Key], output: &Output) {
+        let mut words: Vec<String> = Vec::new();
+        for key in keys {
+            for (held, value) in self.held(*key) {
+                let word = format!("--set {held}=\"{}\"", held.kind().format_exact(value));
+                if !keys.contains(&held) && !words.contains(&word) {
+                    words.push(word);
+                }
+            }
+        }
+        if !words.is_empty() {
+            output.note(&format!(
+                "held while {} varies; with its value the same point again: {}",
+                keys.iter()
+                    .map(|key| key.path())
+                    .collect::<Vec<_>>()
+                    .join(" and "),
+                words.join(" ")
+            ));
+        }
+    }
+
+    /// Its model.
+    pub(crate) fn model(&self) -> Result<Model, Failure> {
+        Ok(self.0.model()?)
+    }
+
+    /// What it is, in a few words: `3 modes at Ω = 2.6`.
+    pub(crate) fn summary(&self) -> String {
+        if let Some(oscillator) = self.oscillator() {
+            let stop = if self.has_rigid_stop() {
+                "rigid"
+            } else {
+                "soft"
+            };
+            return format!(
+                "an oscillator with a {stop} stop at ω = {}",
+                number::chosen(oscillator.omega)
+            );
+        }
+        let Some(cantilever) = self.cantilever() else {
+            return "a lever".to_owned();
+        };
+        format!(
+            "{} at Ω = {}",
+            number::counted(cantilever.modes, "mode", "modes"),
+            // A physical case's Ω was computed, not chosen.
+            if self.is_physical() {
+                number::significant(cantilever.omega, 6)
+            } else {
+                number::chosen(cantilever.omega)
+            }
+        )
+    }
+
+    /// The parameter that is called `name`.
+    pub(crate) fn key(&self, name: &str) -> Result<Key, Failure> {
+        Ok(self.0.key(name)?)
+    }
+
+    /// The parameter that is called `name`, and values of it given after their options.
+    pub(crate) fn key_and_values<const N: usize>(
+        &self,
+        name: &str,
+        given: [(&str, &str); N],
+    ) -> Result<(Key, [f64; N]), Failure> {
+        let key = self.key(name)?;
+        let mut values = [0.0; N];
+        for (value, (option, text)) in values.iter_mut().zip(given) {
+            *value = self.value(key, option, text)?;
+        }
+        Ok((key, values))
+    }
+
+    /// A value of a parameter, given after `option`: a number of the dimensionless model,
+    /// or of a physical case a quantity with its unit.
+    pub(crate) fn value(&self, key: Key, option: &str, text: &str) -> Result<f64, Failure> {
+        self.0.value(key, text).map_err(|error| {
+            let help = match self.parameter_unit(key) {
+                Some(_) if key.is_physical() => "give a quantity with its unit".to_owned(),
+                Some(_) => "give a number or a quantity".to_owned(),
+                None => format!("give a value of {key} as a number"),
+            };
+            Failure::input(format!("{option} {error}"), help)
+        })
+    }
+}

@@ -1,0 +1,386 @@
+//! What a document says, key by key, and what that describes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::document::{Document, Entry, Value as Written};
+use super::problem::{CaseFileError, Place, Problem, Problems, Source};
+use super::refusal;
+use crate::case::key::{Default, Key, ModelKind, Section, Takes};
+use crate::case::quantity::Kind;
+use crate::case::stated::{Origin, Said, Stated, Value};
+use crate::model::cantilever::{self, Cantilever, CosineTerm};
+use crate::model::contact::ContactLaw;
+use crate::model::drive_form::Actuation;
+use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use crate::model::parameter::Parameter;
+
+/// What a case file and the words beside it describe.
+#[derive(Debug)]
+pub(crate) enum Described {
+    /// A dimensionless cantilever, every number checked.
+    Cantilever(Cantilever),
+    /// An oscillator, every number checked.
+    Oscillator(Oscillator),
+    /// A physical cantilever: each value checked by itself.
+    Physical(Stated),
+}
+
+/// The entries that count, by key.
+type Known<'a> = BTreeMap<Key, &'a Entry>;
+
+/// Reads a text, if there is one, and puts the `key=value` words of `overrides` in place of
+/// what it says.
+///
+/// # Errors
+/// Everything that is wrong with the text and the words, each with its place.
+pub(crate) fn parse(
+    source: Option<Source>,
+    overrides: &[String],
+) -> Result<Described, CaseFileError> {
+    let mut document = source.map_or_else(|| Ok(Document::default()), Document::parse)?;
+    let mut problems = Problems::default();
+    for written in overrides {
+        if let Err(problem) = document.set(written) {
+            problems.add(|| problem);
+        }
+    }
+    match described(&document, &mut problems) {
+        Some(described) if problems.is_empty() => Ok(described),
+        _ => Err(CaseFileError::of(document.source, problems)),
+    }
+}
+
+/// What `document` describes, as far as its problems let it be built.
+fn described(document: &Document, problems: &mut Problems) -> Option<Described> {
+    refusal::misplaced(document, problems);
+    let all_placed = problems.is_empty();
+    let kind = kind_of(document, problems);
+    let tables = || document.headers.iter().map(|header| &header.name);
+    let physical = tables()
+        .chain(document.entries.iter().map(|entry| &entry.table))
+        .filter_map(|name| Section::find(name))
+        .find(|section| section.is_physical());
+    if let Some(section) = physical {
+        let known = known(document, ModelKind::Cantilever, problems);
+        refusal::mixed(section, kind, &known, problems);
+        let stated = stated(document, &known, problems);
+        refusal::twice(&known, problems);
+        return Some(Described::Physical(stated));
+    }
+    let known = known(document, kind, problems);
+    let stated = stated(document, &known, problems);
+    let law = word(&stated, Key::Contact).unwrap_or_default();
+    let missing = all_placed
+        .then(|| refusal::missing(document, kind, law, &known))
+        .flatten();
+    let read = match kind {
+        ModelKind::Cantilever => {
+            cantilever(&known, &stated, law, problems).map(Described::Cantilever)
+        }
+        _ => oscillator(kind, &known, &stated, problems).map(Described::Oscillator),
+    };
+    if let Some(missing) = missing {
+        problems.add(|| missing);
+        return None;
+    }
+    read
+}
+
+/// Which kind `[model]` is.
+fn kind_of(document: &Document, problems: &mut Problems) -> ModelKind {
+    let is_kind = |entry: &&Entry| entry.table == "model" && entry.key == Key::Kind.name();
+    let Some(entry) = document.entries.iter().rev().find(is_kind) else {
+        return ModelKind::default();
+    };
+    let text = match &entry.value {
+        Written::Text(text) => text.as_str(),
+        _ => "",
+    };
+    let named = |kind: &ModelKind| kind.name() == text;
+    ModelKind::ALL.into_iter().find(named).unwrap_or_else(|| {
+        let words = ModelKind::ALL.map(ModelKind::name);
+        problems.add(|| refusal::not_among(entry, text, &words));
+        ModelKind::default()
+    })
+}
+
+/// The entries by key. What is set beside the file replaces what the file says, the same or
+/// in another way; one key by two of its names is refused.
+fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -> Known<'a> {
+    let mut known = Known::new();
+    for entry in &document.entries {
+        let Some(section) = Section::find(&entry.table) else {
+            continue;
+        };
+        let key = match section {
+            Section::Model => kind.key(&entry.key),
+            _ => section.keys().find(|key| key.name() == entry.key),
+        };
+        let Some(key) = key else {
+            problems.add(|| match section {
+                Section::Model => refusal::unknown_model_key(kind, entry),
+                _ => refusal::unknown_physical_key(section, entry),
+            });
+            continue;
+        };
+        if entry.is_override() {
+            for (other, _) in key.alternatives() {
+                if known
+                    .get(&other)
+                    .is_some_and(|entry: &&Entry| !entry.is_override())
+                {
+                    known.remove(&other);
+                }
+            }
+        }
+        let Some(before) = known.insert(key, entry) else {
+            continue;
+        };
+        let beside = before.is_override() && before.key != entry.key;
+        if beside || !entry.is_override() {
+            problems.add(|| refusal::same_key(before, entry));
+        }
+    }
+    known
+}
+
+/// The values of `known`, each checked by itself, and where they were said.
+fn stated(document: &Document, known: &Known<'_>, problems: &mut Problems) -> Stated {
+    let mut stated = Stated::default();
+    let mut origin = Origin {
+        source: document.source.clone(),
+        headers: document.headers.clone(),
+        said: Vec::with_capacity(known.len()),
+    };
+    for (&key, &entry) in known {
+        match value(key, entry) {
+            Ok(value) => stated.put(key, value),
+            Err(problem) => problems.add(|| problem.key(Some(key.path()))),
+        }
+        let said = Said {
+            name: entry.key.clone(),
+            written: entry.written.clone(),
+            key_place: entry.key_place.clone(),
+            value_place: entry.value_place.clone(),
+        };
+        origin.said.push((key, said));
+    }
+    stated.origin = Arc::new(origin);
+    stated
+}
+
+/// The value of an entry, or what is wrong with it.
+fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
+    if key.is_physical() {
+        return physical_value(key, entry);
+    }
+    let text = match &entry.value {
+        Written::Text(text) => text.as_str(),
+        _ => "",
+    };
+    match key.entry().takes {
+        Takes::Count(most) => {
+            let modes = refusal::count(entry, most)?;
+            Ok(Value::Number(modes as f64, Kind::Number))
+        }
+        Takes::Word(words) => key
+            .read(text)
+            .map_err(|_| refusal::not_among(entry, text, words)),
+        Takes::FrequencyRatio => {
+            let text = if text.is_empty() {
+                &entry.written
+            } else {
+                text
+            };
+            key.read(text)
+                .map_err(|error| refusal::out_of_range(entry, &error.to_string()))
+        }
+        _ => Ok(Value::Number(refusal::number(entry)?, Kind::Number)),
+    }
+}
+
+fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
+    let at = |message: String| Problem::new(entry.value_place.clone(), message);
+    let Some(text) = entry.text() else {
+        let Written::Other(what) = entry.value else {
+            return Err(at(format!("`{key}` = {} is no value", entry.written)));
+        };
+        return Err(at(format!("`{key}` = {} is {what}", entry.written))
+            .help("write a quantity with its unit, in quotes, or a plain number"));
+    };
+    let value = key.read(&text).map_err(|error| {
+        use crate::case::stated::ValueError;
+        match error {
+            ValueError::Quantity(error) => at(format!("{key}: {error}")),
+            ValueError::Ratio(error) => at(format!("{key} = {text}: {error}")),
+            ValueError::Word { words, .. } => Problem {
+                message: format!(
+                    "{key} = \"{text}\" is not one of {}",
+                    crate::case::stated::quoted(words)
+                ),
+                ..refusal::not_among(entry, &text, words)
+            },
+        }
+    })?;
+    match key.objection(&value) {
+        None => Ok(value),
+        Some(reason) => Err(at(format!("{key} = {text}: {reason}"))),
+    }
+}
+
+impl Key {
+    /// What is wrong with a value of a physical key, by itself.
+    pub(crate) fn objection(self, value: &Value) -> Option<&'static str> {
+        let Value::Number(number, kind) = value else {
+            return None;
+        };
+        if self.entry().takes == Takes::FractionOrLength {
+            let right = *number > 0.0 && (*kind == Kind::Length || *number < 1.0);
+            return (!right).then_some(
+                "a setpoint is a fraction of the free amplitude between 0 and 1, or an \
+                 amplitude such as \"8 nm\"",
+            );
+        }
+        let range = self.entry().range;
+        (!range.contains(*number)).then_some(range.reason)
+    }
+}
+
+/// The variant that a stated word names; the default where none is stated.
+pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
+    stated: &Stated,
+    key: Key,
+) -> Option<T> {
+    match stated.get(key) {
+        Some(Value::Word(word)) => word.parse().ok(),
+        _ => Some(T::default()),
+    }
+}
+
+/// Which form of Eq. (14) is stated.
+pub(crate) fn cosine_term(stated: &Stated) -> CosineTerm {
+    match stated.get(Key::CosineTerm) {
+        Some(Value::Word(word)) if *word == CosineTerm::Printed.name() => CosineTerm::Printed,
+        _ => CosineTerm::Corrected,
+    }
+}
+
+/// How many modes are stated.
+pub(crate) fn modes(stated: &Stated) -> usize {
+    stated
+        .number(Key::Modes)
+        .map_or(crate::case::DEFAULT_MODES, |modes| modes as usize)
+}
+
+/// The value of a key that need not be written, with a sample of this law.
+pub(super) fn default_of(key: Key, law: ContactLaw) -> Option<f64> {
+    let solid = law == ContactLaw::StandardLinearSolid;
+    match (key, key.entry().default) {
+        (Key::Alpha6, _) if solid => Some(0.0),
+        (Key::RelaxationStiffness | Key::RelaxationTime, _) if !solid => Some(0.0),
+        (_, Default::Number(value)) => Some(value),
+        _ => None,
+    }
+}
+
+fn cantilever(
+    known: &Known<'_>,
+    stated: &Stated,
+    law: ContactLaw,
+    problems: &mut Problems,
+) -> Option<Cantilever> {
+    let before = problems.found.len();
+    let mut case = Cantilever {
+        modes: modes(stated),
+        alpha5: 0.0,
+        contact: law,
+        actuation: word::<Actuation>(stated, Key::Actuation)?,
+        cosine_term: cosine_term(stated),
+        tone2_ratio: match stated.get(Key::Tone2Ratio) {
+            Some(Value::Ratio(ratio)) => Some(*ratio),
+            _ => None,
+        },
+        ..Cantilever::paper()
+    };
+    if let (CosineTerm::Printed, Actuation::Tip | Actuation::Distributed, Some(entry)) = (
+        case.cosine_term,
+        case.actuation,
+        known.get(&Key::CosineTerm),
+    ) {
+        problems.add(|| refusal::printed_term(entry));
+    }
+    let mut complete = true;
+    for parameter in Parameter::every() {
+        let key = Key::of(parameter);
+        let Some(value) = stated.number(key).or_else(|| default_of(key, law)) else {
+            complete = false;
+            continue;
+        };
+        case = case.with(parameter, value);
+        let Some(entry) = known.get(&key) else {
+            continue;
+        };
+        let refused = cantilever::check(parameter, value)
+            .err()
+            .map(|error| error.reason);
+        if let Some(reason) = refused.or_else(|| case.misplaced(parameter)) {
+            problems
+                .add(|| refusal::out_of_range(entry, &reason.to_string()).key(Some(key.path())));
+        }
+    }
+    (complete && problems.found.len() == before).then_some(case)
+}
+
+fn oscillator(
+    kind: ModelKind,
+    known: &Known<'_>,
+    stated: &Stated,
+    problems: &mut Problems,
+) -> Option<Oscillator> {
+    let stop = match kind {
+        ModelKind::Impact => Stop::Rigid { restitution: 1.0 },
+        _ => Stop::Soft {
+            stiffness: 1.0,
+            damping: 0.0,
+        },
+    };
+    // Valid, so that each value can be checked by itself.
+    let plain = Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.0,
+        forcing: 1.0,
+        omega: 1.0,
+        gap: 0.0,
+        stop,
+    };
+    let (mut oscillator, mut complete) = (plain, true);
+    for parameter in OscillatorParameter::ALL {
+        if plain.get(parameter).is_none() {
+            continue;
+        }
+        let key = Key::of_oscillator(parameter);
+        let default = || default_of(key, ContactLaw::default());
+        let Some(value) = stated.number(key).or_else(default) else {
+            complete = false;
+            continue;
+        };
+        oscillator = oscillator.with(parameter, value);
+        if let (Err(error), Some(entry)) =
+            (plain.with(parameter, value).validate(), known.get(&key))
+        {
+            complete = false;
+            problems.add(|| refusal::out_of_range(entry, error.expected).key(Some(key.path())));
+        }
+    }
+    complete.then_some(oscillator)
+}
+
+/// Where something stands in the order of reading.
+pub(super) fn offset(place: &Place) -> usize {
+    match place {
+        Place::Span(span) => span.start,
+        Place::Override(_) | Place::Whole => usize::MAX,
+    }
+}

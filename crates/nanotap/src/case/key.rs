@@ -1,0 +1,526 @@
+//! A key of a case: what it is called, what it takes, and which keys say the same.
+//!
+//! The entries themselves stand in [`keys`](super::keys), once. Whatever reads, checks,
+//! varies, explains or documents a key asks here.
+
+use std::fmt;
+use std::sync::LazyLock;
+
+use serde::{Serialize, Serializer};
+
+pub use super::keys::Key;
+use super::keys::{ALTERNATIVES, TABLE};
+use super::near_name::near_name;
+use super::quantity::Kind;
+use crate::model::cantilever;
+use crate::model::oscillator::{self, OscillatorParameter};
+use crate::model::parameter::Parameter;
+
+/// A table of a case file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Section {
+    /// `[model]`: dimensionless numbers.
+    Model,
+    /// `[cantilever]`
+    Cantilever,
+    /// `[tip]`
+    Tip,
+    /// `[sample]`
+    Sample,
+    /// `[drive]`
+    Drive,
+    /// `[gap]`
+    Gap,
+}
+
+impl Section {
+    /// Every section.
+    pub const ALL: [Self; 6] = [
+        Self::Model,
+        Self::Cantilever,
+        Self::Tip,
+        Self::Sample,
+        Self::Drive,
+        Self::Gap,
+    ];
+
+    /// Its name, without brackets.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Model => "model",
+            Self::Cantilever => "cantilever",
+            Self::Tip => "tip",
+            Self::Sample => "sample",
+            Self::Drive => "drive",
+            Self::Gap => "gap",
+        }
+    }
+
+    /// The section of this name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|section| section.name() == name)
+    }
+
+    /// Whether its keys are physical quantities.
+    pub const fn is_physical(self) -> bool {
+        !matches!(self, Self::Model)
+    }
+
+    /// Its keys.
+    pub fn keys(self) -> impl Iterator<Item = Key> {
+        Key::all().filter(move |key| key.section() == self)
+    }
+}
+
+/// What `[model]` describes, by its key `kind`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ModelKind {
+    /// The cantilever.
+    #[default]
+    Cantilever,
+    /// An oscillator with a soft stop.
+    VibroImpact,
+    /// An oscillator with a rigid stop.
+    Impact,
+}
+
+impl ModelKind {
+    /// Every kind.
+    pub const ALL: [Self; 3] = [Self::Cantilever, Self::VibroImpact, Self::Impact];
+
+    /// The word of the key `kind`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cantilever => "cantilever",
+            Self::VibroImpact => "vibro_impact",
+            Self::Impact => "impact",
+        }
+    }
+
+    /// The keys that `[model]` takes for it, numbers first.
+    pub fn keys(self) -> impl Iterator<Item = Key> + Clone {
+        Key::all().filter(move |key| key.entry().models.contains(&self))
+    }
+
+    /// Every name of its keys, aliases too.
+    pub fn names(self) -> impl Iterator<Item = &'static str> + Clone {
+        let names = self.keys().map(Key::name);
+        names.chain(self.keys().filter_map(Key::alias))
+    }
+
+    /// The key that is called `word`. Of a cantilever's numbers case does not matter, nor do
+    /// hyphens and blanks in place of underscores, and their symbols are names too.
+    pub fn key(self, word: &str) -> Option<Key> {
+        let exact = |key: &Key| key.name() == word || key.alias() == Some(word);
+        if let Some(key) = self.keys().find(exact) {
+            return Some(key);
+        }
+        let plain = word.trim().to_lowercase().replace(['-', ' '], "_");
+        self.keys().find(|key| {
+            let symbol = key.symbol().to_lowercase();
+            key.parameter().is_some()
+                && (key.name() == plain
+                    || key.alias() == Some(&plain)
+                    || symbol == plain
+                    || without_subscripts(&symbol) == plain)
+        })
+    }
+
+    /// The name of a key that `word` was probably meant to be.
+    pub fn near(self, word: &str) -> Option<&'static str> {
+        near_name(word, self.names())
+    }
+}
+
+/// α₄ as it is typed: α4.
+fn without_subscripts(symbol: &str) -> String {
+    symbol
+        .chars()
+        .map(|c| match c {
+            '₀'..='₉' => char::from(b'0' + (c as u32 - '₀' as u32) as u8),
+            'ₘ' => 'm',
+            other => other,
+        })
+        .collect()
+}
+
+/// What a key takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Takes {
+    /// A quantity of this kind; in `[model]` a plain number.
+    Quantity(Kind),
+    /// A fraction, or a length.
+    FractionOrLength,
+    /// A whole number from 1 to this.
+    Count(usize),
+    /// One of these words.
+    Word(&'static [&'static str]),
+    /// The name of a lever of the catalogue.
+    LeverName,
+    /// The name of a material of the catalogue.
+    MaterialName,
+    /// A ratio of two frequencies: `25/4`, `6.25`.
+    FrequencyRatio,
+}
+
+/// The values that a number may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Least value.
+    pub low: f64,
+    /// Greatest value.
+    pub high: f64,
+    /// Whether the least value itself is excluded.
+    pub above: bool,
+    /// Whether the greatest value itself is excluded.
+    pub below: bool,
+    /// What is said of a value outside.
+    pub reason: &'static str,
+}
+
+impl Range {
+    /// Any finite number.
+    pub const ANY: Self = Self {
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+        above: true,
+        below: true,
+        reason: "it must be a finite number",
+    };
+    /// Above zero.
+    pub const POSITIVE: Self = Self {
+        low: 0.0,
+        reason: "it must be above zero",
+        ..Self::ANY
+    };
+    /// Zero or above.
+    pub const NOT_NEGATIVE: Self = Self {
+        low: 0.0,
+        above: false,
+        reason: "it must not be negative",
+        ..Self::ANY
+    };
+
+    /// Whether it has `value`.
+    pub fn contains(&self, value: f64) -> bool {
+        let high = if self.above {
+            value > self.low
+        } else {
+            value >= self.low
+        };
+        let low = if self.below {
+            value < self.high
+        } else {
+            value <= self.high
+        };
+        high && low
+    }
+}
+
+/// What a key has when nothing is said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Default {
+    /// It must be said, or follows from others.
+    None,
+    /// This number.
+    Number(f64),
+    /// This word.
+    Word(&'static str),
+}
+
+/// The number of the equations that a dimensionless key is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Means {
+    /// None: a physical quantity, a word.
+    Nothing,
+    /// A parameter of the cantilever.
+    Cantilever(Parameter),
+    /// A parameter of an oscillator.
+    Oscillator(OscillatorParameter),
+}
+
+/// What is known of a key.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// The table of the case file that it stands in.
+    pub section: Section,
+    /// Its name there.
+    pub name: &'static str,
+    /// A second name.
+    pub alias: Option<&'static str>,
+    /// How a formula or an axis writes it; empty for its path.
+    pub symbol: &'static str,
+    /// What it takes.
+    pub takes: Takes,
+    /// The values that are allowed.
+    pub range: Range,
+    /// What it has when nothing is said.
+    pub default: Default,
+    /// A value to show.
+    pub example: f64,
+    /// Which kinds of `[model]` take it.
+    pub models: &'static [ModelKind],
+    /// The number of the equations that it is.
+    pub means: Means,
+    /// The parameter that becomes impossible when a physical quantity is: named in refusals.
+    pub feeds: Option<Parameter>,
+    /// What it is, in one line.
+    pub meaning: &'static str,
+}
+
+/// Quantities that each say the same in another way: at most one of the ways is stated.
+#[derive(Debug)]
+pub struct Alternatives {
+    /// The ways, each one or more keys that go together.
+    pub ways: &'static [&'static [Key]],
+    /// Why not two.
+    pub reason: &'static str,
+}
+
+/// Names with their tables, `cantilever.k`, of every key.
+static PATHS: LazyLock<Vec<String>> = LazyLock::new(|| {
+    let path = |entry: &Entry| match entry.section {
+        Section::Model => entry.name.to_owned(),
+        section => format!("{}.{}", section.name(), entry.name),
+    };
+    TABLE.iter().map(path).collect()
+});
+
+impl Key {
+    /// What is known of it.
+    pub fn entry(self) -> &'static Entry {
+        &TABLE[self as usize]
+    }
+
+    /// Its table.
+    pub fn section(self) -> Section {
+        self.entry().section
+    }
+
+    /// Its name in its table: `k`.
+    pub fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// Its name in the whole case: `alpha1`, `cantilever.k`.
+    pub fn path(self) -> &'static str {
+        &PATHS[self as usize]
+    }
+
+    /// Its second name.
+    pub fn alias(self) -> Option<&'static str> {
+        self.entry().alias
+    }
+
+    /// How a figure's axis writes it.
+    pub fn symbol(self) -> &'static str {
+        match self.entry().symbol {
+            "" => self.path(),
+            symbol => symbol,
+        }
+    }
+
+    /// What it is, in one line.
+    pub fn meaning(self) -> &'static str {
+        self.entry().meaning
+    }
+
+    /// What its values measure; a number where they measure nothing.
+    pub fn kind(self) -> Kind {
+        match self.entry().takes {
+            Takes::Quantity(kind) => kind,
+            _ => Kind::Number,
+        }
+    }
+
+    /// Whether it is a quantity of a physical case.
+    pub fn is_physical(self) -> bool {
+        self.section().is_physical()
+    }
+
+    /// The cantilever's parameter that it is.
+    pub fn parameter(self) -> Option<Parameter> {
+        match self.entry().means {
+            Means::Cantilever(parameter) => Some(parameter),
+            _ => None,
+        }
+    }
+
+    /// The key of a parameter of the cantilever.
+    pub fn of(parameter: Parameter) -> Self {
+        let is = |key: &Self| key.entry().means == Means::Cantilever(parameter);
+        // A test sees that every parameter has its key.
+        Self::all().find(is).unwrap_or(Self::Alpha1)
+    }
+
+    /// The key of a parameter of an oscillator.
+    pub fn of_oscillator(parameter: OscillatorParameter) -> Self {
+        let is = |key: &Self| key.entry().means == Means::Oscillator(parameter);
+        Self::all().find(is).unwrap_or(Self::Mass)
+    }
+
+    /// The values that are allowed.
+    pub fn range(self) -> Range {
+        let (low, high) = match self.entry().means {
+            Means::Nothing => return self.entry().range,
+            Means::Cantilever(parameter) => cantilever::range(parameter),
+            Means::Oscillator(parameter) => oscillator::range(parameter),
+        };
+        Range {
+            low,
+            high,
+            above: false,
+            below: false,
+            reason: "it must be within the range of the model",
+        }
+    }
+
+    /// The physical key that is called `section.name`.
+    pub fn find(path: &str) -> Option<Self> {
+        let (section, name) = path.split_once('.')?;
+        let section = Section::find(section).filter(|section| section.is_physical())?;
+        section.keys().find(|key| key.name() == name)
+    }
+
+    /// Why its values cannot vary along a range, where they cannot.
+    pub fn cannot_vary(self) -> Option<&'static str> {
+        match self.entry().takes {
+            Takes::Quantity(_) => None,
+            Takes::FractionOrLength => Some(
+                "each setpoint has its own distance; vary gap.tip, or see A/A0 in the curve of \
+                 an approach",
+            ),
+            Takes::Count(_) => Some("it is a whole number"),
+            Takes::FrequencyRatio => Some("it is a ratio of whole numbers"),
+            Takes::Word(_) | Takes::LeverName | Takes::MaterialName => {
+                Some("it is a name, not a quantity")
+            }
+        }
+    }
+
+    /// The keys that say the same in another way, and why no two of the ways go together.
+    pub fn alternatives(self) -> impl Iterator<Item = (Self, &'static str)> {
+        ALTERNATIVES
+            .iter()
+            .filter(move |group| group.ways.iter().any(|way| way.contains(&self)))
+            .flat_map(move |group| {
+                let others = group.ways.iter().filter(move |way| !way.contains(&self));
+                others.flat_map(|way| way.iter().map(|key| (*key, group.reason)))
+            })
+    }
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(self.path())
+    }
+}
+
+impl Serialize for Key {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.path())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_of_the_equations_has_its_key() {
+        for parameter in Parameter::every() {
+            assert_eq!(Key::of(parameter).parameter(), Some(parameter));
+            assert_eq!(Key::of(parameter).name(), parameter.name());
+        }
+        for parameter in OscillatorParameter::ALL {
+            let key = Key::of_oscillator(parameter);
+            assert_eq!(key.entry().means, Means::Oscillator(parameter));
+            assert_eq!(key.name(), parameter.name());
+        }
+    }
+
+    #[test]
+    fn every_name_leads_back_to_its_key() {
+        for kind in ModelKind::ALL {
+            for key in kind.keys() {
+                assert_eq!(kind.key(key.name()), Some(key), "{key}");
+                if let Some(alias) = key.alias() {
+                    assert_eq!(kind.key(alias), Some(key), "{key}");
+                }
+            }
+        }
+        for key in ModelKind::Cantilever
+            .keys()
+            .filter(|key| key.parameter().is_some())
+        {
+            for word in [key.name(), key.alias().unwrap_or(key.name()), key.symbol()] {
+                let find = |word: &str| ModelKind::Cantilever.key(word);
+                assert_eq!(find(word), Some(key), "{word}");
+                assert_eq!(find(&word.to_uppercase()), Some(key), "{word}");
+                assert_eq!(find(&word.replace('_', "-")), Some(key), "{word}");
+            }
+        }
+        let find = |word: &str| ModelKind::Cantilever.key(word);
+        assert_eq!(find("α4"), Some(Key::Alpha4));
+        assert_eq!(find(" Drive frequency "), Some(Key::Omega));
+        for key in Key::all().filter(|key| key.is_physical()) {
+            assert_eq!(Key::find(key.path()), Some(key));
+        }
+    }
+
+    #[test]
+    fn no_two_keys_of_a_table_have_one_name() {
+        for kind in ModelKind::ALL {
+            let mut names: Vec<_> = kind.names().collect();
+            let count = names.len();
+            names.sort_unstable();
+            names.dedup();
+            assert_eq!(names.len(), count, "{kind:?}");
+        }
+        let mut paths: Vec<_> = Key::all()
+            .filter(|key| key.is_physical())
+            .map(Key::path)
+            .collect();
+        let count = paths.len();
+        paths.sort_unstable();
+        paths.dedup();
+        assert_eq!(paths.len(), count);
+    }
+
+    #[test]
+    fn a_slip_gets_the_name_that_was_meant() {
+        for (slip, meant) in [
+            ("omgea", "omega"),
+            ("alhpa3", "alpha3"),
+            ("contact_stifness", "contact_stiffness"),
+            ("drive_freqency", "drive_frequency"),
+            ("tip_mass", "tip_mass_ratio"),
+            ("relaxation_tme", "relaxation_time"),
+        ] {
+            assert_eq!(ModelKind::Cantilever.key(slip), None, "{slip}");
+            assert_eq!(ModelKind::Cantilever.near(slip), Some(meant), "{slip}");
+        }
+        for strange in ["", "temperature", "\u{0}", "ααα"] {
+            assert_eq!(ModelKind::Cantilever.key(strange), None, "{strange}");
+            assert_eq!(ModelKind::Cantilever.near(strange), None, "{strange}");
+        }
+    }
+
+    #[test]
+    fn what_says_the_same_does_so_both_ways() {
+        for key in Key::all() {
+            for (other, _) in key.alternatives() {
+                assert!(
+                    other.alternatives().any(|(back, _)| back == key),
+                    "{key} {other}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_range_has_its_ends_or_not() {
+        assert!(!Range::POSITIVE.contains(0.0) && Range::NOT_NEGATIVE.contains(0.0));
+        assert!(!Range::ANY.contains(f64::NAN) && !Range::ANY.contains(f64::INFINITY));
+    }
+}

@@ -1,0 +1,73 @@
+//! What a physical case states, one quantity at a time.
+
+use super::catalogue::{Catalogue, Lever, Material};
+use super::error::PhysicalError;
+use crate::case::key::Key;
+use crate::case::stated::{Stated, Value};
+use crate::model::drive_form::FrequencyRatio;
+
+/// The stated values, and the catalogue that their names are from.
+#[derive(Clone, Copy)]
+pub(crate) struct Reader<'a> {
+    pub(crate) stated: &'a Stated,
+    pub(crate) catalogue: &'a Catalogue,
+}
+
+impl<'a> Reader<'a> {
+    /// Whether a key is stated.
+    pub(crate) fn has(self, key: Key) -> bool {
+        self.stated.has(key)
+    }
+
+    /// A quantity in SI, within its range.
+    pub(crate) fn number(self, key: Key) -> Result<Option<f64>, PhysicalError> {
+        let Some(value) = self.stated.get(key) else {
+            return Ok(None);
+        };
+        match key.objection(value) {
+            None => Ok(self.stated.number(key)),
+            Some(reason) => Err(self.impossible(key, reason)),
+        }
+    }
+
+    /// A word.
+    pub(crate) fn word(self, key: Key) -> Option<&'static str> {
+        match self.stated.get(key)? {
+            Value::Word(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    /// A ratio of frequencies.
+    pub(crate) fn ratio(self, key: Key) -> Option<FrequencyRatio> {
+        match self.stated.get(key)? {
+            Value::Ratio(ratio) => Some(*ratio),
+            _ => None,
+        }
+    }
+
+    fn name(self, key: Key) -> Option<&'a str> {
+        match self.stated.get(key)? {
+            Value::Name(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// The lever of the catalogue that is named.
+    pub(crate) fn lever(self) -> Result<Option<&'a Lever>, PhysicalError> {
+        let key = Key::LeverName;
+        let find = |name| self.catalogue.lever(key, name);
+        self.name(key).map(find).transpose()
+    }
+
+    /// The material of the catalogue that is named.
+    pub(crate) fn material(self, key: Key) -> Result<Option<&'a Material>, PhysicalError> {
+        let find = |name| self.catalogue.material(key, name);
+        self.name(key).map(find).transpose()
+    }
+
+    /// The error that a stated value cannot be.
+    pub(crate) fn impossible(self, key: Key, reason: impl Into<String>) -> PhysicalError {
+        PhysicalError::impossible(key, self.stated.written(key), reason)
+    }
+}

@@ -1,0 +1,136 @@
+//! What had to be assumed in mapping a case, and what puts it in doubt.
+
+use super::error::PhysicalError;
+use super::reader::Reader;
+use super::remark::Remark;
+use super::view::{Physical, USUAL_TIP_HEIGHT};
+use crate::case::key::Key;
+use crate::case::quantity::Kind;
+use crate::model::cantilever::Cantilever;
+use crate::model::drive_form::Actuation;
+use crate::model::exact_beam;
+
+impl Physical {
+    /// All remarks, in the order in which the case is read.
+    pub(crate) fn remarks(&self, reader: Reader<'_>) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        if let Ok(Some(known)) = reader.lever() {
+            remarks.push(Remark::note(format!(
+                "lever \"{}\" from the catalogue: {}",
+                known.name, known.source
+            )));
+        }
+        if self.tip.mass.is_none() && !reader.has(Key::LeverF2) {
+            remarks.push(Remark::note(
+                "no tip mass is given: taken as zero (cantilever.f2, tip.mass, tip.mass_ratio \
+                 or tip.shape would tell it)",
+            ));
+        }
+        remarks.extend(self.lever.remarks(&self.data));
+        remarks.extend(self.sample.remarks(reader, &self.tip));
+        if !reader.has(Key::GapTip) {
+            remarks.push(Remark::note(format!(
+                "gap.tip is not given: {}, the setpoint amplitude, until the setpoint is \
+                 solved for",
+                Kind::Length.format(self.parameters.tip_gap)
+            )));
+        }
+        if !reader.has(Key::GapBeam) && self.tip.height.is_none() {
+            remarks.push(Remark::note(format!(
+                "neither gap.beam nor tip.height is given: the tip counts as {} high, which \
+                 matters only for whether the beam touches",
+                Kind::Length.format(USUAL_TIP_HEIGHT)
+            )));
+        }
+        remarks.extend(self.clearance_remarks());
+        remarks.extend(self.truncation_remark().ok().flatten());
+        remarks
+    }
+
+    /// Whether another part of the beam would touch. The trajectory decides in the end; what
+    /// can be said beforehand is how deep the tip sinks when it brings its energy along,
+    /// ½kA₀² = ½K₁δ², but no deeper than it swings.
+    fn clearance_remarks(&self) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        let base = match self.cantilever.actuation {
+            Actuation::Base => self.parameters.drive_amplitude + self.parameters.tone2_amplitude,
+            Actuation::Tip | Actuation::Distributed => 0.0,
+        };
+        if base >= self.scales.length {
+            remarks.push(Remark::warning(format!(
+                "the drive moves the clamped end by {}, further than its gap of {}: the beam \
+                 would touch the sample",
+                Kind::Length.format(base),
+                Kind::Length.format(self.scales.length)
+            )));
+        }
+        let softness = (self.lever.k / self.sample.stiffness).sqrt().min(1.0);
+        let static_depth = (-self.parameters.tip_gap).max(0.0) * self.lever.k
+            / (self.lever.k + self.sample.stiffness);
+        let depth = (self.free_amplitude + base) * softness + static_depth;
+        if depth >= self.tip_height {
+            remarks.push(Remark::warning(format!(
+                "on so soft a sample the tip may sink by {}, more than its height of {}: \
+                 another part of the beam would touch",
+                Kind::Length.format_digits(depth, 2),
+                Kind::Length.format(self.tip_height)
+            )));
+        }
+        if let Some(hertz) = self.sample.hertz
+            && hertz.indentation >= self.tip_height
+        {
+            remarks.push(Remark::warning(format!(
+                "the indentation of {} is more than the tip's height of {}: another part of \
+                 the beam would touch",
+                Kind::Length.format(hertz.indentation),
+                Kind::Length.format(self.tip_height)
+            )));
+        }
+        remarks
+    }
+
+    /// How far the truncated model's first resonance lies from f₀: with a tip mass, modes of
+    /// the bare beam do not reproduce it exactly.
+    fn truncation_remark(&self) -> Result<Option<Remark>, PhysicalError> {
+        let exact = exact_beam::frequencies(self.cantilever.alpha1, 0.0, 1)?[0];
+        let truncated = truncated_first_frequency(&self.cantilever)?;
+        let shift = truncated / exact - 1.0;
+        if shift * self.lever.quality_factor < 0.05 {
+            return Ok(None);
+        }
+        Ok(Some(Remark::warning(format!(
+            "with {} modes the model resonates at {} instead of {}, {} of the resonance's \
+             width away: take more modes",
+            self.cantilever.modes,
+            Kind::Frequency.format_digits(self.lever.f0 * (1.0 + shift), 5),
+            Kind::Frequency.format_digits(self.lever.f0, 5),
+            Kind::Number.format_digits(shift * self.lever.quality_factor, 2)
+        ))))
+    }
+}
+
+/// First natural frequency of the Galerkin equations with tip mass: the root below ω₀₁ of
+/// 1 = α1Ω² Σφ_j(1)²/(β_j⁴ − Ω²), whose right side rises from 0 to infinity.
+fn truncated_first_frequency(case: &Cantilever) -> Result<f64, PhysicalError> {
+    let bare = exact_beam::frequencies(0.0, 0.0, case.modes)?;
+    let excess = |omega: f64| {
+        let square = omega * omega;
+        let sum: f64 = bare
+            .iter()
+            .map(|frequency| 4.0 / (frequency * frequency - square))
+            .sum();
+        case.alpha1 * square * sum >= 1.0
+    };
+    let (mut low, mut high) = (0.0, bare[0]);
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return Ok(middle);
+        }
+        if excess(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+}

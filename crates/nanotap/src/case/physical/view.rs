@@ -1,0 +1,342 @@
+//! A case as an experimenter states it, mapped to the model: the view in SI.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Complex;
+
+use super::drive::{Drive, DriveFrequency, DriveStrength, FIRST, SECOND, Setpoint};
+use super::error::PhysicalError;
+use super::free_response::{free_response, response_at};
+use super::lever::{Lever, LeverData};
+use super::mapping::{MappingRow, PhysicalParameters, Scales, mapping_table};
+use super::reader::Reader;
+use super::sample::Sample;
+use super::tip::Tip;
+use crate::case::file::{cosine_term, modes};
+use crate::case::key::{Key, ModelKind};
+use crate::case::quantity::Kind;
+use crate::case::stated::{Stated, Value};
+use crate::model::cantilever::Cantilever;
+use crate::model::drive_form::Actuation;
+use crate::model::parameter::Parameter;
+
+/// Height of the tip where nothing tells it; tips of silicon levers are 10 to 15 µm high.
+pub(super) const USUAL_TIP_HEIGHT: f64 = 10e-6;
+
+/// A physical case with its dimensionless parameters and the units between the two.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physical {
+    /// The dimensionless numbers, valid.
+    pub cantilever: Cantilever,
+    /// SI values of the model's units.
+    pub scales: Scales,
+    /// The lever.
+    pub lever: Lever,
+    /// The sample.
+    pub sample: Sample,
+    /// The physical quantities behind α1 … α6 and Ω.
+    pub parameters: PhysicalParameters,
+    /// Free amplitude A₀ of the tip's deflection at the drive frequency, in m.
+    pub free_amplitude: f64,
+    /// Free amplitude of the second tone, in m, if there is one.
+    pub second_free_amplitude: Option<f64>,
+    /// Phase of the free deflection behind the drive (the base's displacement, or the force
+    /// on the lever) in degrees: 90 at resonance.
+    pub free_phase: f64,
+    /// Setpoint amplitude over A₀, if one was given: experiments solve for its gap.
+    pub setpoint: Option<f64>,
+    /// Height of the tip, g₀ − g₁, in m.
+    pub tip_height: f64,
+    /// What was known of the lever.
+    pub(super) data: LeverData,
+    /// The tip.
+    pub(super) tip: Tip,
+}
+
+impl Physical {
+    /// What the stated quantities come to. Where neither lever nor tip changed, the `lever`
+    /// that they gave before is taken.
+    ///
+    /// # Errors
+    /// [`PhysicalError`] if the quantities contradict each other or describe something
+    /// impossible; it names a key that was stated.
+    pub(crate) fn map(reader: Reader<'_>, lever: Option<Lever>) -> Result<Self, PhysicalError> {
+        mapped(reader, lever).map_err(|error| named(reader, error))
+    }
+
+    /// The same with dimensionless numbers put in place of those that were mapped.
+    pub(crate) fn with_numbers(
+        mut self,
+        numbers: &[(Parameter, f64)],
+    ) -> Result<Self, PhysicalError> {
+        for &(parameter, value) in numbers {
+            self.cantilever = self.cantilever.with(parameter, value);
+        }
+        self.cantilever.validate()?;
+        self.parameters = PhysicalParameters::from_case(&self.cantilever, &self.scales);
+        let response = free_response(&self.cantilever)?;
+        self.free_amplitude = self.cantilever.alpha2 * response.norm() * self.scales.length;
+        self.free_phase = -response.arg().to_degrees();
+        if let Some(ratio) = self.cantilever.tone2_ratio {
+            let second = response_at(&self.cantilever, ratio.value() * self.cantilever.omega)?;
+            let amplitude = self.cantilever.tone2_amplitude * second.norm();
+            self.second_free_amplitude = Some(amplitude * self.scales.length);
+        }
+        self.tip_height = self.scales.length - self.parameters.tip_gap;
+        Ok(self)
+    }
+
+    /// The mapping to α1 … α6 and Ω, line by line.
+    pub fn mapping(&self) -> Vec<MappingRow> {
+        mapping_table(&self.cantilever, &self.scales)
+    }
+
+    /// What phases are counted from.
+    pub const fn phase_reference(&self) -> &'static str {
+        match self.cantilever.actuation {
+            Actuation::Base => "displacement of the clamped end",
+            Actuation::Tip => "force at the tip",
+            Actuation::Distributed => "force on the lever",
+        }
+    }
+
+    /// The key of the drive's own strength: of the base's motion, or of the force.
+    pub(crate) fn strength_key(&self, keys: [Key; 3]) -> Key {
+        match self.cantilever.actuation {
+            Actuation::Base => keys[0],
+            Actuation::Tip | Actuation::Distributed => keys[1],
+        }
+    }
+
+    /// The value of a quantity in SI, stated or following from what is; `None` where nothing
+    /// tells it.
+    pub(crate) fn value(&self, key: Key) -> Option<f64> {
+        let (parameters, second) = (&self.parameters, self.cantilever.tone2_ratio);
+        let damping = parameters.contact_damping;
+        Some(match key {
+            Key::LeverK => self.lever.k,
+            Key::LeverF0 => self.lever.f0,
+            Key::LeverQ => self.lever.quality_factor,
+            Key::LeverLength => self.data.geometry?.length,
+            Key::LeverWidth => self.data.geometry?.width,
+            Key::LeverThickness => self.data.geometry?.thickness,
+            Key::TipMass => parameters.tip_mass,
+            Key::TipMassRatio => self.lever.tip_mass_ratio,
+            Key::TipRadius => self.tip.radius?,
+            Key::TipHeight => self.tip_height,
+            Key::TipModulus => self.tip.elastic?.modulus,
+            Key::TipPoisson => self.tip.elastic?.poisson,
+            Key::SampleStiffness => parameters.contact_stiffness,
+            Key::SampleDamping => damping,
+            Key::SampleLossTangent => {
+                damping * TAU * parameters.drive_frequency / parameters.contact_stiffness
+            }
+            Key::SampleRelaxationStiffness => parameters.relaxation_stiffness,
+            Key::SampleRelaxationTime => parameters.relaxation_time,
+            Key::SampleModulus => self.sample.elastic?.modulus,
+            Key::SamplePoisson => self.sample.elastic?.poisson,
+            Key::SampleIndentation => self.sample.hertz?.indentation,
+            Key::DriveFrequency => parameters.drive_frequency,
+            Key::DriveFrequencyRatio => parameters.drive_frequency / self.lever.f0,
+            Key::DriveAmplitude | Key::DriveForce if key == self.strength_key(FIRST) => {
+                parameters.drive_amplitude
+            }
+            Key::DriveFreeAmplitude => self.free_amplitude,
+            Key::SecondFrequency => second?.value() * parameters.drive_frequency,
+            Key::SecondAmplitude | Key::SecondForce if key == self.strength_key(SECOND) => {
+                second.map(|_| parameters.tone2_amplitude)?
+            }
+            Key::SecondFreeAmplitude => self.second_free_amplitude?,
+            Key::SecondPhase => second.map(|_| parameters.tone2_phase)?,
+            Key::GapTip => parameters.tip_gap,
+            Key::GapBeam => self.scales.length,
+            _ => return None,
+        })
+    }
+
+    /// What stays while a quantity varies, said as numbers of their own. An experimenter who
+    /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
+    /// voltage, not the lever's answer to it), the second tone its place among the harmonics
+    /// of the first, the sample its place, and the unit of length g₀ stays so that all values
+    /// are told in one.
+    pub(crate) fn held(&self, stated: &Stated) -> Stated {
+        let mut held = stated.clone();
+        held.set(Key::GapBeam, self.scales.length);
+        held.set(Key::GapTip, self.parameters.tip_gap);
+        if stated.has(Key::DriveFreeAmplitude) {
+            held.set(self.strength_key(FIRST), self.parameters.drive_amplitude);
+        }
+        if stated.has(Key::SecondFreeAmplitude) {
+            held.set(self.strength_key(SECOND), self.parameters.tone2_amplitude);
+        }
+        if let (Some(ratio), true) = (
+            self.cantilever.tone2_ratio,
+            stated.has(Key::SecondFrequency),
+        ) {
+            held.remove(Key::SecondFrequency);
+            held.put(Key::SecondRatio, Value::Ratio(ratio));
+        }
+        held
+    }
+}
+
+/// Names the stated key behind a parameter that the model does not take.
+fn named(reader: Reader<'_>, error: PhysicalError) -> PhysicalError {
+    let PhysicalError::Model { key: None, error } = error else {
+        return error;
+    };
+    let parameter = ModelKind::Cantilever
+        .key(error.key)
+        .and_then(Key::parameter);
+    let feeds = |key: &Key| key.entry().feeds.is_some() && key.entry().feeds == parameter;
+    let stated = Key::all().find(|key| feeds(key) && reader.has(*key));
+    PhysicalError::Model {
+        key: stated.map(|key| (key, reader.stated.written(key))),
+        error,
+    }
+}
+
+fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, PhysicalError> {
+    let catalogued = reader.lever()?;
+    let tip = Tip::read(reader, catalogued)?;
+    let data = LeverData::read(reader, catalogued, tip.mass)?;
+    let sample = Sample::read(reader, &tip)?;
+    let drive = Drive::read(reader)?;
+    let lever = known.map_or_else(|| Lever::resolve(&data), Ok)?;
+    let frequency = match drive.frequency {
+        DriveFrequency::Absolute(frequency) => frequency,
+        DriveFrequency::Ratio(ratio) => ratio * lever.f0,
+    };
+    let ratio = drive.second.map(|s| s.frequency.ratio(frequency));
+    let like = Cantilever {
+        modes: modes(reader.stated),
+        cosine_term: cosine_term(reader.stated),
+        contact: sample.law,
+        actuation: drive.actuation,
+        tone2_ratio: ratio.transpose()?,
+        ..Cantilever::paper()
+    };
+    // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
+    // in which a force is measured in k/3.
+    let free = free_case(&lever, frequency, &like);
+    let unit = Scales::new(&lever, 1.0).of(Parameter::Alpha2, like.actuation);
+    let response = free_response(&free)?;
+    let strength =
+        |strength, response: Complex<f64>, key| applied(strength, response.norm() / unit, key);
+    let (base, free_amplitude) = strength(drive.strength, response, Key::DriveFreeAmplitude)?;
+    let second = match (drive.second, like.tone2_ratio) {
+        (Some(second), Some(ratio)) => {
+            let response = response_at(&free, ratio.value() * free.omega)?;
+            let key = Key::SecondFreeAmplitude;
+            Some((second.phase, strength(second.strength, response, key)?))
+        }
+        _ => None,
+    };
+    let setpoint = setpoint_ratio(reader, &drive, free_amplitude)?;
+    let tip_gap = match (reader.number(Key::GapTip)?, setpoint) {
+        (Some(gap), _) => gap,
+        // Until the setpoint is solved for.
+        (None, Some(ratio)) => ratio * free_amplitude,
+        (None, None) => {
+            return Err(PhysicalError::missing(
+                Key::GapTip,
+                "give the gap between tip and sample at rest, or drive.setpoint",
+            ));
+        }
+    };
+    let height = tip.height.unwrap_or(USUAL_TIP_HEIGHT);
+    let beam_gap = reader.number(Key::GapBeam)?.unwrap_or(tip_gap + height);
+    if !(beam_gap > tip_gap && beam_gap > 0.0) {
+        return Err(PhysicalError::impossible(
+            Key::GapBeam,
+            Kind::Length.format(beam_gap),
+            format!(
+                "it is the tip's gap, {}, and the tip's height together: it must be above \
+                 zero and above gap.tip, or the beam would touch before the tip",
+                Kind::Length.format(tip_gap)
+            ),
+        ));
+    }
+    let scales = Scales::new(&lever, beam_gap);
+    let parameters = PhysicalParameters {
+        tip_mass: lever.tip_mass(),
+        drive_amplitude: base,
+        beam_damping: lever.damping() * scales.damping,
+        contact_stiffness: sample.stiffness,
+        tip_gap,
+        contact_damping: sample.damper(TAU * frequency),
+        drive_frequency: frequency,
+        relaxation_stiffness: sample.relaxation_stiffness,
+        relaxation_time: sample.relaxation_time,
+        tone2_amplitude: second.map_or(0.0, |(_, (applied, _))| applied),
+        tone2_phase: second.map_or(0.0, |(phase, _)| phase),
+    };
+    let cantilever = parameters.to_case(&scales, &like);
+    cantilever.validate()?;
+    Ok(Physical {
+        cantilever,
+        scales,
+        lever,
+        sample,
+        parameters,
+        free_amplitude,
+        second_free_amplitude: second.map(|(_, (_, free))| free),
+        free_phase: -response.arg().to_degrees(),
+        setpoint,
+        tip_height: beam_gap - tip_gap,
+        data,
+        tip,
+    })
+}
+
+/// The lever alone, driven with unit amplitude.
+fn free_case(lever: &Lever, frequency: f64, like: &Cantilever) -> Cantilever {
+    Cantilever {
+        modes: like.modes,
+        alpha1: lever.tip_mass_ratio,
+        alpha2: 1.0,
+        alpha3: lever.damping(),
+        alpha4: 0.0,
+        alpha5: 0.0,
+        alpha6: 0.0,
+        omega: TAU * frequency * lever.time_unit(),
+        cosine_term: like.cosine_term,
+        actuation: like.actuation,
+        ..Cantilever::paper()
+    }
+}
+
+fn setpoint_ratio(
+    reader: Reader<'_>,
+    drive: &Drive,
+    free_amplitude: f64,
+) -> Result<Option<f64>, PhysicalError> {
+    match drive.setpoint {
+        None => Ok(None),
+        Some(Setpoint::Ratio(ratio)) => Ok(Some(ratio)),
+        Some(Setpoint::Amplitude(amplitude)) if amplitude < free_amplitude => {
+            Ok(Some(amplitude / free_amplitude))
+        }
+        Some(Setpoint::Amplitude(_)) => Err(reader.impossible(
+            Key::DriveSetpoint,
+            format!(
+                "it must be below the free amplitude, {}",
+                Kind::Length.format(free_amplitude)
+            ),
+        )),
+    }
+}
+
+/// Amplitude of the drive and of the free tip, one from the other by the `gain` from the
+/// first to the second, both in SI.
+fn applied(strength: DriveStrength, gain: f64, key: Key) -> Result<(f64, f64), PhysicalError> {
+    match strength {
+        DriveStrength::Applied(applied) => Ok((applied, applied * gain)),
+        DriveStrength::Free(free) if (free / gain).is_finite() => Ok((free / gain, free)),
+        DriveStrength::Free(free) => Err(PhysicalError::impossible(
+            key,
+            Kind::Length.format(free),
+            "the lever does not move at this drive frequency",
+        )),
+    }
+}

@@ -145,7 +145,7 @@ impl Arguments {
         let over = self
             .over
             .iter()
-            .map(|given| Over::parse(given, &studied))
+            .map(|given| Over::parse(given, studied))
             .collect::<Result<Vec<_>, _>>()?;
         let starts = match (self.starts, &self.state) {
             (Some(count), _) => Starts::Seeded {

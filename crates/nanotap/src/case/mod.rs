@@ -30,11 +30,11 @@ pub mod quantity;
 mod stated;
 pub mod units;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use nanotap_flow::sensitivity::SystemTangent;
-use serde::ser::SerializeMap as _;
 use serde::{Serialize, Serializer};
 
 pub use error::{CaseError, NoSuchKey, ValueOfKeyError};
@@ -623,20 +623,25 @@ impl Serialize for Case {
             What::Oscillator(oscillator) => return oscillator.serialize(serializer),
             What::Quantities(quantities) => quantities,
         };
-        let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("modes", &file::modes(&quantities.stated))?;
-        for (parameter, value) in &quantities.numbers {
-            map.serialize_entry(parameter.name(), value)?;
-        }
-        for (key, value) in quantities
-            .stated
-            .iter()
-            .filter(|(key, _)| key.is_physical())
-        {
-            map.serialize_entry(key.path(), &value.text())?;
-        }
-        map.end()
+        let stated = quantities.stated.iter();
+        let document = QuantitiesDocument {
+            cantilever: self.cantilever(),
+            quantities: stated
+                .filter(|(key, _)| key.is_physical())
+                .map(|(key, value)| (key.path(), value.text()))
+                .collect(),
+        };
+        document.serialize(serializer)
     }
+}
+
+/// A physical case: the numbers that it comes to, and what was stated.
+#[derive(Serialize)]
+struct QuantitiesDocument<'a> {
+    #[serde(flatten)]
+    cantilever: Option<&'a Cantilever>,
+    #[serde(flatten)]
+    quantities: BTreeMap<&'static str, String>,
 }
 
 impl NoSuchKey {

@@ -115,12 +115,12 @@ pub struct Sample {
 impl Sample {
     /// What `[sample]` says.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Self, PhysicalError> {
-        let (stiffness, hertz, elastic) = match reader.number(Key::SampleStiffness)? {
-            Some(stiffness) => (stiffness, None, None),
-            None => {
-                let (hertz, elastic) = read_hertz(reader, tip)?;
-                (hertz.stiffness(), Some(hertz), Some(elastic))
-            }
+        let given = reader.number(Key::SampleStiffness)?;
+        let (stiffness, hertz, elastic) = if let Some(stiffness) = given {
+            (stiffness, None, None)
+        } else {
+            let (hertz, elastic) = read_hertz(reader, tip)?;
+            (hertz.stiffness(), Some(hertz), Some(elastic))
         };
         let damper = reader.number(Key::SampleDamping)?;
         let tangent = reader.number(Key::SampleLossTangent)?;

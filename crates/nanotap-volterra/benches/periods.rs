@@ -11,7 +11,7 @@ fn main() {
     divan::main();
 }
 
-fn flow(modes: usize) -> (Flow, Vec<f64>) {
+fn flow(modes: usize, nodes: usize) -> (Flow, Vec<f64>) {
     let law = laws::build(
         "dmt",
         &[
@@ -25,7 +25,7 @@ fn flow(modes: usize) -> (Flow, Vec<f64>) {
         ],
     )
     .unwrap();
-    let system = common::beam(law, modes, 0.9, 200.0, 20.0, 18.0, 20);
+    let system = common::beam(law, modes, 0.9, 200.0, 20.0, 18.0, nodes);
     let mut flow = Flow::new(Arc::new(system));
     // Near the repulsive orbit, and settled for a while.
     let mut state = vec![0.0; 2 * modes];
@@ -40,7 +40,7 @@ fn flow(modes: usize) -> (Flow, Vec<f64>) {
 
 #[divan::bench(args = [1, 3, 5, 10, 20])]
 fn dmt_period(bencher: divan::Bencher, modes: usize) {
-    let (mut flow, mut state) = flow(modes);
+    let (mut flow, mut state) = flow(modes, 20);
     let before = flow.statistics();
     let mut periods: u64 = 0;
     bencher.bench_local(|| {
@@ -61,9 +61,19 @@ fn dmt_period(bencher: divan::Bencher, modes: usize) {
     );
 }
 
+#[divan::bench(args = [12, 16, 20, 24, 28])]
+fn dmt_period_of_three_modes_by_nodes(bencher: divan::Bencher, nodes: usize) {
+    let (mut flow, mut state) = flow(3, nodes);
+    bencher.bench_local(|| {
+        flow.start(&state, 0.0).unwrap();
+        flow.run_until(TAU).unwrap();
+        flow.state(&mut state);
+    });
+}
+
 #[divan::bench(args = [1, 3, 10])]
 fn dmt_period_with_jacobian(bencher: divan::Bencher, modes: usize) {
-    let (mut flow, state) = flow(modes);
+    let (mut flow, state) = flow(modes, 20);
     let mut jacobian = nalgebra::DMatrix::zeros(2 * modes, 2 * modes);
     let mut none = nalgebra::DMatrix::zeros(2 * modes, 0);
     bencher.bench_local(|| {

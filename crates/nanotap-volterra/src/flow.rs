@@ -7,7 +7,7 @@ use crate::kernel::{LENGTHS, TimeMap};
 use crate::law::{Approach, Exit, Guard};
 use crate::linear::add_product;
 use crate::quadrature::derivative;
-use crate::step::{Quality, Solver, Statistics, Step};
+use crate::step::{Quality, Solver, Statistics, Step, gap_scale};
 use crate::system::System;
 use std::sync::Arc;
 
@@ -386,6 +386,14 @@ impl Flow {
         if let Some((number, time)) = passed
             && system.exits(self.branch)[number].before != Approach::Analytic
         {
+            // The series says better when than the chord between two nodes.
+            let exit = system.exits(self.branch)[number];
+            self.guard_values(system, &exit, n);
+            self.guard_series(system);
+            let time = match first_fall(&self.work.series, &mut self.work.scratch) {
+                Fall::At(u) if u > 0.0 => self.step.map.time(self.step.length, u),
+                _ => time,
+            };
             return Attempt::Ends(number, time);
         }
         let degree = match self.step.map {
@@ -490,12 +498,14 @@ impl Flow {
         if let Some(level) = level
             && u < 1.0
         {
+            let scale = gap_scale(system, &self.step.modal).0;
             for _ in 0..3 {
                 let time = self.step.end_time();
                 let (gap, rate) = system.gap_of(time, &self.modal);
                 let slope = rate * self.step.map.rate(self.step.length, self.step.end);
                 let next = self.step.end - (gap - level) / slope;
-                if !(next > 0.0 && next <= 1.0) || (next - self.step.end).abs() <= 1e-15 {
+                let near = (gap - level).abs() <= 2.0 * f64::EPSILON * scale;
+                if near || !(next > 0.0 && next <= 1.0) || next == self.step.end {
                     break;
                 }
                 self.step.end = next;

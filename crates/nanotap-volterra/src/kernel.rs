@@ -8,7 +8,9 @@
 
 use crate::VolterraError;
 use crate::modes::{Block, Modes};
-use crate::quadrature::{chebyshev_basis, chebyshev_coefficients, chebyshev_nodes, gauss_legendre};
+use crate::quadrature::{
+    chebyshev_basis, chebyshev_coefficients, chebyshev_nodes, gauss_legendre, series_at,
+};
 use nalgebra::{DVector, RowDVector};
 use std::f64::consts::SQRT_2;
 use std::sync::{Arc, OnceLock};
@@ -89,7 +91,7 @@ pub struct Kernel {
     longest: f64,
     /// Bound of the amplitude in the gap that a unit impulse of force excites.
     pub(crate) reach: f64,
-    panel: (Vec<f64>, Vec<f64>),
+    panel: ([f64; PANEL_POINTS], [f64; PANEL_POINTS]),
     tables: [Vec<OnceLock<Box<Table>>>; 3],
 }
 
@@ -115,6 +117,15 @@ pub(crate) struct Table {
     pub(crate) exponentials: Vec<[[f64; 2]; 2]>,
     /// Sums of the sizes in the rows of `gap_force` and `rate_force`, at the nodes.
     pub(crate) row_sums: Vec<[f64; 2]>,
+}
+
+/// The Gauss–Legendre rule of a panel.
+fn panel_rule() -> ([f64; PANEL_POINTS], [f64; PANEL_POINTS]) {
+    let (nodes, weights) = gauss_legendre(PANEL_POINTS);
+    (
+        std::array::from_fn(|i| nodes[i]),
+        std::array::from_fn(|i| weights[i]),
+    )
 }
 
 impl Kernel {
@@ -208,7 +219,7 @@ impl Kernel {
             coefficients: chebyshev_coefficients(nodes),
             longest,
             reach,
-            panel: gauss_legendre(PANEL_POINTS),
+            panel: panel_rule(),
             tables: std::array::from_fn(|_| (0..LENGTHS).map(|_| OnceLock::new()).collect()),
         }))
     }
@@ -425,9 +436,9 @@ impl Kernel {
         let end = map.time(h, u);
         let width = u / panels as f64;
         for panel in 0..panels {
-            for (x, w) in self.panel.0.iter().zip(&self.panel.1) {
-                let at = width * (panel as f64 + x);
-                let force = crate::quadrature::series(coefficients, at);
+            let places = self.panel.0.each_ref().map(|x| width * (panel as f64 + x));
+            let values = series_at(coefficients, &places);
+            for ((at, force), w) in places.into_iter().zip(values).zip(&self.panel.1) {
                 out.push((end - map.time(h, at), w * width * map.rate(h, at) * force));
             }
         }

@@ -95,6 +95,20 @@ pub(crate) fn series(coefficients: &[f64], u: f64) -> f64 {
     coefficients[0] + x * b1 - b2
 }
 
+/// [`series`] at many points at once.
+pub(crate) fn series_at<const N: usize>(coefficients: &[f64], u: &[f64; N]) -> [f64; N] {
+    let x = u.map(|u| 2.0 * u - 1.0);
+    let (mut b1, mut b2) = ([0.0; N], [0.0; N]);
+    for &c in coefficients[1..].iter().rev() {
+        for i in 0..N {
+            let b = 2.0 * x[i] * b1[i] - b2[i] + c;
+            b2[i] = b1[i];
+            b1[i] = b;
+        }
+    }
+    std::array::from_fn(|i| coefficients[0] + x[i] * b1[i] - b2[i])
+}
+
 /// Coefficients of the derivative by `u` of a series in `T_j(2u − 1)`, written to `out`.
 pub(crate) fn derivative(coefficients: &[f64], out: &mut [f64]) {
     let n = coefficients.len();

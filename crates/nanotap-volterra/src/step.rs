@@ -266,16 +266,19 @@ impl Solver {
         excess
     }
 
-    /// Completes gap and rate at all points for forces that have been found.
+    /// Gap and rate at all points for forces that have been found.
     fn complete(&mut self, table: &Table, step: &mut Step) {
         let n = step.forces.len();
-        step.gap[n..].copy_from_slice(&self.base_gap[n..]);
-        for (k, gap) in step.gap[n..].iter_mut().enumerate() {
-            let row = table.gap_force[n + k..].iter().step_by(n + CHECKS);
-            *gap += row.zip(&step.forces).map(|(w, f)| w * f).sum::<f64>();
-        }
+        step.gap.copy_from_slice(&self.base_gap);
+        add_product(&table.gap_force, &step.forces, &mut step.gap);
         step.rate.copy_from_slice(&self.base_rate);
         add_product(&table.rate_force, &step.forces, &mut step.rate);
+        if let Some(level) = step.pinned_end {
+            step.gap[n - 1] = level;
+        }
+        if let Some(level) = step.pinned_start {
+            step.gap[0] = level;
+        }
     }
 
     /// Factors `1 − ∂F_d W − ∂F_v W'` at the present point.
@@ -352,8 +355,12 @@ impl Solver {
                     });
                 }
             }
-            if steepness(table, step) > CONTRACTION {
-                if !factored || size > 0.02 * last {
+            let contraction = steepness(table, step);
+            // What will be left after this correction: by the bound of a plain iteration, by
+            // the rate of the last two under one factorisation.
+            let left = if contraction > CONTRACTION {
+                let rate = size / last;
+                if !factored || rate > 0.02 {
                     if !self.factor(table, step) {
                         return Err(Refusal::Newton);
                     }
@@ -365,9 +372,15 @@ impl Solver {
                     &self.pivots,
                     &mut self.residual,
                 );
-            }
+                if last.is_finite() { rate * size } else { size }
+            } else {
+                contraction * size
+            };
             last = size;
             self.add_residual(step);
+            if left <= 0.05 * allowed {
+                return self.assess(system, table, step, allowed, rounding);
+            }
         }
         Err(Refusal::Newton)
     }

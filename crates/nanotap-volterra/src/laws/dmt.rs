@@ -51,6 +51,7 @@ impl Formula for Dmt {
         ]
     }
 
+    #[inline]
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
         if branch == 0 {
             -c[2] * gap.square().recip()

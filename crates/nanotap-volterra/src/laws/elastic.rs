@@ -150,6 +150,7 @@ impl Formula for Elastic {
         vec![p[5], reduced_modulus(p) * self.0.factor(p[4])]
     }
 
+    #[inline]
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
         if branch == 0 {
             return S::constant(0.0);

@@ -111,6 +111,8 @@ pub struct Law<F: Formula> {
     parameters: Vec<f64>,
     constants: Vec<f64>,
     lifted: Vec<Dual<2>>,
+    /// For laws that depend on the gap alone.
+    lifted_gap: Vec<Dual<1>>,
     /// The constants with their derivatives by each parameter.
     varied: Vec<Vec<Dual<1>>>,
 }
@@ -136,6 +138,7 @@ impl<F: Formula> Law<F> {
             })
             .collect();
         Self {
+            lifted_gap: constants.iter().map(|&c| Dual::constant(c)).collect(),
             lifted: constants.iter().map(|&c| Dual::constant(c)).collect(),
             formula,
             parameters,
@@ -185,6 +188,20 @@ impl<F: Formula> ForceLaw for Law<F> {
     }
 
     fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
+        if !self.formula.depends_on_rate() {
+            for (out, gap) in out.iter_mut().zip(gaps) {
+                let gap = Dual::variable(*gap, 0);
+                let force = self
+                    .formula
+                    .force(&self.lifted_gap, branch, gap, Dual::constant(0.0));
+                *out = Force {
+                    value: force.value,
+                    by_gap: force.slopes[0],
+                    by_rate: 0.0,
+                };
+            }
+            return;
+        }
         for ((out, gap), rate) in out.iter_mut().zip(gaps).zip(rates) {
             *out = force_of(self.formula.force(
                 &self.lifted,

@@ -76,6 +76,7 @@ impl Formula for VanDerWaals {
         vec![p[2], strength, -strength * fall(self.0, p[2])]
     }
 
+    #[inline]
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
         if branch == 0 {
             -c[1] * fall(self.0, gap)

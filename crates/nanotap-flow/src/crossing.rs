@@ -45,6 +45,13 @@ pub enum Start {
     },
     /// On the surface with rate and curvature zero as well: release from sticking.
     Release,
+    /// On the surface, with further derivatives zero by what is known of the start.
+    Flat {
+        /// How many derivatives vanish, the value counted as the first.
+        vanishing: usize,
+        /// The first that does not.
+        derivative: f64,
+    },
 }
 
 /// A zero of a signal.
@@ -132,7 +139,7 @@ fn whole_stretch(signal: &Signal, length: f64, start: Start) -> Option<Stretch> 
     let surface = match start {
         Start::Inside => None,
         Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
-        Start::Release => return None,
+        Start::Release | Start::Flat { .. } => return None,
     };
     Some(Stretch {
         start: 0.0,
@@ -470,6 +477,13 @@ impl<M: Math> Search<'_, M> {
             }
             Start::Surface { rate } => self.leave_surface(1, rate),
             Start::Release => self.leave_surface(3, None),
+            Start::Flat {
+                vanishing,
+                derivative,
+            } => {
+                self.statistics.evaluations += 1;
+                self.taylor_departure(vanishing, Some(derivative))
+            }
         };
         match departure {
             Departure::Crossing(crossing) => Some(crossing),
@@ -657,14 +671,14 @@ impl<M: Math> Search<'_, M> {
     }
 
     #[cold]
-    fn taylor_departure(&mut self, vanishing: usize, rate: Option<f64>) -> Departure {
+    fn taylor_departure(&mut self, vanishing: usize, first: Option<f64>) -> Departure {
         let reach = (TAYLOR_REACH / self.signal.fastest()).min(self.length);
         let mut derivatives = [0.0; TAYLOR_ORDER + 1];
         for (order, d) in derivatives.iter_mut().enumerate().skip(vanishing) {
             *d = self.signal.derivative_at_start(order as u32);
         }
-        if let (1, Some(rate)) = (vanishing, rate) {
-            derivatives[1] = rate;
+        if let Some(first) = first {
+            derivatives[vanishing] = first;
         }
         let mut vanishing = vanishing;
         while vanishing < TAYLOR_ORDER && derivatives[vanishing] == 0.0 {

@@ -52,6 +52,19 @@ pub enum FlowError {
         /// Digits lost.
         digits: u32,
     },
+    /// A mode is too fast beside the drive to be followed over a period.
+    #[error(
+        "regime {regime}: its fastest mode oscillates {oscillations:.3e} times in one drive \
+         period, and at most {limit:.0e} are followed; raise the drive's frequency"
+    )]
+    TooFast {
+        /// The regime.
+        regime: usize,
+        /// Its oscillations in one period.
+        oscillations: f64,
+        /// The most that are followed.
+        limit: f64,
+    },
     /// The starting state lies in no regime.
     #[error("the starting state lies in no regime: every regime's exit is already passed there")]
     NoRegime,

@@ -3,6 +3,7 @@
 
 use crate::crossing::Statistics;
 use crate::motion::Motion;
+use crate::pack::Pack;
 use crate::regime::Regime;
 use crate::system::{Switch, System};
 use crate::{Complex, FlowError};
@@ -23,6 +24,10 @@ pub struct SegmentView<'a> {
     pub modal: &'a [Complex],
     /// `e^{λ_k · length}`.
     pub factors: &'a [Complex],
+    /// Modal coordinates and the tones' phasors at its start, and what they are multiplied by
+    /// on the way.
+    pub(crate) packed: &'a [[Pack; 2]],
+    pub(crate) turns: &'a [[Pack; 2]],
 }
 
 impl SegmentView<'_> {

@@ -32,6 +32,8 @@ const ANGLE: f64 = 2.4;
 const CELLS: [f64; 2] = [24.0, 8.0];
 /// The most terms that are followed, on the fine level and on the coarse one.
 const FOLLOWED: [usize; 2] = [8, 3];
+/// The most terms that are followed on the fine level where extrema are looked for.
+const FOLLOWED_FOR_EXTREMA: usize = 32;
 /// How much faster the fine level's fastest term must be than the coarse level's.
 const COARSER: f64 = 2.0;
 /// What a period may cost on the fine level alone, in multiplications of packs, before a
@@ -39,8 +41,11 @@ const COARSER: f64 = 2.0;
 const CHEAP: f64 = 1500.0;
 /// The most packs of points: longer stretches are searched in pieces.
 const LARGEST: usize = 64;
+/// The most points of the fine level: faster terms are not followed. With that many the tables of
+/// a regime stay below 16 MiB.
+const MOST_POINTS: f64 = 8192.0;
 /// What rounding, in table and sums, could take from a value, in units of the terms' size.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
+pub(crate) const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// The tabulated exponentials of one guard.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,35 +53,35 @@ pub(crate) struct Lattice {
     /// Which terms are followed, slowest first.
     followed: Vec<usize>,
     /// Over the whole reach, or from one coarse point to the next.
-    fine: Level,
-    coarse: Option<Coarse>,
+    pub(crate) fine: Level,
+    pub(crate) coarse: Option<Coarse>,
     /// How far it reaches.
     reach: f64,
 }
 
 /// The coarse level.
 #[derive(Clone, Debug, PartialEq)]
-struct Coarse {
-    level: Level,
+pub(crate) struct Coarse {
+    pub(crate) level: Level,
     /// Of every followed term, the exponential at each point.
     powers: Vec<Vec<Pair>>,
 }
 
 /// Equidistant points with the exponentials of the slowest terms.
 #[derive(Clone, Debug, PartialEq)]
-struct Level {
+pub(crate) struct Level {
     /// Distance of the points, `h`, and its inverse.
-    step: f64,
+    pub(crate) step: f64,
     density: f64,
     /// How many terms it follows.
-    terms: usize,
+    pub(crate) terms: usize,
     /// Whether these are all.
-    complete: bool,
+    pub(crate) complete: bool,
     /// `[Re, Im]` of each followed term's exponential at four points, pack after pack.
-    table: Vec<[Pack; 2]>,
+    pub(crate) table: Vec<[Pack; 2]>,
     /// For packs of terms: the weight of their amplitudes in `M₆h⁶/7200`, and 1 where a
     /// term is not followed.
-    weights: Vec<[Pack; 2]>,
+    pub(crate) weights: Vec<[Pack; 2]>,
 }
 
 /// A complex number as `[Re, Im]`.
@@ -88,10 +93,10 @@ pub(crate) type Amplitude = [[Pack; 2]; 3];
 
 /// Value, rate and curvature.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Point {
-    value: f64,
-    rate: f64,
-    curvature: f64,
+pub(crate) struct Point {
+    pub(crate) value: f64,
+    pub(crate) rate: f64,
+    pub(crate) curvature: f64,
 }
 
 /// Two neighbouring points.
@@ -102,13 +107,13 @@ pub(crate) struct Cell {
     /// Where it ends.
     pub(crate) end: f64,
     /// The number of the point where it begins.
-    point: usize,
+    pub(crate) point: usize,
     /// Its width.
-    width: f64,
+    pub(crate) width: f64,
     /// Its ends.
-    ends: [Point; 2],
+    pub(crate) ends: [Point; 2],
     /// Bound on the distance from the quintic to the signal within.
-    error: f64,
+    pub(crate) error: f64,
 }
 
 /// A zero of a cell's quintic.
@@ -123,24 +128,36 @@ pub(crate) struct FallingZero {
 }
 
 impl Lattice {
-    /// The lattice for `kernel` over stretches of up to `period`, if one makes sense.
+    /// The lattice for the guard `kernel` over stretches of up to `period`, if one makes sense.
     pub(crate) fn new(kernel: &Kernel, period: f64) -> Option<Self> {
+        Self::following(FOLLOWED[0], kernel, period)
+    }
+
+    /// The lattice for outputs whose extrema are looked for.
+    pub(crate) fn for_extrema(kernel: &Kernel, period: f64) -> Option<Self> {
+        Self::following(FOLLOWED_FOR_EXTREMA, kernel, period)
+    }
+
+    /// The lattice that follows so many terms at most.
+    fn following(most: usize, kernel: &Kernel, period: f64) -> Option<Self> {
         if kernel.grows || kernel.fastest <= 0.0 {
             return None;
         }
         let mut order: Vec<usize> = (0..kernel.count).collect();
         order.sort_by(|&a, &b| norm(kernel, a).total_cmp(&norm(kernel, b)));
-        let fine_terms = order.len().min(FOLLOWED[0]);
+        let step_of = |term: usize, level: usize| {
+            (ANGLE / norm(kernel, order[term])).min(period / CELLS[level])
+        };
+        // The slowest term sets how coarse the coarse level can be.
+        let slowest = step_of(0, 1);
+        let follows = |term: &usize| slowest <= MOST_POINTS * step_of(*term, 0);
+        let fine_terms = (1..order.len().min(most)).take_while(follows).count() + 1;
         let fastest = norm(kernel, order[fine_terms - 1]);
         let slow = order
             .iter()
             .filter(|&&k| norm(kernel, k) * COARSER < fastest);
         let terms = [fine_terms, slow.count().clamp(1, FOLLOWED[1])];
-        let step = |level: usize| {
-            let fastest = norm(kernel, order[terms[level] - 1]);
-            (ANGLE / fastest).min(period / CELLS[level])
-        };
-        let [fine_step, coarse_step] = [step(0), step(1)];
+        let [fine_step, coarse_step] = [step_of(terms[0] - 1, 0), step_of(terms[1] - 1, 1)];
         let packs =
             |length: f64, step: f64| ((length / step / WIDTH as f64) as usize + 1).min(LARGEST);
         let cost = period / fine_step / WIDTH as f64 * (6 * terms[0] + 20) as f64;

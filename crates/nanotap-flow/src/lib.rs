@@ -39,6 +39,7 @@ pub mod jacobian;
 mod lattice;
 mod motion;
 mod pack;
+mod range;
 pub mod regime;
 pub mod sensitivity;
 pub mod signal;

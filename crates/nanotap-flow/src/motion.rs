@@ -91,10 +91,10 @@ impl Motion {
         x: &[f64],
         phase: f64,
     ) -> Result<(), FlowError> {
-        let (regime, surface) = system.regime_at(x, phase)?;
+        let (regime, surface) = system.start_at(x, phase)?;
         self.regime = regime;
         self.phase = phase;
-        self.surface = surface.map(|exit| (exit, Start::Surface { rate: None }));
+        self.surface = surface;
         let regime = &system.regimes()[regime];
         self.modal
             .resize(regime.basis().len(), Complex::new(0.0, 0.0));
@@ -515,6 +515,8 @@ impl Motion {
                 length,
                 modal: &self.modal,
                 factors: &self.factors,
+                packed: &self.packed,
+                turns: &self.turns,
             });
         }
         for (q, [re, im]) in self.packed.iter_mut().zip(&self.turns) {

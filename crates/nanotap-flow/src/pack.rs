@@ -31,6 +31,7 @@ pub(crate) trait Math: Copy {
     fn fnma(a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
     fn sqrt(a: Self::Lanes) -> Self::Lanes;
     fn min(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    fn max(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// A bit a lane, set where not `a ≥ b` (so where one is not a number as well).
     fn below(a: Self::Lanes, b: Self::Lanes) -> u32;
     /// `a` with the first lane of `b`.
@@ -263,6 +264,10 @@ macro_rules! arrays {
             std::array::from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
         }
         #[inline(always)]
+        fn max(a: Pack, b: Pack) -> Pack {
+            std::array::from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
+        }
+        #[inline(always)]
         fn below(a: Pack, b: Pack) -> u32 {
             let at_least = |i: usize| a[i] >= b[i];
             (0..WIDTH).fold(0, |bits, i| bits | (u32::from(!at_least(i)) << i))
@@ -373,6 +378,10 @@ mod fused {
         #[inline(always)]
         fn min(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
             unsafe { x::_mm256_min_pd(a, b) }
+        }
+        #[inline(always)]
+        fn max(a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { x::_mm256_max_pd(a, b) }
         }
         #[inline(always)]
         fn below(a: Self::Lanes, b: Self::Lanes) -> u32 {

@@ -1,5 +1,6 @@
 //! A piecewise-linear system: its regimes and the exits between them.
 
+use crate::crossing::Start;
 use crate::harmonic::{HarmonicVector, Output};
 use crate::lattice::Lattice;
 use crate::pack::{Math, Pack, WIDTH};
@@ -370,6 +371,17 @@ impl System {
             .map(|r| packed_rates(r, &system.drive))
             .collect();
         let rates = system.rates.iter().flatten();
+        for (r, regime) in system.regimes.iter().enumerate() {
+            let rates = regime.basis().eigenvalues.iter();
+            let turns = rates.map(|z| z.im.abs()).fold(0.0, f64::max) * system.drive.period();
+            if turns > MOST_TURNS * std::f64::consts::TAU {
+                return Err(FlowError::TooFast {
+                    regime: r,
+                    oscillations: turns / std::f64::consts::TAU,
+                    limit: MOST_TURNS,
+                });
+            }
+        }
         system.fastest = rates
             .flat_map(|[re, im]| re.iter().zip(im).map(|(re, im)| re.hypot(*im)))
             .fold(0.0, f64::max);
@@ -429,6 +441,16 @@ impl System {
     /// # Errors
     /// [`FlowError::NoRegime`] when there is none.
     pub fn regime_at(&self, x: &[f64], t: f64) -> Result<(usize, Option<usize>), FlowError> {
+        let (regime, surface) = self.start_at(x, t)?;
+        Ok((regime, surface.map(|(exit, _)| exit)))
+    }
+
+    /// The same, with how the guard that starts at zero rises.
+    pub(crate) fn start_at(
+        &self,
+        x: &[f64],
+        t: f64,
+    ) -> Result<(usize, Option<(usize, Start)>), FlowError> {
         let exact = |_: usize, output: &Output| ON_SURFACE * rounding(output, x);
         if let Some(found) = self.regime_within(x, t, &exact) {
             return Ok(found);
@@ -461,7 +483,7 @@ impl System {
         x: &[f64],
         t: f64,
         tolerance: &impl Fn(usize, &Output) -> f64,
-    ) -> Option<(usize, Option<usize>)> {
+    ) -> Option<(usize, Option<(usize, Start)>)> {
         self.exits.iter().enumerate().find_map(|(r, exits)| {
             if !self.may_stick(r, x, t, tolerance) {
                 return None;
@@ -470,8 +492,9 @@ impl System {
             let inside = exits.iter().enumerate().all(|(e, exit)| {
                 let value = exit.guard.at(&self.drive, x, t);
                 if value.abs() <= tolerance(r, &exit.guard) {
-                    surface = Some(e);
-                    return self.rises(r, &exit.guard, x, t, tolerance);
+                    let start = self.rises(r, &exit.guard, x, t, tolerance);
+                    surface = start.map(|start| (e, start));
+                    return start.is_some();
                 }
                 value > 0.0
             });
@@ -523,6 +546,7 @@ impl System {
             .all(|output| output.at(&self.drive, x, t).abs() <= 2.0 * tolerance(from, output))
     }
 
+    /// How a guard that is zero rises, if it does: by its first derivative that does not vanish.
     fn rises(
         &self,
         r: usize,
@@ -530,17 +554,25 @@ impl System {
         x: &[f64],
         t: f64,
         tolerance: &impl Fn(usize, &Output) -> f64,
-    ) -> bool {
+    ) -> Option<Start> {
         let regime = &self.regimes[r];
         let mut output = guard.clone();
-        for _ in 0..4 {
+        for vanishing in 1..=FLATTEST {
             output = output.rate(regime.matrix(), regime.forcing(), &self.drive);
-            let value = output.at(&self.drive, x, t);
-            if value.abs() > tolerance(r, &output) {
-                return value > 0.0;
+            let derivative = output.at(&self.drive, x, t);
+            if derivative.abs() > tolerance(r, &output) {
+                return (derivative > 0.0).then_some(if vanishing == 1 {
+                    Start::Surface { rate: None }
+                } else {
+                    Start::Flat {
+                        vanishing,
+                        derivative,
+                    }
+                });
             }
         }
-        true
+        // Nothing moves it.
+        Some(Start::Surface { rate: None })
     }
 
     /// The size of rounding errors that an output has along the motion through this state:
@@ -765,6 +797,12 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<[Pack; 2]> {
     }
     packs
 }
+
+/// Oscillations of a mode in one drive period that are followed.
+const MOST_TURNS: f64 = 1e7;
+
+/// Derivatives of a guard that are looked at where it starts at zero.
+const FLATTEST: usize = 6;
 
 /// A state is on a surface when its guard is within this many rounding errors of zero: a
 /// state computed a moment after a switch is no nearer.

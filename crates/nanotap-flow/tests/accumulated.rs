@@ -253,7 +253,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, max_shrink_iters: 50, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, max_shrink_iters: 50, ..ProptestConfig::default() })]
 
     #[test]
     fn what_is_accumulated_is_what_the_trajectory_gives(example in example()) {

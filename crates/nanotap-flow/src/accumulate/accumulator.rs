@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 
-use super::request::{End, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey};
+use super::request::{
+    End, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, RangePlan, RegimePlan, Sign,
+};
+use super::stretch::Stretch;
 use crate::Complex;
-use crate::extrema::sign_changes;
 use crate::flow::{Observer, SegmentView, SwitchView};
 use crate::integral::{fourier_integral, integral, product_integral};
+use crate::lattice::Lattice;
+use crate::pack::{LARGEST_ANGLE, Pack, WIDTH};
+use crate::range::{Range, RangeWork, extend, extend_by_certified_steps};
 use crate::signal::Signal;
 
 /// Switches from one regime to another.
@@ -34,6 +39,9 @@ pub struct Accumulator {
     switches: Vec<Switches>,
     duration: f64,
     periods: u64,
+    /// Work space.
+    stretch: Stretch,
+    search: RangeWork,
 }
 
 impl Accumulator {
@@ -49,6 +57,8 @@ impl Accumulator {
             switches: vec![Switches::default(); regimes * regimes],
             duration: 0.0,
             periods: 0,
+            stretch: Stretch::default(),
+            search: RangeWork::default(),
             plan: Arc::clone(plan),
         };
         accumulator.clear();
@@ -134,42 +144,182 @@ fn nothing_yet(end: End) -> f64 {
     }
 }
 
-impl Observer for Accumulator {
-    fn segment(&mut self, segment: &SegmentView<'_>) {
-        let length = segment.length;
-        if length <= 0.0 {
-            return;
-        }
-        self.duration += length;
-        self.times[segment.regime] += length;
-        let plan = Arc::clone(&self.plan);
-        let (request, outputs) = (&plan.request, &plan.outputs[segment.regime]);
-        let (drive, regime) = (segment.system.drive(), segment.regime());
-        let signal = |channel: usize| {
-            let output = &outputs[channel];
-            Signal::of(regime, drive, output, segment.modal, segment.phase, length)
+impl Accumulator {
+    /// Adds a stretch of a regime whose eigenvalues are all simple.
+    #[inline(always)]
+    fn add_stretch(&mut self, plan: &Plan, segment: &SegmentView<'_>) {
+        let (regime, drive) = (&plan.regimes[segment.regime], segment.system.drive());
+        let (length, modes) = (segment.length, segment.modal.len());
+        let tones = drive.frequencies().len();
+        let of = |packed: &[[Pack; 2]], k: usize| {
+            let [re, im] = &packed[k / WIDTH];
+            Complex::new(re[k % WIDTH], im[k % WIDTH])
         };
-        let time = self.periods as f64 * drive.period() + segment.phase;
-        for (sum, &channel) in self.integrals.iter_mut().zip(&request.integrals) {
+        let stretch = &mut self.stretch;
+        stretch.length = length;
+        stretch.terms.clear();
+        let terms = (0..modes + tones).map(|k| [of(segment.packed, k), of(segment.turns, k)]);
+        stretch
+            .terms
+            .extend(terms.chain([[Complex::new(1.0, 0.0); 2]]));
+        let used = |channel: usize| !regime.weights[channel].is_empty();
+
+        let integrals = &plan.request.integrals;
+        if integrals.iter().any(|&c| used(c)) {
+            stretch.integrate(&regime.rates);
+            for (sum, &channel) in self.integrals.iter_mut().zip(integrals) {
+                *sum += stretch.integral(&regime.weights[channel]);
+            }
+        }
+        for (number, (&omega, rates)) in plan.frequencies.iter().zip(&regime.turned).enumerate() {
+            let wanted = |&(c, n): &(usize, usize)| n == number && used(c);
+            if !plan.fouriers.iter().any(wanted) {
+                continue;
+            }
+            let tone = drive.frequencies().iter().position(|&w| w == omega);
+            let (start, over) = if let Some(tone) = tone {
+                let [start, over] = stretch.terms[modes + tone];
+                (start, over)
+            } else {
+                let time = self.periods as f64 * drive.period() + segment.phase;
+                let turned = |angle: f64| {
+                    let (sin, cos) = angle.sin_cos();
+                    Complex::new(cos, sin)
+                };
+                (turned(omega * time), turned(omega * length))
+            };
+            stretch.turn(rates, start.conj(), over.conj());
+            for (sum, fourier) in self.fouriers.iter_mut().zip(&plan.fouriers) {
+                if wanted(fourier) {
+                    *sum += stretch.fourier(&regime.weights[fourier.0]);
+                }
+            }
+        }
+        let products = &plan.request.products;
+        if products.iter().any(|&(g, h)| used(g) && used(h)) {
+            stretch.pair(&regime.rates);
+            for (sum, &(g, h)) in self.products.iter_mut().zip(products) {
+                if used(g) && used(h) {
+                    *sum += stretch.product(&regime.weights[g], &regime.weights[h]);
+                }
+            }
+        }
+    }
+
+    /// The same where eigenvalues coincide, from signals.
+    #[cold]
+    fn add_clustered_stretch(&mut self, plan: &Plan, segment: &SegmentView<'_>) {
+        let length = segment.length;
+        let signal = |channel: usize| signal(plan, segment, channel);
+        let time = self.periods as f64 * segment.system.drive().period() + segment.phase;
+        for (sum, &channel) in self.integrals.iter_mut().zip(&plan.request.integrals) {
             *sum += integral(&signal(channel), length);
         }
-        for (sum, &(channel, omega)) in self.fouriers.iter_mut().zip(&request.fouriers) {
+        for (sum, &(channel, omega)) in self.fouriers.iter_mut().zip(&plan.request.fouriers) {
             *sum += fourier_integral(&signal(channel), time, length, omega);
         }
-        for (sum, &(g, h)) in self.products.iter_mut().zip(&request.products) {
+        for (sum, &(g, h)) in self.products.iter_mut().zip(&plan.request.products) {
             *sum += product_integral(&signal(g), &signal(h), length);
         }
-        for (extremum, &(channel, end)) in self.extrema.iter_mut().zip(&request.extrema) {
-            let signal = signal(channel);
-            let rate = signal.differentiated(length);
-            let zeros = sign_changes(&rate, length);
-            for s in zeros.into_iter().chain([0.0, length]) {
-                let value = signal.at(s);
-                *extremum = match end {
-                    End::Least => extremum.min(value),
-                    End::Greatest => extremum.max(value),
-                };
+    }
+
+    /// Extends the extrema of channel `wanted.channel` over a stretch.
+    #[inline(always)]
+    fn extend_range(&mut self, plan: &Plan, segment: &SegmentView<'_>, wanted: &RangePlan) {
+        let known = |key: Option<usize>, otherwise: f64| key.map_or(otherwise, |k| self.extrema[k]);
+        let mut range = Range {
+            least: known(wanted.least, f64::MIN),
+            greatest: known(wanted.greatest, f64::MAX),
+        };
+        let regime = &plan.regimes[segment.regime];
+        let weights = &regime.weights[wanted.channel];
+        if weights.is_empty() {
+            range.hold(0.0);
+        } else if let Some(table) = Self::table(regime, segment) {
+            let kernel = &regime.kernels[wanted.channel];
+            let size = self.stretch.size(weights);
+            for end in self.stretch.ends(weights) {
+                range.hold(if end.abs() <= DROWNED * size {
+                    0.0
+                } else {
+                    end
+                });
             }
+            // What a guard says of the sign, or the size of all terms, may settle it.
+            let sign = regime.signs[wanted.channel];
+            let lower =
+                range.least <= -size || sign == Some(Sign::NotNegative) && range.least <= 0.0;
+            let upper =
+                range.greatest >= size || sign == Some(Sign::NotPositive) && range.greatest >= 0.0;
+            if !(lower && upper) {
+                let (packed, length) = (segment.packed, segment.length);
+                let mut within = Range {
+                    least: if lower { f64::MIN } else { range.least },
+                    greatest: if upper { f64::MAX } else { range.greatest },
+                };
+                extend(&mut within, table, kernel, packed, length, &mut self.search);
+                if !lower {
+                    range.least = within.least;
+                }
+                if !upper {
+                    range.greatest = within.greatest;
+                }
+            }
+        } else {
+            let signal = signal(plan, segment, wanted.channel);
+            extend_by_certified_steps(&mut range, &signal, segment.length);
+        }
+        if let Some(key) = wanted.least {
+            self.extrema[key] = range.least;
+        }
+        if let Some(key) = wanted.greatest {
+            self.extrema[key] = range.greatest;
+        }
+    }
+
+    /// The table for the outputs of a regime: its guards', or its own.
+    #[inline(always)]
+    fn table<'a>(regime: &'a RegimePlan, segment: &SegmentView<'a>) -> Option<&'a Lattice> {
+        if segment.system.largest_angle() > LARGEST_ANGLE {
+            return None;
+        }
+        let exits = segment.system.prepared(segment.regime);
+        let guards = || exits.iter().find_map(|exit| exit.lattice.as_ref());
+        regime.table.as_ref().or_else(guards)
+    }
+}
+
+/// Ends of a stretch within this part of its terms' size are zero, but for rounding.
+const DROWNED: f64 = 128.0 * f64::EPSILON;
+
+fn signal(plan: &Plan, segment: &SegmentView<'_>, channel: usize) -> Signal {
+    let output = &plan.regimes[segment.regime].outputs[channel];
+    let drive = segment.system.drive();
+    Signal::of(
+        segment.regime(),
+        drive,
+        output,
+        segment.modal,
+        segment.phase,
+        segment.length,
+    )
+}
+
+impl Observer for Accumulator {
+    fn segment(&mut self, segment: &SegmentView<'_>) {
+        if segment.length <= 0.0 {
+            return;
+        }
+        self.duration += segment.length;
+        self.times[segment.regime] += segment.length;
+        let plan = Arc::clone(&self.plan);
+        if segment.regime().basis().clusters.is_empty() {
+            self.add_stretch(&plan, segment);
+        } else {
+            self.add_clustered_stretch(&plan, segment);
+        }
+        for wanted in &plan.ranges {
+            self.extend_range(&plan, segment, wanted);
         }
     }
 

@@ -52,10 +52,11 @@
 //!   extremum alone (extrema of every period, say). Time is counted, for Fourier
 //!   coefficients, from the start of the drive period in which the accumulator was last
 //!   cleared.
-//! - A stretch costs no allocation.
+//! - A stretch costs no allocation, unless eigenvalues coincide (critical damping).
 
 mod accumulator;
 mod request;
+mod stretch;
 
 pub use accumulator::{Accumulator, Switches};
 pub use request::{Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request};

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::regime::ModalOutput;
-use crate::{FlowError, Output, System};
+use super::stretch::{Rate, Rates};
+use crate::lattice::Lattice;
+use crate::regime::{Kernel, ModalOutput};
+use crate::{Complex, Drive, FlowError, Output, Regime, System};
 
 /// An output of a [`Request`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -111,6 +113,7 @@ impl Request {
             });
         }
         let mut outputs = vec![Vec::with_capacity(self.outputs.len()); regimes.len()];
+        let mut signs = vec![Vec::with_capacity(self.outputs.len()); regimes.len()];
         for channel in &self.outputs {
             if let Outputs::ByRegime(all) = channel
                 && all.len() != regimes.len()
@@ -122,17 +125,65 @@ impl Request {
                 });
             }
             for (r, (regime, modal)) in regimes.iter().zip(&mut outputs).enumerate() {
+                let guards = &system.exits()[r];
                 let output = match channel {
                     Outputs::Same(output) => output,
                     Outputs::ByRegime(all) => &all[r],
                 };
                 output.check("an output", n, tones)?;
                 modal.push(regime.project(output));
+                let reversed = output.scaled(-1.0);
+                signs[r].push(guards.iter().find_map(|exit| {
+                    if exit.guard == *output {
+                        Some(Sign::NotNegative)
+                    } else {
+                        (exit.guard == reversed).then_some(Sign::NotPositive)
+                    }
+                }));
             }
         }
+        let mut frequencies = Vec::new();
+        let fouriers = self.fouriers.iter();
+        let fouriers = fouriers
+            .map(|&(c, omega)| (c, place(&mut frequencies, omega)))
+            .collect();
+        let mut ranges = Vec::new();
+        for (key, &(channel, end)) in self.extrema.iter().enumerate() {
+            let at = ranges.iter().position(|r: &RangePlan| r.channel == channel);
+            let at = at.unwrap_or_else(|| {
+                ranges.push(RangePlan {
+                    channel,
+                    least: None,
+                    greatest: None,
+                });
+                ranges.len() - 1
+            });
+            match end {
+                End::Least => ranges[at].least = Some(key),
+                End::Greatest => ranges[at].greatest = Some(key),
+            }
+        }
+        let products = !self.products.is_empty();
+        let regimes = regimes.iter().zip(outputs).zip(signs).enumerate();
+        let regimes = regimes
+            .map(|(r, ((regime, outputs), signs))| {
+                // The table of a guard serves every output of its regime.
+                let tabulated = system
+                    .prepared(r)
+                    .iter()
+                    .any(|exit| exit.lattice.as_ref().is_some_and(Lattice::is_complete));
+                let drive = system.drive();
+                let plan =
+                    RegimePlan::new(regime, drive, outputs, &frequencies, products, tabulated);
+                RegimePlan { signs, ..plan }
+            })
+            .collect();
         Ok(Arc::new(Plan {
             request: self.clone(),
-            outputs,
+            ranges,
+            fouriers,
+            frequencies,
+            regimes,
         }))
     }
 }
@@ -151,13 +202,96 @@ fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     pub(super) request: Request,
-    /// `outputs[r][c]`: channel `c` in modal coordinates of regime `r`.
-    pub(super) outputs: Vec<Vec<ModalOutput>>,
+    pub(super) ranges: Vec<RangePlan>,
+    /// Channel and number of the frequency of each Fourier coefficient.
+    pub(super) fouriers: Vec<(usize, usize)>,
+    pub(super) frequencies: Vec<f64>,
+    pub(super) regimes: Vec<RegimePlan>,
+}
+
+/// The extrema of one channel: their keys, where they are asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RangePlan {
+    pub(super) channel: usize,
+    pub(super) least: Option<usize>,
+    pub(super) greatest: Option<usize>,
+}
+
+/// What a guard says of a channel's sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sign {
+    NotNegative,
+    NotPositive,
+}
+
+/// The channels in one regime.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RegimePlan {
+    pub(super) outputs: Vec<ModalOutput>,
+    /// Of each channel the weights of modes, tones and constant; none where it is zero.
+    pub(super) weights: Vec<Vec<Complex>>,
+    pub(super) kernels: Vec<Kernel>,
+    pub(super) rates: Rates,
+    /// The rates as each frequency sees them.
+    pub(super) turned: Vec<Vec<[Rate; 2]>>,
+    /// Of each channel, whether it is a guard of the regime, hence not negative, or one's
+    /// negative.
+    pub(super) signs: Vec<Option<Sign>>,
+    /// The table of a regime whose guards have none that follows every term.
+    pub(super) table: Option<Lattice>,
+}
+
+impl RegimePlan {
+    fn new(
+        regime: &Regime,
+        drive: &Drive,
+        outputs: Vec<ModalOutput>,
+        frequencies: &[f64],
+        products: bool,
+        tabulated: bool,
+    ) -> Self {
+        let weights = outputs.iter().map(weights).collect();
+        let kernel = |output| Kernel::new(regime, drive, output);
+        let kernels: Vec<Kernel> = outputs.iter().map(kernel).collect();
+        let rates = Rates::new(&regime.basis().eigenvalues, drive, products);
+        let turned = frequencies
+            .iter()
+            .map(|&omega| rates.turned(omega))
+            .collect();
+        let clustered = !regime.basis().clusters.is_empty();
+        let table = kernels.first().filter(|_| !tabulated && !clustered);
+        let table = table.and_then(|kernel| Lattice::for_extrema(kernel, drive.period()));
+        Self {
+            outputs,
+            weights,
+            kernels,
+            rates,
+            turned,
+            signs: Vec::new(),
+            table,
+        }
+    }
+}
+
+fn weights(output: &ModalOutput) -> Vec<Complex> {
+    let constant = Complex::new(output.constant, 0.0);
+    let all: Vec<Complex> = output
+        .modal
+        .iter()
+        .chain(&output.tones)
+        .copied()
+        .chain([constant])
+        .collect();
+    if all.iter().all(|w| w.re == 0.0 && w.im == 0.0) {
+        Vec::new()
+    } else {
+        all
+    }
 }
 
 impl Plan {
     /// How many regimes the system has.
     pub(super) fn regimes(&self) -> usize {
-        self.outputs.len()
+        self.regimes.len()
     }
 }

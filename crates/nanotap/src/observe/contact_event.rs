@@ -14,8 +14,8 @@ pub struct ContactEvent {
     pub tau: f64,
     /// Which way.
     pub kind: ContactEventKind,
-    /// Rate of the gap between tip and surface just before it. A Kelvin–Voigt surface follows
-    /// the tip until it lets go of it: there the rate is 0.
+    /// Rate of the gap just before it. Where contact with a Kelvin–Voigt surface ends, which
+    /// has followed the tip, that of the tip's height.
     pub gap_rate: f64,
 }
 
@@ -34,9 +34,9 @@ pub enum ContactEventKind {
 /// Notes the contacts of a motion while it runs.
 pub struct Contacts<'a> {
     model: &'a Model,
-    /// Rates of the gap and of the tip's height, an entry a regime. What ends a contact may be
-    /// the force and not the gap.
-    rates: Vec<[ModalOutput; 2]>,
+    /// Rate of the gap, an entry a regime: what ends a contact may be the force and not the
+    /// gap.
+    rates: Vec<ModalOutput>,
     periods: usize,
     events: Vec<ContactEvent>,
 }
@@ -45,9 +45,12 @@ impl<'a> Contacts<'a> {
     /// Of a motion of `model` that is still to run.
     pub fn of(model: &'a Model) -> Self {
         let drive = model.system.drive();
-        let rate = |r: &nanotap_flow::Regime| {
-            [&model.gap, &model.height].map(|o| r.project(&o.rate(r.matrix(), r.forcing(), drive)))
+        let gap = if model.forgetting.is_some() {
+            &model.height
+        } else {
+            &model.gap
         };
+        let rate = |r: &nanotap_flow::Regime| r.project(&gap.rate(r.matrix(), r.forcing(), drive));
         Self {
             model,
             rates: model.system.regimes().iter().map(rate).collect(),
@@ -62,19 +65,12 @@ impl<'a> Contacts<'a> {
     }
 
     fn gap_rate(&self, view: &SwitchView<'_>) -> f64 {
-        const ROUNDING: f64 = 1e-11;
         let drive = self.model.system.drive();
-        let [gap, height] = self.rates[view.switch.from].each_ref().map(|rate| {
-            let phasors = (0..rate.tones.len()).map(|k| drive.phasor(k, view.phase));
-            let modes = rate.modal.iter().copied().zip(view.modal.iter().copied());
-            let terms = modes.chain(rate.tones.iter().copied().zip(phasors));
-            rate.constant + terms.map(|(w, q)| (w * q).re).sum::<f64>()
-        });
-        if gap.abs() <= ROUNDING * height.abs() {
-            0.0
-        } else {
-            gap
-        }
+        let rate = &self.rates[view.switch.from];
+        let phasors = (0..rate.tones.len()).map(|k| drive.phasor(k, view.phase));
+        let modes = rate.modal.iter().copied().zip(view.modal.iter().copied());
+        let terms = modes.chain(rate.tones.iter().copied().zip(phasors));
+        rate.constant + terms.map(|(w, q)| (w * q).re).sum::<f64>()
     }
 }
 

@@ -494,7 +494,15 @@ impl<'a> Measured<'a> {
 
     /// The same in drive periods.
     pub(super) fn periods(&self) -> f64 {
-        self.duration() / self.model.period()
+        let whole = self
+            .found
+            .as_ref()
+            .map_or(0, |found| found.accumulator.periods());
+        if whole > 0 {
+            whole as f64
+        } else {
+            self.duration() / self.model.period()
+        }
     }
 
     /// Time in contact.

@@ -192,6 +192,9 @@ observables! {
     amplitude: f64, Length, common,
         "amplitude (half of peak to peak)", "half of peak to peak of the tip deflection",
         |m| 0.5 * (m.greatest(Tip) - m.least(Tip));
+    mean_deflection: f64, Length, common,
+        "mean tip deflection", "time mean of the tip deflection",
+        |m| m.mean(Tip);
     first_harmonic as "A": f64, Length, common,
         "amplitude $A$",
         "amplitude of the tip deflection at the drive frequency: what a lock-in amplifier reads",
@@ -200,42 +203,9 @@ observables! {
         "phase behind the drive (°)",
         "lag of the tip deflection at the drive frequency behind the drive",
         |m| lag(m.component(Tip, Tone::First));
-    tone2_response: Option<f64>, Length, rare,
-        "amplitude at the second tone",
-        "amplitude of the tip deflection at the frequency of the second tone",
-        |m| m.second_tone().map(|c| c.norm());
-    tone2_lag: Option<f64>, Angle, rare,
-        "phase behind the second tone (°)",
-        "lag of the tip deflection behind the second tone",
-        |m| m.second_tone().map(lag);
-    mean_deflection: f64, Length, common,
-        "mean tip deflection", "time mean of the tip deflection",
-        |m| m.mean(Tip);
-    rms_deflection: f64, Length, rare,
-        "root mean square of the tip deflection",
-        "root mean square of the tip deflection about its mean",
-        |m| (m.mean_product(Tip, Tip) - m.mean(Tip).powi(2)).max(0.0).sqrt();
-    gap_range: [f64; 2], Length, rare,
-        "gap", "least and greatest height of the tip over the undeformed surface",
-        |m| m.range(Height);
-    contact_fraction: f64, Number, common,
-        "part of the time in contact", "part of the time in contact",
-        |m| m.contact_time() / m.duration();
-    contact_time: f64, Time, common,
-        "contact time", "time in contact in one drive period",
-        |m| m.contact_time() / m.periods();
     indentation: f64, Length, common,
         "indentation", "greatest depth of the tip below the resting surface",
         |m| m.indentation();
-    contacts_per_period: f64, PerPeriod, common,
-        "contacts a drive period", "contacts begun a drive period",
-        |m| m.contacts().count as f64 / m.periods();
-    peak_force as "F_max": f64, Force, common,
-        "greatest force $F_{max}$", "greatest force of the sample on the tip",
-        |m| m.peak_force();
-    least_force: f64, Force, rare,
-        "least force", "least force of the sample on the tip: below zero where it pulls",
-        |m| m.least_force();
     mean_force: f64, Force, common,
         "mean force", "time mean of the force of the sample on the tip",
         |m| m.mean(Force);
@@ -245,15 +215,52 @@ observables! {
     virial: f64, Energy, common,
         "virial ⟨$F W$⟩", "time mean of force times tip deflection, the force counted along it",
         |m| m.along_tip() * m.mean_product(Force, Tip);
+    contact_fraction: f64, Number, common,
+        "part of the time in contact", "part of the time in contact",
+        |m| m.contact_time() / m.duration();
+    contacts_per_period: f64, PerPeriod, common,
+        "contacts a drive period", "contacts begun a drive period",
+        |m| m.contacts().count as f64 / m.periods();
+    peak_force as "F_max": f64, Force, common,
+        "greatest force $F_{max}$", "greatest force of the sample on the tip",
+        |m| m.peak_force();
+    impact_speed: f64, Velocity, common,
+        "speed of approach", "greatest speed at which a contact begins",
+        |m| m.contacts().greatest_speed;
+    contact_time: f64, Time, common,
+        "contact time", "time in contact in one drive period",
+        |m| m.contact_time() / m.periods();
+    tone2_response: Option<f64>, Length, rare,
+        "amplitude at the second tone",
+        "amplitude of the tip deflection at the frequency of the second tone",
+        |m| m.second_tone().map(|c| c.norm());
+    tone2_lag: Option<f64>, Angle, rare,
+        "phase behind the second tone (°)",
+        "lag of the tip deflection behind the second tone",
+        |m| m.second_tone().map(lag);
+    rms_deflection: f64, Length, rare,
+        "root mean square of the tip deflection",
+        "root mean square of the tip deflection about its mean",
+        |m| (m.mean_product(Tip, Tip) - m.mean(Tip).powi(2)).max(0.0).sqrt();
+    gap_range: [f64; 2], Length, rare,
+        "gap", "least and greatest height of the tip over the undeformed surface",
+        |m| m.range(Height);
+    least_force: f64, Force, rare,
+        "least force", "least force of the sample on the tip: below zero where it pulls",
+        |m| m.least_force();
+    contact_force: Option<f64>, Force, rare,
+        "mean force in contact", "time mean of the force of the sample on the tip while they touch",
+        |m| {
+            let impulse = m.mean(Force) * m.duration();
+            let time = m.contact_time();
+            (time > 0.0).then(|| impulse / time)
+        };
     drive_power: f64, Power, rare,
         "power of the drive", "mean power of the drive",
         |m| m.energy_balance().drive_work / m.duration();
     sample_power: f64, Power, rare,
         "power that the sample takes", "mean power that the sample takes",
         |m| m.dissipation() * m.periods() / m.duration();
-    impact_speed: f64, Velocity, common,
-        "speed of approach", "greatest speed at which a contact begins",
-        |m| m.contacts().greatest_speed;
     slope_range: Option<[f64; 2]>, Slope, rare,
         "slope at the tip", "least and greatest slope at the tip",
         |m| m.is_beam().then(|| m.range(Slope));

@@ -96,6 +96,7 @@ fn virial_and_dissipation_of_a_permanent_contact() {
     let force = -gap * Complex::new(case.alpha4, case.alpha6 * case.omega);
     let mean_force = -case.alpha4 * (o.mean_deflection + case.alpha5);
     near(o.mean_force, mean_force, 1e-12);
+    near(o.contact_force.unwrap(), mean_force, 1e-12);
     near(
         o.virial,
         mean_force * o.mean_deflection + 0.5 * (force * tip.conj()).re,

@@ -58,6 +58,18 @@ impl Recorder {
         self.periods as f64 * system.drive().period()
     }
 
+    /// Takes a stretch that is known by its modal coordinates: in `regime`, from `phase` within
+    /// the drive period on, for `length`.
+    pub fn take_stretch(&mut self, regime: usize, phase: f64, length: f64, modal: &[Complex]) {
+        self.segments.push(Segment {
+            regime,
+            start: phase,
+            phase,
+            length,
+            modal: modal.to_vec(),
+        });
+    }
+
     /// The recording, of a flow of `system`.
     pub fn finish(self, system: Arc<System>) -> Trajectory {
         let end = self.segments.last().map_or(0.0, |s| s.start + s.length);

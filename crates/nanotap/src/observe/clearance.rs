@@ -15,7 +15,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nanotap_flow::flow::{Observer as _, SegmentView};
+use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, FlowError, Output, Trajectory};
 use serde::Serialize;
@@ -352,14 +352,7 @@ impl Start {
 
     fn state(&self, model: &Model) -> Option<Vec<f64>> {
         let mut recorder = Recorder::default();
-        recorder.segment(&SegmentView {
-            system: &model.system,
-            regime: self.regime,
-            phase: 0.0,
-            length: model.period(),
-            modal: &self.modal,
-            factors: &[],
-        });
+        recorder.take_stretch(self.regime, 0.0, model.period(), &self.modal);
         recorder.finish(Arc::clone(&model.system)).state_at(0.0)
     }
 }

@@ -2,7 +2,7 @@
 //! and what is stored. Over a period of a periodic orbit it closes to rounding, a
 //! check of the whole computation.
 
-use nanotap_flow::flow::{Observer as _, SegmentView};
+use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, Output};
 use serde::Serialize;
@@ -166,14 +166,7 @@ impl Stretch {
     fn stored(&self, model: &Model, s: f64) -> f64 {
         let drive = model.system.drive();
         let mut recorder = Recorder::default();
-        recorder.segment(&SegmentView {
-            system: &model.system,
-            regime: self.regime,
-            phase: self.phase,
-            length: self.length,
-            modal: &self.modal,
-            factors: &[],
-        });
+        recorder.take_stretch(self.regime, self.phase, self.length, &self.modal);
         let stretch = recorder.finish(std::sync::Arc::clone(&model.system));
         let Some(state) = stretch.state_at(self.phase + s) else {
             return 0.0;

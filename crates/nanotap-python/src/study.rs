@@ -27,7 +27,7 @@ use crate::watch::{on_threads, watched};
 pub(crate) fn attractors(
     py: Python<'_>,
     case: &CaseCore,
-    starts: usize,
+    starts: Option<usize>,
     seed: u64,
     sides: Vec<(String, f64, f64)>,
     max_period: usize,
@@ -38,6 +38,8 @@ pub(crate) fn attractors(
     let studied = case.studied(py)?;
     let done = watched(py, progress, move |control| {
         let model = studied.model()?;
+        // A box that was given is searched with the 256 starts of old, if no number is.
+        let starts = starts.or((!sides.is_empty()).then_some(256));
         let options = AttractorsOptions {
             starts,
             seed,

@@ -144,7 +144,7 @@ def glossary() -> str: ...
 def attractors(
     case: CaseCore,
     *,
-    starts: int,
+    starts: int | None,
     seed: int,
     sides: list[tuple[str, float, float]],
     max_period: int,

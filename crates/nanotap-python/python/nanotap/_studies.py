@@ -26,7 +26,7 @@ _MOST_POINTS = 10_000_000
 def attractors(
     case: Case,
     *,
-    starts: int = 256,
+    starts: int | None = None,
     seed: int = 1,
     box: Box = None,
     max_period: int = 64,
@@ -34,11 +34,13 @@ def attractors(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Attractors:
-    """Every motion that coexists: a census from starts spread over a box of states.
+    """Every motion that coexists: a census from starts spread over states of every size.
 
     Args:
         case: Whose motions.
-        starts: How many starts.
+        starts: How many starts, spread evenly over one box of states. Without it, starts
+            of every size go on until the share of starts that may lead to motions not
+            found is below 0.2 % (with 95 % confidence), or 5000 are done.
         seed: Their seed: the same seed gives the same answer on any number of threads.
         box: Sides of the box, as in `{"a1": (-1, 1)}`; the others are derived from the
             linear response to the drive.
@@ -55,7 +57,7 @@ def attractors(
     with bar(progress, "starts") as hears:
         document, interrupted = _nanotap.attractors(
             _cased(case)._core,
-            starts=_arguments.count("starts", starts),
+            starts=_arguments.optional_count("starts", starts),
             seed=_arguments.seed(seed),
             sides=sides,
             max_period=_arguments.count("max_period", max_period, 1),

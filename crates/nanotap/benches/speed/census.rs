@@ -11,7 +11,7 @@ use crate::cases;
 fn starts_64(bencher: Bencher<'_, '_>, modes: usize) {
     let model = cases::model(&cases::coexisting(modes));
     let options = AttractorsOptions {
-        starts: 64,
+        starts: Some(64),
         ..AttractorsOptions::default()
     };
     bencher.bench_local(|| {

@@ -3,7 +3,7 @@
 
 use nanotap_dynamics::{
     AttractorKind, Census, CensusOptions, Control, Fraction, OrbitSearch, PeriodicOrbit,
-    SettleOptions, StartBox, StartBoxError, census, find_orbits,
+    SettleOptions, StartBox, StartBoxError, StartSet, census_of, find_orbits,
 };
 use serde::Serialize;
 
@@ -14,16 +14,18 @@ use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::orbit::{OrbitError, OrbitReport, report};
 use crate::study::simulate::{Classification, SimulateError, largest_exponent};
-use crate::study::start_box::default_box;
+use crate::study::start_box::{default_box, default_starts};
 
 /// How to look for attractors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttractorsOptions {
-    /// Starts.
-    pub starts: usize,
+    /// Starts drawn evenly from the box; `None`: starts of every size, besides rest and the
+    /// linear responses, until the share of starts that may lead to motions not found is small
+    /// (the box is not used then).
+    pub starts: Option<usize>,
     /// Seed of the starts.
     pub seed: u64,
-    /// Where the starts lie; `None`: [`default_box`].
+    /// Where a given number of starts lies; `None`: [`default_box`].
     pub start_box: Option<StartBox>,
     /// Budgets of each start.
     pub settle: SettleOptions,
@@ -39,7 +41,7 @@ impl Default for AttractorsOptions {
     fn default() -> Self {
         let census = CensusOptions::default();
         Self {
-            starts: 256,
+            starts: None,
             seed: 1,
             start_box: None,
             settle: census.settle,
@@ -93,6 +95,12 @@ pub struct Attractors {
     pub sides: Vec<Side>,
     /// Attractors, most frequent first.
     pub attractors: Vec<AttractorReport>,
+    /// The same shares for each size of the starts, where they were drawn at several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sizes: Vec<SizeReport>,
+    /// How much may have been missed, where starts were drawn until that was small.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unseen: Option<UnseenReport>,
     /// Starts without a verdict.
     pub undecided: Vec<UndecidedStart>,
     /// Part of the starts without a verdict.
@@ -106,6 +114,28 @@ pub struct Attractors {
     pub unstable: Option<Vec<OrbitReport>>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
+}
+
+/// What became of the starts of one size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SizeReport {
+    /// Size of their box, as a part of the largest.
+    pub scale: f64,
+    /// How many there were.
+    pub starts: usize,
+    /// Part that goes to each attractor, in the order of the attractors.
+    pub fractions: Vec<f64>,
+}
+
+/// How much of the set of starts may lead to motions that were not found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct UnseenReport {
+    /// Motions found.
+    pub motions: usize,
+    /// Starts since the last of them was found.
+    pub starts: usize,
+    /// With 95 % confidence at most this part of the starts leads to motions not found.
+    pub fraction: f64,
 }
 
 /// A side of the box of starts.
@@ -243,13 +273,12 @@ pub fn attractors(
     options: &AttractorsOptions,
     control: &Control<'_>,
 ) -> Result<Attractors, AttractorsError> {
-    if options.starts == 0 {
-        return Err(AttractorsError::NoStarts);
-    }
-    if options.starts > MOST_STARTS {
-        return Err(AttractorsError::TooManyStarts {
-            starts: options.starts,
-        });
+    match options.starts {
+        Some(0) => return Err(AttractorsError::NoStarts),
+        Some(starts) if starts > MOST_STARTS => {
+            return Err(AttractorsError::TooManyStarts { starts });
+        }
+        _ => {}
     }
     let start_box = options
         .start_box
@@ -259,12 +288,15 @@ pub fn attractors(
         let (found, expected) = (start_box.dimension(), model.dimension());
         return Err(AttractorsError::Dimension { found, expected });
     }
-    let starts = start_box.starts(options.seed, options.starts);
+    let set = match options.starts {
+        Some(count) => StartSet::given(start_box.starts(options.seed, count)),
+        None => default_starts(model, options.seed)?,
+    };
     let map = Strobe::new(model);
     let settle = bounded(&options.settle, &start_box);
-    let found = census(
+    let found = census_of(
         &map,
-        &starts,
+        &set,
         &CensusOptions {
             pilots: options.pilots,
             settle,
@@ -272,6 +304,7 @@ pub fn attractors(
         },
         control,
     );
+    let starts: Vec<Vec<f64>> = (0..found.fates.len()).map_while(|k| set.start(k)).collect();
     let unstable = if options.unstable > 0 {
         Some(unstable_orbits(model, &map, &starts, options, control)?)
     } else {
@@ -337,6 +370,20 @@ fn described(
         seed: options.seed,
         sides,
         attractors,
+        sizes: found
+            .by_size
+            .iter()
+            .map(|size| SizeReport {
+                scale: size.scale,
+                starts: size.starts,
+                fractions: size.attractors.iter().map(|f| f.estimate).collect(),
+            })
+            .collect(),
+        unseen: found.unseen.map(|unseen| UnseenReport {
+            motions: unseen.motions,
+            starts: unseen.starts,
+            fraction: unseen.share,
+        }),
         undecided: found
             .undecided
             .iter()

@@ -101,7 +101,7 @@ fn the_census_at_high_frequency_is_complete() {
     let count = |alpha1: f64| {
         let model = Model::cantilever(&at(20.0).with(Parameter::Alpha1, alpha1)).unwrap();
         let options = AttractorsOptions {
-            starts: 64,
+            starts: Some(64),
             ..AttractorsOptions::default()
         };
         attractors(&model, &options, &Control::default()).unwrap()
@@ -311,4 +311,49 @@ fn what_is_called_periodic_is_the_orbit() {
     };
     let early = simulate(&model, &options).unwrap();
     assert!(early.distance_to_orbit.unwrap() > 0.01);
+}
+
+/// A census without options finds motions whose basins lie in a hundredth of the resonant
+/// response. The periods were found by an independent Taylor integrator of order 22 from starts
+/// in a box 100 times smaller than the resonant one.
+#[test]
+fn a_census_finds_motions_in_a_hundredth_of_the_box() {
+    let case = |numbers: [f64; 7]| {
+        let [alpha1, alpha2, alpha3, alpha4, alpha5, alpha6, omega] = numbers;
+        Cantilever {
+            modes: 1,
+            alpha1,
+            alpha2,
+            alpha3,
+            alpha4,
+            alpha5,
+            alpha6,
+            omega,
+            ..Cantilever::paper()
+        }
+    };
+    for (numbers, periods, least) in [
+        (
+            [0.018, 0.1, 0.0236, 53.55, 0.2, 0.0969, 6.03],
+            &[1, 3, 4, 5, 8][..],
+            5,
+        ),
+        ([0.115, 0.1, 0.0639, 19.68, 0.202, 0.0108, 8.89], &[][..], 3),
+    ] {
+        let model = Model::cantilever(&case(numbers)).unwrap();
+        let found = attractors(&model, &AttractorsOptions::default(), &Control::default()).unwrap();
+        let here: Vec<usize> = found
+            .attractors
+            .iter()
+            .filter_map(|a| a.orbit.as_ref().map(|o| o.period))
+            .collect();
+        assert!(found.attractors.len() >= least, "{here:?}");
+        assert!(periods.iter().all(|p| here.contains(p)), "{here:?}");
+        let unseen = found.unseen.unwrap();
+        assert!(
+            unseen.fraction > 0.0 && unseen.fraction < 0.02,
+            "{unseen:?}"
+        );
+        assert!(found.sizes.len() > 3);
+    }
 }

@@ -81,7 +81,9 @@ def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
     }
     assert set(colours) == kinds
     for word, colour in colours.items():
-        known = plot.MOTIONS | {f"period {n + 1}": c for n, c in enumerate(plot.PERIODS)}
+        known = plot.MOTIONS | {
+            f"period {n + 1}": c for n, c in enumerate(plot.PERIODS)
+        }
         assert colour == known[word]
     # A dot for each turn of each orbit.
     for period in np.unique(swept.period.values[periodic]):
@@ -112,7 +114,7 @@ def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
 def test_basins_branches_and_the_rest_are_drawn(bistable, regular):
     basin = nanotap.basin(bistable, x="a1=-1:1:10", y="v1=-20:20:8", starts=24)
     axes = drawn(plot.show(basin)).axes[0]
-    assert axes.get_xlim()[0] < -1 and "a_{1}" in axes.get_ylabel()
+    assert axes.get_xlim()[0] < -1 and "ȧ_{1}" in axes.get_ylabel()
     branch = nanotap.branch(
         regular, parameter="omega", from_=3.0, to=2.9, second={"alpha4": (18, 22)}
     )

@@ -5,7 +5,7 @@ range, colour and letter decided. Nothing here knows what a figure is of.
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -99,7 +99,7 @@ def page(width: float, height: float, **grid: Any) -> Iterator[tuple[Picture, An
         yield picture, picture.subplots(**grid)
 
 
-def draw(description: str, axes: "Axes | Sequence[Axes] | None" = None) -> Any:
+def draw(description: str, axes: Any = None) -> Figure:
     """Draws a figure: on a page of its own, or into `axes`, one for each panel.
 
     Raises:
@@ -114,7 +114,8 @@ def draw(description: str, axes: "Axes | Sequence[Axes] | None" = None) -> Any:
             raise ValueError(message)
         for one, panel in zip(given, panels, strict=True):
             _panel(one, panel)
-        return given[0].figure
+        figure_given: Figure = given[0].figure
+        return figure_given
     rows, cols = figure["rows"], figure["cols"]
     usual = min(max(0.68 * figure["width"] / cols, 42), 90) * rows
     with page(
@@ -131,9 +132,18 @@ def draw(description: str, axes: "Axes | Sequence[Axes] | None" = None) -> Any:
         for spare in flat[len(panels) :]:
             spare.remove()
         for index, (one, panel) in enumerate(zip(flat, panels, strict=False)):
-            _panel(one, panel, last=index + cols >= len(panels) or not figure["share_x"])
-            if panel["letter"]:
-                one.set_title(panel["letter"], loc="left", fontweight="bold", x=-0.12)
+            _panel(
+                one, panel, last=index + cols >= len(panels) or not figure["share_x"]
+            )
+            one.annotate(
+                panel["letter"] or "",
+                (0, 1),
+                (-6, 4),
+                xycoords="axes fraction",
+                textcoords="offset points",
+                ha="right",
+                fontweight="bold",
+            )
         if figure["title"]:
             picture.suptitle(_text(figure["title"]), fontsize=9)
         if figure["caption"]:
@@ -146,22 +156,25 @@ def _text(words: str) -> str:
 
 
 def _panel(axes: "Axes", panel: dict[str, Any], last: bool = True) -> None:
-    for axis, name in ((panel["x"], "x"), (panel["y"], "y")):
+    both = ((panel["x"], "x"), (panel["y"], "y"))
+    for axis, name in both:
         _scale(axis, name, axes)
+        _limit(axis, name, axes)
     handles: list[Any] = []
     for layer in panel["layers"]:
         handles += _LAYERS[layer["kind"]](axes, layer) or []
-    for axis, name in ((panel["x"], "x"), (panel["y"], "y")):
-        if "fixed" in axis["range"]:
-            getattr(axes, f"set_{name}lim")(axis["range"]["fixed"])
+    # What was drawn may have moved them.
+    for axis, name in both:
+        _limit(axis, name, axes)
     axes.set_ylabel(_label(panel["y"]))
     if last:
         axes.set_xlabel(_label(panel["x"]))
-    if panel["title"]:
-        axes.set_title(_text(panel["title"]))
     if not panel["layers"]:
         axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center")
-    _legend(axes, panel["legend"], handles)
+    rows = _legend(axes, panel["legend"], handles)
+    if panel["title"]:
+        # The title stands above a legend that stands above the panel.
+        axes.set_title(_text(panel["title"]), pad=4 + 12 * rows)
 
 
 def _label(axis: dict[str, Any]) -> str:
@@ -177,21 +190,33 @@ def _scale(axis: dict[str, Any], name: str, axes: "Axes") -> None:
         getattr(axes, f"set_{name}ticks")(places, words)
 
 
-def _legend(axes: "Axes", place: str, more: list[Any]) -> None:
+def _limit(axis: dict[str, Any], name: str, axes: "Axes") -> None:
+    if "fixed" in axis["range"]:
+        getattr(axes, f"set_{name}lim")(axis["range"]["fixed"])
+
+
+def _legend(axes: "Axes", place: str, more: list[Any]) -> int:
+    """Draws the legend; its rows above the panel, if it stands there."""
     handles, labels = axes.get_legend_handles_labels()
     # Layers of the same words share an entry.
     entries = dict(zip(reversed(labels), reversed(handles), strict=True))
-    entries = dict(reversed(entries.items())) | {patch.get_label(): patch for patch in more}
+    entries = dict(reversed(entries.items())) | {
+        patch.get_label(): patch for patch in more
+    }
     if place == "hidden" or not entries:
-        return
+        return 0
     settings: dict[str, Any] = {"loc": _CORNERS.get(place)}
     if place == "right":
-        settings = {"loc": "upper left", "bbox_to_anchor": (1.02, 1), "borderaxespad": 0}
+        settings = {
+            "loc": "upper left",
+            "bbox_to_anchor": (1.02, 1),
+            "borderaxespad": 0,
+        }
     elif place == "above":
         settings = {
-            "loc": "lower right",
-            "bbox_to_anchor": (1, 1),
-            "ncols": min(len(entries), 3),
+            "loc": "lower left",
+            "bbox_to_anchor": (0, 1),
+            "ncols": _columns_above(axes, entries),
             "columnspacing": 1.2,
             "borderaxespad": 0.2,
         }
@@ -202,6 +227,18 @@ def _legend(axes: "Axes", place: str, more: list[Any]) -> None:
         if isinstance(handle, mpl.collections.PathCollection):
             # A dot that is seen, however small those of the cloud.
             handle.set_sizes([max(6.0, *handle.get_sizes())])
+    above = place == "above"
+    return -(-len(entries) // _columns_above(axes, entries)) if above else 0
+
+
+def _columns_above(axes: "Axes", entries: dict[str, Any]) -> int:
+    """As many columns as the panel is wide, with letters of about half their height."""
+    bounds = axes.get_position()
+    width = 72 * bounds.width * axes.figure.get_figwidth()
+    columns = [30 + 3.6 * len(words) for words in entries]
+    if sum(columns) <= width:
+        return len(columns)
+    return int(min(max(width // max(columns), 1), len(columns)))
 
 
 def _columns(layer: dict[str, Any]) -> tuple[Any, Any]:
@@ -244,7 +281,9 @@ def _markers(axes: "Axes", layer: dict[str, Any]) -> None:
         linestyle="none",
         marker=_SHAPES[layer["shape"]],
         color=colour,
-        markersize=layer["size"] * _POINTS * (0.8 if layer["shape"] == "diamond" else 1),
+        markersize=layer["size"]
+        * _POINTS
+        * (0.8 if layer["shape"] == "diamond" else 1),
         markerfacecolor="white" if layer["open"] else colour,
         markeredgecolor="white" if layer["edge"] else colour,
         markeredgewidth=0.8 if layer["edge"] or layer["open"] else 0.5,
@@ -333,7 +372,9 @@ def _heatmap(axes: "Axes", layer: dict[str, Any]) -> None:
         layer,
         layer["values"],
         cmap=_COLOURMAPS.get(layer["map"], layer["map"]),
-        norm={"log": mpl.colors.LogNorm, "linear": mpl.colors.Normalize}[norm](low, high),
+        norm={"log": mpl.colors.LogNorm, "linear": mpl.colors.Normalize}[norm](
+            low, high
+        ),
     )
     axes.figure.colorbar(image, ax=axes, label=_label(scale))
 
@@ -360,7 +401,9 @@ def _stems(axes: "Axes", layer: dict[str, Any]) -> None:
 
 
 def _bars(axes: "Axes", layer: dict[str, Any]) -> None:
-    axes.bar(*_columns(layer), layer["width"], color=layer["colour"], label=_words(layer))
+    axes.bar(
+        *_columns(layer), layer["width"], color=layer["colour"], label=_words(layer)
+    )
 
 
 _LAYERS: dict[str, Callable[["Axes", dict[str, Any]], list[Any] | None]] = {

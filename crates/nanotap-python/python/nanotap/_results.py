@@ -12,9 +12,9 @@ from ._arguments import Floats
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from ._case import Case
-    from .plot import Picture
 
 
 class Record(Mapping[str, Any]):
@@ -231,7 +231,7 @@ class Orbit(Result):
             "order"
         )
 
-    def plot(self, **options: Any) -> "Picture":
+    def plot(self, **options: Any) -> "Figure":
         """The orbit as the terminal draws it; see `nanotap.plot.orbit`."""
         from . import plot
 
@@ -349,7 +349,7 @@ class Attractors(Sequence[Attractor]):
         rows = [[getattr(one, name) for name in columns] for one in self]
         return pd.DataFrame(rows, columns=columns)
 
-    def plot(self, **options: Any) -> "Picture":
+    def plot(self, **options: Any) -> "Figure":
         """The attractors as the terminal draws them; see `nanotap.plot.attractors`."""
         from . import plot
 

@@ -200,6 +200,7 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
             locus_second=("locus_point", _joined(curve["second"] for curve in curves)),
         )
         ds.attrs["second"] = loci["second"]
+        ds.attrs["second_symbol"] = symbols.get(loci["second"], loci["second"])
     ds.attrs.update(case_attributes(case, "branches of periodic orbits"))
     ds.attrs.update(
         parameter=name,

@@ -19,6 +19,7 @@ from ._results import Attractors, Convergence, Lyapunov, Modes, Orbit
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 __all__ = [
     "LINES",
@@ -65,7 +66,7 @@ def _drawn(
     facts: Mapping[str, Any],
     axes: Any,
     columns: Mapping[str, Any] | None = None,
-) -> Any:
+) -> "Figure":
     """The figure that a study's facts and large columns describe."""
     arrays = {
         name: np.require(np.ravel(values), np.float64, ["C", "A"])
@@ -100,13 +101,18 @@ def _motion(
     shown = time <= periods + 1e-9
     tip, rate = ds.tip.values, ds.tip_rate.values
     contact = np.append(False, np.append(ds.contact.values[shown], False)).astype(int)
-    begun, ended = np.flatnonzero(np.diff(contact) == 1), np.flatnonzero(np.diff(contact) == -1)
+    begun, ended = (
+        np.flatnonzero(np.diff(contact) == 1),
+        np.flatnonzero(np.diff(contact) == -1),
+    )
     whole = (np.abs(time - np.round(time)) < 1e-9) & (time < time.max() - 0.5)
     return {
         "axes": {"beam": _is_beam(ds)},
         "title": title,
         "contacts": _points(time[begun], time[ended - 1]),
-        "surface": _points(time[shown], (tip - ds.gap.values)[shown]) if "gap" in ds else [],
+        "surface": _points(time[shown], (tip - ds.gap.values)[shown])
+        if "gap" in ds
+        else [],
         "tip": _points(time[shown], tip[shown]),
         "portrait": _points(tip, rate),
         "strobe": _points(tip[whole], rate[whole]),
@@ -114,7 +120,9 @@ def _motion(
     }
 
 
-def run(ds: "xr.Dataset", *, periods: float | None = None, axes: Any = None) -> Any:
+def run(
+    ds: "xr.Dataset", *, periods: float | None = None, axes: Any = None
+) -> "Figure":
     """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
         message = "the run has no time series; leave series= away"
@@ -135,7 +143,7 @@ def run(ds: "xr.Dataset", *, periods: float | None = None, axes: Any = None) -> 
     return _drawn("motion", _motion(ds, title, shown, endless=not repeats), axes)
 
 
-def orbit(orbit: Orbit, *, axes: Any = None) -> Any:
+def orbit(orbit: Orbit, *, axes: Any = None) -> "Figure":
     """An orbit: time series, phase portrait, harmonics, multipliers."""
     ds = orbit.series
     if ds is None:
@@ -156,7 +164,7 @@ _MOST = 8
 _ENDLESS_PERIODS = 64
 
 
-def attractors(found: Attractors, *, axes: Any = None) -> Any:
+def attractors(found: Attractors, *, axes: Any = None) -> "Figure":
     """Phase portraits and strobe points of every attractor, each in its own colour."""
     case = found.case
     curves = []
@@ -165,7 +173,11 @@ def attractors(found: Attractors, *, axes: Any = None) -> Any:
             series = _motions.orbit(case, period=one.period, state=one.state).series
         else:
             series = _motions.simulate(
-                case, state=one.state, transient=0, periods=_ENDLESS_PERIODS, max_period=1
+                case,
+                state=one.state,
+                transient=0,
+                periods=_ENDLESS_PERIODS,
+                max_period=1,
             )
         assert series is not None
         curves.append(
@@ -204,28 +216,34 @@ def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     }
 
 
-def sweep(ds: "xr.Dataset", *, axes: Any = None) -> Any:
+def sweep(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
     """A sweep: a bifurcation diagram over one parameter, a map of motions over two."""
     if "start" not in ds.dims:
         ds = ds.expand_dims("start", axis=-1)
     names = [str(dim) for dim in ds.classification.dims if dim != "start"]
     order = (*names, "start")
-    directions = np.atleast_1d(ds.direction.values) if "direction" in ds.coords else None
+    directions = (
+        np.atleast_1d(ds.direction.values) if "direction" in ds.coords else None
+    )
     facts = {
         "axes": [_grid_axis(ds, name) for name in names],
         "directions": [""] * ds.sizes["start"]
         if directions is None
         else [str(way) for way in directions],
-        "units": str(ds.period_max.attrs.get("units", "")) if "period_max" in ds else "",
+        "units": str(ds.period_max.attrs.get("units", ""))
+        if "period_max" in ds
+        else "",
     }
     columns = {f"axis{k}": ds[name].values for k, name in enumerate(names)}
-    columns |= {key: ds[key].transpose(*order).values for key in ("classification", "period")}
+    columns |= {
+        key: ds[key].transpose(*order).values for key in ("classification", "period")
+    }
     if len(names) == 1:
         columns["period_max"] = ds.period_max.transpose(*order, ...).values
     return _drawn("sweep", facts, axes, columns)
 
 
-def basin(ds: "xr.Dataset", *, axes: Any = None) -> Any:
+def basin(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
     """Basins: a colour an attractor, and where the attractors' own strobe points lie."""
     y, x = (str(dim) for dim in ds.attractor.dims)
     facts = {
@@ -238,7 +256,7 @@ def basin(ds: "xr.Dataset", *, axes: Any = None) -> Any:
     return _drawn("basin", facts, axes, columns)
 
 
-def branch(ds: "xr.Dataset", *, show: str = "tip_max", axes: Any = None) -> Any:
+def branch(ds: "xr.Dataset", *, show: str = "tip_max", axes: Any = None) -> "Figure":
     """Branches against the parameter, a colour a period, with their bifurcations; beside them
     the bifurcation curves in two parameters, if they were traced."""
     if show not in _LABELS or show not in ds:
@@ -272,7 +290,10 @@ def _rows(**columns: Any) -> list[dict[str, Any]]:
 
 
 def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
-    parts = [ds.isel(locus_point=ds.locus.values == one) for one in np.unique(ds.locus.values)]
+    parts = [
+        ds.isel(locus_point=ds.locus.values == one)
+        for one in np.unique(ds.locus.values)
+    ]
     first, second = ds[name].values, ds.locus_second.values
     return {
         "y_label": f"${ds.attrs.get('second_symbol', ds.attrs['second'])}$",
@@ -290,7 +311,17 @@ def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     }
 
 
-_PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+_PREFIXES = {
+    -18: "a",
+    -15: "f",
+    -12: "p",
+    -9: "n",
+    -6: "µ",
+    -3: "m",
+    0: "",
+    3: "k",
+    6: "M",
+}
 
 
 def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]:
@@ -303,7 +334,7 @@ def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]
     return 10.0**-power, f" ({_PREFIXES[power]}{unit})"
 
 
-def approach(ds: "xr.Dataset", *, axes: Any = None) -> Any:
+def approach(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
     """Amplitude, phase, dissipated energy and peak force against the distance, both ways."""
     name = ds.attrs["parameter"]
     physical = "physical_A" in ds
@@ -317,26 +348,38 @@ def approach(ds: "xr.Dataset", *, axes: Any = None) -> Any:
         ("peak_force", "physical_F_max", "greatest force $F_{max}$", "N", 1.0),
     )
     # How many of the unit a model's number is: its ratio where it is largest.
+    x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
     panels = []
     for plain, si, label, base, part in rows:
         values = ds[plain].values
         scale = 1.0
         if physical and base:
             k = np.nanargmax(np.abs(values))
-            scale = float(ds[si].values.flat[k] / values.flat[k]) / part if values.flat[k] else 1.0
+            scale = (
+                float(ds[si].values.flat[k] / values.flat[k]) / part
+                if values.flat[k]
+                else 1.0
+            )
         natural = None
         if plain == "dissipation":
-            natural = scale * float(np.nanmax(np.abs(ds.first_harmonic * ds.peak_force)))
+            natural = scale * float(
+                np.nanmax(np.abs(ds.first_harmonic * ds.peak_force))
+            )
         shown, named = (
-            _prefixed(scale * values, base, natural or 0.0) if physical and base else (1.0, "")
+            _prefixed(scale * values, base, natural or 0.0)
+            if physical and base
+            else (1.0, "")
         )
         shown *= scale
-        x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
 
-        def curve(way: str, values: Any = ds[plain], by: float = shown) -> list[list[float]]:
+        def curve(
+            way: str, values: Any = ds[plain], by: float = shown
+        ) -> list[list[float]]:
             return _points(factor * distance, by * values.sel(way=way).values)
 
-        def branches(prefix: str, by: float = shown, plain: str = plain, **more: Any) -> Any:
+        def branches(
+            prefix: str, by: float = shown, plain: str = plain, **more: Any
+        ) -> Any:
             if f"{prefix}{plain}" not in ds:
                 return []
             x, y = x_scale * ds[f"{prefix}parameter"], by * ds[f"{prefix}{plain}"]
@@ -353,7 +396,9 @@ def approach(ds: "xr.Dataset", *, axes: Any = None) -> Any:
                 "bifurcations": branches("bifurcation_", kind=1),
             }
         )
-    symbol = "distance $z_c$" if physical else "distance $α₅$" if name == "alpha5" else name
+    symbol = (
+        "distance $z_c$" if physical else "distance $α₅$" if name == "alpha5" else name
+    )
     facts = {
         "x_label": f"{symbol}{unit}",
         "x_range": [float(factor * distance.min()), float(factor * distance.max())],
@@ -362,7 +407,7 @@ def approach(ds: "xr.Dataset", *, axes: Any = None) -> Any:
     return _drawn("approach", facts, axes)
 
 
-def section(found: Lyapunov, *, axes: Any = None) -> Any:
+def section(found: Lyapunov, *, axes: Any = None) -> "Figure":
     """A Poincaré section, and the exponents with their errors."""
     cut = found.section
     phases = np.unique(np.round(cut.phase.values, 9))
@@ -381,12 +426,12 @@ def section(found: Lyapunov, *, axes: Any = None) -> Any:
     return _drawn("section", facts, axes)
 
 
-def modes(found: Modes, *, axes: Any = None) -> Any:
+def modes(found: Modes, *, axes: Any = None) -> "Figure":
     """The mode shapes of the bare beam."""
     return _drawn("modes", {"modes": found.modes}, axes)
 
 
-def convergence(found: Convergence, *, axes: Any = None) -> Any:
+def convergence(found: Convergence, *, axes: Any = None) -> "Figure":
     """What the tip deflection still changes, against the number of modes."""
     facts = {
         "modes": list(found.modes),
@@ -397,9 +442,9 @@ def convergence(found: Convergence, *, axes: Any = None) -> Any:
     return _drawn("convergence", facts, axes)
 
 
-def show(result: Any, **options: Any) -> Any:
+def show(result: Any, **options: Any) -> "Figure":
     """The figure of any result."""
-    draw_it: Callable[..., Any]
+    draw_it: Callable[..., Figure]
     for kind, draw_it in _FIGURES.items():
         if isinstance(result, kind):
             return draw_it(result, **options)
@@ -410,7 +455,7 @@ def show(result: Any, **options: Any) -> Any:
     raise TypeError(message)
 
 
-_FIGURES: dict[type, Callable[..., Any]] = {
+_FIGURES: dict[type, Callable[..., "Figure"]] = {
     Orbit: orbit,
     Attractors: attractors,
     Lyapunov: section,
@@ -418,7 +463,7 @@ _FIGURES: dict[type, Callable[..., Any]] = {
     Convergence: convergence,
 }
 # The first one that a Dataset has says what it is.
-_FIGURES_BY_VARIABLE: dict[str, Callable[..., Any]] = {
+_FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {
     "branch": branch,
     "attractor": basin,
     "period_max": sweep,

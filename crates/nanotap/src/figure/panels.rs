@@ -329,10 +329,10 @@ pub struct SectionCurves {
 impl SectionCurves {
     /// The section, and the exponents with their errors.
     pub fn figure(&self) -> Figure {
-        let diameter = if self.points.len() > 20_000 {
-            0.15
-        } else {
-            0.3
+        let diameter = match self.points.len() {
+            0..=500 => 0.8,
+            501..=20_000 => 0.3,
+            _ => 0.15,
         };
         let points = Points::new(self.points.clone())
             .diameter(diameter)

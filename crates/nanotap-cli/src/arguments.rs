@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     #[arg(long, global = true)]
     pub(crate) json: bool,
 
-    /// Leave out notes, warnings and progress
+    /// Leave out notes and progress; what puts the result in doubt is said all the same
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
 

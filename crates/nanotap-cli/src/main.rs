@@ -11,6 +11,7 @@ mod given_case;
 mod motion;
 mod number;
 mod output;
+mod page;
 mod progress;
 mod series;
 mod style;
@@ -27,7 +28,10 @@ use output::Output;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let output = Output::new(arguments.json, arguments.quiet);
-    match command::run(&arguments.command, &output) {
+    progress::begin(&output);
+    let result = command::run(&arguments.command, &output);
+    progress::end();
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => failure::report(error),
     }

@@ -11,6 +11,7 @@ use nanotap::observe::{Observables, Spectrum};
 use nanotap::study::simulate::Classification;
 
 use crate::output::Output;
+pub(crate) use crate::page::paragraph;
 use crate::table::{Align, Table};
 use crate::{number, style};
 
@@ -31,23 +32,6 @@ pub(crate) fn verdict(classification: Classification, period: Option<usize>) -> 
         Some(n) => format!("periodic: it repeats every {n} drive periods"),
         None => classification.name().to_owned(),
     }
-}
-
-/// Words wrapped to the width of a page, each line indented by two.
-pub(crate) fn paragraph(words: &str) -> String {
-    const WIDTH: usize = 92;
-    let mut text = String::new();
-    let mut line = String::from(" ");
-    for word in words.split_whitespace() {
-        if line.chars().count() + word.chars().count() >= WIDTH {
-            let _ = writeln!(text, "{line}");
-            line = String::from(" ");
-        }
-        line.push(' ');
-        line.push_str(word);
-    }
-    let _ = writeln!(text, "{line}");
-    text
 }
 
 /// A phase in degrees.

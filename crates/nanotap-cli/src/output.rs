@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write as _};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::style;
+use crate::{progress, style};
 
 /// How results are to be shown.
 #[derive(Debug)]
@@ -32,6 +32,7 @@ impl Output {
         result: &R,
         text: impl FnOnce(&R) -> String,
     ) -> Result<(), Failure> {
+        progress::end();
         if self.json {
             let mut json = serde_json::to_string_pretty(result)
                 .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
@@ -45,15 +46,19 @@ impl Output {
     /// A remark worth knowing.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
+            progress::clear();
             anstream::eprintln!("{}", style::note(text));
         }
     }
 
-    /// A remark that puts the result in doubt.
+    /// A remark that puts the result in doubt: it is shown in any case.
+    #[expect(
+        clippy::unused_self,
+        reason = "remarks go through the output, shown or not"
+    )]
     pub(crate) fn warning(&self, text: &str) {
-        if !self.quiet {
-            anstream::eprintln!("{}", style::warning(text));
-        }
+        progress::clear();
+        anstream::eprintln!("{}", style::warning(text));
     }
 }
 

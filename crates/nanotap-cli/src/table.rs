@@ -1,8 +1,15 @@
-//! Aligned tables for the terminal.
+//! Aligned tables, no wider than the terminal.
+
+use std::ops::Range;
 
 use unicode_width::UnicodeWidthStr;
 
-use crate::style;
+use crate::{page, style};
+
+/// Blanks between two columns.
+const BETWEEN: usize = 2;
+/// Words are not broken into columns narrower than this.
+const NARROWEST: usize = 14;
 
 /// How the cells of a column stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,9 +50,17 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// The table, a line a row, no blanks at the ends of lines.
+    /// The table, no blanks at the ends of lines.
     pub(crate) fn render(&self) -> String {
-        let cells: Vec<Vec<String>> = (0..self.columns.len())
+        self.fitted(page::width())
+    }
+
+    /// The table in lines of at most `width`: where it is wider, words are broken over several
+    /// lines, and if that is not enough, the columns stand in blocks beneath each other, each
+    /// beginning with the first column.
+    fn fitted(&self, width: usize) -> String {
+        let headed = self.columns.iter().any(|(name, _)| !name.is_empty());
+        let columns: Vec<Vec<String>> = (0..self.columns.len())
             .map(|index| {
                 aligned(
                     &self.columns[index],
@@ -53,29 +68,108 @@ impl Table {
                 )
             })
             .collect();
+        let mut widths: Vec<usize> = columns.iter().map(|cells| cells[0].width()).collect();
+        self.narrow(&mut widths, width);
+        let blocks = self.blocks(&widths, width);
         let mut text = String::new();
-        if self.columns.iter().any(|(name, _)| !name.is_empty()) {
-            let line = self.line(&cells, 0);
-            text.push_str(&style::faint(&line));
-            text.push('\n');
-        }
-        for row in 0..self.rows.len() {
-            text.push_str(&self.line(&cells, row + 1));
-            text.push('\n');
+        for (index, block) in blocks.iter().enumerate() {
+            if index > 0 {
+                text.push('\n');
+            }
+            // The first column says in each block which row it is.
+            let members: Vec<usize> = (index > 0)
+                .then_some(0)
+                .into_iter()
+                .chain(block.clone())
+                .collect();
+            for row in usize::from(!headed)..=self.rows.len() {
+                let lines = self.lines(&columns, &widths, &members, row);
+                text.push_str(&if row == 0 {
+                    style::faint(&lines)
+                } else {
+                    lines
+                });
+                text.push('\n');
+            }
         }
         text
     }
 
-    fn line(&self, cells: &[Vec<String>], row: usize) -> String {
-        let mut line = " ".repeat(self.indent);
-        for (index, column) in cells.iter().enumerate() {
-            if index > 0 {
-                line.push_str("  ");
-            }
-            line.push_str(&column[row]);
+    /// Takes width from columns of words, the widest first, until the table fits or none has
+    /// any to give: a word stays whole.
+    fn narrow(&self, widths: &mut [usize], width: usize) {
+        let full = |widths: &[usize]| {
+            self.indent + widths.iter().sum::<usize>() + BETWEEN * widths.len().saturating_sub(1)
+        };
+        let least: Vec<usize> = (0..widths.len())
+            .map(|index| self.longest_word(index))
+            .collect();
+        while full(widths) > width {
+            let widest = (0..widths.len())
+                .filter(|&index| {
+                    self.columns[index].1 == Align::Left && widths[index] > least[index]
+                })
+                .max_by_key(|&index| widths[index]);
+            let Some(widest) = widest else { return };
+            let excess = full(widths) - width;
+            widths[widest] = widths[widest].saturating_sub(excess).max(least[widest]);
         }
-        line.truncate(line.trim_end().len());
-        line
+    }
+
+    /// The width of the longest word of a column, or of the narrowest column of words.
+    fn longest_word(&self, index: usize) -> usize {
+        let cells = self.rows.iter().map(|row| row[index].as_str());
+        std::iter::once(self.columns[index].0.as_str())
+            .chain(cells)
+            .flat_map(str::split_whitespace)
+            .map(UnicodeWidthStr::width)
+            .fold(NARROWEST, usize::max)
+    }
+
+    /// The columns of each block that fits; every block has at least one beside the first.
+    fn blocks(&self, widths: &[usize], width: usize) -> Vec<Range<usize>> {
+        let mut blocks = Vec::new();
+        let mut begin = 0;
+        let mut taken = self.indent;
+        for (index, column) in widths.iter().enumerate() {
+            if index > begin.max(1) && taken + BETWEEN + column > width {
+                blocks.push(begin..index);
+                begin = index;
+                taken = self.indent + widths[0];
+            }
+            taken += column + if index > 0 { BETWEEN } else { 0 };
+        }
+        blocks.push(begin..widths.len());
+        blocks
+    }
+
+    /// One row of these columns: a line, or several where words are broken.
+    fn lines(
+        &self,
+        columns: &[Vec<String>],
+        widths: &[usize],
+        members: &[usize],
+        row: usize,
+    ) -> String {
+        let cells: Vec<Vec<&str>> = members
+            .iter()
+            .map(|&index| page::broken(&columns[index][row], widths[index]))
+            .collect();
+        let height = cells.iter().map(Vec::len).max().unwrap_or(0);
+        let lines: Vec<String> = (0..height)
+            .map(|line| {
+                let mut text = " ".repeat(self.indent);
+                for (position, (cell, &index)) in cells.iter().zip(members).enumerate() {
+                    let piece = cell.get(line).copied().unwrap_or_default();
+                    text.push_str(&" ".repeat(if position > 0 { BETWEEN } else { 0 }));
+                    text.push_str(piece);
+                    text.push_str(&" ".repeat(widths[index].saturating_sub(piece.width())));
+                }
+                text.truncate(text.trim_end().len());
+                text
+            })
+            .collect();
+        lines.join("\n")
     }
 }
 
@@ -147,5 +241,37 @@ mod tests {
         assert_eq!(lines.len(), 3);
         assert!(lines[1].ends_with("   1  3.5160"), "{lines:?}");
         assert_eq!(lines[2], "    12");
+    }
+    /// A narrow terminal: words go on in the next line, under themselves.
+    #[test]
+    fn words_are_broken_where_the_line_ends() {
+        let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
+        table.row(["α1", "0.1", "tip mass over beam mass"]);
+        table.row(["α4", "20", "stiffness"]);
+        assert_eq!(
+            table.fitted(28),
+            "  α1   0.1  tip mass over\n            beam mass\n  α4  20    stiffness\n"
+        );
+        assert_eq!(table.fitted(usize::MAX), table.fitted(80));
+    }
+
+    /// Numbers cannot be broken: the columns go on in another block, with the first again.
+    #[test]
+    fn columns_go_on_beneath() {
+        let mut table = Table::new([("", Align::Right); 4]);
+        table.row(["1", "1.2345678", "2.3456789", "3.4567891"]);
+        table.row(["2", "9.2345678", "8.3456789", "7.4567891"]);
+        assert_eq!(
+            table.fitted(26),
+            "  1  1.2345678  2.3456789\n  2  9.2345678  8.3456789\n\n  1  3.4567891\n  2  7.4567891\n"
+        );
+        // However narrow, every number is there, whole.
+        let narrow = table.fitted(5);
+        assert!(
+            ["3.4567891", "8.3456789"]
+                .iter()
+                .all(|n| narrow.contains(n)),
+            "{narrow}"
+        );
     }
 }

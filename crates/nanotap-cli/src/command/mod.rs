@@ -5,7 +5,9 @@ mod attractors;
 mod basin;
 mod branch;
 mod case;
+mod catalogue;
 mod convergence;
+mod generate;
 mod lyapunov;
 mod merge;
 mod modes;
@@ -16,6 +18,7 @@ mod simulate;
 mod sweep;
 mod window;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Subcommand;
@@ -60,6 +63,10 @@ pub(crate) enum Command {
     Samples(samples::Arguments),
     /// Every figure and number of the paper, with verdicts and evidence
     Paper(paper::Arguments),
+    /// The levers and materials that a case can name
+    Catalogue(catalogue::Arguments),
+    /// Shell completions and manual pages
+    Generate(generate::Arguments),
 }
 
 /// Runs `command`.
@@ -80,6 +87,8 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Convergence(arguments) => convergence::run(arguments, output),
         Command::Samples(arguments) => samples::run(arguments, output),
         Command::Paper(arguments) => paper::run(arguments, output),
+        Command::Catalogue(arguments) => catalogue::run(arguments, output),
+        Command::Generate(arguments) => generate::run(arguments, output),
     }
 }
 
@@ -91,12 +100,18 @@ pub(crate) fn title(arguments: &CaseArguments) -> String {
     )
 }
 
-/// The case of the arguments, with the built-in catalogue and those that they add.
-pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
+/// The built-in catalogue and what these files add to it.
+fn catalogue(files: &[PathBuf]) -> Result<Arc<Catalogue>, Failure> {
     let mut catalogue = Catalogue::shared();
-    for path in &arguments.catalogue {
+    for path in files {
         Arc::make_mut(&mut catalogue).extend_from_file(path)?;
     }
+    Ok(catalogue)
+}
+
+/// The case of the arguments, with the built-in catalogue and those that they add.
+pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
+    let catalogue = catalogue(&arguments.catalogue)?;
     let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
     Ok(case.called(&title(arguments)))
 }

@@ -83,3 +83,193 @@ fn json_is_alone_on_standard_output_and_remarks_can_be_silenced() {
     assert_eq!(quiet.stderr, "");
     assert_eq!(quiet.stdout, outcome.stdout);
 }
+
+/// A beam that would pass through the sample makes the motion none of the model's.
+#[test]
+fn what_puts_the_result_in_doubt_is_said_even_when_quiet() {
+    let folder = Folder::with_paper_case();
+    let outcome = folder.run(&["orbit", "case.toml", "--set", "omega=20", "--quiet"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+    assert!(outcome.stderr.starts_with("warning:"), "{}", outcome.stderr);
+    assert!(
+        outcome.stderr.contains("pass through the sample"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn tables_fit_the_terminal() {
+    let folder = Folder::with_paper_case();
+    for columns in [60, 80, 100] {
+        for arguments in [
+            &["case", "case.toml"][..],
+            &["modes", "case.toml"],
+            &["catalogue"],
+            &["orbit", "case.toml", "--set", "omega=20", "--quiet"],
+            &[
+                "convergence",
+                "case.toml",
+                "--set",
+                "omega=20",
+                "--largest",
+                "3",
+            ],
+        ] {
+            let output = folder
+                .command(arguments)
+                .env("COLUMNS", columns.to_string())
+                .output()
+                .unwrap();
+            let text = String::from_utf8(output.stdout).unwrap();
+            assert!(!text.is_empty());
+            let long: Vec<&str> = text
+                .lines()
+                .filter(|line| line.chars().count() > columns)
+                .collect();
+            assert!(
+                long.is_empty(),
+                "{arguments:?} in {columns} columns: {long:#?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_catalogue_lists_what_a_case_can_name() {
+    let folder = Folder::with_paper_case();
+    let listed = folder.run(&["catalogue", "--json"]).json();
+    let lever = |listed: &serde_json::Value, name: &str| {
+        let levers = listed["levers"].as_array().unwrap().clone();
+        levers.into_iter().find(|lever| lever["name"] == name)
+    };
+    let fm = lever(&listed, "PPP-FM").unwrap();
+    // The maker's nominal values, in SI.
+    assert_eq!(fm["k"], 2.8);
+    assert_eq!(fm["f0"], 75e3);
+    assert_eq!(fm["length"], 225e-6);
+    assert!(fm["source"].as_str().unwrap().contains("Nanosensors"));
+    let materials = listed["materials"].as_array().unwrap();
+    assert!(
+        materials
+            .iter()
+            .any(|m| m["name"] == "polystyrene" && m["modulus"] == 4e9)
+    );
+
+    let named = folder.run(&["catalogue", "nchr", "PS"]);
+    for words in ["PPP-NCHR", "42 N/m", "polystyrene", "4 GPa", "Dokukin"] {
+        assert!(named.stdout.contains(words), "{words}:\n{}", named.stdout);
+    }
+    assert!(!named.stdout.contains("75 kHz"), "{}", named.stdout);
+    folder
+        .run(&["catalogue", "PPP-NCHX"])
+        .refused(&["PPP-NCHX", "PPP-NCHR", "nanotap catalogue"]);
+
+    folder.write(
+        "own.toml",
+        "[lever.\"mine\"]\nk = \"2.4 N/m\"\nf0 = \"71 kHz\"\nsource = \"thermal noise\"\n",
+    );
+    let own = folder
+        .run(&["catalogue", "--catalogue", "own.toml", "--json"])
+        .json();
+    assert_eq!(lever(&own, "mine").unwrap()["k"], 2.4);
+}
+
+#[test]
+fn completions_and_manual_pages_know_every_command() {
+    let folder = Folder::with_paper_case();
+    let help = folder.run(&["--help"]).stdout;
+    let commands: Vec<&str> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .map_while(|line| line.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .collect();
+    assert!(
+        commands.len() > 15 && commands.contains(&"orbit"),
+        "{commands:?}"
+    );
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let completions = folder.run(&["generate", shell]);
+        assert_eq!((completions.code, completions.stderr.as_str()), (0, ""));
+        for command in &commands {
+            assert!(completions.stdout.contains(command), "{shell}: {command}");
+        }
+    }
+    let page = folder.run(&["generate", "man"]).stdout;
+    assert!(page.contains(".TH nanotap 1"), "{page}");
+    let written = folder
+        .run(&["generate", "man", "--out", "man/man1", "--json"])
+        .json();
+    assert_eq!(
+        written["files"].as_array().unwrap().len(),
+        commands.len() + 1
+    );
+    for command in commands {
+        let page = folder.read(&format!("man/man1/nanotap-{command}.1"));
+        assert!(page.contains(".SH OPTIONS"), "{command}");
+    }
+    folder
+        .run(&["generate", "fish", "--out", "there"])
+        .refused(&["--out there", "standard output"]);
+}
+
+/// On a terminal a line says that the program works, and is gone when the result is there.
+#[cfg(unix)]
+#[test]
+fn long_work_says_that_it_goes_on() {
+    use std::io::Read as _;
+
+    let folder = Folder::with_paper_case();
+    let terminal = nix::pty::openpty(None, None).unwrap();
+    // A chaotic motion, of which nothing but the periods is counted.
+    let mut child = folder
+        .command(&["lyapunov", "case.toml", "--periods", "300000"])
+        .stdout(Stdio::null())
+        .stderr(terminal.slave)
+        .spawn()
+        .unwrap();
+    let mut text = Vec::new();
+    // A terminal of which the program is gone ends in an error.
+    let _ = std::fs::File::from(terminal.master).read_to_end(&mut text);
+    assert!(child.wait().unwrap().success());
+    let text = String::from_utf8_lossy(&text);
+    assert!(text.contains("working, 1 s so far"), "{text:?}");
+    assert!(text.ends_with("\r\u{1b}[K"), "{text:?}");
+}
+
+#[test]
+fn refusals_name_what_was_typed() {
+    let folder = Folder::with_paper_case();
+    folder
+        .run(&["attractors", "case.toml", "--box", "v2=2:1"])
+        .refused(&["v2", "from 2 to 1", "upwards"]);
+    folder
+        .run(&["basin", "case.toml", "--x", "a1=-1:1:2", "--y", "a1=0:1:2"])
+        .refused(&["both axes", "`a1`"]);
+    folder
+        .run(&["merge", "case.toml", "--out", "whole.zarr"])
+        .refused(&["case.toml", "no folder", "nanotap sweep"]);
+}
+
+#[test]
+fn numbers_and_nouns_agree() {
+    let folder = Folder::with_paper_case();
+    // Nothing moves more than a hundredfold of itself: one mode will do.
+    let convergence = folder.run(&[
+        "convergence",
+        "case.toml",
+        "--set",
+        "omega=20",
+        "--largest",
+        "2",
+        "--tolerance",
+        "100",
+    ]);
+    assert!(
+        convergence.stdout.contains("1 mode is enough"),
+        "{}",
+        convergence.stdout
+    );
+}

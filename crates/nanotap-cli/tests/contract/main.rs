@@ -56,6 +56,7 @@ snapshots! {
     basin
     branch
     case
+    catalogue
     convergence
     help
     lyapunov

@@ -89,6 +89,7 @@ impl Store {
                     "it is not there"
                 }));
             }
+            Err(_) if path.is_file() => return Err(refuse("it is a file, no folder")),
             Err(error) => return Err(StoreError::io("read", &document)(error)),
         };
         let parsed: Value = serde_json::from_str(&metadata)

@@ -189,6 +189,12 @@ pub enum BasinError {
         /// What there is.
         known: String,
     },
+    /// A slice has two directions.
+    #[error("both axes are `{name}`")]
+    SameAxis {
+        /// The entry of the state.
+        name: String,
+    },
     /// More than fit in memory.
     #[error("{starts} starts are too many; {MOST_STARTS} at most")]
     TooManyStarts {
@@ -282,6 +288,11 @@ impl Basin {
         let model = case.model()?;
         let names = state_names(&model);
         let origin = starting_state(&model, options.state.as_deref())?;
+        if options.x.name == options.y.name {
+            return Err(BasinError::SameAxis {
+                name: options.x.name.clone(),
+            });
+        }
         let slice = Slice::new(origin, options.x.axis(&names)?, options.y.axis(&names)?)?;
         let starts = match &options.attractors {
             Some(states) => {

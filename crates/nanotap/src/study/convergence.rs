@@ -203,7 +203,12 @@ fn verdict(
             format!("no orbit was found with {largest} modes, so nothing can be compared")
         }
         (Some(n), _) => format!(
-            "{n} modes are enough: from there on the tip moves within {percent} % of {largest} modes"
+            "{} enough: from there on the tip moves within {percent} % of {largest} modes",
+            if n == 1 {
+                "1 mode is".to_owned()
+            } else {
+                format!("{n} modes are")
+            }
         ),
         (None, _) => {
             format!("{largest} modes are not shown to be enough at {percent} %: take more")

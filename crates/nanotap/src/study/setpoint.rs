@@ -34,7 +34,7 @@ pub enum SetpointError {
     /// The amplitude never falls so far.
     #[error(
         "the setpoint A/A0 = {ratio} is not reached on the way to the sample's own position \
-         (gap.tip = 0), where A/A0 is {least}; raise drive.setpoint, or give gap.tip"
+         (gap.tip = 0), where A/A0 is {least:.3}; raise drive.setpoint, or give gap.tip"
     )]
     NotReached {
         /// The setpoint.
@@ -44,8 +44,8 @@ pub enum SetpointError {
     },
     /// The amplitude jumps past the setpoint.
     #[error(
-        "on approach the amplitude jumps past the setpoint A/A0 = {ratio}: from {before} to \
-         {after} of A0 between gap.tip = {from} and {to}; change drive.setpoint, or give gap.tip"
+        "on approach the amplitude jumps past the setpoint A/A0 = {ratio}: from {before:.3} to \
+         {after:.3} of A0 between gap.tip = {from} and {to}; change drive.setpoint, or give gap.tip"
     )]
     Jump {
         /// The setpoint.

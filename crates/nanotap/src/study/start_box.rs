@@ -149,6 +149,16 @@ pub enum SideError {
         /// What there is.
         known: String,
     },
+    /// It does not run upwards.
+    #[error("{name} runs from {low} to {high}; it must run upwards, between finite numbers")]
+    Downwards {
+        /// The coordinate.
+        name: String,
+        /// Its lower end, as it was given.
+        low: f64,
+        /// Its upper end.
+        high: f64,
+    },
     /// It makes no box.
     #[error(transparent)]
     Box(#[from] StartBoxError),
@@ -170,6 +180,13 @@ pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox,
                 known: names.join(", "),
             });
         };
+        if !(low <= high && (high - low).is_finite()) {
+            return Err(SideError::Downwards {
+                name: name.clone(),
+                low: *low,
+                high: *high,
+            });
+        }
         (lower[index], upper[index]) = (*low, *high);
     }
     Ok(StartBox::new(lower, upper)?)
@@ -237,7 +254,7 @@ mod tests {
         ));
         assert!(matches!(
             box_with(&model, &[("a1".into(), 1.0, 0.0)]),
-            Err(SideError::Box(_))
+            Err(SideError::Downwards { .. })
         ));
     }
 }

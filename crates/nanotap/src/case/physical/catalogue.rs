@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::PhysicalError;
 use super::lever::BeamGeometry;
@@ -28,7 +28,7 @@ use crate::case::near_name::near_names;
 use crate::case::quantity::{Kind, QuantityError};
 
 /// A lever as its box describes it. No quality factor: that depends on what surrounds it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lever {
     /// Its name.
     pub name: String,
@@ -39,6 +39,7 @@ pub struct Lever {
     /// First free resonance in Hz, with its tip.
     pub f0: f64,
     /// Dimensions of the beam.
+    #[serde(flatten)]
     pub geometry: Option<BeamGeometry>,
     /// Radius of the tip's apex in m.
     pub tip_radius: Option<f64>,
@@ -49,13 +50,14 @@ pub struct Lever {
 }
 
 /// A material of samples and tips.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Material {
     /// Its name.
     pub name: String,
     /// Other names it answers to.
     pub aliases: Vec<String>,
     /// Young's modulus and Poisson's ratio.
+    #[serde(flatten)]
     pub elastic: Elastic,
     /// Density in kg/m³, where a tip may be made of it.
     pub density: Option<f64>,

@@ -19,7 +19,7 @@ use crate::case::quantity::Kind;
 use crate::model::exact_beam;
 
 /// Dimensions of a beam of rectangular cross-section, in m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BeamGeometry {
     /// Length L.
     pub length: f64,

@@ -1,5 +1,7 @@
 //! The sample under the tip: a spring and a damper, given or from Hertz's contact.
 
+use serde::Serialize;
+
 use super::catalogue::Material;
 use super::error::PhysicalError;
 use super::reader::Reader;
@@ -10,7 +12,7 @@ use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
 
 /// Elastic constants of an isotropic solid.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Elastic {
     /// Young's modulus in Pa, above zero.
     pub modulus: f64,

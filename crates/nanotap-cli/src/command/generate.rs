@@ -1,0 +1,129 @@
+//! `nanotap generate`: shell completions and manual pages, made from the command line itself.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, CommandFactory as _, ValueEnum};
+use clap_complete::Shell;
+use clap_mangen::Man;
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Shell completions and manual pages.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// Completions for this shell, or the manual pages
+    #[arg(value_enum)]
+    what: What,
+
+    /// Folder for the manual pages, one for each command, made if it is not there; without it,
+    /// the first page goes to standard output
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum What {
+    /// Completions, as in nanotap generate bash > ~/.local/share/bash-completion/completions/nanotap
+    Bash,
+    /// Completions, as in nanotap generate elvish >> ~/.config/elvish/rc.elv
+    Elvish,
+    /// Completions, as in nanotap generate fish > ~/.config/fish/completions/nanotap.fish
+    Fish,
+    /// Completions, as in nanotap generate powershell >> $PROFILE
+    Powershell,
+    /// Completions, as in nanotap generate zsh > ~/.zfunc/_nanotap
+    Zsh,
+    /// Manual pages, as in nanotap generate man --out ~/.local/share/man/man1
+    Man,
+}
+
+/// What was made.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Made {
+    /// A text for standard output.
+    Text(String),
+    /// Files in a folder.
+    Files(Vec<PathBuf>),
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let made = match (arguments.what.shell(), &arguments.out) {
+        (Some(shell), None) => Made::Text(completions(shell)),
+        (None, None) => Made::Text(first_page()?),
+        (None, Some(folder)) => Made::Files(pages(folder)?),
+        (Some(_), Some(folder)) => {
+            return Err(Failure::input(
+                format!(
+                    "--out {}: completions go to standard output",
+                    folder.display()
+                ),
+                "leave --out away and redirect the output where the shell looks for completions",
+            ));
+        }
+    };
+    output.result(&made, |made| match made {
+        Made::Text(text) => text.clone(),
+        Made::Files(files) => files
+            .iter()
+            .map(|path| format!("{}\n", path.display()))
+            .collect(),
+    })
+}
+
+impl What {
+    /// The shell that is completed, if it is one.
+    fn shell(self) -> Option<Shell> {
+        match self {
+            Self::Bash => Some(Shell::Bash),
+            Self::Elvish => Some(Shell::Elvish),
+            Self::Fish => Some(Shell::Fish),
+            Self::Powershell => Some(Shell::PowerShell),
+            Self::Zsh => Some(Shell::Zsh),
+            Self::Man => None,
+        }
+    }
+}
+
+fn completions(shell: Shell) -> String {
+    let mut text = Vec::new();
+    let mut command = crate::arguments::Arguments::command();
+    clap_complete::generate(shell, &mut command, "nanotap", &mut text);
+    String::from_utf8_lossy(&text).into_owned()
+}
+
+/// The command line, every command of it by its whole name, as in `nanotap-orbit`.
+fn command() -> clap::Command {
+    let mut command = crate::arguments::Arguments::command().disable_help_subcommand(true);
+    command.build();
+    command
+}
+
+/// The manual page of the program.
+fn first_page() -> Result<String, Failure> {
+    let mut text = Vec::new();
+    Man::new(command())
+        .render(&mut text)
+        .map_err(|error| Failure::numerics(format!("cannot make the manual page: {error}")))?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
+/// Writes a page for the program and for each of its commands.
+fn pages(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let refuse = |error| Failure::files(format!("cannot write to {}: {error}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    let whole = command();
+    let shown = whole
+        .get_subcommands()
+        .filter(|command| !command.is_hide_set());
+    std::iter::once(&whole)
+        .chain(shown)
+        .map(|command| {
+            Man::new(command.clone())
+                .generate_to(folder)
+                .map_err(refuse)
+        })
+        .collect()
+}

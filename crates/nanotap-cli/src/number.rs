@@ -1,4 +1,6 @@
-//! Numbers as a person reads them.
+//! Numbers as a person reads them, and as a table holds them.
+
+use nanotap::dataset::table::shortest;
 
 /// `value` with `digits` significant digits: `0.1447`, `20.34`, `3.113e-8`.
 ///
@@ -62,6 +64,12 @@ pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
+/// Numbers as a line of a CSV file, each in the shortest form that reads back.
+pub(crate) fn row(values: impl IntoIterator<Item = f64>) -> String {
+    let cells: Vec<String> = values.into_iter().map(shortest).collect();
+    cells.join(",")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,6 +102,18 @@ mod tests {
         }
         assert_eq!(chosen(20.0), "20");
         assert_eq!(chosen(1e-9), "1e-9");
+    }
+
+    #[test]
+    fn rows_read_back_and_are_short() {
+        let values = [0.1, -0.0, 3.402830773979555e-18, 1.0 / 3.0, 20.0, -5e-9];
+        let text = row(values);
+        assert_eq!(
+            text,
+            "0.1,0,3.402830773979555e-18,0.3333333333333333,20,-5e-9"
+        );
+        let read = text.split(',').map(|cell| cell.parse::<f64>().unwrap());
+        assert!(read.eq(values));
     }
 
     #[test]

@@ -32,7 +32,6 @@ impl Output {
         result: &R,
         text: impl FnOnce(&R) -> String,
     ) -> Result<(), Failure> {
-        progress::end();
         if self.json {
             let mut json = serde_json::to_string_pretty(result)
                 .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
@@ -63,6 +62,7 @@ impl Output {
 }
 
 fn print(text: &str) -> Result<(), Failure> {
+    progress::end();
     let mut stream = anstream::stdout().lock();
     match stream
         .write_all(text.as_bytes())

@@ -9,7 +9,7 @@ use nanotap::model::Model;
 use nanotap::observe::time_series;
 
 use crate::failure::Failure;
-use crate::file;
+use crate::{file, number};
 
 /// Writes `periods` drive periods from `start`, `resolution` rows each and the very end.
 /// Of a physical case, columns in SI follow the model's own.
@@ -39,12 +39,8 @@ pub(crate) fn write(
     .collect();
     csv.push('\n');
     time_series::sample(model, start, periods, resolution, |row| {
-        for (column, value) in row.iter().enumerate() {
-            let _ = write!(csv, "{}{value}", if column == 0 { "" } else { "," });
-        }
-        for (column, unit) in &si {
-            let _ = write!(csv, ",{}", row[*column] * unit);
-        }
+        let si = si.iter().map(|(column, unit)| row[*column] * unit);
+        csv.push_str(&number::row(row.iter().copied().chain(si)));
         csv.push('\n');
     })
     .map_err(|error| Failure::numerics(error.to_string()))?;

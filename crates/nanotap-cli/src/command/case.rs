@@ -167,7 +167,7 @@ fn physical(title: &str, view: &Physical) -> String {
     let free = Kind::Length.format(view.free_amplitude);
     let phase = format!(
         "free amplitude of the tip, {:.1}° behind the {}",
-        view.free_phase,
+        shown_phase(view.free_phase),
         view.phase_reference()
     );
     given.row(["A0", &free, &phase]);

@@ -1,7 +1,5 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
-use std::fmt::Write as _;
-
 use clap::{Args, ValueEnum};
 use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
@@ -107,17 +105,8 @@ fn csv(model: &Model, report: &LyapunovReport) -> String {
     let names = time_series::state_names(model).join(",");
     let mut csv = format!("phase_degrees,tip,tip_rate,gap_rate,{names}\n");
     for p in &report.section {
-        let _ = write!(
-            csv,
-            "{},{},{},{}",
-            360.0 * p.phase,
-            p.tip,
-            p.tip_rate,
-            p.gap_rate
-        );
-        for value in &p.state {
-            let _ = write!(csv, ",{value}");
-        }
+        let cells = [360.0 * p.phase, p.tip, p.tip_rate, p.gap_rate];
+        csv.push_str(&number::row(cells.iter().chain(&p.state).copied()));
         csv.push('\n');
     }
     csv

@@ -51,10 +51,10 @@ fn shapes(beam: &Modes) -> String {
     let mut csv = format!("xi,{}\n", names.join(","));
     for point in 0..POINTS {
         let xi = point as f64 / (POINTS - 1) as f64;
-        let _ = write!(csv, "{xi}");
-        for value in beam.shapes(xi).iter() {
-            let _ = write!(csv, ",{value}");
-        }
+        let shapes = beam.shapes(xi);
+        csv.push_str(&number::row(
+            std::iter::once(xi).chain(shapes.iter().copied()),
+        ));
         csv.push('\n');
     }
     csv

@@ -116,14 +116,8 @@ fn harmonics_csv(orbit: &OrbitReport) -> String {
     let mut csv = String::from("order,tip,tip_lag_degrees,force,force_lag_degrees");
     csv.push_str(if beam { ",slope\n" } else { "\n" });
     for h in &orbit.spectrum.harmonics {
-        let _ = write!(
-            csv,
-            "{},{},{},{},{}",
-            h.order, h.tip, h.tip_phase, h.force, h.force_phase
-        );
-        if let Some(slope) = h.slope {
-            let _ = write!(csv, ",{slope}");
-        }
+        let cells = [h.order, h.tip, h.tip_phase, h.force, h.force_phase];
+        csv.push_str(&number::row(cells.into_iter().chain(h.slope)));
         csv.push('\n');
     }
     csv

@@ -82,8 +82,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 fn csv(result: &Comparison) -> String {
     let mut csv = String::from("contact,indentation,force\n");
     for sample in &result.samples {
-        for [indentation, force] in sample.orbit.iter().flat_map(|o| &o.force_loop) {
-            let _ = writeln!(csv, "{},{indentation},{force}", sample.contact);
+        for point in sample.orbit.iter().flat_map(|o| &o.force_loop) {
+            let _ = writeln!(csv, "{},{}", sample.contact, number::row(*point));
         }
     }
     csv

@@ -282,8 +282,9 @@ fn rk4(
 /// Time, tip displacement and its rate at every step.
 fn curve(run: &FixedStepRun) -> String {
     let mut csv = String::from("tau,tip,tip_rate\n");
-    for [tau, tip, rate] in &run.curve {
-        let _ = writeln!(csv, "{tau},{tip},{rate}");
+    for point in &run.curve {
+        csv.push_str(&number::row(*point));
+        csv.push('\n');
     }
     csv
 }

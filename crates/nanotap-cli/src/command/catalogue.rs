@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nanotap::case::Key;
 use nanotap::case::physical::catalogue::{Lever, Material};
 use nanotap::case::physical::{Catalogue, Kind};
 use serde::Serialize;
@@ -51,8 +52,8 @@ fn named<'a>(catalogue: &'a Catalogue, names: &[String]) -> Result<Listed<'a>, F
         materials: Vec::new(),
     };
     for name in names {
-        let lever = catalogue.lever("cantilever.lever", name);
-        let material = catalogue.material("sample.material", name);
+        let lever = catalogue.lever(Key::LeverName, name);
+        let material = catalogue.material(Key::SampleMaterial, name);
         if let (Err(lever), Err(material)) = (&lever, &material) {
             return Err(Failure::input(
                 format!("`{name}` is neither a lever nor a material: {lever}; {material}"),

@@ -329,7 +329,7 @@ fn pictures_are_drawn() {
         o.follow = Follow::Both;
     });
     let svg = figure(&swept.store).unwrap().to_svg().unwrap();
-    for word in ["chaotic", "periodic", "following up", "following down"] {
+    for word in ["chaotic", "period 1", "following up", "following down"] {
         assert!(svg.contains(word), "{word}");
     }
 }

@@ -11,7 +11,7 @@ use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::table::{Align, Table};
-use crate::{file, number, style};
+use crate::{file, motion, number, style};
 
 /// Points along the beam in the table of mode shapes.
 const POINTS: usize = 201;
@@ -88,9 +88,10 @@ fn text(title: &str, case: &Cantilever, table: &ModeTable) -> String {
             frequencies(galerkin, exact, eigenvalues.as_deref())
         );
     }
-    text.push_str(
-        "\n  Galerkin: these modes of the bare beam, undamped; exact: the beam itself.\n",
-    );
+    text.push('\n');
+    text.push_str(&motion::paragraph(
+        "Galerkin: these modes of the bare beam, undamped; exact: the beam itself.",
+    ));
     text
 }
 

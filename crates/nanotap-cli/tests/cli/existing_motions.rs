@@ -25,9 +25,10 @@ fn coexisting_motions_are_all_found() {
     let list = json["attractors"].as_array().unwrap();
     let periods: Vec<u64> = list.iter().map(|a| a["period"].as_u64().unwrap()).collect();
     // Reference: at Ω = 20, α1 = 0 a period-1 (W up to 0.7357) and a period-4 (W up to 3.0047).
-    assert_eq!(periods, [1, 4]);
-    assert!((number(&list[0], "tip_max") - 0.7357).abs() < 5e-5);
-    assert!((number(&list[1], "tip_max") - 3.0047).abs() < 5e-5);
+    // Plain runs of 3000 periods from 1000 starts of this box: 67 % go to the period-4 orbit.
+    assert_eq!(periods, [4, 1]);
+    assert!((number(&list[0], "tip_max") - 3.0047).abs() < 5e-5);
+    assert!((number(&list[1], "tip_max") - 0.7357).abs() < 5e-5);
     let total: f64 = list.iter().map(|a| number(a, "fraction")).sum();
     assert!((total - 1.0).abs() < 1e-12, "{total}");
     for attractor in list {

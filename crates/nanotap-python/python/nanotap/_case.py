@@ -96,8 +96,7 @@ class Case:
             "alpha6": 0.2,
             "omega": 2.6,
         }
-        named = {_OTHER_NAMES.get(key, key): value for key, value in keys.items()}
-        return _again(cls, None, _words(own | named), [])
+        return _again(cls, None, _words(own) | _words(keys), [])
 
     def with_(self, **keys: Value) -> "Case":
         """The same case with some keys changed."""
@@ -270,7 +269,8 @@ def _text(path: Path) -> str:
 
 def _words(keys: Mapping[str, Any]) -> dict[str, str]:
     """`key=value` words by the one name that each key has."""
-    words = {}
+    words: dict[str, str] = {}
+    typed: dict[str, str] = {}
     for key, value in keys.items():
         if isinstance(value, Mapping):
             for inner, quantity in value.items():
@@ -279,6 +279,10 @@ def _words(keys: Mapping[str, Any]) -> dict[str, str]:
         else:
             name = key.removeprefix("model.")
             name = _OTHER_NAMES.get(name, name)
+            if name in typed:
+                message = f"`{typed[name]}` and `{key}` are the same key; keep one of the two"
+                raise ValueError(message)
+            typed[name] = key
             words[name] = f"{name}={_written(name, value)}"
     return words
 

@@ -55,9 +55,11 @@ pub enum ValueOfKeyError {
         /// What was given.
         text: String,
     },
-    /// The quantity makes no sense.
-    #[error("{text}: {error}")]
+    /// Not the quantity that the key is.
+    #[error("{text}: {key}: {error}")]
     Quantity {
+        /// The key.
+        key: Key,
         /// What was given.
         text: String,
         /// Why.

@@ -419,6 +419,7 @@ impl Case {
     /// When `text` is neither.
     pub fn value(&self, key: Key, text: &str) -> Result<f64, ValueOfKeyError> {
         let of_quantity = |error| ValueOfKeyError::Quantity {
+            key,
             text: text.to_owned(),
             error: Box::new(error),
         };
@@ -625,7 +626,8 @@ impl Serialize for Case {
         };
         let stated = quantities.stated.iter();
         let document = QuantitiesDocument {
-            cantilever: self.cantilever(),
+            cantilever: self.cantilever().filter(|_| !quantities.held),
+            modes: quantities.held.then(|| file::modes(&quantities.stated)),
             quantities: stated
                 .filter(|(key, _)| key.is_physical())
                 .map(|(key, value)| (key.path(), value.text()))
@@ -635,11 +637,14 @@ impl Serialize for Case {
     }
 }
 
-/// A physical case: the numbers that it comes to, and what was stated.
+/// A physical case: the numbers that it comes to, unless quantities vary, and what was
+/// stated.
 #[derive(Serialize)]
 struct QuantitiesDocument<'a> {
     #[serde(flatten)]
     cantilever: Option<&'a Cantilever>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    modes: Option<usize>,
     #[serde(flatten)]
     quantities: BTreeMap<&'static str, String>,
 }

@@ -37,8 +37,7 @@ pub(crate) fn paragraph(words: &str) -> String {
     let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
     broken(&words, READABLE.min(width()) - 2)
         .into_iter()
-        .map(|line| format!("  {line}\n"))
-        .collect()
+        .fold(String::new(), |text, line| text + "  " + line + "\n")
 }
 
 /// `text` cut at blanks into lines of at most `width`; a word that is longer has a line of its

@@ -66,10 +66,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     };
     output.result(&made, |made| match made {
         Made::Text(text) => text.clone(),
-        Made::Files(files) => files
-            .iter()
-            .map(|path| format!("{}\n", path.display()))
-            .collect(),
+        Made::Files(files) => files.iter().fold(String::new(), |text, path| {
+            text + &path.display().to_string() + "\n"
+        }),
     })
 }
 

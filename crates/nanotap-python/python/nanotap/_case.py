@@ -280,7 +280,9 @@ def _words(keys: Mapping[str, Any]) -> dict[str, str]:
             name = key.removeprefix("model.")
             name = _OTHER_NAMES.get(name, name)
             if name in typed:
-                message = f"`{typed[name]}` and `{key}` are the same key; keep one of the two"
+                message = (
+                    f"`{typed[name]}` and `{key}` are the same key; keep one of the two"
+                )
                 raise ValueError(message)
             typed[name] = key
             words[name] = f"{name}={_written(name, value)}"

@@ -17,6 +17,7 @@ use crate::study::approach::{ApproachReport, Way};
 /// way there and back as marks in two colours, the branches as lines, dashed where unstable,
 /// with their bifurcations.
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
+    const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
     let (x_factor, x_unit) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
     let symbol = if matches!(units, Units::Si(_)) {
         "distance $z_c$"
@@ -25,7 +26,6 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     } else {
         "distance $α₅$"
     };
-    const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
     ApproachCurves {
         x_label: format!("{symbol}{x_unit}"),
         x_range: [report.to, report.from].map(|gap| x_factor * gap),

@@ -58,6 +58,9 @@ pub struct SweepTable {
     pub period_max: Vec<f64>,
 }
 
+/// Direction and motion of a cloud of points; no motion: one too rare to be named.
+type CloudOf<'a> = (&'a str, Option<Motion>);
+
 impl SweepTable {
     /// What a finished dataset holds.
     ///
@@ -147,7 +150,7 @@ impl SweepTable {
         frequent.sort_by_key(|motion| std::cmp::Reverse(counts[motion]));
         frequent.truncate(MOST_CATEGORIES);
         // None of what is too rare to be named.
-        let mut clouds: BTreeMap<(&str, Option<Motion>), Vec<(f64, f64)>> = BTreeMap::new();
+        let mut clouds: BTreeMap<CloudOf<'_>, Vec<(f64, f64)>> = BTreeMap::new();
         for cell in 0..cells {
             let Some(motion) = self.motion(cell) else {
                 continue;
@@ -294,7 +297,7 @@ fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
         .filter(|v| v.is_finite())
         .fold(0.0, |size: f64, v| size.max(v.abs()));
     let (factor, unit) = prefixed(Kind::Length, 1.0, size);
-    (factor, unit.to_string())
+    (factor, unit.clone())
 }
 
 /// Amplitude and phase at the drive's frequency over one parameter, a colour a direction of
@@ -401,7 +404,7 @@ impl GridAxis {
                     .iter()
                     .fold(0.0, |size: f64, v| size.max(v.abs()));
                 let (factor, unit) = prefixed(kind, 1.0, size);
-                (factor, words, unit.to_string())
+                (factor, words, unit.clone())
             }
             None if self.symbol.contains('.') => (1.0, words, String::new()),
             None => (1.0, format!("${}$", self.symbol), String::new()),

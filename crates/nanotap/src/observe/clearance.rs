@@ -58,13 +58,13 @@ impl Clearance {
 }
 
 /// The beam over a short recording.
-struct Beam<'a> {
+struct RecordedBeam<'a> {
     model: &'a Model,
     beam: &'a BeamOutputs,
     trajectory: &'a Trajectory,
 }
 
-impl Beam<'_> {
+impl RecordedBeam<'_> {
     /// The least height over all places, of which none is lower than its `bound`.
     ///
     /// Places on a grid first; then, between the neighbours of the best, the place where the
@@ -318,7 +318,7 @@ impl ClearanceSearch {
                 continue;
             };
             let period = Trajectory::record(&model.system, &state, 1)?;
-            let beam = Beam {
+            let beam = RecordedBeam {
                 model,
                 beam,
                 trajectory: &period,
@@ -344,7 +344,11 @@ impl ClearanceSearch {
 
 impl Start {
     fn is(&self, other: &Self) -> bool {
-        let size = self.modal.iter().map(|q| q.norm_sqr()).fold(0.0, f64::max);
+        let size = self
+            .modal
+            .iter()
+            .map(nalgebra::Complex::norm_sqr)
+            .fold(0.0, f64::max);
         let apart = self.modal.iter().zip(&other.modal);
         self.regime == other.regime
             && apart.map(|(a, b)| (a - b).norm_sqr()).fold(0.0, f64::max) <= SAME * SAME * size

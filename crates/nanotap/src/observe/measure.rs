@@ -437,17 +437,14 @@ impl<'a> Measured<'a> {
 
     /// What was gathered; 0 before the run.
     fn value(&mut self, need: Need) -> Complex {
-        match &self.found {
-            Some(found) => {
-                let known = found.values.iter().find(|(known, _)| *known == need);
-                known.map_or(f64::NAN.into(), |(_, value)| *value)
+        if let Some(found) = &self.found {
+            let known = found.values.iter().find(|(known, _)| *known == need);
+            known.map_or(f64::NAN.into(), |(_, value)| *value)
+        } else {
+            if !self.asked.contains(&need) {
+                self.asked.push(need);
             }
-            None => {
-                if !self.asked.contains(&need) {
-                    self.asked.push(need);
-                }
-                0.0.into()
-            }
+            0.0.into()
         }
     }
 

@@ -148,8 +148,8 @@ macro_rules! observables {
             pub(super) fn read(set: Set, measured: &mut Measured<'_>) -> Self {
                 let mut all = Self { periods: measured.periods(), ..Self::UNKNOWN };
                 $(if set.contains(&OBSERVABLES[Row::$name as usize]) {
-                    let read: fn(&mut Measured<'_>) -> $type = $read;
-                    all.$name = read(measured);
+                    #[allow(clippy::redundant_closure_call)] // the table writes closures
+                    { all.$name = ($read as fn(&mut Measured<'_>) -> $type)(measured); }
                 })*
                 all
             }
@@ -233,7 +233,7 @@ observables! {
     tone2_response: Option<f64>, Length, rare,
         "amplitude at the second tone",
         "amplitude of the tip deflection at the frequency of the second tone",
-        |m| m.second_tone().map(|c| c.norm());
+        |m| m.second_tone().map(nalgebra::Complex::norm);
     tone2_lag: Option<f64>, Angle, rare,
         "phase behind the second tone (°)",
         "lag of the tip deflection behind the second tone",
@@ -267,7 +267,7 @@ observables! {
     optical_amplitude: Option<f64>, Length, rare,
         "amplitude read by an optical lever",
         "amplitude that an optical lever, calibrated by a static force, reads at the drive frequency",
-        |m| m.optical_lever().map(|c| c.norm());
+        |m| m.optical_lever().map(nalgebra::Complex::norm);
     optical_phase: Option<f64>, Angle, rare,
         "phase read by an optical lever (°)", "lag that an optical lever reads behind the drive",
         |m| m.optical_lever().map(lag);

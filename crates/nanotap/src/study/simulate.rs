@@ -227,7 +227,7 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
 /// for: near a multiplier of modulus one it takes longer than anyone would run.
-fn measured_transient(map: &mut Strobe, state: &mut Vec<f64>, options: &SettleOptions) -> usize {
+fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &SettleOptions) -> usize {
     let settled = settle(map, state, options);
     state.copy_from_slice(&settled.state);
     let (Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. }) = &settled.verdict

@@ -80,7 +80,7 @@ fn text(listed: &Listed<'_>, with_sources: bool) -> String {
             text.push('\n');
         }
         text.push_str(&style::bold(
-            "materials, as in material = \"silicon\" under [sample] or [tip]",
+            "materials, as in material = \"silicon\" ([sample], [tip])",
         ));
         text.push_str("\n\n");
         text.push_str(&materials(&listed.materials).render());

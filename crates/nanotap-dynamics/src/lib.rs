@@ -11,7 +11,7 @@
 //! | [`neighbourhood`] | from where every motion goes to a given orbit |
 //! | [`lyapunov`] | how fast neighbouring motions part |
 //! | [`classify`] | what the motion from one start comes to |
-//! | [`census`] | which attractors a set of starts goes to, and what it may have missed |
+//! | [`mod@census`] | which attractors a set of starts goes to, and what it may have missed |
 //! | [`global`] | which attractors there are all over a grid of parameter values |
 //! | [`basin`] | which points of a slice go to which attractor |
 //! | [`continuation`] | how an orbit goes on in one parameter, and its bifurcations |

@@ -3,7 +3,7 @@
 //! A [`Request`] names outputs (scalars affine in the state, which may differ from regime to
 //! regime) and what is wanted of each: its least or greatest value, its integral, its
 //! Fourier coefficient at a frequency, the integral of its product with another. Nothing else
-//! is computed. A [`Plan`] is the request made ready for one [`System`]; it is immutable and
+//! is computed. A [`Plan`] is the request made ready for one [`System`](crate::System); it is immutable and
 //! may be shared. An [`Accumulator`] is an [`Observer`](crate::flow::Observer) that carries
 //! the sums along:
 //!

@@ -1,6 +1,6 @@
 //! A key of a case: what it is called, what it takes, and which keys say the same.
 //!
-//! The entries themselves stand in [`keys`](super::keys), once. Whatever reads, checks,
+//! The entries themselves stand in `keys`, once. Whatever reads, checks,
 //! varies, explains or documents a key asks here.
 
 use std::fmt;

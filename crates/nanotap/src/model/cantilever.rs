@@ -204,7 +204,7 @@ impl Cantilever {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`CaseError`] for the first field that makes no sense, with its value and
+    /// [`CantileverError`] for the first field that makes no sense, with its value and
     /// what would be right.
     pub fn validate(&self) -> Result<(), CantileverError> {
         if !(1..=MAX_MODES).contains(&self.modes) {
@@ -237,7 +237,7 @@ pub const fn range(parameter: Parameter) -> (f64, f64) {
 /// Checks one parameter on its own.
 ///
 /// # Errors
-/// [`CaseError`] if `value` makes no sense for `parameter`.
+/// [`CantileverError`] if `value` makes no sense for `parameter`.
 pub fn check(parameter: Parameter, value: f64) -> Result<(), CantileverError> {
     match objection(parameter, value) {
         None => Ok(()),

@@ -14,7 +14,7 @@ use crate::model::parameter::Parameter;
 /// `alpha1` and tip spring `alpha4`, ascending. `alpha4` = 0 is free flight.
 ///
 /// # Errors
-/// [`CaseError`] unless 1 ≤ `count` ≤ 50 and both parameters are finite and ≥ 0.
+/// [`CantileverError`] unless 1 ≤ `count` ≤ 50 and both parameters are finite and ≥ 0.
 pub fn frequencies(alpha1: f64, alpha4: f64, count: usize) -> Result<Vec<f64>, CantileverError> {
     check(Parameter::Alpha1, alpha1)?;
     check(Parameter::Alpha4, alpha4)?;
@@ -106,7 +106,7 @@ fn bisect(before: impl Fn(f64) -> bool, mut low: f64, mut high: f64) -> f64 {
 /// where the tip moves against the base.
 ///
 /// # Errors
-/// [`CaseError`] if `omega` is no valid drive frequency.
+/// [`CantileverError`] if `omega` is no valid drive frequency.
 pub fn base_excitation_gain(omega: f64) -> Result<f64, CantileverError> {
     check(Parameter::Omega, omega)?;
     let beta = omega.sqrt();

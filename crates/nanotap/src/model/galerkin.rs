@@ -102,7 +102,7 @@ impl Galerkin {
     /// Sets up the equations of `case`.
     ///
     /// # Errors
-    /// [`CaseError`] if the case is not valid.
+    /// [`CantileverError`] if the case is not valid.
     pub fn new(case: &Cantilever) -> Result<Self, CantileverError> {
         case.validate()?;
         let modes = Modes::shared(case.modes)?;

@@ -10,7 +10,7 @@ use crate::model::drive_form::Actuation;
 /// see [`response_at`].
 ///
 /// # Errors
-/// [`CaseError`] if the case is not valid.
+/// [`CantileverError`] if the case is not valid.
 pub fn free_response(case: &Cantilever) -> Result<Complex<f64>, CantileverError> {
     response_at(case, case.omega)
 }
@@ -31,7 +31,7 @@ pub fn free_response(case: &Cantilever) -> Result<Complex<f64>, CantileverError>
 /// `alpha2`, `alpha4`, `alpha5` and `alpha6` do not matter.
 ///
 /// # Errors
-/// [`CaseError`] if the case is not valid.
+/// [`CantileverError`] if the case is not valid.
 pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, CantileverError> {
     case.validate()?;
     let modes = Modes::shared(case.modes).map_err(|error| CantileverError {

@@ -106,15 +106,6 @@ fn tables_fit_the_terminal() {
             &["case", "case.toml"][..],
             &["modes", "case.toml"],
             &["catalogue"],
-            &["orbit", "case.toml", "--set", "omega=20", "--quiet"],
-            &[
-                "convergence",
-                "case.toml",
-                "--set",
-                "omega=20",
-                "--largest",
-                "3",
-            ],
         ] {
             let output = folder
                 .command(arguments)

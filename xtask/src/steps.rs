@@ -1,5 +1,7 @@
 //! The chores themselves.
 
+use std::process::Command;
+
 use crate::process::{shown_and_kept, succeeds};
 use crate::tally::Tally;
 use crate::tools::Workspace;
@@ -62,11 +64,18 @@ pub(crate) static STEPS: &[Step] = &[
 ];
 
 /// Chores that are no checks.
-pub(crate) static BESIDE: &[Step] = &[Step {
-    name: "wheel",
-    about: "the Python package, installable, in target/wheels",
-    run: wheel,
-}];
+pub(crate) static BESIDE: &[Step] = &[
+    Step {
+        name: "wheel",
+        about: "the Python package, installable, in target/wheels",
+        run: wheel,
+    },
+    Step {
+        name: "signatures",
+        about: "Python's functions written anew from what the studies declare",
+        run: write_signatures,
+    },
+];
 
 fn fmt(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["fmt", "--all", "--check"]);
@@ -117,18 +126,36 @@ fn wheel(workspace: &Workspace) -> Result<Tally, String> {
     Ok(Tally::passed_check())
 }
 
-fn test_python(workspace: &Workspace) -> Result<Tally, String> {
+/// Writes Python's functions from the schemas that the program prints, or checks that they are
+/// what it would write.
+fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> {
     let mut build = workspace.cargo(&["build", "--release"]);
     if !succeeds(&workspace.root, &mut build)? {
         return Err("the program could not be built".into());
     }
+    let mut command = Command::new("python3");
+    command
+        .arg("crates/nanotap-python/signatures.py")
+        .arg(workspace.target().join("release").join("nanotap"))
+        .args(further);
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+fn write_signatures(workspace: &Workspace) -> Result<Tally, String> {
+    signatures(workspace, &[])
+}
+
+fn test_python(workspace: &Workspace) -> Result<Tally, String> {
+    let fresh = signatures(workspace, &["--check"])?;
     let environment = wheel::installed(workspace)?;
     let mut command = environment.program("pytest");
     command.arg("python-tests");
     let program = workspace.target().join("release").join("nanotap");
     command.env("NANOTAP", program);
     let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
-    Ok(Tally::of_tests(&lines, succeeded))
+    let mut tally = fresh;
+    tally += Tally::of_tests(&lines, succeeded);
+    Ok(tally)
 }
 
 fn test_rust(workspace: &Workspace) -> Result<Tally, String> {

@@ -127,6 +127,8 @@ pub(crate) struct DatasetReport<S> {
     pub(crate) summary: Option<S>,
     /// What this command took.
     pub(crate) seconds: f64,
+    /// Seed of the starts.
+    pub(crate) seed: u64,
 }
 
 impl<S> DatasetReport<S> {
@@ -136,6 +138,7 @@ impl<S> DatasetReport<S> {
         destination: Destination,
         plot: Option<&Path>,
         begun: Instant,
+        seed: u64,
         summary: impl FnOnce(&Store) -> Result<S, StoreError>,
         figure: impl FnOnce(&Store) -> Result<Figure, StoreError>,
     ) -> Result<Self, Failure> {
@@ -152,6 +155,7 @@ impl<S> DatasetReport<S> {
             chunks: store.chunks(),
             finished: store.chunks() - missing,
             summary,
+            seed,
             seconds: begun.elapsed().as_secs_f64(),
         })
     }

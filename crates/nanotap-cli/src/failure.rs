@@ -39,6 +39,10 @@ pub(crate) fn flag(option: &str) -> String {
 /// A problem without a text that it points into.
 fn plain(problem: &ErrorProblem) -> String {
     let what = match &problem.place {
+        // A message that begins with the value goes on where the flag was typed.
+        ErrorPlace::Option(name) if !problem.message.starts_with(char::is_alphabetic) => {
+            format!("{} {}", flag(name), problem.message)
+        }
         ErrorPlace::Option(name) => format!("{}: {}", flag(name), problem.message),
         _ => problem.message.clone(),
     };

@@ -3,7 +3,6 @@
 
 use std::ops::Deref;
 
-pub(crate) use nanotap::case::ParameterUnit;
 use nanotap::case::physical::Severity;
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
@@ -120,37 +119,5 @@ impl GivenCase {
                 number::chosen(cantilever.omega)
             }
         )
-    }
-
-    /// The parameter that is called `name`.
-    pub(crate) fn key(&self, name: &str) -> Result<Key, Failure> {
-        Ok(self.0.key(name)?)
-    }
-
-    /// The parameter that is called `name`, and values of it given after their options.
-    pub(crate) fn key_and_values<const N: usize>(
-        &self,
-        name: &str,
-        given: [(&str, &str); N],
-    ) -> Result<(Key, [f64; N]), Failure> {
-        let key = self.key(name)?;
-        let mut values = [0.0; N];
-        for (value, (option, text)) in values.iter_mut().zip(given) {
-            *value = self.value(key, option, text)?;
-        }
-        Ok((key, values))
-    }
-
-    /// A value of a parameter, given after `option`: a number of the dimensionless model,
-    /// or of a physical case a quantity with its unit.
-    pub(crate) fn value(&self, key: Key, option: &str, text: &str) -> Result<f64, Failure> {
-        self.0.value(key, text).map_err(|error| {
-            let help = match self.parameter_unit(key) {
-                Some(_) if key.is_physical() => "give a quantity with its unit".to_owned(),
-                Some(_) => "give a number or a quantity".to_owned(),
-                None => format!("give a value of {key} as a number"),
-            };
-            Failure::input(format!("{option} {error}"), help)
-        })
     }
 }

@@ -13,6 +13,7 @@ mod number;
 mod output;
 mod page;
 mod progress;
+mod request;
 mod series;
 mod style;
 mod table;

@@ -15,16 +15,6 @@ pub(crate) use crate::page::paragraph;
 use crate::table::{Align, Table};
 use crate::{number, style};
 
-/// The state that a run starts from, as somebody types it.
-pub(crate) fn parse_state(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!(
-            "`{text}` is no finite number; write the state as 0.1,-0.02,0.3"
-        )),
-    }
-}
-
 /// The heading: what the motion is.
 pub(crate) fn verdict(classification: Classification, period: Option<usize>) -> String {
     match period {

@@ -2,6 +2,7 @@
 
 use std::io::{ErrorKind, Write as _};
 
+use nanotap::study::registry::Document;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -42,6 +43,21 @@ impl Output {
         }
     }
 
+    /// Prints the report of a study: as JSON with the case and the version, else the text that
+    /// `text` makes.
+    pub(crate) fn study<R: Serialize>(
+        &self,
+        case: &nanotap::case::Case,
+        report: &R,
+        text: impl FnOnce(&R) -> String,
+    ) -> Result<(), Failure> {
+        if self.json {
+            self.result(&Document::new(report, case), |_| String::new())
+        } else {
+            print(&text(report))
+        }
+    }
+
     /// A remark worth knowing.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
@@ -61,7 +77,8 @@ impl Output {
     }
 }
 
-fn print(text: &str) -> Result<(), Failure> {
+/// Prints `text` on standard output.
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
     progress::end();
     let mut stream = anstream::stdout().lock();
     match stream

@@ -1,6 +1,7 @@
 //! How many threads work.
 
 use clap::Args;
+use nanotap::study::threads::{checked, install};
 
 use crate::failure::Failure;
 
@@ -15,31 +16,11 @@ pub(crate) struct ThreadsArgument {
 impl ThreadsArgument {
     /// How many; 0 if nobody said.
     pub(crate) fn number(&self) -> Result<usize, Failure> {
-        if self.threads == Some(0) {
-            return Err(nobody());
-        }
-        Ok(self.threads.unwrap_or(0))
+        Ok(checked(self.threads)?.unwrap_or(0))
     }
 
     /// Does `work` on so many threads.
     pub(crate) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R, Failure> {
-        let Some(threads) = self.threads else {
-            return Ok(work());
-        };
-        if threads == 0 {
-            return Err(Failure::input(
-                "--threads 0: nobody would work",
-                "give 1 or more",
-            ));
-        }
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map(|pool| pool.install(work))
-            .map_err(|error| Failure::numerics(format!("cannot start {threads} threads: {error}")))
+        install(self.threads, work)
     }
-}
-
-fn nobody() -> Failure {
-    Failure::input("--threads 0: nobody would work", "give 1 or more")
 }

@@ -6,13 +6,13 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nanotap::case::Case;
-use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
-use nanotap::dataset::{self, Schema, Share, Store, Work, WorkError, table};
-use nanotap::study::basin::{self, Basin, BasinOptions, SliceRange};
-use nanotap::study::sweep::{self, Follow, Over, Starts, Sweep, SweepOptions};
+use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
+use nanotap::study::basin;
+use nanotap::study::sweep;
+use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
+use nanotap::study::{self, registry};
 use nanotap_figures::Figure;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -20,134 +20,47 @@ use pyo3::types::PyBytes;
 
 use crate::case::CaseCore;
 use crate::failure::Failure;
-use crate::motion::numbers;
-use crate::watch::{on_threads, watched};
-
-/// What is computed.
-enum Kind {
-    Sweep(Box<Sweep>),
-    Basin(Box<Basin>),
-}
-
-impl Kind {
-    fn schema(&self) -> &Schema {
-        match self {
-            Self::Sweep(sweep) => sweep.schema(),
-            Self::Basin(basin) => basin.schema(),
-        }
-    }
-
-    fn compute(&self, store: &Store, work: &Work<'_>) -> Result<(), WorkError> {
-        match self {
-            Self::Sweep(sweep) => sweep.compute(store, work),
-            Self::Basin(basin) => basin.compute(store, work),
-        }
-    }
-
-    fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
-        match self {
-            Self::Sweep(sweep) => sweep.chunk_files(chunk, control),
-            Self::Basin(basin) => basin.chunk_files(chunk, control),
-        }
-    }
-}
+use crate::study::json;
+use crate::watch::watched;
 
 /// A sweep or basin that was checked: its chunks are pure functions of it.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct Recipe {
-    kind: Arc<Kind>,
+    recipe: Arc<study::recipe::Recipe>,
 }
 
 #[pymethods]
 impl Recipe {
-    /// A sweep over one or two parameters, each written as the terminal does.
-    #[staticmethod]
-    #[pyo3(signature = (case, *, over, starts, seed, sides, state, follow, periods, strobe, transient, max_period))]
-    fn sweep(
+    /// What the study called `name` computes of a case. What must be known beforehand, as the
+    /// attractors of basins, is found now.
+    #[new]
+    #[pyo3(signature = (name, case, request, *, threads=None, progress=None))]
+    fn new(
         py: Python<'_>,
+        name: &str,
         case: &CaseCore,
-        over: Vec<String>,
-        starts: Option<usize>,
-        seed: u64,
-        sides: Vec<(String, f64, f64)>,
-        state: Option<PyReadonlyArray1<'_, f64>>,
-        follow: Option<&str>,
-        periods: usize,
-        strobe: Option<usize>,
-        transient: Option<usize>,
-        max_period: usize,
-    ) -> PyResult<Self> {
-        let studied = case.studied(py)?;
-        let over = over
-            .iter()
-            .map(|given| Over::parse(given, &studied))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(Failure::from)?;
-        let starts = match (starts, numbers(state)) {
-            (Some(count), _) => Starts::Seeded { count, seed, sides },
-            (None, Some(state)) => Starts::Given(state),
-            (None, None) => Starts::Rest,
-        };
-        let follow = follow
-            .map_or(Ok(Follow::Off), str::parse)
-            .map_err(Failure::input)?;
-        let options = SweepOptions {
-            starts,
-            follow,
-            periods,
-            strobe: strobe.unwrap_or(periods).min(periods),
-            transient,
-            max_period,
-            ..SweepOptions::new(over)
-        };
-        let sweep = Sweep::new(Case::clone(&studied), options).map_err(Failure::from)?;
-        Ok(Self {
-            kind: Arc::new(Kind::Sweep(Box::new(sweep))),
-        })
-    }
-
-    /// Basins on a slice, its axes written as the terminal does. The census that finds the
-    /// attractors runs now.
-    #[staticmethod]
-    #[pyo3(signature = (case, *, x, y, state, attractors, starts, seed, periods, max_period, threads, progress))]
-    fn basin(
-        py: Python<'_>,
-        case: &CaseCore,
-        x: &str,
-        y: &str,
-        state: Option<PyReadonlyArray1<'_, f64>>,
-        attractors: Option<Vec<Vec<f64>>>,
-        starts: usize,
-        seed: u64,
-        periods: usize,
-        max_period: usize,
-        threads: usize,
+        request: &str,
+        threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
+        let entry = registry::study(name)
+            .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
+        let request = json(request)?;
         let studied = case.studied(py)?;
-        let range = |given: &str| SliceRange::parse(given).map_err(Failure::from);
-        let options = BasinOptions {
-            state: numbers(state),
-            attractors,
-            starts,
-            seed,
-            periods,
-            max_period,
-            ..BasinOptions::new(range(x)?, range(y)?)
-        };
         let done = watched(py, progress, move |control| {
-            let basin = on_threads(threads, || Basin::new(&studied, &options, control))??;
-            Ok(basin)
+            Ok(install(threads, || {
+                entry.recipe(&studied, request, control)
+            })??)
         })?;
         Ok(Self {
-            kind: Arc::new(Kind::Basin(Box::new(done.result))),
+            recipe: Arc::new(done.result),
         })
     }
 
     /// Number of chunks.
     #[getter]
     fn chunks(&self) -> usize {
-        self.kind.schema().grid.chunks()
+        self.recipe.schema().grid.chunks()
     }
 
     /// Computes the chunks of a share that the store at `path` lacks; says whether Ctrl-C
@@ -158,21 +71,22 @@ impl Recipe {
         py: Python<'_>,
         path: PathBuf,
         share: &str,
-        threads: usize,
+        threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<bool> {
+        let threads = checked(threads).map_err(Failure::from)?.unwrap_or(0);
         let share: Share = share
             .parse()
             .map_err(|error: dataset::ShareError| Failure::input(error.to_string()))?;
         let store = self.store(&path)?;
-        let kind = Arc::clone(&self.kind);
+        let recipe = Arc::clone(&self.recipe);
         let done = watched(py, progress, move |control| {
             let work = Work {
                 share,
                 threads,
                 control: *control,
             };
-            match kind.compute(&store, &work) {
+            match recipe.compute(&store, &work) {
                 Ok(()) | Err(WorkError::Cancelled { .. }) => Ok(()),
                 Err(WorkError::Store(error)) => Err(error.into()),
             }
@@ -186,9 +100,10 @@ impl Recipe {
         py: Python<'py>,
         chunk: usize,
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
-        let kind = Arc::clone(&self.kind);
+        let recipe = Arc::clone(&self.recipe);
         let done = watched(py, None, move |control| {
-            kind.chunk_files(chunk, control)
+            recipe
+                .chunk_files(chunk, control)
                 .ok_or_else(|| Failure::input(format!("there is no chunk {chunk}")))
         })?;
         let files = done.result.iter().map(|file| PyBytes::new(py, file));
@@ -205,7 +120,7 @@ impl Recipe {
 
 impl Recipe {
     fn store(&self, path: &Path) -> Result<Store, Failure> {
-        Ok(Store::create_or_resume(path, self.kind.schema().clone())?)
+        Ok(Store::create_or_resume(path, self.recipe.schema().clone())?)
     }
 }
 

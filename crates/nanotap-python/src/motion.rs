@@ -5,57 +5,24 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::ErrorKind;
 use nanotap::case::Case;
+use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
-use nanotap::observe::PhysicalMotion;
 use nanotap::observe::time_series;
-use nanotap::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
-use nanotap::study::modes::ModeTable;
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit as find_orbit};
-use nanotap::study::simulate::{SettleOptions, SimulateOptions, Simulation, simulate as run};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use nanotap::study::modes::{ModesRequest, ModesStudy};
+use nanotap::study::orbit::{OrbitRequest, OrbitStudy};
+use nanotap::study::registry::{self, Document, Study as _};
+use nanotap::study::request::read;
+use nanotap::study::simulate::{SimulateReport, SimulateRequest, SimulateStudy};
+use nanotap::study::threads::install;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::case::CaseCore;
 use crate::failure::Failure;
-use crate::watch::{on_threads, watched};
-
-/// A result with what it is in SI.
-#[derive(Serialize)]
-struct Document<'a, R: Serialize> {
-    #[serde(flatten)]
-    result: &'a R,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    physical: Option<PhysicalMotion>,
-}
-
-fn run_document(run: &Simulation, studied: &Case) -> Result<String, Failure> {
-    let physical = studied
-        .physical()
-        .map(|resolved| PhysicalMotion::alone(&run.observables, None, resolved));
-    Ok(serde_json::to_string(&Document {
-        result: run,
-        physical,
-    })?)
-}
-
-/// The document of an orbit.
-pub(crate) fn orbit_document(orbit: &OrbitReport, studied: &Case) -> Result<String, Failure> {
-    let physical = studied
-        .physical()
-        .map(|resolved| PhysicalMotion::alone(&orbit.observables, Some(&orbit.spectrum), resolved));
-    Ok(serde_json::to_string(&Document {
-        result: orbit,
-        physical,
-    })?)
-}
-
-/// A state as numpy holds it.
-pub(crate) fn numbers(state: Option<PyReadonlyArray1<'_, f64>>) -> Option<Vec<f64>> {
-    state.map(|state| state.as_array().to_vec())
-}
+use crate::study::json;
+use crate::watch::watched;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 type Rows<'py> = Bound<'py, PyArray2<f64>>;
@@ -72,38 +39,24 @@ fn table(py: Python<'_>, names: Vec<String>, values: Vec<f64>) -> PyResult<Table
 pub(crate) fn modes<'py>(
     py: Python<'py>,
     case: &CaseCore,
-    points: usize,
+    request: &str,
 ) -> PyResult<(String, Row<'py>, Rows<'py>)> {
     let studied = case.studied(py)?;
-    let Some(case) = studied.cantilever() else {
-        return Err(oscillator(&studied, "modes").into());
-    };
-    let table = ModeTable::new(case).map_err(Failure::from)?;
-    let beam = Modes::new(case.modes).map_err(|error| Failure::input(error.to_string()))?;
-    let step = 1.0 / points.saturating_sub(1).max(1) as f64;
-    let xi: Vec<f64> = (0..points).map(|point| point as f64 * step).collect();
+    let request: ModesRequest = read(json(request)?).map_err(Failure::from)?;
+    let table = ModesStudy::run(&studied, &request, &Control::default()).map_err(Failure::from)?;
+    let beam = Modes::new(table.modes).map_err(|error| Failure::input(error.to_string()))?;
+    let points = request.points;
+    let xi: Vec<f64> = (0..points)
+        .map(|point| point as f64 / (points - 1) as f64)
+        .collect();
     let shapes: Vec<f64> = xi
         .iter()
         .flat_map(|&xi| beam.shapes(xi).as_slice().to_vec())
         .collect();
-    let document = serde_json::to_string(&table).map_err(Failure::from)?;
-    let shapes = PyArray1::from_vec(py, shapes).reshape([points, case.modes])?;
+    let document =
+        serde_json::to_string(&Document::new(&table, &studied)).map_err(Failure::from)?;
+    let shapes = PyArray1::from_vec(py, shapes).reshape([points, table.modes])?;
     Ok((document, PyArray1::from_vec(py, xi), shapes))
-}
-
-/// A case of the wrong kind.
-pub(crate) fn oscillator(studied: &Case, command: &str) -> Failure {
-    Failure::input(format!(
-        "{}: `{command}` needs a cantilever; this is an oscillator",
-        studied.title()
-    ))
-}
-
-fn settle(max_period: usize) -> SettleOptions {
-    SettleOptions {
-        max_period,
-        ..SettleOptions::default()
-    }
 }
 
 fn series(
@@ -119,104 +72,54 @@ fn series(
     Ok(values)
 }
 
-/// One run: its document and `series` periods of its time series.
+/// One run: its document, and its time series or, of fixed steps, its curve. Of the time
+/// series `series_periods` are taken.
 #[pyfunction]
-#[pyo3(signature = (case, *, periods, transient, state, strobe, max_period, series_periods, resolution))]
 pub(crate) fn simulate<'py>(
     py: Python<'py>,
     case: &CaseCore,
-    periods: usize,
-    transient: Option<usize>,
-    state: Option<PyReadonlyArray1<'_, f64>>,
-    strobe: usize,
-    max_period: usize,
+    request: &str,
     series_periods: usize,
-    resolution: usize,
 ) -> PyResult<(String, Table<'py>)> {
     let studied = case.studied(py)?;
-    let options = SimulateOptions {
-        periods,
-        transient,
-        state: numbers(state),
-        strobe,
-        settle: settle(max_period),
-        ..SimulateOptions::default()
-    };
-    let done = watched(py, None, move |_| {
-        let model = studied.model()?;
-        let run = run(&model, &options)?;
-        let values = series(&model, &run.start, series_periods, resolution)?;
-        Ok((
-            run_document(&run, &studied)?,
-            time_series::columns(&model),
-            values,
-        ))
+    let request: SimulateRequest = read(json(request)?).map_err(Failure::from)?;
+    let done = watched(py, None, move |control| {
+        let report = SimulateStudy::run(&studied, &request, control)?;
+        let document = serde_json::to_string(&Document::new(&report, &studied))?;
+        let (names, values) = match &report {
+            SimulateReport::Exact(run) => {
+                let model = studied.model()?;
+                let start = &run.motion.start;
+                let values = series(&model, start, series_periods, request.resolution)?;
+                (time_series::columns(&model), values)
+            }
+            SimulateReport::FixedStep(run) => {
+                let names = ["tau", "tip", "tip_rate"].map(str::to_owned).to_vec();
+                (names, run.curve.concat())
+            }
+        };
+        Ok((document, names, values))
     })?;
     let (document, names, values) = done.result;
     Ok((document, table(py, names, values)?))
 }
 
-/// One run of the paper's fixed-step method: its document and its curve.
-#[pyfunction]
-#[pyo3(signature = (case, *, periods, transient, state, strobe, max_period, steps, every_stage))]
-pub(crate) fn fixed_step<'py>(
-    py: Python<'py>,
-    case: &CaseCore,
-    periods: usize,
-    transient: Option<usize>,
-    state: Option<PyReadonlyArray1<'_, f64>>,
-    strobe: usize,
-    max_period: usize,
-    steps: [u32; 2],
-    every_stage: bool,
-) -> PyResult<(String, Table<'py>)> {
-    let studied = case.studied(py)?;
-    let options = FixedStepOptions {
-        periods,
-        transient: transient.unwrap_or(FixedStepOptions::default().transient),
-        state: numbers(state),
-        strobe,
-        steps,
-        switching: if every_stage {
-            Switching::EveryStage
-        } else {
-            Switching::EveryStep
-        },
-        settle: settle(max_period),
-    };
-    let done = watched(py, None, move |_| {
-        let run: FixedStepRun = fixed_step_run(&studied.model()?, &options)?;
-        Ok((serde_json::to_string(&run)?, run.curve.concat()))
-    })?;
-    let (document, values) = done.result;
-    let names = ["tau", "tip", "tip_rate"].map(str::to_owned).to_vec();
-    Ok((document, table(py, names, values)?))
-}
-
 /// A periodic orbit: its document and the time series of one repetition.
 #[pyfunction]
-#[pyo3(signature = (case, *, period, state, harmonics, resolution))]
 pub(crate) fn orbit<'py>(
     py: Python<'py>,
     case: &CaseCore,
-    period: Option<usize>,
-    state: Option<PyReadonlyArray1<'_, f64>>,
-    harmonics: usize,
-    resolution: usize,
+    request: &str,
 ) -> PyResult<(String, Table<'py>)> {
     let studied = case.studied(py)?;
-    let options = OrbitOptions {
-        period,
-        state: numbers(state),
-        harmonics,
-        ..OrbitOptions::default()
-    };
-    let done = watched(py, None, move |_| {
+    let request: OrbitRequest = read(json(request)?).map_err(Failure::from)?;
+    let done = watched(py, None, move |control| {
         let model = studied.model()?;
-        let found = find_orbit(&model, &options)?;
-        let values = series(&model, &found.state, found.period, resolution)?;
+        let found = OrbitStudy::run(&studied, &request, control)?;
+        let orbit = &found.motion;
+        let values = series(&model, &orbit.state, orbit.period, request.resolution)?;
         Ok((
-            orbit_document(&found, &studied)?,
+            serde_json::to_string(&Document::new(&found, &studied))?,
             time_series::columns(&model),
             values,
         ))
@@ -231,65 +134,26 @@ type Observed = Result<String, String>;
 /// The same as Python is told.
 type Told = (Option<String>, String);
 
-/// How each of many cases is observed.
-#[derive(Clone)]
-enum Observe {
-    Run(SimulateOptions),
-    Orbit(OrbitOptions),
-}
-
-impl Observe {
-    fn one(&self, studied: &Case) -> Result<String, Failure> {
-        let model = studied.model()?;
-        match self {
-            Self::Run(options) => run_document(&run(&model, options)?, studied),
-            Self::Orbit(options) => orbit_document(&find_orbit(&model, options)?, studied),
-        }
-    }
-}
-
-/// Many cases, each run or brought to its orbit, on several threads: a document (`None`
-/// where there is none) and a reason (empty where there is a document) each, and whether
-/// Ctrl-C stopped it.
+/// Many cases, each run or brought to its orbit as the study called `name` does, on several
+/// threads: a document (`None` where there is none) and a reason (empty where there is a
+/// document) each, and whether Ctrl-C stopped it.
 #[pyfunction]
-#[pyo3(signature = (cases, *, orbits, periods, transient, period, state, strobe, max_period, harmonics, threads, progress))]
+#[pyo3(signature = (cases, name, request, *, threads=None, progress=None))]
 pub(crate) fn observe(
     py: Python<'_>,
     cases: Vec<PyRef<'_, CaseCore>>,
-    orbits: bool,
-    periods: usize,
-    transient: Option<usize>,
-    period: Option<usize>,
-    state: Option<PyReadonlyArray1<'_, f64>>,
-    strobe: usize,
-    max_period: usize,
-    harmonics: usize,
-    threads: usize,
+    name: &str,
+    request: &str,
+    threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Vec<Told>, bool)> {
     let cases: Vec<Arc<Case>> = cases
         .iter()
         .map(|case| case.studied(py))
         .collect::<PyResult<_>>()?;
-    let state = numbers(state);
-    let how = if orbits {
-        Observe::Orbit(OrbitOptions {
-            period,
-            state,
-            harmonics,
-            settle: settle(max_period),
-            ..OrbitOptions::default()
-        })
-    } else {
-        Observe::Run(SimulateOptions {
-            periods,
-            transient,
-            state,
-            strobe,
-            settle: settle(max_period),
-            ..SimulateOptions::default()
-        })
-    };
+    let entry = registry::study(name)
+        .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
+    let request = json(request)?;
     let done = watched(py, progress, move |control| {
         let finished = AtomicUsize::new(0);
         let total = cases.len();
@@ -297,10 +161,10 @@ pub(crate) fn observe(
             if control.is_cancelled() {
                 return Ok(Err("stopped before its turn".into()));
             }
-            let observed = match how.one(studied) {
+            let observed = match entry.document(studied, request.clone(), &Control::default()) {
                 Ok(document) => Ok(document),
-                Err(Failure(error)) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
-                Err(other) => return Err(other),
+                Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
+                Err(other) => return Err(other.into()),
             };
             let count = finished.fetch_add(1, Ordering::Relaxed) + 1;
             if let Some(progress) = control.progress {
@@ -308,7 +172,7 @@ pub(crate) fn observe(
             }
             Ok(observed)
         };
-        on_threads(threads, || {
+        install(threads, || {
             cases.par_iter().map(one).collect::<Result<Vec<_>, _>>()
         })?
     })?;

@@ -129,25 +129,3 @@ fn ended<R>(done: Outcome<R>, stopped: Option<PyErr>) -> PyResult<Watched<R>> {
         }
     }
 }
-
-/// Does `work` on `threads` threads; 0 is one a core.
-///
-/// # Errors
-/// When the threads cannot be started.
-pub(crate) fn on_threads<R: Send>(
-    threads: usize,
-    work: impl FnOnce() -> R + Send,
-) -> Result<R, Failure> {
-    if threads == 0 {
-        return Ok(work());
-    }
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map(|pool| pool.install(work))
-        .map_err(|error| {
-            Failure(nanotap::Error::numerics(format!(
-                "cannot start {threads} threads: {error}"
-            )))
-        })
-}

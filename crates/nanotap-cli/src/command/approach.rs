@@ -4,20 +4,21 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use nanotap::case::ParameterUnit;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::dataset::table::shortest;
 use nanotap::figure::approach::approach_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};
-use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, approach};
+use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
+use nanotap::study::registry::Study as _;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -29,30 +30,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
-    /// times what the free tip swings towards the sample
-    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
-    from: Option<String>,
-
-    /// Distance at which to turn back; without it, 0
-    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
-    to: Option<String>,
-
-    /// Distances each way
-    #[arg(long, value_name = "P", default_value_t = 80)]
-    points: usize,
-
-    /// Only follow the motion: continue no branches
-    #[arg(long)]
-    no_branches: bool,
-
-    /// Doublings of branches to follow
-    #[arg(long, value_name = "DEPTH", default_value_t = 1)]
-    switch: usize,
-
-    /// Longest period looked for
-    #[arg(long, value_name = "N", default_value_t = 32)]
-    max_period: usize,
+    #[command(flatten)]
+    request: Request<ApproachRequest>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -62,19 +41,17 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// The JSON document.
+/// The report, and where its table went.
 #[derive(Serialize)]
-struct Document<'a> {
+struct Written<'a> {
     /// The table, if it was written to a file.
     path: Option<PathBuf>,
     #[serde(flatten)]
     report: &'a ApproachReport,
-    /// Of a physical case: what a distance is to be multiplied with for SI.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameter_unit: Option<ParameterUnit>,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
@@ -82,26 +59,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         file::ending(path, &["svg", "png", "pdf"])?;
     }
     let studied = GivenCase::with_any_distance(&arguments.case, output)?;
-    let key = studied.gap_key();
-    let distance = |option: &str, given: &Option<String>| {
-        given
-            .as_ref()
-            .map(|text| studied.value(key, option, text))
-            .transpose()
-    };
-    let options = ApproachOptions {
-        from: distance("--from", &arguments.from)?,
-        to: distance("--to", &arguments.to)?,
-        points: arguments.points,
-        branches: !arguments.no_branches,
-        doublings: arguments.switch,
-        max_period: arguments.max_period,
-        ..ApproachOptions::default()
-    };
-    let report = progress::watched(output, "distances", |control| {
+    let report = progress::watched(output, ApproachStudy::COUNTED, |control| {
         arguments
             .threads
-            .install(|| approach(&studied, &options, control))
+            .install(|| ApproachStudy::run(&studied, &request, control))
     })???;
     if report.cancelled {
         output.warning("stopped before it was done");
@@ -118,12 +79,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.plot.plot {
         approach_figure(&report, &studied.units()).write(path)?;
     }
-    let document = Document {
+    let written = Written {
         path: arguments.out.out.clone(),
         report: &report,
-        parameter_unit: studied.parameter_unit(key),
     };
-    output.result(&document, |_| text(&studied, &report))
+    output.study(&studied, &written, |_| text(&studied, &report))
 }
 
 /// A row a distance, there and back; of a physical case the SI columns follow.

@@ -8,15 +8,15 @@ use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
 use nanotap::study::attractors::{
-    AttractorReport, Attractors, AttractorsOptions, UnseenReport, attractors,
+    AttractorReport, Attractors, AttractorsRequest, AttractorsStudy, UnseenReport,
 };
-use nanotap::study::simulate::SettleOptions;
-use nanotap::study::start_box::box_with;
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -27,28 +27,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
-    /// resonant response down to below the gap, go on until the share of starts that may lead
-    /// to motions not found is below 0.2 % (with 95 % confidence), or 5000 are done
-    #[arg(long, value_name = "S")]
-    starts: Option<usize>,
-
-    /// Seed of the starts: the same seed gives the same answer on any number of threads
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    seed: u64,
-
-    /// A side of one box of starts, as in a1=-1:1 or v2=-4:4; may be repeated; the other sides
-    /// are derived from the linear response to the drive. 256 starts if --starts says no number
-    #[arg(long = "box", value_name = "COORDINATE=LOW:HIGH", allow_hyphen_values = true, value_parser = parse_side)]
-    sides: Vec<(String, f64, f64)>,
-
-    /// Longest period looked for
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    max_period: usize,
-
-    /// Also list unstable orbits up to this period (4 if no number is given)
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4", default_value_t = 0, hide_default_value = true)]
-    unstable: usize,
+    #[command(flatten)]
+    request: Request<AttractorsRequest>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -58,63 +38,18 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// Starts in a box that was given without their number.
-const STARTS_IN_A_BOX: usize = 256;
-
-pub(super) fn parse_side(text: &str) -> Result<(String, f64, f64), String> {
-    let wrong = || format!("`{text}` is no side of a box; write it as a1=-1:1");
-    let (name, interval) = text.split_once('=').ok_or_else(wrong)?;
-    let (low, high) = interval.split_once(':').ok_or_else(wrong)?;
-    let end = |text: &str| {
-        text.trim()
-            .parse::<f64>()
-            .ok()
-            .filter(|v| v.is_finite())
-            .ok_or_else(wrong)
-    };
-    Ok((name.trim().to_owned(), end(low)?, end(high)?))
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    if arguments.max_period == 0 {
-        return Err(Failure::input(
-            "--max-period 0: no motion has that period",
-            "give at least 1",
-        ));
-    }
+    let request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
-    let start_box = box_with(&model, &arguments.sides).map_err(|error| {
-        Failure::input(
-            format!("--box: {error}"),
-            "name coordinates as in --box a1=-1:1",
-        )
-    })?;
-    let options = AttractorsOptions {
-        starts: arguments
-            .starts
-            .or((!arguments.sides.is_empty()).then_some(STARTS_IN_A_BOX)),
-        seed: arguments.seed,
-        start_box: Some(start_box),
-        settle: SettleOptions {
-            max_period: arguments.max_period,
-            ..SettleOptions::default()
-        },
-        unstable: arguments.unstable,
-        ..AttractorsOptions::default()
-    };
-    let found = progress::watched(output, "starts", |control| {
+    let found = progress::watched(output, AttractorsStudy::COUNTED, |control| {
         arguments
             .threads
-            .install(|| attractors(&model, &options, control))
+            .install(|| AttractorsStudy::run(&studied, &request, control))
     })???;
-    let found = match studied.physical() {
-        Some(resolved) => found.in_si(resolved),
-        None => found,
-    };
     if let Some(path) = &arguments.out.out {
         file::write(path, csv(&model, &found).as_bytes())?;
     }
@@ -134,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             motion::warn(observables, &format!("attractor {}: ", k + 1), output);
         }
     }
-    output.result(&found, |found| text(&studied, found))
+    output.study(&studied, &found, |found| text(&studied, found))
 }
 
 /// A row a strobe point of each attractor (of one that does not repeat, one point).

@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::study::basin::{Basin, BasinOptions, Shares, SliceRange, figure, shares};
+use nanotap::study::basin::{Basin, BasinOptions, BasinRequest, Shares, figure, shares};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, motion, number, progress};
+use crate::{file, number, progress};
 
 /// Basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
@@ -20,49 +21,13 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
-    /// many (a1…aN, v1…vN; oscillator: x, v)
-    #[arg(
-        long,
-        value_name = "ENTRY=FROM:TO:COUNT",
-        required = true,
-        allow_hyphen_values = true
-    )]
-    x: String,
-
-    /// The vertical axis
-    #[arg(
-        long,
-        value_name = "ENTRY=FROM:TO:COUNT",
-        required = true,
-        allow_hyphen_values = true
-    )]
-    y: String,
-
-    /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
-    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
-    state: Option<Vec<f64>>,
-
     /// The attractors, from `nanotap attractors --json`; without it, a census in the slice
     /// finds them
     #[arg(long, value_name = "FILE", conflicts_with = "starts")]
     attractors: Option<PathBuf>,
 
-    /// Starts of the census
-    #[arg(long, value_name = "S", default_value_t = 64)]
-    starts: usize,
-
-    /// Seed of the census
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    seed: u64,
-
-    /// Drive periods after which a point is called unsettled
-    #[arg(long, value_name = "P", default_value_t = 1000)]
-    periods: usize,
-
-    /// Longest period looked for
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    max_period: usize,
+    #[command(flatten)]
+    request: Request<BasinRequest>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -72,7 +37,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
-    let options = arguments.options()?;
+    let mut request = arguments.request.read()?;
+    request.attractors = arguments.attractors.as_deref().map(states).transpose()?;
+    let options = request.options()?;
     let studied = GivenCase::of(&arguments.case, output)?;
     let dataset = &arguments.dataset;
     let name = derived_name(
@@ -96,33 +63,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         |store, work| basin.compute(store, work),
     )?;
     let plot = arguments.plot.plot.as_deref();
-    let done = DatasetReport::of(&store, destination, plot, begun, shares, figure)?;
-    output.result(&done, |done| text(&studied, &options, done))
-}
-
-impl Arguments {
-    fn options(&self) -> Result<BasinOptions, Failure> {
-        let range = |option: &str, given: &str| {
-            SliceRange::parse(given).map_err(|error| {
-                Failure::input(
-                    format!("--{option} {error}"),
-                    format!(
-                        "write --{option} a1=-1:1:200: entry, first value, last value, how many"
-                    ),
-                )
-            })
-        };
-        let attractors = self.attractors.as_deref().map(states).transpose()?;
-        Ok(BasinOptions {
-            state: self.state.clone(),
-            attractors,
-            starts: self.starts,
-            seed: self.seed,
-            periods: self.periods,
-            max_period: self.max_period,
-            ..BasinOptions::new(range("x", &self.x)?, range("y", &self.y)?)
-        })
-    }
+    let seed = request.seed;
+    let done = DatasetReport::of(&store, destination, plot, begun, seed, shares, figure)?;
+    output.study(&studied, &done, |done| text(&studied, &options, done))
 }
 
 /// The states on the attractors that a file of `nanotap attractors --json` names.

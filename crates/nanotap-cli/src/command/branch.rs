@@ -9,13 +9,14 @@ use nanotap::case::units;
 use nanotap::dataset::table::shortest;
 use nanotap::figure::branch::{ParameterAxis, Shown, branch_figure};
 use nanotap::observe::{Set, columns, time_series};
-use nanotap::study::branch::{BranchOptions, BranchReport, PointReport, SeedOptions, branch};
-use serde::Serialize;
+use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
-use crate::given_case::{GivenCase, ParameterUnit};
+use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -26,61 +27,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
-    /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
-    #[arg(long, value_name = "KEY")]
-    parameter: String,
-
-    /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
-    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
-    from: String,
-
-    /// The other end of its range
-    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
-    to: String,
-
-    /// Period of the orbit at the start; without it, that of the motion where a run settles
-    #[arg(long, value_name = "N")]
-    period: Option<usize>,
-
-    /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
-    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
-    state: Option<Vec<f64>>,
-
-    /// Also follow the doubled branches at flips, so many doublings deep (1 if no number is given)
-    #[arg(long, value_name = "DEPTH", num_args = 0..=1, default_missing_value = "1")]
-    switch: Option<usize>,
-
-    /// Assemble the whole picture: every stable orbit of a census at several values,
-    /// followed both ways and through two doublings (or as --switch says)
-    #[arg(long)]
-    diagram: bool,
-
-    /// Of --diagram: values of the parameter at which a census is taken
-    #[arg(long, value_name = "K", default_value_t = 5)]
-    values: usize,
-
-    /// Of --diagram: starts at each
-    #[arg(long, value_name = "S", default_value_t = 48)]
-    starts: usize,
-
-    /// Of --diagram: seed of the starts
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    seed: u64,
-
-    /// A second parameter and its range, as in alpha4=5:40: the loci of the bifurcations
-    /// are traced in both
-    #[arg(long, value_name = "KEY=LOW:HIGH", allow_hyphen_values = true)]
-    second: Option<String>,
-
-    /// Longest step, as a part of the range
-    #[arg(
-        long,
-        value_name = "PART",
-        default_value_t = 0.01,
-        allow_negative_numbers = true
-    )]
-    max_step: f64,
+    #[command(flatten)]
+    request: Request<BranchRequest>,
 
     /// What --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
@@ -101,27 +49,21 @@ fn shown() -> impl TypedValueParser<Value = Shown> {
         .try_map(|name| Shown::named(&name).ok_or_else(|| format!("nothing is called {name}")))
 }
 
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    report: &'a BranchReport,
-    /// Of a physical case: what a value of the parameter is to be multiplied with for SI.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameter_unit: Option<ParameterUnit>,
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
-    let options = options(arguments, &studied)?;
+    let mut options = request.options(&studied)?;
     studied.say_held(&[options.key], output);
-    let report = progress::watched(output, "points", |control| {
+    if let Some(shown) = arguments.show.and_then(Shown::observable) {
+        options.observables = options.observables.with(shown);
+    }
+    let report = progress::watched(output, BranchStudy::COUNTED, |control| {
         arguments
             .threads
-            .install(|| branch(&studied, &options, control))
+            .install(|| followed(&studied, &options, control))
     })???;
     if report.cancelled {
         output.warning("stopped before it was done");
@@ -150,11 +92,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         )
         .write(path)?;
     }
-    let document = Document {
-        report: &report,
-        parameter_unit: studied.parameter_unit(report.key),
-    };
-    output.result(&document, |_| text(&studied, &report))
+    output.study(&studied, &report, |report| text(&studied, report))
 }
 
 /// What is shown if nobody says: the greatest displacement of an oscillator with a wall is
@@ -166,62 +104,6 @@ fn default_shown(studied: &GivenCase) -> Shown {
         "tip_max"
     };
     Shown::named(name).unwrap_or(Shown::SpectralRadius)
-}
-
-fn options(arguments: &Arguments, studied: &GivenCase) -> Result<BranchOptions, Failure> {
-    let (key, [from, to]) = studied.key_and_values(
-        &arguments.parameter,
-        [("--from", &arguments.from), ("--to", &arguments.to)],
-    )?;
-    let census = arguments.diagram.then(|| SeedOptions {
-        values: arguments.values,
-        starts: arguments.starts,
-        seed: arguments.seed,
-        ..SeedOptions::default()
-    });
-    if census.is_some() && (arguments.values < 2 || arguments.starts == 0) {
-        return Err(Failure::input(
-            format!(
-                "--diagram with --values {} and --starts {}",
-                arguments.values, arguments.starts
-            ),
-            "give at least 2 values and 1 start",
-        ));
-    }
-    let second = arguments
-        .second
-        .as_deref()
-        .map(|text| second(studied, text))
-        .transpose()?;
-    Ok(BranchOptions {
-        period: arguments.period,
-        state: arguments.state.clone(),
-        doublings: arguments
-            .switch
-            .unwrap_or(if arguments.diagram { 2 } else { 0 }),
-        census,
-        second,
-        max_step: arguments.max_step,
-        observables: arguments
-            .show
-            .and_then(Shown::observable)
-            .map_or(Set::COMMON, |shown| Set::COMMON.with(shown)),
-        ..BranchOptions::over(key, from, to)
-    })
-}
-
-fn second(studied: &GivenCase, text: &str) -> Result<(Key, f64, f64), Failure> {
-    let wrong = || {
-        Failure::input(
-            format!("--second {text}: not a parameter with its range"),
-            "write it as --second alpha4=5:40",
-        )
-    };
-    let (name, range) = text.split_once('=').ok_or_else(wrong)?;
-    let (low, high) = range.split_once(':').ok_or_else(wrong)?;
-    let ends = [("--second", low), ("--second", high)];
-    let (key, [low, high]) = studied.key_and_values(name.trim(), ends)?;
-    Ok((key, low, high))
 }
 
 /// The axis of a parameter that goes up to `size`, in SI where the case has it.

@@ -5,15 +5,16 @@ use std::fmt::Write as _;
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::control::Control;
 use nanotap::figure::motion::convergence_figure;
-use nanotap::model::beam::MAX_MODES;
-use nanotap::study::convergence::{Convergence, convergence};
-use nanotap::study::orbit::OrbitOptions;
+use nanotap::study::convergence::{Convergence, ConvergenceRequest, ConvergenceStudy};
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
@@ -23,22 +24,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Largest number of modes
-    #[arg(long, value_name = "K", default_value_t = 10)]
-    largest: usize,
-
-    /// Difference of the tip deflection, as a part of the amplitude, that is small enough
-    #[arg(
-        long,
-        value_name = "D",
-        default_value_t = 0.01,
-        allow_negative_numbers = true
-    )]
-    tolerance: f64,
-
-    /// Period of the orbit to compare; without it, the motion where a run from rest settles
-    #[arg(long, value_name = "N")]
-    period: Option<usize>,
+    #[command(flatten)]
+    request: Request<ConvergenceRequest>,
 
     #[command(flatten)]
     out: OutArgument,
@@ -47,38 +34,19 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    if !(2..=MAX_MODES).contains(&arguments.largest) {
-        return Err(Failure::input(
-            format!("--largest {}: nothing to compare", arguments.largest),
-            format!("give a number of modes from 2 to {MAX_MODES}"),
-        ));
-    }
-    if !(arguments.tolerance > 0.0 && arguments.tolerance.is_finite()) {
-        return Err(Failure::input(
-            format!(
-                "--tolerance {}: no difference is that small",
-                arguments.tolerance
-            ),
-            "give a positive part of the amplitude, as in --tolerance 0.01",
-        ));
-    }
+    let request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
-    let case = super::cantilever_of(&studied, "nanotap convergence")?;
-    let options = OrbitOptions {
-        period: arguments.period,
-        ..OrbitOptions::default()
-    };
-    let result = convergence(&case, arguments.largest, arguments.tolerance, &options)?;
+    let result = ConvergenceStudy::run(&studied, &request, &Control::default())?;
     if let Some(path) = &arguments.out.out {
         file::write(path, csv(&result).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
         convergence_figure(&result, &studied.units()).write(path)?;
     }
-    output.result(&result, |result| text(&studied, result))
+    output.study(&studied, &result, |result| text(&studied, result))
 }
 
 fn csv(result: &Convergence) -> String {

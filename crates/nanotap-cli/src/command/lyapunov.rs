@@ -1,15 +1,18 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use nanotap::control::Control;
 use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
-use nanotap::study::lyapunov::{LyapunovOptions, LyapunovReport, Section, lyapunov};
+use nanotap::study::lyapunov::{LyapunovReport, LyapunovRequest, LyapunovStudy};
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
@@ -19,34 +22,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Drive periods averaged over
-    #[arg(long, value_name = "P", default_value_t = 20_000)]
-    periods: usize,
-
-    /// Drive periods thrown away first
-    #[arg(long, value_name = "T", default_value_t = 1000)]
-    transient: usize,
-
-    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
-    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
-    state: Option<Vec<f64>>,
-
-    /// Where the section for --out and --plot is taken
-    #[arg(long, value_enum, default_value_t = Cut::Phase)]
-    section: Cut,
-
-    /// Drive phase of the section in degrees
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    phase: f64,
-
-    /// Points of the section
-    #[arg(long, value_name = "K", default_value_t = 5000)]
-    points: usize,
+    #[command(flatten)]
+    request: Request<LyapunovRequest>,
 
     #[command(flatten)]
     out: OutArgument,
@@ -54,40 +31,18 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// Where a motion is cut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Cut {
-    /// Once a drive period, at --phase
-    Phase,
-    /// At the beginning of every contact
-    Contact,
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    if !arguments.phase.is_finite() {
-        return Err(Failure::input(
-            format!("--phase {}: no phase", arguments.phase),
-            "give a drive phase in degrees, as in --phase 90",
-        ));
-    }
+    let mut request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
     let wanted = arguments.out.out.is_some() || arguments.plot.plot.is_some();
-    let options = LyapunovOptions {
-        transient: arguments.transient,
-        state: arguments.state.clone(),
-        periods: arguments.periods,
-        section: match arguments.section {
-            Cut::Phase => Section::Phase((arguments.phase / 360.0).rem_euclid(1.0)),
-            Cut::Contact => Section::Contact,
-        },
-        points: if wanted { arguments.points } else { 0 },
-        ..LyapunovOptions::default()
-    };
-    let report = lyapunov(&model, &options)?;
+    if !wanted {
+        request.points = 0;
+    }
+    let report = LyapunovStudy::run(&studied, &request, &Control::default())?;
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }
@@ -97,7 +52,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.plot.plot {
         section_figure(&model, &report, &studied.units()).write(path)?;
     }
-    output.result(&report, |report| text(&studied, report))
+    output.study(&studied, &report, |report| text(&studied, report))
 }
 
 /// A row a point of the section.

@@ -6,6 +6,7 @@ mod basin;
 mod branch;
 mod case;
 mod catalogue;
+mod contact_laws;
 mod convergence;
 mod generate;
 mod lyapunov;
@@ -13,7 +14,7 @@ mod merge;
 mod modes;
 mod orbit;
 mod paper;
-mod samples;
+mod schema;
 mod simulate;
 mod sweep;
 mod window;
@@ -60,13 +61,16 @@ pub(crate) enum Command {
     /// The same motion with N = 1 … K modes: how many are enough
     Convergence(convergence::Arguments),
     /// The same lever and drive on every contact law: what difference the sample makes
-    Samples(samples::Arguments),
+    #[command(alias = "samples")]
+    ContactLaws(contact_laws::Arguments),
     /// Every figure and number of the paper, with verdicts and evidence
     Paper(paper::Arguments),
     /// The levers and materials that a case can name
     Catalogue(catalogue::Arguments),
     /// Shell completions and manual pages
     Generate(generate::Arguments),
+    /// The JSON schema of what a study is asked for
+    Schema(schema::Arguments),
 }
 
 /// Runs `command`.
@@ -85,10 +89,11 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Merge(arguments) => merge::run(arguments, output),
         Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
         Command::Convergence(arguments) => convergence::run(arguments, output),
-        Command::Samples(arguments) => samples::run(arguments, output),
+        Command::ContactLaws(arguments) => contact_laws::run(arguments, output),
         Command::Paper(arguments) => paper::run(arguments, output),
         Command::Catalogue(arguments) => catalogue::run(arguments, output),
         Command::Generate(arguments) => generate::run(arguments, output),
+        Command::Schema(arguments) => schema::run(arguments),
     }
 }
 

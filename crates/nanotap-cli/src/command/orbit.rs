@@ -3,18 +3,19 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::control::Control;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::PhysicalMotion;
 use nanotap::observe::time_series;
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
-use serde::Serialize;
+use nanotap::study::orbit::{OrbitReport, OrbitRequest, OrbitStudy};
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::{file, number, series, style};
 
@@ -24,21 +25,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Its period in drive periods; without it, that of the motion where a run settles
-    #[arg(long, value_name = "N")]
-    period: Option<usize>,
-
-    /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
-    state: Option<Vec<f64>>,
-
-    /// Harmonics of the drive frequency to tell
-    #[arg(long, value_name = "H", default_value_t = 20)]
-    harmonics: usize,
-
-    /// Samples a drive period in --out
-    #[arg(long, value_name = "S", default_value_t = 200)]
-    resolution: usize,
+    #[command(flatten)]
+    request: Request<OrbitRequest>,
 
     /// Write the harmonics to this file (.csv)
     #[arg(long, value_name = "PATH")]
@@ -50,65 +38,42 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    orbit: &'a OrbitReport,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    physical: Option<PhysicalMotion>,
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    if arguments.resolution == 0 {
-        return Err(Failure::input(
-            "--resolution 0: nothing would be written",
-            "give at least 1 sample a period",
-        ));
-    }
+    let request = arguments.request.read()?;
     for path in arguments.out.out.iter().chain(&arguments.harmonics_out) {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
-    let options = OrbitOptions {
-        period: arguments.period,
-        state: arguments.state.clone(),
-        harmonics: arguments.harmonics,
-        ..OrbitOptions::default()
-    };
-    let found = orbit(&model, &options)?;
-    if let Some(asked) = arguments.period.filter(|n| *n != found.period) {
+    let found = OrbitStudy::run(&studied, &request, &Control::default())?;
+    let found = &found;
+    let orbit = &found.motion;
+    if let Some(asked) = request.period.filter(|n| *n != orbit.period) {
         output.note(&format!(
             "an orbit of period {asked} was asked for; Newton closed one that repeats every {} already",
-            number::counted(found.period, "period", "periods")
+            number::counted(orbit.period, "period", "periods")
         ));
     }
     if let Some(path) = &arguments.out.out {
         series::write(
             path,
             &model,
-            &found.state,
-            found.period,
-            arguments.resolution,
+            &orbit.state,
+            orbit.period,
+            request.resolution,
             &studied.units(),
         )?;
     }
     if let Some(path) = &arguments.harmonics_out {
-        file::write(path, harmonics_csv(&found).as_bytes())?;
+        file::write(path, harmonics_csv(orbit).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
-        orbit_figure(&model, &found, &studied.units()).write(path)?;
+        orbit_figure(&model, orbit, &studied.units()).write(path)?;
     }
-    motion::warn(&found.observables, "", output);
-    let physical = studied
-        .physical()
-        .map(|resolved| PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved));
-    let document = Document {
-        orbit: &found,
-        physical,
-    };
-    output.result(&document, |_| text(&studied, &model, &found))
+    motion::warn(&orbit.observables, "", output);
+    output.study(&studied, found, |found| {
+        text(&studied, &model, &found.motion)
+    })
 }
 
 fn harmonics_csv(orbit: &OrbitReport) -> String {

@@ -2,22 +2,23 @@
 
 use std::fmt::Write as _;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nanotap::case::units::Units;
+use nanotap::control::Control;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
-use nanotap::observe::PhysicalMotion;
-use nanotap::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
+use nanotap::study::fixed_step::FixedStepRun;
+use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{
-    Classification, SettleOptions, SimulateOptions, Simulation, simulate,
+    Classification, SimulateReport, SimulateRequest, SimulateStudy, Simulation,
 };
-use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::{file, number, series, style};
 
@@ -27,48 +28,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Drive periods recorded
-    #[arg(long, value_name = "P", default_value_t = 50)]
-    periods: usize,
-
-    /// Drive periods thrown away first; without it, as many as the motion is measured to
-    /// need; 0: from the start
-    #[arg(long, value_name = "T")]
-    transient: Option<usize>,
-
-    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
-    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
-    state: Option<Vec<f64>>,
-
-    /// How many of the last states at drive phase 0 to tell
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    strobe: usize,
-
-    /// Longest period looked for
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    max_period: usize,
-
-    /// Samples a drive period in --out
-    #[arg(long, value_name = "S", default_value_t = 200)]
-    resolution: usize,
-
-    /// How the motion is computed
-    #[arg(long, value_enum, default_value_t = Method::Exact)]
-    method: Method,
-
-    /// Of rk4: steps a drive period, in free flight and (after a comma) in contact
-    #[arg(
-        long,
-        value_name = "FREE,CONTACT",
-        value_delimiter = ',',
-        num_args = 1,
-        default_value = "200"
-    )]
-    steps: Vec<u32>,
-
-    /// Of rk4: where within a step the regime is looked at
-    #[arg(long, value_enum, default_value_t = Grid::Step)]
-    switching: Grid,
+    #[command(flatten)]
+    request: Request<SimulateRequest>,
 
     #[command(flatten)]
     out: OutArgument,
@@ -76,99 +37,43 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// How the motion is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
-    /// The exact flow: no time step, no contact missed
-    Exact,
-    /// The paper's method, to compare: Runge–Kutta steps that switch on their grid
-    Rk4,
-}
-
-/// Where rk4 looks at the regime.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Grid {
-    /// Once a step
-    Step,
-    /// At every stage of a step
-    Stage,
-}
-
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    run: &'a Simulation,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    physical: Option<PhysicalMotion>,
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    if arguments.resolution == 0 {
-        return Err(Failure::input(
-            "--resolution 0: nothing would be written",
-            "give at least 1 sample a period",
-        ));
-    }
-    if arguments.max_period == 0 {
-        return Err(Failure::input(
-            "--max-period 0: no motion has that period",
-            "give at least 1",
-        ));
-    }
+    let request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
     let model = studied.model()?;
-    let settle = SettleOptions {
-        max_period: arguments.max_period,
-        ..SettleOptions::default()
-    };
-    match arguments.method {
-        Method::Exact => exact(arguments, &studied, &model, settle, output),
-        Method::Rk4 => rk4(arguments, &studied, &model, settle, output),
+    let report = SimulateStudy::run(&studied, &request, &Control::default())?;
+    let units = studied.units();
+    match &report {
+        SimulateReport::Exact(run) => {
+            let run = &run.motion;
+            if let Some(path) = &arguments.out.out {
+                let resolution = request.resolution;
+                series::write(path, &model, &run.start, run.periods, resolution, &units)?;
+            }
+            if let Some(path) = &arguments.plot.plot {
+                simulation_figure(&model, run, &units).write(path)?;
+            }
+            motion::warn(&run.observables, "", output);
+        }
+        SimulateReport::FixedStep(run) => {
+            if let Some(path) = &arguments.out.out {
+                file::write(path, curve(run).as_bytes())?;
+            }
+            if let Some(path) = &arguments.plot.plot {
+                fixed_step_figure(&model, run, &units).write(path)?;
+            }
+            output.note(
+                "rk4 is the paper's own method, kept to show what a time step does; nothing it says is certified",
+            );
+        }
     }
-}
-
-fn exact(
-    arguments: &Arguments,
-    studied: &GivenCase,
-    model: &Model,
-    settle: SettleOptions,
-    output: &Output,
-) -> Result<(), Failure> {
-    let options = SimulateOptions {
-        periods: arguments.periods,
-        transient: arguments.transient,
-        state: arguments.state.clone(),
-        strobe: arguments.strobe,
-        settle,
-        ..SimulateOptions::default()
-    };
-    let run = simulate(model, &options)?;
-    if let Some(path) = &arguments.out.out {
-        series::write(
-            path,
-            model,
-            &run.start,
-            run.periods,
-            arguments.resolution,
-            &studied.units(),
-        )?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        simulation_figure(model, &run, &studied.units()).write(path)?;
-    }
-    motion::warn(&run.observables, "", output);
-    let physical = studied
-        .physical()
-        .map(|resolved| PhysicalMotion::alone(&run.observables, None, resolved));
-    let document = Document {
-        run: &run,
-        physical,
-    };
-    output.result(&document, |_| text(studied, model, &run))
+    output.study(&studied, &report, |report| match report {
+        SimulateReport::Exact(run) => text(&studied, &model, &run.motion),
+        SimulateReport::FixedStep(run) => rk4_text(&studied, run),
+    })
 }
 
 fn text(studied: &GivenCase, model: &Model, run: &Simulation) -> String {
@@ -234,49 +139,6 @@ fn text(studied: &GivenCase, model: &Model, run: &Simulation) -> String {
         number::significant(run.evaluations_per_period, 3),
     )));
     text
-}
-
-fn rk4(
-    arguments: &Arguments,
-    studied: &GivenCase,
-    model: &Model,
-    settle: SettleOptions,
-    output: &Output,
-) -> Result<(), Failure> {
-    let steps = match arguments.steps[..] {
-        [both] => [both, both],
-        [free, contact] => [free, contact],
-        _ => {
-            return Err(Failure::input(
-                format!("--steps has {} numbers", arguments.steps.len()),
-                "give the steps a drive period in free flight and in contact: --steps 200,400",
-            ));
-        }
-    };
-    let default = FixedStepOptions::default();
-    let options = FixedStepOptions {
-        periods: arguments.periods,
-        transient: arguments.transient.unwrap_or(default.transient),
-        state: arguments.state.clone(),
-        strobe: arguments.strobe,
-        steps,
-        switching: match arguments.switching {
-            Grid::Step => Switching::EveryStep,
-            Grid::Stage => Switching::EveryStage,
-        },
-        settle,
-    };
-    let run = fixed_step_run(model, &options)?;
-    if let Some(path) = &arguments.out.out {
-        file::write(path, curve(&run).as_bytes())?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        fixed_step_figure(model, &run, &studied.units()).write(path)?;
-    }
-    output.note(
-        "rk4 is the paper's own method, kept to show what a time step does; nothing it says is certified",
-    );
-    output.result(&run, |run| rk4_text(studied, run))
 }
 
 /// Time, tip displacement and its rate at every step.

@@ -3,20 +3,20 @@
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
+use nanotap::case::Key;
 use nanotap::case::physical::Kind;
-use nanotap::case::{Case, Key};
 use nanotap::study::sweep::{
-    Follow, Over, Starts, Summary, Sweep, SweepOptions, figure, response_figure, summary,
+    Follow, Over, Summary, Sweep, SweepRequest, figure, response_figure, summary,
 };
 
-use super::attractors::parse_side;
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
+use crate::number;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{motion, number};
 
 /// How the motion changes with one or two parameters, from any number of starts.
 #[derive(Args, Debug)]
@@ -24,55 +24,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-    /// alpha4=1:1000:50:log in equal ratios; modes too; of a physical case also
-    /// drive.frequency=60kHz:80kHz:200; once or twice
-    #[arg(
-        long,
-        value_name = "KEY=FROM:TO:COUNT",
-        required = true,
-        allow_hyphen_values = true
-    )]
-    over: Vec<String>,
-
-    /// Quasi-random starts at each value, spread over a box of states; without it, one start
-    /// from rest
-    #[arg(long, value_name = "S", conflicts_with = "state")]
-    starts: Option<usize>,
-
-    /// Seed of the starts
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    seed: u64,
-
-    /// A side of the box, as in a1=-1:1 or v2=-4:4; may be repeated; the other sides are
-    /// derived from the linear response to the drive
-    #[arg(long = "box", value_name = "COORDINATE=LOW:HIGH", allow_hyphen_values = true, value_parser = parse_side, requires = "starts")]
-    sides: Vec<(String, f64, f64)>,
-
-    /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-    #[arg(long, value_name = "A1,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = motion::parse_state)]
-    state: Option<Vec<f64>>,
-
-    /// Start each value from the last state of the one before, along the first --over: up,
-    /// down or both. A whole line is then one piece of work, lost when interrupted
-    #[arg(long, value_name = "WAY")]
-    follow: Option<Follow>,
-
-    /// Drive periods recorded
-    #[arg(long, value_name = "P", default_value_t = 100)]
-    periods: usize,
-
-    /// States kept, at the end of each of the last periods; without it, of every recorded one
-    #[arg(long, value_name = "K")]
-    strobe: Option<usize>,
-
-    /// Drive periods thrown away first; without it, as many as the motion is measured to need
-    #[arg(long, value_name = "T")]
-    transient: Option<usize>,
-
-    /// Longest period looked for
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    max_period: usize,
+    #[command(flatten)]
+    request: Request<SweepRequest>,
 
     /// What --plot shows of one parameter; without it the response over drive.frequency, else
     /// the diagram
@@ -95,9 +48,10 @@ enum Show {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
     let begun = Instant::now();
     let studied = GivenCase::of(&arguments.case, output)?;
-    let sweep = Sweep::new(Case::clone(&studied), arguments.options(&studied)?)?;
+    let sweep = request.sweep(&studied)?;
     let keys: Vec<Key> = sweep.options().over.iter().map(|o| o.key).collect();
     studied.say_held(&keys, output);
     let names: Vec<&str> = keys.iter().map(|key| key.path()).collect();
@@ -136,36 +90,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Show::Response => response_figure,
     };
     let plot = arguments.plot.plot.as_deref();
-    let done = DatasetReport::of(&store, destination, plot, begun, summary, drawn)?;
-    output.result(&done, |done| text(&studied, &sweep, done))
-}
-
-impl Arguments {
-    fn options(&self, studied: &GivenCase) -> Result<SweepOptions, Failure> {
-        let over = self
-            .over
-            .iter()
-            .map(|given| Over::parse(given, studied))
-            .collect::<Result<Vec<_>, _>>()?;
-        let starts = match (self.starts, &self.state) {
-            (Some(count), _) => Starts::Seeded {
-                count,
-                seed: self.seed,
-                sides: self.sides.clone(),
-            },
-            (None, Some(state)) => Starts::Given(state.clone()),
-            (None, None) => Starts::Rest,
-        };
-        Ok(SweepOptions {
-            starts,
-            follow: self.follow.unwrap_or_default(),
-            periods: self.periods,
-            strobe: self.strobe.unwrap_or(self.periods).min(self.periods),
-            transient: self.transient,
-            max_period: self.max_period,
-            ..SweepOptions::new(over)
-        })
-    }
+    let seed = request.seed;
+    let done = DatasetReport::of(&store, destination, plot, begun, seed, summary, drawn)?;
+    output.study(&studied, &done, |done| text(&studied, &sweep, done))
 }
 
 fn text(studied: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {

@@ -6,10 +6,9 @@
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::case::{Case, Key};
+use nanotap::case::Key;
 use nanotap::dataset::StoreError;
-use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
-use nanotap::study::window::{Condition, Window};
+use nanotap::study::window::{Condition, Window, WindowRequest};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -17,6 +16,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 
 /// The operating window over two parameters: where there is only one motion, and where a second
@@ -26,27 +26,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26 or
-    /// omega=2:4:81; twice, the first is the horizontal axis
-    #[arg(
-        long,
-        value_name = "KEY=FROM:TO:COUNT",
-        required = true,
-        allow_hyphen_values = true
-    )]
-    over: Vec<String>,
-
-    /// Quasi-random starts of the census at each point
-    #[arg(long, value_name = "S", default_value_t = 16)]
-    starts: usize,
-
-    /// Seed of the starts
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    seed: u64,
-
-    /// Longest period looked for
-    #[arg(long, value_name = "N", default_value_t = 32)]
-    max_period: usize,
+    #[command(flatten)]
+    request: Request<WindowRequest>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -55,39 +36,13 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
     let begun = Instant::now();
-    let names: Vec<&str> = arguments
-        .over
-        .iter()
-        .map(|over| over.split('=').next().unwrap_or_default().trim())
-        .collect();
-    if names.len() != 2 {
-        return Err(Failure::input(
-            format!("{} parameters make no window", names.len()),
-            "give --over twice, as in --over gap.tip=5nm:25nm:41 --over drive.frequency=320kHz:340kHz:41",
-        ));
-    }
+    let names = request.over.names();
     let studied = GivenCase::of(&arguments.case, output)?;
-    let over = arguments
-        .over
-        .iter()
-        .map(|given| Over::parse(given, &studied))
-        .collect::<Result<Vec<_>, _>>()?;
-    let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
+    let sweep = request.sweep(&studied)?;
+    let keys: Vec<Key> = sweep.options().over.iter().map(|over| over.key).collect();
     studied.say_held(&keys, output);
-    let options = SweepOptions {
-        starts: Starts::Seeded {
-            count: arguments.starts,
-            seed: arguments.seed,
-            sides: Vec::new(),
-        },
-        // What a motion is counts, not its course.
-        periods: 1,
-        strobe: 1,
-        max_period: arguments.max_period,
-        ..SweepOptions::new(over)
-    };
-    let sweep = Sweep::new(Case::clone(&studied), options)?;
     let name = derived_name(
         arguments.case.file.as_deref(),
         &[&["window"], names.as_slice()].concat(),
@@ -105,15 +60,16 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         |store, work| sweep.compute(store, work),
     )?;
     let drawn = |store: &_| -> Result<_, StoreError> { Window::of(store)?.figure(store) };
-    let done = DatasetReport::of(&store, destination, plot, begun, Window::of, drawn)?;
-    output.result(&done, |done| {
+    let seed = request.seed;
+    let done = DatasetReport::of(&store, destination, plot, begun, seed, Window::of, drawn)?;
+    output.study(&studied, &done, |done| {
         let heading = format!(
             "{}: operating window over {} and {}, {} at each of {} points",
             studied.title(),
             names[0],
             names[1],
-            number::counted(arguments.starts, "start", "starts"),
-            sweep.runs() / arguments.starts.max(1)
+            number::counted(request.starts, "start", "starts"),
+            sweep.runs() / request.starts.max(1)
         );
         done.text(&heading, shares)
     })

@@ -348,7 +348,7 @@ fn what_makes_no_sense_is_refused() {
     refused(&over("3", "3"), &["from 3 to 3", "two different"]);
     refused(&over("3", "nan"), &["finite"]);
     refused(&over("3", "-1"), &["omega = -1"]);
-    refused(&over("x", "2"), &["--from x", "number"]);
+    refused(&over("x", "2"), &["--from: x", "number"]);
     refused(
         &[&over("3", "2")[..], &["--max-step", "0"]].concat(),
         &["longest step", "--max-step"],
@@ -359,11 +359,11 @@ fn what_makes_no_sense_is_refused() {
     );
     refused(
         &[&over("3", "2")[..], &["--second", "alpha4"]].concat(),
-        &["--second alpha4", "alpha4=5:40"],
+        &["--second", "`alpha4`", "alpha4=5:40"],
     );
     refused(
         &[&over("3", "2")[..], &["--period", "0"]].concat(),
-        &["at least 1"],
+        &["--period", "from 1 to"],
     );
     refused(
         &[&over("3", "2")[..], &["--state", "1"]].concat(),
@@ -371,7 +371,7 @@ fn what_makes_no_sense_is_refused() {
     );
     refused(
         &[&over("3", "2")[..], &["--diagram", "--values", "1"]].concat(),
-        &["at least 2 values"],
+        &["--values", "from 2 to"],
     );
     refused(&["--parameter", "omega", "--from", "3"], &["--to"]);
 }

@@ -255,7 +255,7 @@ fn what_makes_no_sense_is_refused() {
     };
     refused(
         &["attractors", "--starts", "0"],
-        &["at least one start", "--starts"],
+        &["--starts 0", "from 1 to"],
     );
     refused(
         &["attractors", "--box", "a7=-1:1"],
@@ -266,7 +266,7 @@ fn what_makes_no_sense_is_refused() {
     refused(&["attractors", "--threads", "0"], &["--threads 0"]);
     refused(&["attractors", "--out", "all.json"], &["all.json", ".csv"]);
     refused(&["attractors", "--max-period", "0"], &["--max-period 0"]);
-    refused(&["lyapunov", "--periods", "0"], &["0 were asked for"]);
+    refused(&["lyapunov", "--periods", "0"], &["--periods 0"]);
     refused(&["lyapunov", "--phase", "inf"], &["--phase"]);
     refused(
         &["lyapunov", "--state", "1"],

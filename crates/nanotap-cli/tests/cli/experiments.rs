@@ -75,7 +75,7 @@ fn senseless_approaches_are_refused() {
     folder.write("lever.toml", STIFF);
     let run = |arguments: &[&str]| folder.run(&[&["approach", "lever.toml"], arguments].concat());
     run(&["--from", "5 nm", "--to", "20 nm"]).refused(&["from far to near"]);
-    run(&["--points", "1"]).refused(&["at least 2"]);
+    run(&["--points", "1"]).refused(&["--points 1", "from 2 to"]);
     run(&["--from", "20 kHz"]).refused(&["--from 20 kHz", "length", "frequency"]);
     run(&["--out", "curve.xlsx"]).refused(&["curve.xlsx", ".csv"]);
     case(STIFF, &["--set", "gap.tip=15 kHz"]).refused(&["gap.tip", "length"]);

@@ -368,29 +368,23 @@ fn what_makes_no_sense_is_refused_with_a_remedy() {
     );
     refused(
         &["simulate", "--state", "1,2,x,4,5,6"],
-        &["`x` is no finite number"],
+        &["--state `x`", "0.1,-0.02,0.3"],
     );
-    refused(
-        &["simulate", "--state", "NaN,0,0,0,0,0"],
-        &["no finite number"],
-    );
-    refused(
-        &["simulate", "--periods", "0"],
-        &["0 were asked for", "--periods"],
-    );
+    refused(&["simulate", "--state", "NaN,0,0,0,0,0"], &["`NaN`"]);
+    refused(&["simulate", "--periods", "0"], &["--periods 0"]);
     refused(&["simulate", "--out", "run.xlsx"], &["run.xlsx", ".csv"]);
     refused(&["simulate", "--plot", "run.gif"], &["run.gif", ".svg"]);
     refused(&["simulate", "--resolution", "0"], &["--resolution 0"]);
     refused(
         &["simulate", "--method", "rk4", "--steps", "0"],
-        &["step count", "--steps"],
+        &["--steps 0"],
     );
     refused(
         &["simulate", "--method", "rk4", "--steps", "1,2,3"],
-        &["3 numbers"],
+        &["no steps a drive period"],
     );
     refused(&["simulate", "--methd", "rk4"], &["--methd", "--method"]);
-    refused(&["orbit", "--period", "0"], &["at least 1"]);
+    refused(&["orbit", "--period", "0"], &["from 1 to"]);
     refused(
         &["convergence", "--largest", "1"],
         &["--largest 1", "2 to 50"],

@@ -54,7 +54,7 @@ fn samples_are_compared() {
         .refused(&["holds no damper", "--arm"]);
     folder
         .run(&["samples", "case.toml", "--period", "0"])
-        .refused(&["--period 1 or more"]);
+        .refused(&["--period 0", "from 1 to"]);
 }
 
 /// Every analysis takes a sample with a memory, and says its state by name.

@@ -304,17 +304,17 @@ fn bad_requests_of_a_sweep_are_refused() {
         &["--over", "alpha1=0:1:2", "--over", "alpha2=0:1:2"],
         &["one or two"],
     );
-    with(&["--starts", "0"], &["0 starts"]);
+    with(&["--starts", "0"], &["--starts 0"]);
     with(&["--starts", "x"], &["--starts"]);
     with(&["--starts", "2", "--state", "0,0,0,0,0,0"], &["--state"]);
     with(&["--state", "0,0"], &["2 numbers where 6"]);
-    with(&["--state", "0,0,0,0,0,nan"], &["no finite number"]);
+    with(&["--state", "0,0,0,0,0,nan"], &["`nan`"]);
     with(&["--starts", "2", "--box", "a9=0:1"], &["a9", "a1, a2, a3"]);
     with(&["--starts", "2", "--box", "a1=1:0"], &["upwards"]);
     with(&["--box", "a1=0:1"], &["--starts"]);
-    with(&["--follow", "sideways"], &["up, down and both"]);
-    with(&["--periods", "0"], &["0 periods"]);
-    with(&["--max-period", "0"], &["longest period"]);
+    with(&["--follow", "sideways"], &["up, down, both"]);
+    with(&["--periods", "0"], &["--periods 0"]);
+    with(&["--max-period", "0"], &["--max-period 0"]);
     with(&["--threads", "0"], &["--threads 0"]);
     with(&["--chunk", "3/2"], &["3/2"]);
     with(&["--chunk", "half"], &["half"]);
@@ -420,8 +420,8 @@ fn bad_requests_of_a_basin_are_refused() {
     refused("a4=0:1:5", y, &[], &["a4", "a1, a2, a3, v1, v2, v3"]);
     refused(x, "a1=0:1:5", &[], &["both axes"]);
     refused(x, y, &["--state", "0,0"], &["2 numbers where 6"]);
-    refused(x, y, &["--starts", "0"], &["0 starts"]);
-    refused(x, y, &["--periods", "0"], &["0 periods"]);
+    refused(x, y, &["--starts", "0"], &["--starts 0"]);
+    refused(x, y, &["--periods", "0"], &["--periods 0"]);
     refused(x, y, &["--threads", "0"], &["--threads 0"]);
     refused(x, y, &["--attractors", "none.json"], &["none.json"]);
     folder.write("strange.json", "{\"attractors\": [{\"state\": [\"x\"]}]}");

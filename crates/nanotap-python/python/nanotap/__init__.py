@@ -2,7 +2,7 @@
 
 A `Case` says which cantilever, sample and drive; a function for every command of the
 terminal says what it does: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`,
-`branch`, `approach`, `window`, `lyapunov`, `convergence`, `paper`, `merge`. Results carry the names that the
+`branch`, `approach`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`. Results carry the names that the
 terminal's JSON has, as xarray Datasets, objects and lists of objects.
 
 >>> import nanotap
@@ -15,9 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ._case import Case, catalogue
-from ._datasets import basin, merge, open, sweep, window
+from ._datasets import merge, open
 from ._interrupt import Interrupted
-from ._motions import modes, orbit, simulate
 from ._nanotap import __version__
 from ._results import (
     Attractor,
@@ -29,7 +28,21 @@ from ._results import (
     Paper,
     Record,
 )
-from ._studies import approach, attractors, branch, convergence, lyapunov, paper
+from ._signatures import (
+    approach,
+    attractors,
+    basin,
+    branch,
+    contact_laws,
+    convergence,
+    lyapunov,
+    modes,
+    orbit,
+    simulate,
+    sweep,
+    window,
+)
+from ._studies import paper
 
 if TYPE_CHECKING:
     from . import export, plot
@@ -51,6 +64,7 @@ __all__ = [
     "basin",
     "branch",
     "catalogue",
+    "contact_laws",
     "convergence",
     "export",
     "lyapunov",

@@ -1,30 +1,45 @@
 """Arguments as the extension takes them, with the reason where they cannot be."""
 
+import json
+import math
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from functools import cache
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from . import _nanotap
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 Floats: TypeAlias = npt.NDArray[np.float64]
 Progress: TypeAlias = bool | Callable[[int, int], object] | None
 Box: TypeAlias = Mapping[str, tuple[float, float]] | None
+# A key of the case: one value, or many.
+Varied: TypeAlias = "float | str | Sequence[float] | npt.NDArray[Any] | xr.DataArray"
 
 # No machine counts further, and the extension takes no more.
 _MOST = 2**63 - 1
 
 
-def count(name: str, value: Any, least: int = 0) -> int:
-    """A whole number that is at least `least`."""
+def whole(name: str, value: Any) -> int:
+    """A whole number."""
     if isinstance(value, bool | np.bool_):
         message = f"{name}: {value} is no number"
         raise TypeError(message)
     try:
-        number = operator.index(value)
+        return operator.index(value)
     except TypeError:
         message = f"{name}: a whole number is needed, not {value!r}"
         raise TypeError(message) from None
+
+
+def count(name: str, value: Any, least: int = 0) -> int:
+    """A whole number that is at least `least`."""
+    number = whole(name, value)
     if not least <= number <= _MOST:
         message = f"{name}: {number} is out of range; a whole number from {least} on is needed"
         raise ValueError(message)
@@ -57,9 +72,14 @@ def state(value: Any) -> Floats | None:
     """A state: one row of real numbers."""
     if value is None:
         return None
-    array = real(value, "state")
+    return row("state", value)
+
+
+def row(name: str, value: Any) -> Floats:
+    """One row of real numbers."""
+    array = real(value, name)
     if array.ndim != 1:
-        message = f"state: one row of numbers is needed, not an array of {array.ndim} dimensions"
+        message = f"{name}: one row of numbers is needed, not an array of {array.ndim} dimensions"
         raise ValueError(message)
     return array
 
@@ -159,3 +179,82 @@ def slice_axis(name: str, value: str | Mapping[str, Any]) -> str:
         message = f'{name}: name one entry of the state, as in {{"a1": (-1, 1, 200)}} or "a1=-1:1:200"'
         raise TypeError(message)
     return words[0]
+
+
+@cache
+def _studies() -> dict[str, tuple[str, dict[str, Any]]]:
+    """What the progress of each study counts, and the schemas of its options."""
+    return {
+        name: (counted, json.loads(schema)["properties"])
+        for name, _, counted, schema in _nanotap.studies()
+    }
+
+
+def counted(study: str) -> str:
+    """What the progress of a study counts."""
+    return _studies()[study][0]
+
+
+def request(study: str, options: Mapping[str, Any]) -> str:
+    """What a study is asked for, as JSON.
+
+    A value of the wrong type is a `TypeError`; ranges and words are for the library to refuse.
+    """
+    schemas = _studies()[study][1]
+    given = {
+        name: _plain("from_" if name == "from" else name, value, schemas[name])
+        for name, value in options.items()
+        # Only a number cannot be nothing.
+        if value is not None or _kinds(schemas[name]) <= {"integer", "number"}
+    }
+    return json.dumps(given, allow_nan=False)
+
+
+def _kinds(schema: Mapping[str, Any]) -> set[str]:
+    kinds = schema.get("type")
+    if kinds is None:
+        choices = [*schema.get("anyOf", ()), *schema.get("oneOf", ())]
+        return {kind for choice in choices for kind in _kinds(choice)}
+    return {kinds} if isinstance(kinds, str) else set(kinds)
+
+
+def _plain(name: str, value: Any, schema: Mapping[str, Any]) -> Any:
+    """A value as JSON has it."""
+    kinds = _kinds(schema)
+    if "boolean" in kinds:
+        return bool(value)
+    if "object" in kinds:
+        if isinstance(value, str) and "string" in kinds:
+            return value
+        return {side: list(ends) for side, *ends in _sides(name, value)}
+    if "array" in kinds and "integer" in kinds:
+        many = [value] if isinstance(value, int | np.integer) else list(value)
+        return [whole(name, one) for one in many]
+    if "array" in kinds and schema.get("items", {}).get("type") in ("string", "array"):
+        return value
+    if "array" in kinds:
+        return [_finite(one) for one in row(name, value).tolist()]
+    if "number" in kinds:
+        if isinstance(value, str) and "string" in kinds:
+            return value
+        return _finite(number(name, value))
+    if "integer" in kinds:
+        return whole(name, value)
+    return str(value)
+
+
+def _finite(value: float) -> float | str:
+    """JSON has no infinity: its word is refused with what would be right."""
+    return value if math.isfinite(value) else str(value)
+
+
+def _sides(name: str, value: Any) -> list[tuple[str, Any, Any]]:
+    if not isinstance(value, Mapping):
+        message = f'{name}: name the sides with their ends, as in {{"a1": (-1, 1)}}'
+        raise TypeError(message)
+    sides = []
+    for side, ends in value.items():
+        low, high = _pair(f"{name}: {side}", ends)
+        place = f"{name}: {side}"
+        sides.append((str(side), quantity(place, low), quantity(place, high)))
+    return sides

@@ -14,7 +14,8 @@ from typing import Any, TypeAlias
 from . import _nanotap
 from ._case import Case
 
-Plan: TypeAlias = tuple[str, Case, dict[str, Any]]
+# A study, its case and its request.
+Plan: TypeAlias = tuple[str, Case, str]
 
 # Tasks that wait on the cluster for each of its threads: enough to keep it busy, few enough
 # to be dropped at once.
@@ -86,30 +87,14 @@ def compute(
     return False
 
 
-def _packed(plan: Plan) -> tuple[str, str, Case, tuple[tuple[str, Any], ...]]:
+def _packed(plan: Plan) -> tuple[str, str, Case, str]:
     """A plan that can be sent, and be a key."""
-    kind, case, options = plan
-    return (
-        _nanotap.__version__,
-        kind,
-        case,
-        tuple((k, _hashable(v)) for k, v in options.items()),
-    )
+    return (_nanotap.__version__, *plan)
 
 
-def _hashable(value: Any) -> Any:
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return tuple(_hashable(entry) for entry in value)
-    return value
-
-
-def chunk_files(
-    task: tuple[str, str, Case, tuple[tuple[str, Any], ...]], chunk: int
-) -> list[bytes]:
+def chunk_files(task: tuple[str, str, Case, str], chunk: int) -> list[bytes]:
     """The files of one chunk. Runs on a worker."""
-    version, kind, case, options = task
+    version, study, case, request = task
     if version != _nanotap.__version__:
         message = (
             f"this worker has nanotap {_nanotap.__version__}, {version} is asked of it"
@@ -117,21 +102,9 @@ def chunk_files(
         raise RuntimeError(message)
     # Dask counts one thread for a task.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
-    return _recipe(kind, case, options).chunk_files(chunk)
+    return _recipe(study, case, request).chunk_files(chunk)
 
 
 @lru_cache(maxsize=4)
-def _recipe(
-    kind: str, case: Case, options: tuple[tuple[str, Any], ...]
-) -> "_nanotap.Recipe":
-    from . import _arguments
-
-    given = dict(options)
-    given["state"] = _arguments.state(given["state"])
-    if kind == "sweep":
-        given["over"] = list(given["over"])
-        given["sides"] = list(given["sides"])
-        return _nanotap.Recipe.sweep(case._core, **given)
-    if given["attractors"] is not None:
-        given["attractors"] = [list(state) for state in given["attractors"]]
-    return _nanotap.Recipe.basin(case._core, **given, threads=1, progress=None)
+def _recipe(study: str, case: Case, request: str) -> "_nanotap.Recipe":
+    return _nanotap.Recipe(study, case._core, request, threads=1)

@@ -4,19 +4,18 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _arguments, _nanotap
-from ._arguments import Box, Progress
+from ._arguments import Progress
 from ._case import Case, Path
 from ._interrupt import Interrupted
 from ._motions import _cased
 from ._progress import bar
 from ._results import Record
-from ._studies import _threads
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,156 +26,42 @@ if TYPE_CHECKING:
 
 def sweep(
     case: Case,
-    *,
-    over: str | Sequence[str] | Mapping[str, Any],
-    starts: int | None = None,
-    seed: int = 1,
-    box: Box = None,
-    state: Any = None,
-    follow: Literal["up", "down", "both"] | None = None,
-    periods: int = 100,
-    strobe: int | None = None,
-    transient: int | None = None,
-    max_period: int = 64,
-    out: Path | None = None,
-    chunk: str = "1/1",
-    threads: int | None = None,
-    client: "Client | None" = None,
-    progress: Progress = None,
+    options: Mapping[str, Any],
+    out: Path | None,
+    chunk: str,
+    threads: int | None,
+    client: "Client | None",
+    progress: Progress,
 ) -> "xr.Dataset":
-    """How the motion changes with one or two parameters, from any number of starts.
-
-    Args:
-        case: What is swept.
-        over: One or two parameters with their values: `{"omega": (2, 4, 400)}` (first, last,
-            how many), `{"alpha4": (1, 1000, 50, "log")}` in equal ratios, an array in equal
-            steps or ratios, or words as at the terminal, `"omega=2:4:400"`.
-        starts: Quasi-random starts at each value, spread over a box of states; without it,
-            one start from rest.
-        seed: Their seed.
-        box: Sides of the box, as in `{"a1": (-1, 1)}`; the others are derived from the
-            linear response to the drive.
-        state: Start from this state at drive phase 0.
-        follow: Start each value from the last state of the one before, along the first
-            parameter: up, down or both.
-        periods: Drive periods recorded.
-        strobe: States kept, at the end of each of the last periods; without it, of every
-            recorded one.
-        transient: Drive periods thrown away first; without it, as many as the motion is
-            measured to need.
-        max_period: Longest period looked for.
-        out: The dataset, a folder ending in .zarr; where it is there already, the work goes
-            on where it stopped. Without it, everything is in memory.
-        chunk: One of n shares only, as in "2/8"; `merge` puts the shares together.
-        threads: Threads; without it, one a core. The result is the same for any number.
-        client: A Dask client, on whose workers the chunks are computed: the same bytes.
-        progress: Whether to show a bar, or what hears of progress.
-
-    Returns:
-        The dataset, as `open` opens it: lazily from `out`.
-
-    Raises:
-        ValueError: something that was asked for is not right.
-        Interrupted: Ctrl-C; its `result` is the dataset with what is finished, and the same
-            call goes on in `out`.
-    """
-    core = _cased(case)._core
-    # Looked at before the work: one start from rest and many at once make no sense.
-    if starts is not None and state is not None:
-        message = (
-            "starts and state: the starts are drawn, or given; leave one of them away"
-        )
-        raise ValueError(message)
-    if box and starts is None:
-        message = "box: the sides are those of the starts; say how many with starts"
-        raise ValueError(message)
-    options: dict[str, Any] = {
-        "over": _arguments.axes(over),
-        "starts": _arguments.optional_count("starts", starts),
-        "seed": _arguments.seed(seed),
-        "sides": _arguments.box(box),
-        "state": _arguments.state(state),
-        "follow": follow,
-        "periods": _arguments.count("periods", periods),
-        "strobe": _arguments.optional_count("strobe", strobe),
-        "transient": _arguments.optional_count("transient", transient),
-        "max_period": _arguments.count("max_period", max_period),
-    }
-    recipe = _nanotap.Recipe.sweep(core, **options)
-    plan = ("sweep", case, options)
-    noun = "lines" if follow else "values"
-    return _computed(recipe, plan, noun, out, chunk, threads, client, progress)
+    """The runs over the parameters, lazily from `out` or in memory."""
+    request = _arguments.request(
+        "sweep", {**options, "over": _arguments.axes(options["over"])}
+    )
+    noun = "values" if options["follow"] in (None, "off") else "lines"
+    plan = ("sweep", _cased(case), request)
+    return _computed(plan, noun, out, chunk, threads, client, progress)
 
 
 def basin(
     case: Case,
-    *,
-    x: str | Mapping[str, Any],
-    y: str | Mapping[str, Any],
-    state: Any = None,
-    attractors: Iterable[Any] | None = None,
-    starts: int = 64,
-    seed: int = 1,
-    periods: int = 1000,
-    max_period: int = 64,
-    out: Path | None = None,
-    chunk: str = "1/1",
-    threads: int | None = None,
-    client: "Client | None" = None,
-    progress: Progress = None,
+    options: Mapping[str, Any],
+    out: Path | None,
+    chunk: str,
+    threads: int | None,
+    client: "Client | None",
+    progress: Progress,
 ) -> "xr.Dataset":
-    """Basins of attraction on a two-dimensional slice of initial states.
-
-    Args:
-        case: Whose basins.
-        x: The horizontal axis: `{"a1": (-1, 1, 200)}` or `"a1=-1:1:200"`: entry of the
-            state, first value, last value, how many.
-        y: The vertical axis.
-        state: The other entries of the state, in full; without it, 0.
-        attractors: States on the attractors, or what `nanotap.attractors` found; without
-            them, a census in the slice finds them.
-        starts: Starts of the census.
-        seed: Seed of the census.
-        periods: Drive periods after which a point is called unsettled.
-        max_period: Longest period looked for.
-        out: As in `sweep`.
-        chunk: As in `sweep`.
-        threads: As in `sweep`.
-        client: As in `sweep`.
-        progress: As in `sweep`.
-
-    Returns:
-        `attractor` over the two entries of the state: an index into the attractors of the
-        attribute `attractors` (JSON), negative where there is none.
-
-    Raises:
-        ValueError: something that was asked for is not right.
-        RuntimeError: nothing attracts.
-        Interrupted: Ctrl-C, as in `sweep`.
-    """
-    core = _cased(case)._core
-    known = None
-    if attractors is not None:
+    """The points of the slice, lazily from `out` or in memory."""
+    known = options["attractors"]
+    if known is not None:
         known = [
             _state_of(entry, f"attractors: number {k + 1}")
-            for k, entry in enumerate(attractors)
+            for k, entry in enumerate(known)
         ]
-    options: dict[str, Any] = {
-        "x": _arguments.slice_axis("x", x),
-        "y": _arguments.slice_axis("y", y),
-        "state": _arguments.state(state),
-        "attractors": known,
-        "starts": _arguments.count("starts", starts),
-        "seed": _arguments.seed(seed),
-        "periods": _arguments.count("periods", periods),
-        "max_period": _arguments.count("max_period", max_period),
-    }
-    with bar(progress, "starts") as hears:
-        recipe = _nanotap.Recipe.basin(
-            core, **options, threads=_threads(threads), progress=hears
-        )
-    plan = ("basin", case, options)
-    return _computed(recipe, plan, "rows", out, chunk, threads, client, progress)
+    axes = {name: _arguments.slice_axis(name, options[name]) for name in ("x", "y")}
+    request = _arguments.request("basin", {**options, **axes, "attractors": known})
+    plan = ("basin", _cased(case), request)
+    return _computed(plan, "rows", out, chunk, threads, client, progress)
 
 
 def _state_of(entry: Any, name: str) -> list[float]:
@@ -243,62 +128,24 @@ def summary(ds: "xr.Dataset | Path") -> Record:
 
 def window(
     case: Case,
-    *,
-    over: Sequence[str] | Mapping[str, Any],
-    starts: int = 16,
-    seed: int = 1,
-    max_period: int = 32,
-    out: Path | None = None,
-    threads: int | None = None,
-    client: "Client | None" = None,
-    progress: Progress = None,
+    options: Mapping[str, Any],
+    out: Path | None,
+    threads: int | None,
+    client: "Client | None",
+    progress: Progress,
 ) -> "xr.Dataset":
-    """The operating window over two parameters: where the lever taps with one motion only,
-    and where a second state, subharmonics or chaos threaten.
-
-    Args:
-        case: Whose window.
-        over: Two parameters with their values, as in `sweep`; of a physical case also its
-            quantities, as in `{"gap.tip": ("5 nm", "25 nm", 41)}`.
-        starts: Quasi-random starts of the census at each point.
-        seed: Their seed.
-        max_period: Longest period looked for.
-        out: The dataset of the census, as in `sweep`.
-        threads: As in `sweep`.
-        client: As in `sweep`.
-        progress: As in `sweep`.
-
-    Returns:
-        The sweep with `condition` over both parameters: no-contact, one-period-1,
-        second-state, subharmonic, irregular or undecided; `share` says how much of each
-        there is.
-
-    Raises:
-        ValueError: something that was asked for is not right.
-    """
+    """The census at every point, with what its motions mean for imaging."""
     import xarray as xr
 
-    words = _arguments.axes(over)
-    if len(words) != 2:
-        message = f"{len(words)} parameters make no window; two are needed"
-        raise ValueError(message)
+    request = _arguments.request(
+        "window", {**options, "over": _arguments.axes(options["over"])}
+    )
+    plan = ("window", _cased(case), request)
     with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
         store = (
             os.path.join(folder, "window.zarr") if out is None else _ending(out, "out")
         )
-        ds = sweep(
-            case,
-            over=words,
-            starts=starts,
-            seed=seed,
-            periods=1,
-            strobe=1,
-            max_period=max_period,
-            out=store,
-            threads=threads,
-            client=client,
-            progress=progress,
-        )
+        ds = _computed(plan, "values", store, "1/1", threads, client, progress)
         found = json.loads(_nanotap.window(store))
         if out is None:
             ds = ds.load()
@@ -330,7 +177,6 @@ def _ending(path: Path, name: str) -> str:
 
 
 def _computed(
-    recipe: "_nanotap.Recipe",
     plan: "Plan",
     noun: str,
     out: Path | None,
@@ -343,6 +189,7 @@ def _computed(
     if client is not None and chunk != "1/1":
         message = f"chunk {chunk}: a client computes all chunks; leave one of them away"
         raise ValueError(message)
+    recipe = _recipe(plan, threads, progress)
     if out is not None:
         store = _ending(out, "out")
         stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
@@ -367,6 +214,14 @@ def _computed(
     return ds
 
 
+def _recipe(plan: "Plan", threads: int | None, progress: Progress) -> "_nanotap.Recipe":
+    """What is to be computed; for basins, the census of their attractors."""
+    study, case, request = plan
+    many = _arguments.optional_count("threads", threads)
+    with bar(progress if study == "basin" else False, "starts") as show:
+        return _nanotap.Recipe(study, case._core, request, threads=many, progress=show)
+
+
 def _work(
     recipe: "_nanotap.Recipe",
     plan: "Plan",
@@ -384,5 +239,8 @@ def _work(
             return _cluster.compute(client, recipe, plan, store, hears)
     with bar(progress, noun) as hears:
         return recipe.compute(
-            store, share=chunk, threads=_threads(threads), progress=hears
+            store,
+            share=chunk,
+            threads=_arguments.optional_count("threads", threads),
+            progress=hears,
         )

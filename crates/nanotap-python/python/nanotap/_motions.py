@@ -2,8 +2,9 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from itertools import product
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,22 +25,12 @@ _SHOWN_PERIODS = 100
 _MOST_ROWS = 8_000_000
 
 
-def modes(case: Case, *, points: int = 201) -> Modes:
-    """Mode shapes and frequencies, in free flight and in contact.
-
-    Frequencies are those of the Galerkin model (`free`, `contact`) and of the beam itself
-    (`exact_free`, `exact_contact`); `shapes` holds the mode shapes at `points` places.
-
-    Raises:
-        ValueError: the case is an oscillator.
-    """
+def modes(case: Case, options: Mapping[str, Any]) -> Modes:
+    """Frequencies, and the mode shapes as a DataArray."""
     import xarray as xr
 
-    many = _arguments.count("points", points, 2)
-    if many > _MOST_ROWS:
-        message = f"points: {many} are too many; {_MOST_ROWS} at most"
-        raise ValueError(message)
-    document, xi, shapes = _nanotap.modes(_cased(case)._core, many)
+    request = _arguments.request("modes", options)
+    document, xi, shapes = _nanotap.modes(_cased(case)._core, request)
     table = xr.DataArray(
         shapes,
         dims=("xi", "mode"),
@@ -48,167 +39,63 @@ def modes(case: Case, *, points: int = 201) -> Modes:
         attrs={"long_name": "mode shape of the bare beam", "units": "1"},
     )
     table.xi.attrs.update(long_name="place along the beam, clamp 0 to tip 1", units="L")
-    return Modes.of(json.loads(document), shapes=table)
+    return Modes.of(_document(document), shapes=table)
 
 
 def simulate(
     case: Case,
-    *,
-    periods: int = 50,
-    transient: int | None = None,
-    state: Any = None,
-    strobe: int = 1,
-    max_period: int = 64,
-    series: int | None = None,
-    resolution: int = 200,
-    method: Literal["exact", "rk4"] = "exact",
-    steps: int | Sequence[int] = 200,
-    switching: Literal["step", "stage"] = "step",
-    threads: int | None = None,
-    progress: Progress = None,
-    **parameters: Any,
+    options: Mapping[str, Any],
+    series: int | None,
+    threads: int | None,
+    progress: Progress,
+    parameters: Mapping[str, Any],
 ) -> "xr.Dataset":
-    """One run from a state; with arrays as `parameters`, one for each of their values.
-
-    Args:
-        case: What is run.
-        periods: Drive periods recorded.
-        transient: Drive periods thrown away first; without it, as many as the motion is
-            measured to need; 0: from the start.
-        state: State at the start, drive phase 0: a1 … aN, v1 … vN (oscillator: x, v);
-            without it, rest.
-        strobe: How many of the last states at drive phase 0 to keep.
-        max_period: Longest period looked for.
-        series: Periods of the time series, from the start of the recording; without it,
-            all up to 100.
-        resolution: Samples a drive period in the time series.
-        method: `exact`, or `rk4`: the paper's fixed-step method, to compare.
-        steps: Of rk4: steps a drive period, or those in free flight and in contact.
-        switching: Of rk4: whether the regime is looked at once a step or at every stage.
-        threads: Of arrays: threads; without it, one a core.
-        progress: Of arrays: whether to show a bar, or what hears of progress.
-        **parameters: Keys of the case to change. Arrays (one-dimensional, or xarray's
-            DataArrays) make a Dataset over them, each a dimension.
-
-    Returns:
-        What was observed, by the names of the terminal's JSON: `classification`, `period`,
-        `tip_max` …; `strobe` over `strobe_period` and `state`; `events` (their times) with
-        `event_kind`; and the time series `tip`, `gap`, `force` … over `tau`. Over arrays,
-        what is a number in each run, and `failure` where there is none.
-
-    Raises:
-        ValueError: something that was asked for is not right.
-        RuntimeError: the run did not work out.
-    """
-    fixed, varied = _split(parameters)
-    case = _cased(case).with_(**fixed)
-    count = _arguments.count
-    options: dict[str, Any] = {
-        "periods": count("periods", periods),
-        "transient": _arguments.optional_count("transient", transient),
-        "state": _arguments.state(state),
-        "strobe": min(count("strobe", strobe), count("periods", periods)),
-        "max_period": count("max_period", max_period, 1),
-    }
-    if method == "rk4":
-        if varied:
+    """One run, or one for each value of the arrays among `parameters`."""
+    case, varied = _split(case, options, parameters)
+    request = _arguments.request("simulate", options)
+    if varied:
+        if options["method"] == "rk4":
             message = "rk4 runs one case at a time; leave the arrays away"
             raise ValueError(message)
-        return _fixed_step(case, options, steps, switching)
-    if method != "exact":
-        message = f"method: `{method}` is none; there are exact and rk4"
-        raise ValueError(message)
-    if varied:
-        return _over(
-            case,
-            varied,
-            False,
-            {**options, "period": None, "harmonics": 1},
-            threads,
-            progress,
-        )
+        return _over(case, varied, "simulate", request, threads, progress)
+    periods = _arguments.count("periods", options["periods"])
     shown = (
-        min(options["periods"], _SHOWN_PERIODS)
+        min(periods, _SHOWN_PERIODS)
         if series is None
-        else count("series", series)
+        else _arguments.count("series", series)
     )
-    _refuse_rows(shown, count("resolution", resolution, 1))
-    document, (names, values) = _nanotap.simulate(
-        case._core, **options, series_periods=shown, resolution=resolution
-    )
-    return _run_dataset(case, json.loads(document), names, values)
+    _refuse_rows(shown, _arguments.count("resolution", options["resolution"]))
+    text, (names, values) = _nanotap.simulate(case._core, request, shown)
+    document = _document(text)
+    if options["method"] == "rk4":
+        return _fixed_step(case, document, names, values)
+    return _run_dataset(case, document, names, values)
 
 
-@overload
 def orbit(
     case: Case,
-    *,
-    period: int | None = None,
-    state: Any = None,
-    harmonics: int = 20,
-    resolution: int = 200,
-) -> Orbit: ...
-@overload
-def orbit(
-    case: Case,
-    *,
-    period: int | None = None,
-    state: Any = None,
-    harmonics: int = 20,
-    resolution: int = 200,
-    threads: int | None = None,
-    progress: Progress = None,
-    **parameters: Any,
-) -> "Orbit | xr.Dataset": ...
-def orbit(
-    case: Case,
-    *,
-    period: int | None = None,
-    state: Any = None,
-    harmonics: int = 20,
-    resolution: int = 200,
-    threads: int | None = None,
-    progress: Progress = None,
-    **parameters: Any,
+    options: Mapping[str, Any],
+    threads: int | None,
+    progress: Progress,
+    parameters: Mapping[str, Any],
 ) -> "Orbit | xr.Dataset":
-    """A periodic orbit by Newton, stable or not; with arrays, one for each of their values.
-
-    Args:
-        case: Whose orbit.
-        period: Its period in drive periods; without it, that of the motion where a run
-            settles.
-        state: State to look near, at drive phase 0.
-        harmonics: Harmonics of the drive's frequency to tell.
-        resolution: Samples a drive period in its time series, `orbit.series`.
-        threads: Of arrays: threads; without it, one a core.
-        progress: Of arrays: whether to show a bar, or what hears of progress.
-        **parameters: Keys of the case to change; see `simulate`.
-
-    Returns:
-        The orbit, or over arrays a Dataset of what is observed of each, with `failure`
-        where there is none.
-
-    Raises:
-        ValueError: something that was asked for is not right.
-        RuntimeError: no orbit was found.
-    """
-    fixed, varied = _split(parameters)
-    case = _cased(case).with_(**fixed)
-    shared: dict[str, Any] = {
-        "period": _arguments.optional_count("period", period),
-        "state": _arguments.state(state),
-        "harmonics": _arguments.count("harmonics", harmonics),
-    }
+    """A periodic orbit, or one for each value of the arrays among `parameters`."""
+    case, varied = _split(case, options, parameters)
+    request = _arguments.request("orbit", options)
     if varied:
-        options = {"periods": 1, "transient": None, "strobe": 0, "max_period": 64}
-        return _over(case, varied, True, {**shared, **options}, threads, progress)
-    _refuse_rows(1, _arguments.count("resolution", resolution, 1))
-    document, (names, values) = _nanotap.orbit(
-        case._core, **shared, resolution=resolution
-    )
+        return _over(case, varied, "orbit", request, threads, progress)
+    _refuse_rows(1, _arguments.count("resolution", options["resolution"]))
+    document, (names, values) = _nanotap.orbit(case._core, request)
     series = _series(names, values)
     series.attrs.update(case_attributes(case, "a periodic orbit"))
-    return Orbit.of(json.loads(document), series=series)
+    return Orbit.of(_document(document), series=series)
+
+
+def _document(text: str) -> dict[str, Any]:
+    """A document without what the caller has: the case and the version."""
+    document: dict[str, Any] = json.loads(text)
+    del document["case"], document["version"]
+    return document
 
 
 def words(names: Sequence[str]) -> "np.typing.NDArray[np.str_]":
@@ -232,14 +119,20 @@ def _refuse_rows(periods: int, resolution: int) -> None:
         raise ValueError(message)
 
 
-def _split(parameters: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Keys with one value, and keys with many."""
+def _split(
+    case: Case, options: Mapping[str, Any], parameters: Mapping[str, Any]
+) -> tuple[Case, dict[str, Any]]:
+    """The case with the keys that have one value, and the keys that have many."""
     fixed: dict[str, Any] = {}
     varied: dict[str, Any] = {}
     for key, value in parameters.items():
+        near = get_close_matches(key, options, 1, 0.8)
+        if near:
+            message = f"{key}: there is no such argument and no such key; did you mean {near[0]}?"
+            raise TypeError(message)
         many = np.ndim(value) > 0 if not isinstance(value, str | Mapping) else False
         (varied if many else fixed)[key] = value
-    return fixed, varied
+    return _cased(case).with_(**fixed), varied
 
 
 def _series(names: list[str], values: Floats) -> "xr.Dataset":
@@ -339,35 +232,15 @@ def _vector(name: str, value: list[Any], entries: list[str]) -> Any:
 
 
 def _fixed_step(
-    case: Case, options: dict[str, Any], steps: int | Sequence[int], switching: str
+    case: Case, parsed: dict[str, Any], names: list[str], values: Floats
 ) -> "xr.Dataset":
     import xarray as xr
 
-    given = [steps] if isinstance(steps, int | np.integer) else list(steps)
-    if len(given) not in (1, 2):
-        message = (
-            f"steps: {len(given)} numbers; one, or those in free flight and in contact"
-        )
-        raise ValueError(message)
-    if switching not in {"step", "stage"}:
-        message = f"switching: `{switching}` is none; there are step and stage"
-        raise ValueError(message)
-    each = [_arguments.count("steps", one, 1) for one in given]
-    if max(each) > 10_000_000:
-        message = f"steps: {max(each)} a drive period are too many; 10000000 at most"
-        raise ValueError(message)
-    document, (names, values) = _nanotap.fixed_step(
-        case._core,
-        **options,
-        steps=[each[0], each[-1]],
-        every_stage=switching == "stage",
-    )
-    parsed = json.loads(document)
     entries = case.state_names
     exact = parsed.pop("exact")
     strobe = np.array(parsed.pop("strobe"), dtype=float).reshape(-1, len(entries))
     events = parsed.pop("events")
-    parsed.pop("steps")
+    steps = parsed.pop("steps")
     variables, attributes = _variables(parsed, entries)
     last = parsed["periods"]
     ds = xr.Dataset(
@@ -382,7 +255,7 @@ def _fixed_step(
     ds = ds.assign_coords(strobe_period=np.arange(last - len(strobe) + 1, last + 1))
     ds.attrs.update(case_attributes(case, "one run with time steps"), **attributes)
     ds.attrs.update(
-        steps=each if len(each) == 2 else each * 2,
+        steps=steps,
         exact_classification=exact["classification"],
         exact_period=exact["period"] or 0,
         exact_evidence=exact["evidence"],
@@ -393,8 +266,8 @@ def _fixed_step(
 def _over(
     case: Case,
     varied: Mapping[str, Any],
-    orbits: bool,
-    options: dict[str, Any],
+    study: str,
+    request: str,
     threads: int | None,
     progress: Progress,
 ) -> "xr.Dataset":
@@ -409,14 +282,15 @@ def _over(
         case.with_(**{key: array.values[index] for key, array in broadcast.items()})
         for index in product(*map(range, shape))
     ]
-    many = 0 if threads is None else _arguments.count("threads", threads, 1)
-    with bar(progress, "orbits" if orbits else "runs") as hears:
+    many = _arguments.optional_count("threads", threads)
+    noun = "orbits" if study == "orbit" else "runs"
+    with bar(progress, noun) as show:
         found, interrupted = _nanotap.observe(
             [one._core for one in cases],
-            orbits=orbits,
+            study,
+            request,
             threads=many,
-            progress=hears,
-            **options,
+            progress=show,
         )
     coords: dict[str, Any] = {}
     for key, array in arrays.items():
@@ -425,7 +299,7 @@ def _over(
         )
         if key not in dims:
             coords[key] = array
-    documents = [None if text is None else json.loads(text) for text, _ in found]
+    documents = [None if text is None else _document(text) for text, _ in found]
     entries = case.state_names
     ds = _stacked(documents, entries, shape, tuple(map(str, dims))).assign_coords(
         coords
@@ -436,7 +310,7 @@ def _over(
         long_name="why there is none, empty where there is one", units="1"
     )
     # What the case says of a parameter that varies does not matter.
-    ds.attrs.update(case_attributes(case, "orbits" if orbits else "runs"))
+    ds.attrs.update(case_attributes(case, noun))
     ds.attrs["over"] = json.dumps(list(varied))
     ds = describe(ds)
     if interrupted:

@@ -1,7 +1,7 @@
 """The compiled part; see the package for what each is for."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Self, TypeAlias
 
 import numpy as np
@@ -55,144 +55,56 @@ class Receiver:
     def tidy(self) -> bool: ...
 
 class Recipe:
-    @staticmethod
-    def sweep(
+    def __new__(
+        cls,
+        name: str,
         case: CaseCore,
+        request: str,
         *,
-        over: list[str],
-        starts: int | None,
-        seed: int,
-        sides: list[tuple[str, float, float]],
-        state: _Floats | None,
-        follow: str | None,
-        periods: int,
-        strobe: int | None,
-        transient: int | None,
-        max_period: int,
-    ) -> Recipe: ...
-    @staticmethod
-    def basin(
-        case: CaseCore,
-        *,
-        x: str,
-        y: str,
-        state: _Floats | None,
-        attractors: Sequence[Sequence[float]] | None,
-        starts: int,
-        seed: int,
-        periods: int,
-        max_period: int,
-        threads: int,
-        progress: _Progress,
-    ) -> Recipe: ...
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> Self: ...
     @property
     def chunks(self) -> int: ...
     def compute(
-        self, path: _Path, *, share: str, threads: int, progress: _Progress
+        self, path: _Path, *, share: str, threads: int | None, progress: _Progress
     ) -> bool: ...
     def chunk_files(self, chunk: int) -> list[bytes]: ...
     def receiver(self, path: _Path) -> Receiver: ...
 
 def case_keys() -> list[tuple[str, list[tuple[str, str, list[str]]]]]: ...
 def catalogue() -> list[tuple[str, str, str]]: ...
-def modes(case: CaseCore, points: int) -> tuple[str, _Floats, _Floats]: ...
+def studies() -> list[tuple[str, str, str, str]]: ...
+def study(
+    name: str,
+    case: CaseCore,
+    request: str,
+    *,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[str, bool]: ...
+def modes(case: CaseCore, request: str) -> tuple[str, _Floats, _Floats]: ...
 def simulate(
-    case: CaseCore,
-    *,
-    periods: int,
-    transient: int | None,
-    state: _Floats | None,
-    strobe: int,
-    max_period: int,
-    series_periods: int,
-    resolution: int,
+    case: CaseCore, request: str, series_periods: int
 ) -> tuple[str, _Table]: ...
-def fixed_step(
-    case: CaseCore,
-    *,
-    periods: int,
-    transient: int | None,
-    state: _Floats | None,
-    strobe: int,
-    max_period: int,
-    steps: list[int],
-    every_stage: bool,
-) -> tuple[str, _Table]: ...
-def orbit(
-    case: CaseCore,
-    *,
-    period: int | None,
-    state: _Floats | None,
-    harmonics: int,
-    resolution: int,
-) -> tuple[str, _Table]: ...
+def orbit(case: CaseCore, request: str) -> tuple[str, _Table]: ...
+def lyapunov(case: CaseCore, request: str) -> tuple[str, _Floats]: ...
 def observe(
     cases: list[CaseCore],
+    name: str,
+    request: str,
     *,
-    orbits: bool,
-    periods: int,
-    transient: int | None,
-    period: int | None,
-    state: _Floats | None,
-    strobe: int,
-    max_period: int,
-    harmonics: int,
-    threads: int,
-    progress: _Progress,
+    threads: int | None = None,
+    progress: _Progress = None,
 ) -> tuple[list[tuple[str | None, str]], bool]: ...
 def glossary() -> str: ...
-def attractors(
-    case: CaseCore,
-    *,
-    starts: int | None,
-    seed: int,
-    sides: list[tuple[str, float, float]],
-    max_period: int,
-    unstable: int,
-    threads: int,
-    progress: _Progress,
-) -> tuple[str, bool]: ...
-def branch(
-    case: CaseCore,
-    *,
-    parameter: str,
-    from_: str,
-    to: str,
-    period: int | None,
-    state: _Floats | None,
-    doublings: int,
-    census: tuple[int, int, int] | None,
-    second: tuple[str, str, str] | None,
-    max_step: float,
-    threads: int,
-    progress: _Progress,
-) -> tuple[str, bool]: ...
-def approach(
-    case: CaseCore,
-    *,
-    from_: str | None,
-    to: str | None,
-    points: int,
-    branches: bool,
-    doublings: int,
-    max_period: int,
-    threads: int,
-    progress: _Progress,
-) -> tuple[str, bool]: ...
-def lyapunov(
-    case: CaseCore,
-    *,
-    periods: int,
-    transient: int,
-    state: _Floats | None,
-    phase: float | None,
-    points: int,
-) -> tuple[str, _Floats]: ...
-def convergence(
-    case: CaseCore, *, largest: int, tolerance: float, period: int | None
-) -> str: ...
 def paper(
-    *, out: _Path, only: list[str], quick: bool, threads: int, progress: _Progress
+    *,
+    out: _Path,
+    only: list[str],
+    quick: bool,
+    threads: int | None,
+    progress: _Progress,
 ) -> tuple[str, bool]: ...
 def paper_sections() -> list[str]: ...
 def merge(sources: list[str], out: _Path) -> str: ...

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _motions, _nanotap
+from . import _nanotap, _signatures
 from ._case import Case
 from ._figure import STYLE, Picture, draw, page
 from ._results import Attractors, Convergence, Lyapunov, Modes, Orbit
@@ -170,9 +170,9 @@ def attractors(found: Attractors, *, axes: Any = None) -> "Figure":
     curves = []
     for one in list(found)[:_MOST]:
         if one.period:
-            series = _motions.orbit(case, period=one.period, state=one.state).series
+            series = _signatures.orbit(case, period=one.period, state=one.state).series
         else:
-            series = _motions.simulate(
+            series = _signatures.simulate(
                 case,
                 state=one.state,
                 transient=0,

@@ -16,15 +16,20 @@
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
 
 use nanotap_dynamics::{Control, PeriodicOrbit, SettleOptions, settle};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::FreeMotion;
-use crate::case::{Case, CaseError, Key};
+use crate::Error;
+use crate::case::{Case, CaseError, Key, ParameterUnit};
 use crate::model::strobe::Strobe;
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
+use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
+use crate::study::registry::Study;
 use crate::study::simulate::{Classification, Named};
 use crate::study::sweep::{SweepOptions, nearest};
+use crate::study::value::Amount;
 
 /// How to approach. Distances are in the model's unit of length.
 #[derive(Clone, Debug, PartialEq)]
@@ -194,6 +199,9 @@ pub struct ApproachReport {
     pub branches: Option<BranchReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
+    /// Of a physical case: what a distance is to be multiplied with for SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter_unit: Option<ParameterUnit>,
 }
 
 /// Brings the sample near and takes it away.
@@ -250,6 +258,7 @@ pub fn approach(
         table,
         branches,
         cancelled: control.is_cancelled(),
+        parameter_unit: case.parameter_unit(key),
     })
 }
 
@@ -441,6 +450,91 @@ fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Opti
         || a.period != b.period
         || (periodic && amplitudes > DIFFERENT * free_amplitude);
     differ.then_some(amplitudes)
+}
+
+/// What an approach curve is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ApproachRequest {
+    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
+    /// times what the free tip swings towards the sample
+    #[schemars(extend("x-value" = "DISTANCE"))]
+    pub from: Option<Amount>,
+    /// Distance at which to turn back; without it, 0
+    #[schemars(extend("x-value" = "DISTANCE"))]
+    pub to: Option<Amount>,
+    /// Distances each way
+    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+    pub points: usize,
+    /// Also continue the branches that coexist, stable and unstable
+    #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
+    pub branches: bool,
+    /// Doublings of branches to follow
+    #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
+    pub switch: usize,
+    /// Longest period looked for
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub max_period: usize,
+}
+
+impl Default for ApproachRequest {
+    fn default() -> Self {
+        let options = ApproachOptions::default();
+        Self {
+            from: None,
+            to: None,
+            points: options.points,
+            branches: options.branches,
+            switch: options.doublings,
+            max_period: options.max_period,
+        }
+    }
+}
+
+impl ApproachRequest {
+    /// How to approach, in the model's unit of length.
+    ///
+    /// # Errors
+    /// When a distance is none.
+    pub fn options(&self, case: &Case) -> Result<ApproachOptions, Error> {
+        let key = case.gap_key();
+        let distance = |option: &str, given: &Option<Amount>| {
+            let read = |amount: &Amount| case.value(key, amount.text());
+            let read = given.as_ref().map(read).transpose();
+            read.map_err(|error| Error::from(error).at(option))
+        };
+        Ok(ApproachOptions {
+            from: distance("from", &self.from)?,
+            to: distance("to", &self.to)?,
+            points: self.points,
+            branches: self.branches,
+            doublings: self.switch,
+            max_period: self.max_period,
+            ..ApproachOptions::default()
+        })
+    }
+}
+
+/// An approach and retract curve.
+#[derive(Clone, Copy, Debug)]
+pub struct ApproachStudy;
+
+impl Study for ApproachStudy {
+    const NAME: &'static str = "approach";
+    const ABOUT: &'static str = "Amplitude, phase, force and energy against the distance to the \
+                                 sample, both ways, with the branches that coexist";
+    const COUNTED: &'static str = "distances";
+    const ANY_DISTANCE: bool = true;
+    type Request = ApproachRequest;
+    type Report = ApproachReport;
+
+    fn run(
+        case: &Case,
+        request: &ApproachRequest,
+        control: &Control<'_>,
+    ) -> Result<ApproachReport, Error> {
+        Ok(approach(case, &request.options(case)?, control)?)
+    }
 }
 
 impl From<ApproachError> for crate::Error {

@@ -5,16 +5,22 @@ use nanotap_dynamics::{
     AttractorKind, Census, CensusOptions, Control, Fraction, OrbitSearch, PeriodicOrbit,
     SettleOptions, StartBox, StartBoxError, StartSet, census_of, find_orbits,
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use crate::Error;
+use crate::case::Case;
 use crate::case::physical::Physical;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitReport, report};
+use crate::study::registry::Study;
 use crate::study::simulate::{Classification, SimulateError, largest_exponent};
-use crate::study::start_box::{default_box, default_starts};
+use crate::study::start_box::{box_with, default_box, default_starts};
+use crate::study::value::Intervals;
 
 /// How to look for attractors.
 #[derive(Clone, Debug, PartialEq)]
@@ -259,6 +265,8 @@ pub struct TransientChaosReport {
 
 /// Most starts of a census: 480 MB of states at N = 3.
 pub const MOST_STARTS: usize = 10_000_000;
+/// Starts in a box that was given without their number.
+const STARTS_IN_A_BOX: usize = 256;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -503,6 +511,92 @@ fn unstable_orbits(
         .filter(|orbit| !orbit.is_stable())
         .map(|orbit| Ok(report(model, orbit, options.harmonics)?))
         .collect()
+}
+
+/// What a census is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct AttractorsRequest {
+    /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
+    /// resonant response down to below the gap, go on until the share of starts that may lead to
+    /// motions not found is below 0.2 % (with 95 % confidence), or 5000 are done
+    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+    pub starts: Option<usize>,
+    /// Seed of the starts: the same seed gives the same answer on any number of threads
+    #[schemars(extend("x-value" = "K"))]
+    pub seed: u64,
+    /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
+    /// response to the drive. 256 starts if {starts} says no number
+    #[serde(rename = "box")]
+    #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+    pub sides: Intervals,
+    /// Longest period looked for
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub max_period: usize,
+    /// Also list unstable orbits up to this period
+    #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
+    pub unstable: usize,
+}
+
+impl Default for AttractorsRequest {
+    fn default() -> Self {
+        let options = AttractorsOptions::default();
+        Self {
+            starts: options.starts,
+            seed: options.seed,
+            sides: Intervals::default(),
+            max_period: options.settle.max_period,
+            unstable: options.unstable,
+        }
+    }
+}
+
+impl AttractorsRequest {
+    /// How to look for the attractors of `model`.
+    ///
+    /// # Errors
+    /// When a side of the box is none.
+    pub fn options(&self, model: &Model) -> Result<AttractorsOptions, Error> {
+        let default = AttractorsOptions::default();
+        Ok(AttractorsOptions {
+            starts: self
+                .starts
+                .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
+            seed: self.seed,
+            start_box: Some(box_with(model, &self.sides.numbers()?)?),
+            settle: SettleOptions {
+                max_period: self.max_period,
+                ..default.settle.clone()
+            },
+            unstable: self.unstable,
+            ..default
+        })
+    }
+}
+
+/// A census of the attractors.
+#[derive(Clone, Copy, Debug)]
+pub struct AttractorsStudy;
+
+impl Study for AttractorsStudy {
+    const NAME: &'static str = "attractors";
+    const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
+    const COUNTED: &'static str = "starts";
+    type Request = AttractorsRequest;
+    type Report = Attractors;
+
+    fn run(
+        case: &Case,
+        request: &AttractorsRequest,
+        control: &Control<'_>,
+    ) -> Result<Attractors, Error> {
+        let model = case.model()?;
+        let found = attractors(&model, &request.options(&model)?, control)?;
+        Ok(match case.physical() {
+            Some(resolved) => found.in_si(resolved),
+            None => found,
+        })
+    }
 }
 
 impl From<AttractorsError> for crate::Error {

@@ -13,9 +13,11 @@ use nanotap_dynamics::{
     LyapunovOptions, SettleOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
 };
 use nanotap_figures::Figure;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::Error;
 use crate::case::Case;
 use crate::case::CaseError;
 use crate::dataset::schema::Kind;
@@ -27,6 +29,9 @@ use crate::figure::basin::BasinTable;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
+use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::recipe::Recipe;
+use crate::study::registry::DatasetStudy;
 use crate::study::simulate::{Classification, SimulateError, starting_state};
 
 /// Most points along an axis, and of a slice.
@@ -677,6 +682,94 @@ fn names(store: &Store) -> Vec<String> {
         .and_then(|v| v.as_str())
         .unwrap_or_default();
     text.split(' ').map(Into::into).collect()
+}
+
+/// What the study of basins is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct BasinRequest {
+    /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
+    /// many (a1…aN, v1…vN; oscillator: x, v)
+    #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
+    pub x: String,
+    /// The vertical axis
+    #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
+    pub y: String,
+    /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
+    #[schemars(extend("x-value" = "A1,…"))]
+    pub state: Option<Vec<f64>>,
+    /// States on the attractors, or what a census found; without it, a census in the slice
+    /// finds them
+    #[schemars(extend("x-own" = true))]
+    pub attractors: Option<Vec<Vec<f64>>>,
+    /// Starts of the census
+    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+    pub starts: usize,
+    /// Seed of the census
+    #[schemars(extend("x-value" = "K"))]
+    pub seed: u64,
+    /// Drive periods after which a point is called unsettled
+    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+    pub periods: usize,
+    /// Longest period looked for
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub max_period: usize,
+}
+
+impl Default for BasinRequest {
+    fn default() -> Self {
+        Self {
+            x: String::new(),
+            y: String::new(),
+            state: None,
+            attractors: None,
+            starts: 64,
+            seed: 1,
+            periods: 1000,
+            max_period: 64,
+        }
+    }
+}
+
+impl BasinRequest {
+    /// Which slice, and how.
+    ///
+    /// # Errors
+    /// When an axis is none.
+    pub fn options(&self) -> Result<BasinOptions, Error> {
+        let range = |option: &str, given: &str| {
+            SliceRange::parse(given).map_err(|error| {
+                let remedy = "write a1=-1:1:200: entry, first value, last value, how many";
+                Error::option(option, error.to_string(), remedy)
+            })
+        };
+        Ok(BasinOptions {
+            x: range("x", &self.x)?,
+            y: range("y", &self.y)?,
+            state: self.state.clone(),
+            attractors: self.attractors.clone(),
+            starts: self.starts,
+            seed: self.seed,
+            periods: self.periods,
+            max_period: self.max_period,
+        })
+    }
+}
+
+/// Basins of attraction.
+#[derive(Clone, Copy, Debug)]
+pub struct BasinStudy;
+
+impl DatasetStudy for BasinStudy {
+    const NAME: &'static str = "basin";
+    const ABOUT: &'static str = "Basins of attraction on a two-dimensional slice of initial states";
+    const COUNTED: &'static str = "rows";
+    type Request = BasinRequest;
+
+    fn recipe(case: &Case, request: &BasinRequest, control: &Control<'_>) -> Result<Recipe, Error> {
+        let basin = Basin::new(case, &request.options()?, control)?;
+        Ok(Recipe::Basin(Box::new(basin)))
+    }
 }
 
 impl From<BasinError> for crate::Error {

@@ -8,14 +8,19 @@ use nanotap_dynamics::{
     continue_orbit, trace_locus,
 };
 use nanotap_flow::FlowError;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use crate::case::{Case, CaseError, Key, PlaneFamily};
+use crate::Error;
+use crate::case::{Case, CaseError, Key, ParameterUnit, PlaneFamily};
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
+use crate::study::registry::Study;
 use crate::study::start_box::default_box;
+use crate::study::value::{Amount, Interval, key_and_ends};
 
 /// How to follow.
 #[derive(Clone, Debug, PartialEq)]
@@ -202,6 +207,9 @@ pub struct BranchReport {
     /// The parameter, for figures.
     #[serde(skip)]
     pub key: Key,
+    /// Of a physical case: what a value of the parameter is to be multiplied with for SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter_unit: Option<ParameterUnit>,
 }
 
 /// One branch.
@@ -521,6 +529,7 @@ fn described(
             .collect(),
         cancelled: false,
         key,
+        parameter_unit: None,
     };
     // A seed at an end of the range has nothing on one side, and a branch that was followed
     // from both of its ends is one.
@@ -743,6 +752,142 @@ fn crossings(curve: &LocusReport, second: f64) -> impl Iterator<Item = f64> {
             let t = (second - y[0]) / (y[1] - y[0]);
             (0.0..=1.0).contains(&t).then(|| x[0] + t * (x[1] - x[0]))
         })
+}
+
+/// What the study of branches is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct BranchRequest {
+    /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
+    /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
+    #[schemars(extend("x-value" = "KEY", "x-required" = true))]
+    pub parameter: String,
+    /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
+    #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
+    pub from: Amount,
+    /// The other end of its range
+    #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
+    pub to: Amount,
+    /// Period of the orbit at the start; without it, that of the motion to which a run converges
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub period: Option<usize>,
+    /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
+    #[schemars(extend("x-value" = "A1,…"))]
+    pub state: Option<Vec<f64>>,
+    /// Also follow the doubled branches at flips, so many doublings deep
+    #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
+    pub switch: Option<usize>,
+    /// Assemble the whole picture: every stable orbit of a census at several values, followed
+    /// both ways and through two doublings (or as {switch} says)
+    pub diagram: bool,
+    /// Of the {diagram}: values of the parameter at which a census is taken
+    #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
+    pub values: usize,
+    /// Of the {diagram}: starts at each
+    #[schemars(range(min = 1, max = MOST_POINTS), extend("x-value" = "S"))]
+    pub starts: usize,
+    /// Of the {diagram}: seed of the starts
+    #[schemars(extend("x-value" = "K"))]
+    pub seed: u64,
+    /// A second parameter and its range, as in alpha4=5:40: the bifurcation curves are traced in
+    /// both
+    #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+    pub second: Option<Interval>,
+    /// Longest step, as a part of the range
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
+    pub max_step: f64,
+}
+
+impl Default for BranchRequest {
+    fn default() -> Self {
+        let seeds = SeedOptions::default();
+        Self {
+            parameter: String::new(),
+            from: Amount::default(),
+            to: Amount::default(),
+            period: None,
+            state: None,
+            switch: None,
+            diagram: false,
+            values: seeds.values,
+            starts: seeds.starts,
+            seed: seeds.seed,
+            second: None,
+            max_step: 0.01,
+        }
+    }
+}
+
+impl BranchRequest {
+    /// How to follow.
+    ///
+    /// # Errors
+    /// When a parameter or a value of it is none.
+    pub fn options(&self, case: &Case) -> Result<BranchOptions, Error> {
+        let (key, [from, to]) = key_and_ends(
+            case,
+            self.parameter.trim(),
+            [("from", &self.from), ("to", &self.to)],
+        )?;
+        let second = self.second.as_ref().map(|second| {
+            let ends = [("second", &second.low), ("second", &second.high)];
+            key_and_ends(case, &second.name, ends)
+        });
+        let census = self.diagram.then(|| SeedOptions {
+            values: self.values,
+            starts: self.starts,
+            seed: self.seed,
+            ..SeedOptions::default()
+        });
+        Ok(BranchOptions {
+            period: self.period,
+            state: self.state.clone(),
+            doublings: self.switch.unwrap_or(if self.diagram { 2 } else { 0 }),
+            census,
+            second: second
+                .transpose()?
+                .map(|(key, [low, high])| (key, low, high)),
+            max_step: self.max_step,
+            ..BranchOptions::over(key, from, to)
+        })
+    }
+}
+
+/// Branches of periodic orbits in a parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct BranchStudy;
+
+impl Study for BranchStudy {
+    const NAME: &'static str = "branch";
+    const ABOUT: &'static str =
+        "Periodic orbits followed in a parameter, stable and unstable, with their bifurcations";
+    const COUNTED: &'static str = "points";
+    type Request = BranchRequest;
+    type Report = BranchReport;
+
+    fn run(
+        case: &Case,
+        request: &BranchRequest,
+        control: &Control<'_>,
+    ) -> Result<BranchReport, Error> {
+        followed(case, &request.options(case)?, control)
+    }
+}
+
+/// The branches of a case, with what their parameter is in SI.
+///
+/// # Errors
+/// As [`branch`].
+pub fn followed(
+    case: &Case,
+    options: &BranchOptions,
+    control: &Control<'_>,
+) -> Result<BranchReport, Error> {
+    let report = branch(case, options, control)?;
+    Ok(BranchReport {
+        parameter_unit: case.parameter_unit(report.key),
+        ..report
+    })
 }
 
 impl From<BranchError> for crate::Error {

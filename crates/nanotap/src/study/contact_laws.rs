@@ -7,18 +7,23 @@
 
 use nanotap_dynamics::{Control, SettleOptions, ShootingOptions, close_orbit, settle};
 use nanotap_flow::trajectory::PiecewiseSignal;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use crate::case::CaseError;
-use crate::case::{Case, Key};
+use crate::Error;
+use crate::case::Case;
+use crate::case::{CaseError, Key};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
 use crate::model::strobe::Strobe;
 use crate::observe::Observables;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
+use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit};
+use crate::study::registry::{Study, cantilever};
 use crate::study::simulate::{Classification, Named};
+use crate::study::value::Amount;
 
 /// How to compare.
 #[derive(Clone, Debug, PartialEq)]
@@ -255,6 +260,86 @@ fn force_loop(height: &PiecewiseSignal, force: &PiecewiseSignal) -> Vec<[f64; 2]
             })
         })
         .collect()
+}
+
+/// What the comparison of contact laws is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ContactLawsRequest {
+    /// Period of the orbits compared
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub period: usize,
+    /// Stiffness of the standard linear solid's arm; without it, the case's, or twice alpha4
+    #[schemars(extend("x-value" = "K"))]
+    pub arm: Option<f64>,
+    /// Lowest drive frequency to which the orbits are followed
+    #[schemars(extend("x-value" = "OMEGA"))]
+    pub from: Option<Amount>,
+    /// Highest drive frequency to which the orbits are followed
+    #[schemars(extend("x-value" = "OMEGA"))]
+    pub to: Option<Amount>,
+}
+
+impl Default for ContactLawsRequest {
+    fn default() -> Self {
+        let options = ComparisonOptions::default();
+        Self {
+            period: options.period,
+            arm: options.arm,
+            from: None,
+            to: None,
+        }
+    }
+}
+
+impl ContactLawsRequest {
+    /// How to compare.
+    ///
+    /// # Errors
+    /// When a frequency is none, or only one end is given.
+    pub fn options(&self, case: &Case) -> Result<ComparisonOptions, Error> {
+        let key = Key::Omega;
+        let value = |option: &str, amount: &Amount| {
+            let read = case.value(key, amount.text());
+            read.map_err(|error| Error::from(error).at(option))
+        };
+        let frequencies = match (&self.from, &self.to) {
+            (Some(from), Some(to)) => Some((value("from", from)?, value("to", to)?)),
+            (None, None) => None,
+            _ => {
+                return Err(Error::input(
+                    "one end of the drive frequencies is missing",
+                    "give {from} and {to}, or neither",
+                ));
+            }
+        };
+        Ok(ComparisonOptions {
+            period: self.period,
+            arm: self.arm,
+            frequencies,
+        })
+    }
+}
+
+/// The same lever and drive under each contact law.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactLawsStudy;
+
+impl Study for ContactLawsStudy {
+    const NAME: &'static str = "contact-laws";
+    const ABOUT: &'static str =
+        "The same lever and drive on every contact law: what difference the sample makes";
+    type Request = ContactLawsRequest;
+    type Report = Comparison;
+
+    fn run(
+        case: &Case,
+        request: &ContactLawsRequest,
+        control: &Control<'_>,
+    ) -> Result<Comparison, Error> {
+        let lever = cantilever(case, Self::NAME)?;
+        Ok(compare(lever, &request.options(case)?, control)?)
+    }
 }
 
 impl From<ComparisonError> for crate::Error {

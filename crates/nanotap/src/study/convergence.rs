@@ -1,12 +1,19 @@
 //! Which modes matter: the same motion computed with N = 1 … K modes.
 
-use serde::Serialize;
+use nanotap_dynamics::Control;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use crate::Error;
+use crate::case::Case;
+use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::mode_share::ReadingsReport;
 use crate::observe::time_series::with_modes;
+use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use crate::study::registry::{Study, cantilever};
 use crate::study::simulate::Classification;
 
 /// A motion at each number of modes.
@@ -213,5 +220,59 @@ fn verdict(
         (None, _) => {
             format!("{largest} modes are not shown to be enough at {percent} %: take more")
         }
+    }
+}
+
+/// What the study of convergence is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConvergenceRequest {
+    /// Largest number of modes
+    #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
+    pub largest: usize,
+    /// Difference of the tip deflection, as a part of the amplitude, that is small enough
+    #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
+    pub tolerance: f64,
+    /// Period of the orbit to compare; without it, the motion to which a run from rest converges
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub period: Option<usize>,
+}
+
+impl Default for ConvergenceRequest {
+    fn default() -> Self {
+        Self {
+            largest: 10,
+            tolerance: 0.01,
+            period: None,
+        }
+    }
+}
+
+/// How many modes are enough.
+#[derive(Clone, Copy, Debug)]
+pub struct ConvergenceStudy;
+
+impl Study for ConvergenceStudy {
+    const NAME: &'static str = "convergence";
+    const ABOUT: &'static str = "The same motion with N = 1 … K modes: how many are enough";
+    type Request = ConvergenceRequest;
+    type Report = Convergence;
+
+    fn run(
+        case: &Case,
+        request: &ConvergenceRequest,
+        _: &Control<'_>,
+    ) -> Result<Convergence, Error> {
+        let options = OrbitOptions {
+            period: request.period,
+            ..OrbitOptions::default()
+        };
+        let (largest, tolerance) = (request.largest, request.tolerance);
+        Ok(convergence(
+            cantilever(case, Self::NAME)?,
+            largest,
+            tolerance,
+            &options,
+        )?)
     }
 }

@@ -8,13 +8,19 @@ use nanotap_dynamics::{
 };
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Output, Trajectory};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 
+use crate::Error;
+use crate::case::Case;
+use crate::control::Control;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::begins_contact;
+use crate::study::limits::MOST_PERIODS;
+use crate::study::registry::Study;
 use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
 
 /// How to measure.
@@ -256,4 +262,91 @@ fn state_before(trajectory: &Trajectory, time: f64) -> Option<Vec<f64>> {
             Some(piece.signal.at((time - piece.start).min(piece.length)))
         })
         .collect()
+}
+
+/// Where a section is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SectionKind {
+    /// Once a drive period, at one phase
+    #[default]
+    Phase,
+    /// At the beginning of every contact
+    Contact,
+}
+
+/// Most points of a section: 800 MB with three modes.
+pub const MOST_SECTION_POINTS: usize = 10_000_000;
+
+/// What the study of Lyapunov exponents is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LyapunovRequest {
+    /// Drive periods averaged over
+    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+    pub periods: usize,
+    /// Drive periods discarded first
+    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+    pub transient: usize,
+    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+    #[schemars(extend("x-value" = "A1,…"))]
+    pub state: Option<Vec<f64>>,
+    /// Where the section is taken
+    pub section: SectionKind,
+    /// Drive phase of the section in degrees
+    #[schemars(extend("x-value" = "DEGREES"))]
+    pub phase: f64,
+    /// Points of the section
+    #[schemars(range(min = 0, max = MOST_SECTION_POINTS), extend("x-value" = "K"))]
+    pub points: usize,
+}
+
+impl Default for LyapunovRequest {
+    fn default() -> Self {
+        let options = LyapunovOptions::default();
+        Self {
+            periods: options.periods,
+            transient: options.transient,
+            state: options.state,
+            section: SectionKind::default(),
+            phase: 0.0,
+            points: options.points,
+        }
+    }
+}
+
+impl LyapunovRequest {
+    /// How to measure.
+    pub fn options(&self) -> LyapunovOptions {
+        LyapunovOptions {
+            transient: self.transient,
+            state: self.state.clone(),
+            periods: self.periods,
+            section: match self.section {
+                SectionKind::Phase => Section::Phase((self.phase / 360.0).rem_euclid(1.0)),
+                SectionKind::Contact => Section::Contact,
+            },
+            points: self.points,
+            ..LyapunovOptions::default()
+        }
+    }
+}
+
+/// The Lyapunov spectrum.
+#[derive(Clone, Copy, Debug)]
+pub struct LyapunovStudy;
+
+impl Study for LyapunovStudy {
+    const NAME: &'static str = "lyapunov";
+    const ABOUT: &'static str = "Lyapunov spectrum with error bars, and a Poincaré section";
+    type Request = LyapunovRequest;
+    type Report = LyapunovReport;
+
+    fn run(
+        case: &Case,
+        request: &LyapunovRequest,
+        _: &Control<'_>,
+    ) -> Result<LyapunovReport, Error> {
+        Ok(lyapunov(&case.model()?, &request.options())?)
+    }
 }

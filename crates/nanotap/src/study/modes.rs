@@ -3,13 +3,19 @@
 
 use nalgebra::Complex;
 use nanotap_figures::{Axis, Figure, Line, Panel, Rule};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use crate::Error;
+use crate::case::Case;
+use crate::control::Control;
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
 use crate::model::galerkin::Regime;
 use crate::model::spectrum::{self, Spectrum, SpectrumError, TipLoad};
+use crate::study::limits::MOST_POINTS;
+use crate::study::registry::{Study, cantilever};
 
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -103,6 +109,36 @@ pub fn shapes_figure(beam: &Modes) -> Figure {
         });
     }
     Figure::single(panel)
+}
+
+/// What the study of modes is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ModesRequest {
+    /// Points along the beam in the table of mode shapes
+    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+    pub points: usize,
+}
+
+impl Default for ModesRequest {
+    fn default() -> Self {
+        Self { points: 201 }
+    }
+}
+
+/// Mode shapes and frequencies.
+#[derive(Clone, Copy, Debug)]
+pub struct ModesStudy;
+
+impl Study for ModesStudy {
+    const NAME: &'static str = "modes";
+    const ABOUT: &'static str = "Mode shapes and frequencies, in free flight and in contact";
+    type Request = ModesRequest;
+    type Report = ModeTable;
+
+    fn run(case: &Case, _: &ModesRequest, _: &Control<'_>) -> Result<ModeTable, Error> {
+        Ok(ModeTable::new(cantilever(case, Self::NAME)?)?)
+    }
 }
 
 impl From<ModeTableError> for crate::Error {

@@ -9,11 +9,18 @@ use nanotap_dynamics::{
 };
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Trajectory};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use crate::Error;
+use crate::case::Case;
 use crate::model::strobe::Strobe;
 use crate::model::{Forgetting, Model};
+use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, Contacts, Measurement, Observables, Set, Spectrum};
+use crate::study::in_si::InSi;
+use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
+use crate::study::registry::Study;
 use crate::study::simulate::{Named, SimulateError, starting_state};
 use crate::study::start_box::default_box;
 
@@ -378,6 +385,74 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
         })
         .sum();
     flow + impacts
+}
+
+/// What the study of an orbit is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OrbitRequest {
+    /// Its period in drive periods; without it, that of the motion to which a run converges
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub period: Option<usize>,
+    /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+    #[schemars(extend("x-value" = "A1,…"))]
+    pub state: Option<Vec<f64>>,
+    /// Harmonics of the drive frequency to report
+    #[schemars(range(min = 0, max = MOST_HARMONICS), extend("x-value" = "H"))]
+    pub harmonics: usize,
+    /// Samples a drive period in the time series
+    #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+    pub resolution: usize,
+}
+
+impl Default for OrbitRequest {
+    fn default() -> Self {
+        let options = OrbitOptions::default();
+        Self {
+            period: options.period,
+            state: options.state,
+            harmonics: options.harmonics,
+            resolution: 200,
+        }
+    }
+}
+
+impl OrbitRequest {
+    /// How to look for the orbit.
+    pub fn options(&self) -> OrbitOptions {
+        OrbitOptions {
+            period: self.period,
+            state: self.state.clone(),
+            harmonics: self.harmonics,
+            ..OrbitOptions::default()
+        }
+    }
+}
+
+/// A periodic orbit by Newton's method.
+#[derive(Clone, Copy, Debug)]
+pub struct OrbitStudy;
+
+impl Study for OrbitStudy {
+    const NAME: &'static str = "orbit";
+    const ABOUT: &'static str = "A periodic orbit by Newton, stable or not";
+    type Request = OrbitRequest;
+    type Report = InSi<OrbitReport>;
+
+    fn run(
+        case: &Case,
+        request: &OrbitRequest,
+        _: &Control<'_>,
+    ) -> Result<InSi<OrbitReport>, Error> {
+        let found = orbit(&case.model()?, &request.options())?;
+        let physical = case.physical().map(|resolved| {
+            PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved)
+        });
+        Ok(InSi {
+            motion: found,
+            physical,
+        })
+    }
 }
 
 impl From<OrbitError> for crate::Error {

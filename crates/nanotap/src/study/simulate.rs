@@ -7,11 +7,21 @@ pub use nanotap_dynamics::SettleOptions;
 use nanotap_dynamics::{LyapunovSpectrum, PeriodicOrbit, StroboscopicMap, Verdict, settle};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Trajectory};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use crate::Error;
+use crate::case::Case;
+use crate::control::Control;
 use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, Contacts, Measurement, Observables, Set};
+use crate::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
+use crate::study::in_si::InSi;
+use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES};
+use crate::study::registry::Study;
+use crate::study::value::Steps;
 
 /// How to run.
 #[derive(Clone, Debug, PartialEq)]
@@ -421,6 +431,156 @@ impl Named {
             spectrum: spectrum.cloned(),
             evidence,
         }
+    }
+}
+
+/// How a motion is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The exact flow: no time step, no contact missed
+    #[default]
+    Exact,
+    /// The paper's method, to compare: Runge–Kutta steps that switch on their grid
+    Rk4,
+}
+
+/// Where Runge–Kutta steps look at the regime.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Grid {
+    /// Once a step
+    #[default]
+    Step,
+    /// At every stage of a step
+    Stage,
+}
+
+/// What one run is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SimulateRequest {
+    /// Drive periods recorded
+    #[schemars(range(min = 1, max = MOST_RECORDED), extend("x-value" = "P"))]
+    pub periods: usize,
+    /// Drive periods discarded first; without it, as many as the motion is measured to need; 0:
+    /// from the start
+    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+    pub transient: Option<usize>,
+    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+    #[schemars(extend("x-value" = "A1,…"))]
+    pub state: Option<Vec<f64>>,
+    /// How many of the last states at drive phase 0 to keep
+    #[schemars(range(min = 0, max = MOST_RECORDED), extend("x-value" = "K"))]
+    pub strobe: usize,
+    /// Longest period looked for
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub max_period: usize,
+    /// Samples a drive period in the time series
+    #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+    pub resolution: usize,
+    /// How the motion is computed
+    pub method: Method,
+    /// Of rk4: steps a drive period, in free flight and (after a comma) in contact
+    #[schemars(extend("x-value" = "FREE,CONTACT"))]
+    pub steps: Steps,
+    /// Of rk4: where within a step the regime is looked at
+    pub switching: Grid,
+}
+
+/// Most drive periods recorded: their events fill some gigabytes.
+pub const MOST_RECORDED: usize = 10_000_000;
+
+impl Default for SimulateRequest {
+    fn default() -> Self {
+        let options = SimulateOptions::default();
+        Self {
+            periods: options.periods,
+            transient: options.transient,
+            state: options.state,
+            strobe: options.strobe,
+            max_period: options.settle.max_period,
+            resolution: 200,
+            method: Method::default(),
+            steps: Steps::default(),
+            switching: Grid::default(),
+        }
+    }
+}
+
+impl SimulateRequest {
+    /// How to run exactly.
+    pub fn options(&self) -> SimulateOptions {
+        SimulateOptions {
+            periods: self.periods,
+            transient: self.transient,
+            state: self.state.clone(),
+            strobe: self.strobe,
+            settle: self.settle(),
+            ..SimulateOptions::default()
+        }
+    }
+
+    /// How to run with fixed steps.
+    pub fn fixed_step_options(&self) -> FixedStepOptions {
+        let default = FixedStepOptions::default();
+        FixedStepOptions {
+            periods: self.periods,
+            transient: self.transient.unwrap_or(default.transient),
+            state: self.state.clone(),
+            strobe: self.strobe,
+            steps: self.steps.0,
+            switching: match self.switching {
+                Grid::Step => Switching::EveryStep,
+                Grid::Stage => Switching::EveryStage,
+            },
+            settle: self.settle(),
+        }
+    }
+
+    fn settle(&self) -> SettleOptions {
+        SettleOptions {
+            max_period: self.max_period,
+            ..SettleOptions::default()
+        }
+    }
+}
+
+/// What one run came to.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum SimulateReport {
+    /// By the exact flow.
+    Exact(Box<InSi<Simulation>>),
+    /// By fixed steps.
+    FixedStep(Box<FixedStepRun>),
+}
+
+/// One run.
+#[derive(Clone, Copy, Debug)]
+pub struct SimulateStudy;
+
+impl Study for SimulateStudy {
+    const NAME: &'static str = "simulate";
+    const ABOUT: &'static str = "One run: its steady state, or how it gets there";
+    type Request = SimulateRequest;
+    type Report = SimulateReport;
+
+    fn run(
+        case: &Case,
+        request: &SimulateRequest,
+        _: &Control<'_>,
+    ) -> Result<SimulateReport, Error> {
+        let model = case.model()?;
+        if request.method == Method::Rk4 {
+            let run = fixed_step_run(&model, &request.fixed_step_options())?;
+            return Ok(SimulateReport::FixedStep(Box::new(run)));
+        }
+        let motion = simulate(&model, &request.options())?;
+        let physical = case
+            .physical()
+            .map(|resolved| PhysicalMotion::alone(&motion.observables, None, resolved));
+        Ok(SimulateReport::Exact(Box::new(InSi { motion, physical })))
     }
 }
 

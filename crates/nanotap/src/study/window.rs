@@ -7,13 +7,23 @@
 
 use std::collections::BTreeMap;
 
+use nanotap_dynamics::Control;
 use nanotap_figures::{CategoryMap, Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use crate::Error;
+use crate::case::Case;
 use crate::dataset::{Store, StoreError, Values};
 use crate::figure::sweep::GridAxis;
+use crate::study::attractors::MOST_STARTS;
+use crate::study::limits::MOST_PERIOD;
+use crate::study::recipe::Recipe;
+use crate::study::registry::DatasetStudy;
 use crate::study::simulate::Classification;
 use crate::study::sweep::class_of;
+use crate::study::sweep::{Sweep, SweepRequest};
+use crate::study::value::Axes;
 
 /// What there is at one point, from the safest to the least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -253,6 +263,79 @@ fn condition(motions: &[Seen]) -> Condition {
         None => Condition::Undecided,
         Some(orbit) if orbit.contact > 0.0 => Condition::OnePeriod1,
         Some(_) => Condition::NoContact,
+    }
+}
+
+/// What an operating window is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct WindowRequest {
+    /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26 or
+    /// omega=2:4:81; twice, the first is the horizontal axis
+    #[schemars(extend("x-value" = "KEY=FROM:TO:COUNT", "x-required" = true))]
+    pub over: Axes,
+    /// Quasi-random starts of the census at each point
+    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+    pub starts: usize,
+    /// Seed of the starts
+    #[schemars(extend("x-value" = "K"))]
+    pub seed: u64,
+    /// Longest period looked for
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub max_period: usize,
+}
+
+impl Default for WindowRequest {
+    fn default() -> Self {
+        Self {
+            over: Axes::default(),
+            starts: 16,
+            seed: 1,
+            max_period: 32,
+        }
+    }
+}
+
+impl WindowRequest {
+    /// The census at each point as a sweep.
+    ///
+    /// # Errors
+    /// When there are not two parameters, and as for a sweep.
+    pub fn sweep(&self, case: &Case) -> Result<Sweep, Error> {
+        let count = self.over.0.len();
+        if count != 2 {
+            return Err(Error::input(
+                format!("{count} parameters make no window"),
+                "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
+            ));
+        }
+        let request = SweepRequest {
+            over: self.over.clone(),
+            starts: Some(self.starts),
+            seed: self.seed,
+            // What a motion is counts, not its course.
+            periods: 1,
+            max_period: self.max_period,
+            ..SweepRequest::default()
+        };
+        request.sweep(case)
+    }
+}
+
+/// The operating window.
+#[derive(Clone, Copy, Debug)]
+pub struct WindowStudy;
+
+impl DatasetStudy for WindowStudy {
+    const NAME: &'static str = "window";
+    const ABOUT: &'static str = "The operating window over two parameters: where there is only \
+                                 one motion, and where a second state, subharmonics or chaos \
+                                 threaten";
+    const COUNTED: &'static str = "values";
+    type Request = WindowRequest;
+
+    fn recipe(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
+        Ok(Recipe::Sweep(Box::new(request.sweep(case)?)))
     }
 }
 

@@ -1,11 +1,10 @@
 //! Following a motion along a parameter.
 
-use std::str::FromStr;
-
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Which way a motion is followed along the first parameter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Follow {
     /// Every value starts anew.
@@ -27,21 +26,6 @@ impl Follow {
             Self::Up => &[true],
             Self::Down => &[false],
             Self::Both => &[true, false],
-        }
-    }
-}
-
-impl FromStr for Follow {
-    type Err = String;
-
-    fn from_str(given: &str) -> Result<Self, String> {
-        match given {
-            "up" => Ok(Self::Up),
-            "down" => Ok(Self::Down),
-            "both" => Ok(Self::Both),
-            _ => Err(format!(
-                "`{given}` is no way to follow; there are up, down and both"
-            )),
         }
     }
 }

@@ -28,12 +28,14 @@ mod dataset;
 mod error;
 mod follow;
 mod over;
+mod request;
 mod run;
 mod summary;
 
 pub use error::SweepError;
 pub use follow::Follow;
 pub use over::{Over, OverError, Spacing};
+pub use request::{SweepRequest, SweepStudy};
 pub use run::Starts;
 pub(crate) use run::nearest;
 pub use summary::Summary;

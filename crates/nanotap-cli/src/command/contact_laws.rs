@@ -1,17 +1,20 @@
-//! `nanotap samples`: the same lever and drive on every contact law.
+//! `nanotap contact-laws`: the same lever and drive on every contact law.
 
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::case::Key;
 use nanotap::control::Control;
 use nanotap::figure::contact_laws::sample_figure;
-use nanotap::study::contact_laws::{Comparison, ComparisonOptions, SampleMotion, compare};
+use nanotap::study::contact_laws::{
+    Comparison, ContactLawsRequest, ContactLawsStudy, SampleMotion,
+};
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
@@ -21,21 +24,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// Period of the orbits compared
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    period: usize,
-
-    /// Stiffness of the standard linear solid's arm [default: the case's, or twice alpha4]
-    #[arg(long, value_name = "K", allow_negative_numbers = true)]
-    arm: Option<f64>,
-
-    /// Lowest drive frequency to which the orbits are followed
-    #[arg(long, value_name = "OMEGA", requires = "to")]
-    from: Option<String>,
-
-    /// Highest drive frequency to which the orbits are followed
-    #[arg(long, value_name = "OMEGA", requires = "from")]
-    to: Option<String>,
+    #[command(flatten)]
+    request: Request<ContactLawsRequest>,
 
     #[command(flatten)]
     out: OutArgument,
@@ -44,38 +34,19 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
     }
     let studied = GivenCase::of(&arguments.case, output)?;
-    let Some(case) = studied.cantilever() else {
-        return Err(Failure::input(
-            format!(
-                "{}: `nanotap samples` needs a cantilever; this is an oscillator",
-                studied.title()
-            ),
-            "an oscillator's stop is said by its own keys",
-        ));
-    };
-    let key = Key::Omega;
-    let value = |option: &str, text: &Option<String>| {
-        text.as_ref()
-            .map(|text| studied.value(key, option, text))
-            .transpose()
-    };
-    let options = ComparisonOptions {
-        period: arguments.period,
-        arm: arguments.arm,
-        frequencies: value("--from", &arguments.from)?.zip(value("--to", &arguments.to)?),
-    };
-    let result = compare(case, &options, &Control::default())?;
+    let result = ContactLawsStudy::run(&studied, &request, &Control::default())?;
     if let Some(path) = &arguments.out.out {
         file::write(path, csv(&result).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
         sample_figure(&result, &studied.units()).write(path)?;
     }
-    output.result(&result, |result| text(&studied, result))
+    output.study(&studied, &result, |result| text(&studied, result))
 }
 
 /// The loops, a row a point.

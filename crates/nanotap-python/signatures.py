@@ -1,0 +1,392 @@
+"""Writes `_signatures.py`: the public function of every study, from the studies' JSON schemas.
+
+    python crates/nanotap-python/signatures.py target/release/nanotap [--check]
+
+Names, defaults, documentation and ranges are the library's; only what is Python's own (extra
+arguments, what comes back) stands here.
+"""
+
+import json
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from typing import Any
+
+TARGET = Path(__file__).parent / "python" / "nanotap" / "_signatures.py"
+
+THREADS = ("threads", "int | None", "None", "Threads; without it, one a core.")
+PROGRESS = (
+    "progress",
+    "Progress",
+    "None",
+    "Whether to show a bar, or a function that is called with what is done and the total.",
+)
+ARRAYS = (
+    ("threads", "int | None", "None", "Of arrays: threads; without it, one a core."),
+    ("progress", "Progress", "None", "Of arrays: as everywhere, a bar or a function."),
+)
+SERIES = (
+    "series",
+    "int | None",
+    "None",
+    "Periods of the time series, from the start of the recording; without it, all up to 100.",
+)
+
+DATASET = (
+    (
+        "out",
+        "Path | None",
+        "None",
+        (
+            "The dataset, a folder ending in .zarr; where it is there already, the work goes on "
+            "where it stopped. Without it, everything is in memory."
+        ),
+    ),
+    (
+        "chunk",
+        "str",
+        '"1/1"',
+        'One of n shares only, as in "2/8"; `merge` puts the shares together.',
+    ),
+    THREADS,
+    (
+        "client",
+        '"Client | None"',
+        "None",
+        "A Dask client, on whose workers the chunks are computed: the same bytes.",
+    ),
+    PROGRESS,
+)
+
+# What Python adds to a study: further arguments, the type of the result and what it holds.
+PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
+    "modes": (
+        (),
+        "Modes",
+        (
+            "Frequencies of the Galerkin model (`free`, `contact`) and of the beam itself "
+            "(`exact_free`, `exact_contact`); `shapes`, the mode shapes along the beam."
+        ),
+    ),
+    "simulate": (
+        (SERIES, *ARRAYS),
+        "xr.Dataset",
+        (
+            "What was observed, by the names of the terminal's JSON: `classification`, `period`, "
+            "`tip_max` …; `strobe` over `strobe_period` and `state`; `events` (their times) with "
+            "`event_kind`; and the time series `tip`, `gap`, `force` … over `tau`. Over arrays, "
+            "what is a number in each run, and `failure` where there is none."
+        ),
+    ),
+    "orbit": (
+        ARRAYS,
+        "Orbit | xr.Dataset",
+        (
+            "The orbit, or over arrays a Dataset of what is observed of each, with `failure` where "
+            "there is none."
+        ),
+    ),
+    "attractors": (
+        (THREADS, PROGRESS),
+        "Attractors",
+        "The attractors, most frequent first.",
+    ),
+    "branch": (
+        (THREADS, PROGRESS),
+        "xr.Dataset",
+        (
+            "The orbits over `point` (`branch`, the parameter by its name, `stable`, `tip_max`, "
+            "`states` …) and the bifurcations over `bifurcation` (`bifurcation_kind`, "
+            "`bifurcation_parameter`, `bifurcation_states` …); curves in two parameters over "
+            "`locus_point`. The attributes say of each branch why it ends, and what could not be "
+            "followed."
+        ),
+    ),
+    "approach": (
+        (THREADS, PROGRESS),
+        "xr.Dataset",
+        (
+            "What is observed over `way` (approach, retract) and the distance (by the name of its "
+            "parameter, with `zc` in metres for a physical case): `first_harmonic`, `phase`, "
+            "`peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`, "
+            "`physical_E_dis` …; the branches over `branch_point`."
+        ),
+    ),
+    "sweep": (
+        DATASET,
+        "xr.Dataset",
+        (
+            "The dataset, as `open` opens it: lazily from `out`. After Ctrl-C, the `result` of the "
+            "exception is the dataset with what is finished, and the same call goes on in `out`."
+        ),
+    ),
+    "window": (
+        tuple(entry for entry in DATASET if entry[0] != "chunk"),
+        "xr.Dataset",
+        (
+            "The sweep with `condition` over both parameters: no-contact, one-period-1, "
+            "second-state, subharmonic, irregular or undecided; `share` says how much of each "
+            "there is."
+        ),
+    ),
+    "basin": (
+        DATASET,
+        "xr.Dataset",
+        (
+            "`attractor` over the two entries of the state: an index into the attractors of the "
+            "attribute `attractors` (JSON), negative where there is none."
+        ),
+    ),
+    "lyapunov": (
+        (),
+        "Lyapunov",
+        "Exponents with their errors, and the points of the section.",
+    ),
+    "convergence": (
+        (),
+        "Convergence",
+        "The motion with each number of modes, and a verdict.",
+    ),
+    "contact-laws": (
+        (THREADS, PROGRESS),
+        "Record",
+        "`samples`: the motion under each contact law, by the names of the terminal's JSON.",
+    ),
+}
+
+# Studies that run over arrays of parameters.
+OVER_ARRAYS = {"simulate", "orbit"}
+
+HEAD = '''"""The function of every study. Written by signatures.py; do not edit by hand."""
+# ruff: noqa
+# fmt: off
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+from . import _datasets, _motions, _studies
+from ._arguments import Box, Progress, Varied
+from ._case import Case, Path
+from ._results import (
+    Attractors,
+    Convergence,
+    Lyapunov,
+    Modes,
+    Orbit,
+    Record,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from distributed import Client
+'''
+
+
+def main() -> int:
+    program, *rest = sys.argv[1:]
+    schemas = json.loads(subprocess.check_output([program, "schema"], text=True))
+    text = written(schemas)
+    if "--check" in rest:
+        if TARGET.read_text(encoding="utf-8") == text:
+            return 0
+        print(
+            f"{TARGET} is not what the library declares: run `cargo xtask signatures`"
+        )
+        return 1
+    TARGET.write_text(text, encoding="utf-8")
+    return 0
+
+
+def written(schemas: dict[str, Any]) -> str:
+    """The whole module."""
+    functions = [
+        function(name, study["about"], study["request"])
+        for name, study in schemas.items()
+        if name in PYTHON
+    ]
+    return "\n\n".join([HEAD.rstrip("\n"), *functions]) + "\n"
+
+
+def argument_name(option: str) -> str:
+    """The keyword argument of an option: `from` is Python's own word."""
+    return "from_" if option == "from" else option
+
+
+def function(name: str, about: str, schema: dict[str, Any]) -> str:
+    options = schema["properties"]
+    required = set(schema.get("required", ()))
+    extra, result, returns = PYTHON[name]
+    arguments, documents, passed = [], [], []
+    for option, declared in options.items():
+        argument = argument_name(option)
+        default = None if option in required else python_default(declared)
+        kind = annotation(option, declared, default)
+        arguments.append(
+            f"    {argument}: {kind}" + (f" = {default}" if default else "") + ","
+        )
+        documents.append((argument, kind, documentation(declared)))
+        passed.append(f'        "{option}": {argument},')
+    for argument, kind, default, text in extra:
+        arguments.append(f"    {argument}: {kind} = {default},")
+        documents.append((argument, kind, text))
+    python = name.replace("-", "_")
+    arrays = name in OVER_ARRAYS
+    if arrays:
+        documents.append(
+            (
+                "**parameters",
+                "Varied",
+                (
+                    "Keys of the case to change. Arrays (one-dimensional, or xarray's DataArrays) "
+                    "make a Dataset over them, each a dimension."
+                ),
+            )
+        )
+    quoted = f'"{result}"' if "xr." in result else result
+
+    def signature(keys: str, type_: str) -> str:
+        tail = [f"    **parameters: {keys},"] if keys else []
+        star = ["    *,"] if arguments else []
+        lines = ["    case: Case,", *star, *arguments, *tail]
+        return "\n".join([f"def {python}(", *lines, f") -> {type_}:"])
+
+    module = "_studies"
+    if name in {"modes", *OVER_ARRAYS}:
+        module = "_motions"
+    if extra[:1] == DATASET[:1]:
+        module = "_datasets"
+    further = "".join(f", {argument}" for argument, *_ in extra)
+    call = f"    return {module}.{python}(case, options{further}"
+    call += ", parameters)" if arrays else ")"
+    body = "\n".join(
+        [
+            docstring(about, documents, returns),
+            "    options = {",
+            *passed,
+            "    }",
+            call,
+        ]
+    )
+    if name == "orbit":
+        single = signature("float | str", "Orbit")
+        many = signature("Varied", '"xr.Dataset"')
+        whole = signature("Varied", quoted)
+        single = single.replace("(\n", "(  # type: ignore[overload-overlap]\n", 1)
+        return f"@overload\n{single} ...\n@overload\n{many} ...\n{whole}\n{body}"
+    return f"{signature('Varied' if arrays else '', quoted)}\n{body}"
+
+
+def kinds(declared: dict[str, Any]) -> list[str]:
+    found = declared.get("type")
+    if found is None:
+        options = declared.get("anyOf", []) + declared.get("oneOf", [])
+        return [kind for option in options for kind in kinds(option)]
+    return [found] if isinstance(found, str) else list(found)
+
+
+def words(declared: dict[str, Any]) -> list[str]:
+    """The words among which one chooses."""
+    found = list(declared.get("enum", []))
+    if "const" in declared:
+        found.append(declared["const"])
+    for option in declared.get("anyOf", []) + declared.get("oneOf", []):
+        found += words(option)
+    return [word for word in found if isinstance(word, str)]
+
+
+def annotation(option: str, declared: dict[str, Any], default: str | None) -> str:
+    choices = words(declared)
+    known = kinds(declared)
+    if choices:
+        kind = f"Literal[{', '.join(json.dumps(word) for word in choices)}]"
+    elif option == "box":
+        return "Box"
+    elif option == "over":
+        return "str | Sequence[str] | Mapping[str, Any]"
+    elif option in {"x", "y"}:
+        return "str | Mapping[str, Any]"
+    elif option == "attractors":
+        return "Iterable[Any] | None"
+    elif "object" in known:
+        kind = "Mapping[str, tuple[float | str, float | str]] | str"
+    elif "integer" in known and "array" in known:
+        kind = "int | Sequence[int]"
+    elif "array" in known:
+        return "Any"
+    elif "number" in known and "string" in known:
+        kind = "float | str"
+    else:
+        named = {
+            "integer": "int",
+            "number": "float",
+            "boolean": "bool",
+            "string": "str",
+        }
+        kind = next(named[k] for k in known if k in named)
+    return f"{kind} | None" if default == "None" else kind
+
+
+def python_default(declared: dict[str, Any]) -> str:
+    default = declared.get("default")
+    if default == [] or (isinstance(default, str) and not default):
+        return "None"
+    if isinstance(default, list) and len(set(default)) == 1:
+        default = default[0]  # the same in both regimes
+    if isinstance(default, int) and not isinstance(default, bool) and default >= 10_000:
+        return f"{default:_}"
+    return json.dumps(default) if isinstance(default, str) else repr(default)
+
+
+def documentation(declared: dict[str, Any]) -> str:
+    text = " ".join(declared.get("description", "").split())
+    for mark in "{}":
+        text = text.replace(mark, "`")
+    low, high = declared.get("minimum"), declared.get("maximum")
+    if high is not None and "integer" in kinds(declared):
+        text += f" ({low or 0} to {high})"
+    meanings = [
+        f"`{option['const']}`: {option['description']}"
+        for option in declared.get("oneOf", [])
+        if "const" in option and "description" in option
+    ]
+    return "; ".join([text, *meanings]) + "."
+
+
+def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -> str:
+    """In numpy's style."""
+
+    def indented(text: str) -> str:
+        return textwrap.fill(
+            text, 84, initial_indent=" " * 8, subsequent_indent=" " * 8
+        )
+
+    lines = [
+        "    Parameters",
+        "    ----------",
+        "    case : Case",
+        "        What is studied.",
+    ]
+    for argument, kind, text in documents:
+        lines += [f"    {argument} : {kind}", indented(text)]
+    lines += [
+        "",
+        "    Returns",
+        "    -------",
+        textwrap.fill(returns, 84, initial_indent="    ", subsequent_indent="    "),
+    ]
+    lines += [
+        "",
+        "    Raises",
+        "    ------",
+        "    ValueError",
+        "        Something that was asked for is not right.",
+        "    RuntimeError",
+        "        The computation did not succeed.",
+    ]
+    first = textwrap.fill(f"{about}.", 84, subsequent_indent="    ")
+    return f'    """{first}\n\n' + "\n".join(lines) + '\n    """'
+
+
+if __name__ == "__main__":
+    sys.exit(main())

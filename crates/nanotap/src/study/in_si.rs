@@ -1,0 +1,16 @@
+//! A motion with what it is in SI.
+
+use serde::Serialize;
+
+use crate::observe::PhysicalMotion;
+
+/// A motion in the model's units and, of a physical case, in SI.
+#[derive(Clone, Debug, Serialize)]
+pub struct InSi<M> {
+    /// In the model's units.
+    #[serde(flatten)]
+    pub motion: M,
+    /// In SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalMotion>,
+}

@@ -1,0 +1,221 @@
+//! Every study by name, from JSON to JSON: what the front ends iterate over.
+
+use nanotap_dynamics::Control;
+use schemars::{JsonSchema, Schema};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::Error;
+use crate::case::Case;
+use crate::case::document::CaseDocument;
+use crate::model::cantilever::Cantilever;
+use crate::study::recipe::Recipe;
+use crate::study::request::{read, schema};
+use crate::study::setpoint::at_setpoint;
+
+/// A study: what it is asked for, how it runs, what it reports.
+pub trait Study {
+    /// What every front end calls it.
+    const NAME: &'static str;
+    /// What it finds out, in a line.
+    const ABOUT: &'static str;
+    /// What it is asked for.
+    type Request: Serialize + DeserializeOwned + JsonSchema;
+    /// What it found.
+    type Report: Serialize;
+
+    /// What its progress counts, in the plural.
+    const COUNTED: &'static str = "steps";
+    /// Whether it chooses the distance itself, so that none is solved for a setpoint.
+    const ANY_DISTANCE: bool = false;
+
+    /// Studies `case`.
+    ///
+    /// # Errors
+    /// When the request is not right, or the computation does not succeed.
+    fn run(
+        case: &Case,
+        request: &Self::Request,
+        control: &Control<'_>,
+    ) -> Result<Self::Report, Error>;
+}
+
+/// A study whose report is a dataset, computed chunk by chunk.
+pub trait DatasetStudy {
+    /// What every front end calls it.
+    const NAME: &'static str;
+    /// What it finds out, in a line.
+    const ABOUT: &'static str;
+    /// What its progress counts, in the plural.
+    const COUNTED: &'static str;
+    /// What it is asked for.
+    type Request: Serialize + DeserializeOwned + JsonSchema;
+
+    /// What is to be computed of `case`.
+    ///
+    /// # Errors
+    /// When the request is not right, or what must be known beforehand cannot be found.
+    fn recipe(case: &Case, request: &Self::Request, control: &Control<'_>)
+    -> Result<Recipe, Error>;
+}
+
+/// A report with what it is of.
+#[derive(Debug, Serialize)]
+pub struct Document<'a, R: Serialize> {
+    /// What was found.
+    #[serde(flatten)]
+    pub report: &'a R,
+    /// The version of the program.
+    pub version: &'static str,
+    /// The case that was studied.
+    pub case: CaseDocument,
+}
+
+impl<'a, R: Serialize> Document<'a, R> {
+    /// Of a report on `case`.
+    pub fn new(report: &'a R, case: &'a Case) -> Self {
+        Self {
+            report,
+            version: env!("CARGO_PKG_VERSION"),
+            case: CaseDocument::of(case),
+        }
+    }
+}
+
+/// A study without its types.
+#[derive(Clone, Copy, Debug)]
+pub struct StudyEntry {
+    /// What every front end calls it.
+    pub name: &'static str,
+    /// What it finds out, in a line.
+    pub about: &'static str,
+    /// The JSON schema of its request.
+    pub request: fn() -> Schema,
+    /// What its progress counts.
+    pub counted: &'static str,
+    /// Whether it chooses the distance itself.
+    pub any_distance: bool,
+    /// Runs it.
+    pub run: Run,
+}
+
+/// How a study runs on a case: from the JSON of its request.
+#[derive(Clone, Copy, Debug)]
+pub enum Run {
+    /// To the JSON of its document.
+    Document(fn(&Case, Value, &Control<'_>) -> Result<String, Error>),
+    /// To what is to be computed into a dataset.
+    Dataset(fn(&Case, Value, &Control<'_>) -> Result<Recipe, Error>),
+}
+
+impl StudyEntry {
+    const fn of<S: Study>() -> Self {
+        Self {
+            name: S::NAME,
+            about: S::ABOUT,
+            request: schema::<S::Request>,
+            counted: S::COUNTED,
+            any_distance: S::ANY_DISTANCE,
+            run: Run::Document(|case, request, control| {
+                let request = read::<S::Request>(request)?;
+                let case = if S::ANY_DISTANCE {
+                    case.clone()
+                } else {
+                    at_setpoint(case.clone(), control)?.0
+                };
+                let report = S::run(&case, &request, control)?;
+                Ok(serde_json::to_string(&Document::new(&report, &case))?)
+            }),
+        }
+    }
+
+    const fn dataset<S: DatasetStudy>() -> Self {
+        Self {
+            name: S::NAME,
+            about: S::ABOUT,
+            request: schema::<S::Request>,
+            counted: S::COUNTED,
+            any_distance: false,
+            run: Run::Dataset(|case, request, control| {
+                let request = read::<S::Request>(request)?;
+                S::recipe(&at_setpoint(case.clone(), control)?.0, &request, control)
+            }),
+        }
+    }
+
+    /// The JSON of its document.
+    ///
+    /// # Errors
+    /// Those of the study; and when its report is a dataset.
+    pub fn document(
+        &self,
+        case: &Case,
+        request: Value,
+        control: &Control<'_>,
+    ) -> Result<String, Error> {
+        match self.run {
+            Run::Document(run) => run(case, request, control),
+            Run::Dataset(_) => Err(Error::input(
+                format!("{} leaves a dataset, not a document", self.name),
+                "compute its recipe into a folder",
+            )),
+        }
+    }
+
+    /// What is to be computed into a dataset.
+    ///
+    /// # Errors
+    /// Those of the study; and when its report is a document.
+    pub fn recipe(
+        &self,
+        case: &Case,
+        request: Value,
+        control: &Control<'_>,
+    ) -> Result<Recipe, Error> {
+        match self.run {
+            Run::Dataset(recipe) => recipe(case, request, control),
+            Run::Document(_) => Err(Error::input(
+                format!("{} leaves a document, not a dataset", self.name),
+                "take its document",
+            )),
+        }
+    }
+}
+
+/// Every study.
+pub static STUDIES: &[StudyEntry] = &[
+    StudyEntry::of::<super::modes::ModesStudy>(),
+    StudyEntry::of::<super::simulate::SimulateStudy>(),
+    StudyEntry::of::<super::orbit::OrbitStudy>(),
+    StudyEntry::of::<super::attractors::AttractorsStudy>(),
+    StudyEntry::of::<super::branch::BranchStudy>(),
+    StudyEntry::of::<super::approach::ApproachStudy>(),
+    StudyEntry::dataset::<super::sweep::SweepStudy>(),
+    StudyEntry::dataset::<super::window::WindowStudy>(),
+    StudyEntry::dataset::<super::basin::BasinStudy>(),
+    StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
+    StudyEntry::of::<super::convergence::ConvergenceStudy>(),
+    StudyEntry::of::<super::contact_laws::ContactLawsStudy>(),
+];
+
+/// The study that is called `name`.
+pub fn study(name: &str) -> Option<&'static StudyEntry> {
+    STUDIES.iter().find(|study| study.name == name)
+}
+
+/// The dimensionless cantilever of a case, for a study that needs one.
+///
+/// # Errors
+/// When it is an oscillator.
+pub(crate) fn cantilever<'a>(case: &'a Case, study: &str) -> Result<&'a Cantilever, Error> {
+    case.cantilever().ok_or_else(|| {
+        Error::input(
+            format!(
+                "{}: `{study}` needs a cantilever; this is an oscillator",
+                case.title()
+            ),
+            "an oscillator has one degree of freedom and no beam modes",
+        )
+    })
+}

@@ -1,0 +1,133 @@
+//! What a sweep is asked for.
+
+use nanotap_dynamics::Control;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Follow, Over, Starts, Sweep, SweepOptions};
+use crate::Error;
+use crate::case::Case;
+use crate::study::attractors::MOST_STARTS;
+use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::recipe::Recipe;
+use crate::study::registry::DatasetStudy;
+use crate::study::value::{Axes, Intervals};
+
+/// What a sweep is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SweepRequest {
+    /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
+    /// alpha4=1:1000:50:log in equal ratios; modes too; of a physical case also
+    /// drive.frequency=60kHz:80kHz:200; once or twice
+    #[schemars(extend("x-value" = "KEY=FROM:TO:COUNT", "x-required" = true))]
+    pub over: Axes,
+    /// Quasi-random starts at each value, spread over a box of states; without it, one start
+    /// from rest
+    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+    pub starts: Option<usize>,
+    /// Seed of the starts
+    #[schemars(extend("x-value" = "K"))]
+    pub seed: u64,
+    /// Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the linear response
+    /// to the drive
+    #[serde(rename = "box")]
+    #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+    pub sides: Intervals,
+    /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+    #[schemars(extend("x-value" = "A1,…"))]
+    pub state: Option<Vec<f64>>,
+    /// Start each value from the last state of the one before, along the first parameter: up,
+    /// down or both. A whole line is then one piece of work, lost when interrupted
+    #[schemars(extend("x-value" = "WAY"))]
+    pub follow: Follow,
+    /// Drive periods recorded
+    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+    pub periods: usize,
+    /// States kept, at the end of each of the last periods; without it, of every recorded one
+    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "K"))]
+    pub strobe: Option<usize>,
+    /// Drive periods discarded first; without it, as many as the motion is measured to need
+    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+    pub transient: Option<usize>,
+    /// Longest period looked for
+    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    pub max_period: usize,
+}
+
+impl Default for SweepRequest {
+    fn default() -> Self {
+        let options = SweepOptions::new(Vec::new());
+        Self {
+            over: Axes::default(),
+            starts: None,
+            seed: 1,
+            sides: Intervals::default(),
+            state: None,
+            follow: options.follow,
+            periods: options.periods,
+            strobe: None,
+            transient: options.transient,
+            max_period: options.max_period,
+        }
+    }
+}
+
+impl SweepRequest {
+    /// The sweep of `case`, checked.
+    ///
+    /// # Errors
+    /// When a parameter or a start is none, or there is too much of something.
+    pub fn sweep(&self, case: &Case) -> Result<Sweep, Error> {
+        let starts = match (self.starts, &self.state) {
+            (Some(_), Some(_)) => {
+                return Err(Error::input(
+                    "starts and state: the starts are drawn, or given",
+                    "leave {starts} or {state} out",
+                ));
+            }
+            (None, _) if self.sides != Intervals::default() => {
+                return Err(Error::option(
+                    "box",
+                    "the sides are those of the starts",
+                    "say how many with {starts}",
+                ));
+            }
+            (Some(count), None) => Starts::Seeded {
+                count,
+                seed: self.seed,
+                sides: self.sides.numbers()?,
+            },
+            (None, Some(state)) => Starts::Given(state.clone()),
+            (None, None) => Starts::Rest,
+        };
+        let over = self.over.0.iter();
+        let over = over.map(|axis| Over::parse(axis, case));
+        let options = SweepOptions {
+            starts,
+            follow: self.follow,
+            periods: self.periods,
+            strobe: self.strobe.unwrap_or(self.periods).min(self.periods),
+            transient: self.transient,
+            max_period: self.max_period,
+            ..SweepOptions::new(over.collect::<Result<_, _>>()?)
+        };
+        Ok(Sweep::new(case.clone(), options)?)
+    }
+}
+
+/// Runs over one or two parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepStudy;
+
+impl DatasetStudy for SweepStudy {
+    const NAME: &'static str = "sweep";
+    const ABOUT: &'static str =
+        "How the motion changes with one or two parameters, from any number of starts";
+    const COUNTED: &'static str = "values";
+    type Request = SweepRequest;
+
+    fn recipe(case: &Case, request: &SweepRequest, _: &Control<'_>) -> Result<Recipe, Error> {
+        Ok(Recipe::Sweep(Box::new(request.sweep(case)?)))
+    }
+}

@@ -1,0 +1,37 @@
+//! How many threads work on a study. The result is the same for any number.
+
+use crate::Error;
+use crate::study::limits::MOST_THREADS;
+
+/// The number of threads, if it can be had; `None`: one a core.
+///
+/// # Errors
+/// When there are none, or more than any machine has.
+pub fn checked(threads: Option<usize>) -> Result<Option<usize>, Error> {
+    match threads {
+        Some(number) if !(1..=MOST_THREADS).contains(&number) => Err(Error::option(
+            "threads",
+            format!("{number} cannot work"),
+            format!("give a whole number from 1 to {MOST_THREADS}"),
+        )),
+        other => Ok(other),
+    }
+}
+
+/// Does `work` on so many threads; `None`: one a core.
+///
+/// # Errors
+/// As [`checked`], and when the threads cannot be started.
+pub fn install<R: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> R + Send,
+) -> Result<R, Error> {
+    let Some(threads) = checked(threads)? else {
+        return Ok(work());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map(|pool| pool.install(work))
+        .map_err(|error| Error::numerics(format!("cannot start {threads} threads: {error}")))
+}

@@ -1,0 +1,396 @@
+//! Values of options that are more than a number or a word. Each is read from what is easiest
+//! to type at a terminal, `alpha4=5:40`, and from what a program would say,
+//! `{"alpha4": [5, 40]}`.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::Value;
+
+use crate::Error;
+use crate::case::{Case, Key};
+
+/// Most fixed steps a drive period.
+const MOST_STEPS: u64 = 10_000_000;
+
+/// A value of a parameter: a number of the model, or a text with its unit, `"70 kHz"`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Amount(String);
+
+impl Amount {
+    /// As it was written; a number in the fewest digits that give it back.
+    pub fn text(&self) -> &str {
+        &self.0
+    }
+
+    fn of(value: &Value) -> Option<Self> {
+        match value {
+            Value::Number(number) => Some(Self(number.to_string())),
+            Value::String(text) if !text.trim().is_empty() => Some(Self(text.trim().to_owned())),
+            _ => None,
+        }
+    }
+}
+
+impl From<f64> for Amount {
+    fn from(value: f64) -> Self {
+        Self(value.to_string())
+    }
+}
+
+impl From<&str> for Amount {
+    fn from(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+}
+
+impl fmt::Display for Amount {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(formatter)
+    }
+}
+
+impl<'de> Deserialize<'de> for Amount {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        Self::of(&value).ok_or_else(|| {
+            D::Error::custom(format!(
+                "{value} is neither a number nor a quantity with its unit"
+            ))
+        })
+    }
+}
+
+impl JsonSchema for Amount {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Amount".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"type": ["number", "string"]})
+    }
+}
+
+/// The parameter that is called `name`, and values of it, each behind the option that gives it.
+///
+/// # Errors
+/// When there is no such parameter, or a value is none.
+pub(crate) fn key_and_ends<const N: usize>(
+    case: &Case,
+    name: &str,
+    given: [(&str, &Amount); N],
+) -> Result<(Key, [f64; N]), Error> {
+    let key = case.key(name)?;
+    let mut values = [0.0; N];
+    for (value, (option, amount)) in values.iter_mut().zip(given) {
+        *value = case
+            .value(key, amount.text())
+            .map_err(|error| Error::from(error).at(option))?;
+    }
+    Ok((key, values))
+}
+
+/// A name with two ends, `alpha4=5:40`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Interval {
+    /// What has the ends.
+    pub name: String,
+    /// The lower end.
+    pub low: Amount,
+    /// The upper end.
+    pub high: Amount,
+}
+
+impl Interval {
+    fn parse(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is no name with two ends; write it as in alpha4=5:40");
+        let (name, range) = text.split_once('=').ok_or_else(wrong)?;
+        let (low, high) = range.split_once(':').ok_or_else(wrong)?;
+        let end = |end: &str| Amount::of(&end.into()).ok_or_else(wrong);
+        let name = name.trim();
+        if name.is_empty() {
+            return Err(wrong());
+        }
+        Ok(Self {
+            name: name.to_owned(),
+            low: end(low)?,
+            high: end(high)?,
+        })
+    }
+
+    fn pair(name: &str, ends: &Value) -> Result<Self, String> {
+        let wrong = || format!("{name}: {ends} are no two ends; write a lower and an upper one");
+        match ends.as_array().map(Vec::as_slice) {
+            Some([low, high]) => Ok(Self {
+                name: name.to_owned(),
+                low: Amount::of(low).ok_or_else(wrong)?,
+                high: Amount::of(high).ok_or_else(wrong)?,
+            }),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// Names with their ends: `["a1=-1:1"]` or `{"a1": [-1, 1]}`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Intervals(pub Vec<Interval>);
+
+impl Serialize for Intervals {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(
+            self.0
+                .iter()
+                .map(|side| format!("{}={}:{}", side.name, side.low, side.high)),
+        )
+    }
+}
+
+impl<'de> Deserialize<'de> for Intervals {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        let text = |value: &Value| {
+            let wrong = || format!("{value} is no text as in a1=-1:1");
+            Interval::parse(value.as_str().ok_or_else(wrong)?)
+        };
+        let intervals: Result<Vec<Interval>, String> = match &value {
+            Value::Array(list) => list.iter().map(text).collect(),
+            Value::Object(map) => map
+                .iter()
+                .map(|(name, ends)| Interval::pair(name, ends))
+                .collect(),
+            other => text(other).map(|interval| vec![interval]),
+        };
+        intervals.map(Self).map_err(D::Error::custom)
+    }
+}
+
+impl JsonSchema for Intervals {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Intervals".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": ["array", "object", "string"],
+            "items": {"type": "string"},
+            "additionalProperties": {"type": "array", "minItems": 2, "maxItems": 2},
+        })
+    }
+}
+
+impl Intervals {
+    /// Each with its ends as plain numbers, for entries of a state.
+    ///
+    /// # Errors
+    /// When an end is not a finite number.
+    pub fn numbers(&self) -> Result<Vec<(String, f64, f64)>, Error> {
+        let number = |interval: &Interval, end: &Amount| {
+            let value = end.text().parse::<f64>().ok().filter(|v| v.is_finite());
+            value.ok_or_else(|| {
+                Error::input(
+                    format!("{}: `{end}` is no finite number", interval.name),
+                    "write a side as in a1=-1:1",
+                )
+            })
+        };
+        self.0
+            .iter()
+            .map(|side| {
+                Ok((
+                    side.name.clone(),
+                    number(side, &side.low)?,
+                    number(side, &side.high)?,
+                ))
+            })
+            .collect()
+    }
+}
+
+impl Serialize for Interval {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{}={}:{}", self.name, self.low, self.high))
+    }
+}
+
+impl<'de> Deserialize<'de> for Interval {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Intervals(mut intervals) = Intervals::deserialize(deserializer)?;
+        match (intervals.pop(), intervals.is_empty()) {
+            (Some(interval), true) => Ok(interval),
+            _ => Err(D::Error::custom(
+                "one parameter with its range is needed, as in alpha4=5:40",
+            )),
+        }
+    }
+}
+
+impl JsonSchema for Interval {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Interval".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": ["string", "object"],
+            "minProperties": 1,
+            "maxProperties": 1,
+            "additionalProperties": {"type": "array", "minItems": 2, "maxItems": 2},
+        })
+    }
+}
+
+/// Parameters with their values, each as in `omega=2:4:400`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Axes(pub Vec<String>);
+
+impl Axes {
+    /// The names of the parameters.
+    pub fn names(&self) -> Vec<&str> {
+        self.0.iter().map(|axis| name_of(axis)).collect()
+    }
+}
+
+/// What stands before the values.
+fn name_of(axis: &str) -> &str {
+    axis.split_once('=').map_or(axis, |(name, _)| name).trim()
+}
+
+impl<'de> Deserialize<'de> for Axes {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Given {
+            One(String),
+            Several(Vec<String>),
+        }
+        Ok(Self(match Given::deserialize(deserializer)? {
+            Given::One(axis) => vec![axis],
+            Given::Several(axes) => axes,
+        }))
+    }
+}
+
+impl JsonSchema for Axes {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Axes".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"type": ["array", "string"], "items": {"type": "string"}})
+    }
+}
+
+/// Fixed steps a drive period in each regime, free flight and contact: `200`, or `[200, 400]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Steps(pub [u32; 2]);
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self([200, 200])
+    }
+}
+
+impl<'de> Deserialize<'de> for Steps {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        let wrong = || {
+            D::Error::custom(format!(
+                "{value} are no steps a drive period: one number from 1 to {MOST_STEPS}, or those in \
+                 free flight and in contact, as in 200,400"
+            ))
+        };
+        let step = |value: &Value| {
+            let steps = value
+                .as_u64()
+                .filter(|steps| (1..=MOST_STEPS).contains(steps));
+            steps.map(|steps| steps as u32).ok_or_else(wrong)
+        };
+        match &value {
+            Value::Array(both) => match both.as_slice() {
+                [both] => Ok(Self([step(both)?; 2])),
+                [free, contact] => Ok(Self([step(free)?, step(contact)?])),
+                _ => Err(wrong()),
+            },
+            both => Ok(Self([step(both)?; 2])),
+        }
+    }
+}
+
+impl JsonSchema for Steps {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Steps".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let steps = json_schema!({"type": "integer", "minimum": 1, "maximum": MOST_STEPS});
+        json_schema!({
+            "type": ["integer", "array"],
+            "minimum": 1,
+            "maximum": MOST_STEPS,
+            "items": steps,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn both_ways_of_writing_mean_the_same() {
+        let typed: Intervals = serde_json::from_value(json!(["a1=-1:1", "v2 = -4:4"])).unwrap();
+        let said: Intervals =
+            serde_json::from_value(json!({"a1": [-1, 1], "v2": [-4, 4]})).unwrap();
+        assert_eq!(typed, said);
+        let back: Intervals =
+            serde_json::from_value(serde_json::to_value(&typed).unwrap()).unwrap();
+        assert_eq!(back, typed);
+        assert_eq!(
+            typed.numbers().unwrap(),
+            [("a1".to_owned(), -1.0, 1.0), ("v2".to_owned(), -4.0, 4.0)]
+        );
+    }
+
+    #[test]
+    fn what_has_no_two_ends_is_refused() {
+        for wrong in [
+            json!(["a1"]),
+            json!(["=1:2"]),
+            json!({"a1": [1]}),
+            json!({"a1": 3}),
+            json!(4),
+        ] {
+            assert!(serde_json::from_value::<Intervals>(wrong).is_err());
+        }
+        let quantities: Intervals =
+            serde_json::from_value(json!({"drive.frequency": ["60 kHz", 7e4]})).unwrap();
+        assert!(quantities.numbers().is_err());
+    }
+}

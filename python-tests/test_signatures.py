@@ -1,0 +1,55 @@
+"""Functions are what the library declares: names, defaults and documentation."""
+
+import inspect
+import json
+
+import nanotap
+import pytest
+from nanotap import _nanotap
+
+STUDIES = {
+    name: (about, json.loads(schema)) for name, about, _, schema in _nanotap.studies()
+}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_function_has_the_options_that_the_study_declares(name):
+    about, schema = STUDIES[name]
+    function = getattr(nanotap, name.replace("-", "_"))
+    parameters = inspect.signature(function).parameters
+    documentation = " ".join(inspect.getdoc(function).split())
+    assert documentation.startswith(" ".join(about.split()))
+    for option, declared in schema["properties"].items():
+        argument = parameters["from_" if option == "from" else option]
+        words = " ".join(declared["description"].split())
+        assert words.replace("{", "`").replace("}", "`") in documentation
+        if option in schema.get("required", ()):
+            assert argument.default is inspect.Parameter.empty
+        elif isinstance(declared.get("default"), int | float | str):
+            assert argument.default == (declared["default"] or argument.default)
+
+
+def test_misspelt_arguments_are_told_as_such(regular):
+    with pytest.raises(TypeError, match="did you mean period"):
+        nanotap.orbit(regular, perod=2)
+    with pytest.raises(TypeError, match="startz"):
+        nanotap.attractors(regular, startz=2)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "words"),
+    [
+        ("simulate", {"periods": 10**15}, "from 1 to 10000000"),
+        ("orbit", {"period": 2**64 - 1}, "from 1 to 10000"),
+        ("attractors", {"threads": 10**9}, "from 1 to 1024"),
+        ("attractors", {"max_period": 10**9}, "from 1 to 10000"),
+    ],
+)
+def test_absurd_sizes_are_refused_with_the_limit(regular, name, arguments, words):
+    with pytest.raises(ValueError, match=words):
+        getattr(nanotap, name)(regular, **arguments)
+
+
+def test_contact_laws_compares_the_samples(regular):
+    found = nanotap.contact_laws(regular)
+    assert len(found.samples) >= 2

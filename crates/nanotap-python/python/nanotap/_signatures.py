@@ -219,7 +219,7 @@ def orbit(
 def attractors(
     case: Case,
     *,
-    starts: int = 256,
+    starts: int | None = None,
     seed: int = 1,
     box: Box = None,
     max_period: int = 64,
@@ -233,14 +233,18 @@ def attractors(
     ----------
     case : Case
         What is studied.
-    starts : int
-        Starts, spread evenly over a box of states (1 to 10000000).
+    starts : int | None
+        Starts, spread evenly over one box of states. Without it, starts of every
+        size, from the resonant response down to below the gap, go on until the
+        share of starts that may lead to motions not found is below 0.2 % (with 95 %
+        confidence), or 5000 are done (1 to 10000000).
     seed : int
         Seed of the starts: the same seed gives the same answer on any number of
         threads.
     box : Box
-        Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the
-        linear response to the drive.
+        Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived
+        from the linear response to the drive. 256 starts if `starts` says no
+        number.
     max_period : int
         Longest period looked for (1 to 10000).
     unstable : int

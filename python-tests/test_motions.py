@@ -20,7 +20,11 @@ def terminal(tmp_path, case, *arguments):
     done = subprocess.run(
         command, cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    return json.loads(done.stdout)
+    document = json.loads(done.stdout)
+    # What a caller of Python has anyway.
+    assert document.pop("version") == nanotap.__version__
+    assert document.pop("case") == case.to_dict()
+    return document
 
 
 def test_a_run_has_the_terminals_numbers(regular, tmp_path):

@@ -121,17 +121,6 @@ pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
     Ok(case.called(&title(arguments)))
 }
 
-/// The dimensionless cantilever that the arguments describe, for `command`. What puts a
-/// physical case in doubt is said; its notes are `nanotap case`'s.
-fn cantilever(
-    arguments: &CaseArguments,
-    command: &str,
-    output: &Output,
-) -> Result<Cantilever, Failure> {
-    let case = crate::given_case::GivenCase::of(arguments, output)?;
-    cantilever_of(&case, command)
-}
-
 /// The dimensionless cantilever of a case, for `command`.
 fn cantilever_of(case: &Case, command: &str) -> Result<Cantilever, Failure> {
     case.cantilever().cloned().ok_or_else(|| {

@@ -3,18 +3,19 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::control::Control;
 use nanotap::model::beam::Modes;
-use nanotap::model::cantilever::Cantilever;
-use nanotap::study::modes::{ModeTable, damping_ratio, shapes_figure};
+use nanotap::model::parameter::Parameter;
+use nanotap::study::modes::{ModeTable, ModesRequest, ModesStudy, damping_ratio, shapes_figure};
+use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::given_case::GivenCase;
 use crate::output::Output;
+use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
-
-/// Points along the beam in the table of mode shapes.
-const POINTS: usize = 201;
 
 /// Mode shapes and frequencies, in free flight and in contact.
 #[derive(Args, Debug)]
@@ -22,35 +23,37 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
     #[command(flatten)]
+    request: Request<ModesRequest>,
+    #[command(flatten)]
     out: OutArgument,
     #[command(flatten)]
     plot: PlotArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let case = super::cantilever(&arguments.case, "nanotap modes", output)?;
-    let table = ModeTable::new(&case)?;
-    let beam = Modes::new(case.modes).map_err(|error| Failure::numerics(error.to_string()))?;
+    let request = arguments.request.read()?;
+    let studied = GivenCase::of(&arguments.case, output)?;
+    let table = ModesStudy::run(&studied, &request, &Control::default())?;
+    let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     if let Some(path) = &arguments.out.out {
         file::ending(path, &["csv"])?;
-        file::write(path, shapes(&beam).as_bytes())?;
+        file::write(path, shapes(&beam, request.points).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
         shapes_figure(&beam).write(path)?;
     }
-    let title = super::title(&arguments.case);
-    output.result(&table, |table| text(&title, &case, table))
+    output.study(&studied, &table, |table| text(&studied, table))
 }
 
 /// The mode shapes φ_j(ξ) as CSV, a row a point.
-fn shapes(beam: &Modes) -> String {
+fn shapes(beam: &Modes, points: usize) -> String {
     let names: Vec<String> = beam
         .iter()
         .map(|mode| format!("phi{}", mode.number))
         .collect();
     let mut csv = format!("xi,{}\n", names.join(","));
-    for point in 0..POINTS {
-        let xi = point as f64 / (POINTS - 1) as f64;
+    for point in 0..points {
+        let xi = point as f64 / (points - 1) as f64;
         let shapes = beam.shapes(xi);
         csv.push_str(&number::row(
             std::iter::once(xi).chain(shapes.iter().copied()),
@@ -60,11 +63,13 @@ fn shapes(beam: &Modes) -> String {
     csv
 }
 
-fn text(title: &str, case: &Cantilever, table: &ModeTable) -> String {
+fn text(studied: &GivenCase, table: &ModeTable) -> String {
+    let parameter = |which| number::chosen(studied.cantilever().map_or(f64::NAN, |c| c.get(which)));
     let mut text = style::bold(&format!(
-        "{title}: {} of the cantilever, tip mass α₁ = {}",
-        number::counted(case.modes, "mode", "modes"),
-        number::chosen(case.alpha1),
+        "{}: {} of the cantilever, tip mass α₁ = {}",
+        studied.title(),
+        number::counted(table.modes, "mode", "modes"),
+        parameter(Parameter::Alpha1),
     ));
     text.push('\n');
     let regimes = [
@@ -75,7 +80,7 @@ fn text(title: &str, case: &Cantilever, table: &ModeTable) -> String {
             &table.free_eigenvalues,
         ),
         (
-            format!("in contact, α₄ = {}", number::chosen(case.alpha4)),
+            format!("in contact, α₄ = {}", parameter(Parameter::Alpha4)),
             &table.contact,
             &table.exact_contact,
             &table.contact_eigenvalues,

@@ -111,7 +111,8 @@ pub struct Interval {
 
 impl Interval {
     fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no name with two ends; write it as in alpha4=5:40");
+        let wrong =
+            || format!("`{text}` is no name with two ends; write it as in a1=-1:1 or alpha4=5:40");
         let (name, range) = text.split_once('=').ok_or_else(wrong)?;
         let (low, high) = range.split_once(':').ok_or_else(wrong)?;
         let end = |end: &str| Amount::of(&end.into()).ok_or_else(wrong);

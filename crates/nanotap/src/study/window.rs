@@ -305,7 +305,7 @@ impl WindowRequest {
         let count = self.over.0.len();
         if count != 2 {
             return Err(Error::input(
-                format!("{count} parameters make no window"),
+                format!("{count} parameters make no window: two are needed"),
                 "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
             ));
         }

@@ -30,8 +30,7 @@ def peer(name: str, program: str, method: str | None, settings, **more) -> Peer:
 
 
 PEERS = [
-    peer("nanotap", "nanotap", "one", [], threads=True),
-    peer("nanotap, ensembles of 8", "nanotap", "ensemble", [], threads=True),
+    peer("nanotap", "nanotap", None, [], threads=True),
     peer("heyoka", "heyoka", "one", [*TOLERANCES, 1e-15]),
     peer("heyoka, batches of 8", "heyoka", "batch", [*TOLERANCES, 1e-15]),
     peer(

@@ -43,7 +43,7 @@ const HEAD: &str = "\
 <!-- Written by `cargo xtask bench`. -->
 
 The fastest of the samples of each bench, on one core unless the bench says otherwise: other
-programs only ever add time. A `period` is 100 drive periods, of an ensemble 100 of each motion.
+programs only ever add time. A `period` is 100 drive periods.
 `crates/*/benches` says what each does, `docs/performance.md` what follows from them.
 ";
 

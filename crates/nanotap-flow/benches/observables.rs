@@ -11,7 +11,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::accumulate::{Accumulator, Request};
-use nanotap_flow::{Drive, Exit, Flow, HarmonicVector, Output, Regime, System};
+use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System, Transition};
 
 const MODES: [usize; 6] = [1, 2, 3, 5, 10, 20];
 /// Periods a run.
@@ -81,13 +81,13 @@ fn cantilever(n: usize) -> Cantilever {
     };
     let tip = row(0);
     let gap = tip.clone().with_tone(0, 0.1, 0.0);
-    let exits = vec![
-        vec![Exit::new(gap.clone(), 1)],
-        vec![Exit::new(gap.scaled(-1.0), 0)],
+    let transitions = vec![
+        vec![Transition::new(gap.clone(), 1)],
+        vec![Transition::new(gap.scaled(-1.0), 0)],
     ];
     let regimes = vec![regime(0, 0.0, 0.0), regime(1, STIFFNESS, DAMPING)];
     Cantilever {
-        system: Arc::new(System::new(drive.clone(), regimes, exits).expect("a system")),
+        system: Arc::new(System::new(drive.clone(), regimes, transitions).expect("a system")),
         rate: row(n).with_tone(0, 0.0, 0.1 * OMEGA),
         tip,
         gap,

@@ -66,7 +66,9 @@ pub enum FlowError {
         limit: f64,
     },
     /// The starting state lies in no regime.
-    #[error("the starting state lies in no regime: every regime's exit is already passed there")]
+    #[error(
+        "the starting state lies in no regime: every regime's transition is already passed there"
+    )]
     NoRegime,
     /// The motion left the range of double precision.
     #[error("the motion grew beyond the range of double precision at time {time}")]
@@ -76,15 +78,15 @@ pub enum FlowError {
     },
     /// Switches pile up at one instant and no sticking regime was given.
     #[error(
-        "switches accumulate at time {time} (chatter) and the exit names no sticking regime \
+        "switches accumulate at time {time} (chatter) and the transition names no sticking regime \
          in which the motion could go on"
     )]
     Accumulation {
         /// When.
         time: f64,
     },
-    /// An exit names a regime that is not there.
-    #[error("an exit leads to regime {target}, but there are {regimes}")]
+    /// A transition names a regime that is not there.
+    #[error("a transition leads to regime {target}, but there are {regimes}")]
     Target {
         /// The regime named.
         target: usize,

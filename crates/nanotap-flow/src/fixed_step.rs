@@ -101,7 +101,7 @@ impl<'a> FixedStep<'a> {
     }
 
     fn passed(&self, t: f64) -> Option<usize> {
-        self.system.exits()[self.regime]
+        self.system.transitions()[self.regime]
             .iter()
             .find(|e| self.value(&e.guard, &self.state, t) <= 0.0)
             .map(|e| e.target)
@@ -114,8 +114,11 @@ impl<'a> FixedStep<'a> {
     fn field(&self, x: &DVector<f64>, t: f64) -> DVector<f64> {
         let mut regime = self.regime;
         if self.switching == Switching::EveryStage {
-            let exits = &self.system.exits()[regime];
-            if let Some(e) = exits.iter().find(|e| self.value(&e.guard, x, t) <= 0.0) {
+            let transitions = &self.system.transitions()[regime];
+            if let Some(e) = transitions
+                .iter()
+                .find(|e| self.value(&e.guard, x, t) <= 0.0)
+            {
                 regime = e.target;
             }
         }

@@ -1,10 +1,10 @@
 //! Running a system: from switch to switch in modal coordinates, one drive period
 //! at a time.
 
-use crate::crossing::Statistics;
 use crate::motion::Motion;
-use crate::pack::Pack;
 use crate::regime::Regime;
+use crate::search::Statistics;
+use crate::simd::ComplexVector;
 use crate::system::{Switch, System};
 use crate::{Complex, FlowError};
 use std::sync::Arc;
@@ -26,8 +26,8 @@ pub struct SegmentView<'a> {
     pub factors: &'a [Complex],
     /// Modal coordinates and the tones' phasors at its start, and what they are multiplied by
     /// on the way.
-    pub(crate) packed: &'a [[Pack; 2]],
-    pub(crate) turns: &'a [[Pack; 2]],
+    pub(crate) packed: &'a [ComplexVector],
+    pub(crate) turns: &'a [ComplexVector],
 }
 
 impl SegmentView<'_> {
@@ -44,8 +44,8 @@ pub struct SwitchView<'a> {
     pub system: &'a System,
     /// The change of modal coordinates.
     pub switch: &'a Switch,
-    /// The number of the exit taken out of `switch.from`.
-    pub exit: usize,
+    /// The number of the transition taken out of `switch.from`.
+    pub transition: usize,
     /// Whether it ended chatter: the motion goes on in the sticking regime.
     pub stuck: bool,
     /// When it happens, within its drive period.

@@ -99,9 +99,13 @@ impl Jacobian {
         let mut x = DVector::zeros(view.system.dimension());
         let modal = view.modal.iter().copied();
         regime.to_state(view.system.drive(), modal, view.phase, x.as_mut_slice());
-        let saltation =
-            view.system
-                .saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
+        let saltation = view.system.saltation(
+            view.switch.from,
+            view.transition,
+            view.stuck,
+            &x,
+            view.phase,
+        );
         self.columns =
             &view.switch.to_modal * (saltation * (&view.switch.from_modal * &self.columns));
     }

@@ -1,7 +1,7 @@
 //! The exact flow of a harmonically forced piecewise-linear system.
 //!
 //! A [`System`] has regimes, each a linear equation `ẋ = A x + f(t)` with a
-//! harmonic `f`, and exits that lead from one regime to another when a guard (a
+//! harmonic `f`, and transitions that lead from one regime to another when a guard (a
 //! scalar linear in the state, with harmonic terms) falls to zero, optionally
 //! through a reset such as a coefficient of restitution. Inside a regime the
 //! solution is written down in closed form in the eigenbasis of `A`; nothing is
@@ -9,8 +9,8 @@
 //!
 //! - [`regime`]: one linear regime, its spectral basis and its forced response;
 //! - [`signal`]: what any linear output is inside a regime, a sum of decaying
-//!   complex exponentials; [`crossing`], [`extrema`] and [`integral`] work on it;
-//! - [`system`]: regimes and exits together, with every switch a precomputed
+//!   complex exponentials; [`search`], [`extrema`] and [`integral`] work on it;
+//! - [`system`]: regimes and transitions together, with every switch a precomputed
 //!   change of basis; [`flow`] runs it, [`trajectory`] records it;
 //! - [`accumulate`]: exact observables of a motion while it runs, at the price of the motion;
 //! - [`jacobian`] and [`sensitivity`]: derivatives with respect to the state and
@@ -25,10 +25,8 @@
 #![allow(clippy::inline_always)]
 
 pub mod accumulate;
-pub mod crossing;
 mod double_double;
 pub mod drive;
-pub mod ensemble;
 pub mod error;
 pub mod extrema;
 pub mod fixed_step;
@@ -36,13 +34,12 @@ pub mod flow;
 pub mod harmonic;
 pub mod integral;
 pub mod jacobian;
-mod lattice;
 mod motion;
-mod pack;
-mod range;
 pub mod regime;
+pub mod search;
 pub mod sensitivity;
 pub mod signal;
+mod simd;
 pub mod spectral;
 pub mod system;
 pub mod trajectory;
@@ -51,11 +48,10 @@ pub mod trajectory;
 pub type Complex = nalgebra::Complex<f64>;
 
 pub use drive::Drive;
-pub use ensemble::Ensemble;
 pub use error::FlowError;
 pub use flow::{Flow, Observer};
 pub use harmonic::{HarmonicVector, Output};
 pub use regime::Regime;
 pub use spectral::SpectralBasis;
-pub use system::{Exit, Onset, Reset, Sticking, System};
+pub use system::{Onset, Reset, Sticking, System, Transition};
 pub use trajectory::{Event, Trajectory};

@@ -1,7 +1,7 @@
 //! One linear regime, `ẋ = A x + f(t)` with harmonic `f`, solved in closed form.
 
-use crate::pack::{Pack, WIDTH};
 use crate::signal::relaxation_masks;
+use crate::simd::{ComplexVector, Vector, layout};
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
 use nalgebra::{DMatrix, DVector};
 
@@ -150,7 +150,7 @@ pub struct ModalOutput {
 /// coordinates first, then the tones' phasors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Kernel {
-    pub(crate) packs: Vec<KernelPack>,
+    pub(crate) vectors: Vec<KernelVectors>,
     pub(crate) count: usize,
     pub(crate) constant: f64,
     /// The largest `|λ|`.
@@ -161,14 +161,14 @@ pub(crate) struct Kernel {
 
 /// Four terms of a kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct KernelPack {
-    pub(crate) decay: Pack,
-    pub(crate) frequency: Pack,
-    pub(crate) weight: [Pack; 2],
+pub(crate) struct KernelVectors {
+    pub(crate) decay: Vector,
+    pub(crate) frequency: Vector,
+    pub(crate) weight: ComplexVector,
     /// `|λ|³`.
-    pub(crate) cube: Pack,
+    pub(crate) cube: Vector,
     /// Which terms each lower bound follows.
-    pub(crate) masks: [Pack; 2],
+    pub(crate) masks: ComplexVector,
 }
 
 impl Kernel {
@@ -187,7 +187,7 @@ impl Kernel {
             .zip(output.tones.iter().copied());
         let terms: Vec<(Complex, Complex)> = modal.chain(tones).collect();
         let mut kernel = Self {
-            packs: vec![KernelPack::default(); terms.len().div_ceil(WIDTH)],
+            vectors: vec![KernelVectors::default(); layout::vectors_for(terms.len())],
             count: terms.len(),
             constant: output.constant,
             ..Self::default()
@@ -195,22 +195,30 @@ impl Kernel {
         let rates: Vec<Complex> = terms.iter().map(|t| t.0).collect();
         let masks = relaxation_masks(&rates);
         for (k, (rate, weight)) in terms.into_iter().enumerate() {
-            let (pack, i) = (&mut kernel.packs[k / WIDTH], k % WIDTH);
-            for (lanes, mask) in pack.masks.iter_mut().zip(masks[k]) {
+            let (vector, i) = layout::place(k);
+            let vector = &mut kernel.vectors[vector];
+            for (lanes, mask) in vector.masks.iter_mut().zip(masks[k]) {
                 lanes[i] = mask;
             }
             let norm = rate.norm();
-            pack.decay[i] = rate.re;
-            pack.frequency[i] = rate.im;
-            pack.weight[0][i] = weight.re;
-            pack.weight[1][i] = weight.im;
-            pack.cube[i] = norm.powi(3);
+            vector.decay[i] = rate.re;
+            vector.frequency[i] = rate.im;
+            vector.weight[0][i] = weight.re;
+            vector.weight[1][i] = weight.im;
+            vector.cube[i] = norm.powi(3);
             if weight.norm() > 0.0 {
                 kernel.fastest = kernel.fastest.max(norm);
                 kernel.grows |= rate.re > 0.0;
             }
         }
         kernel
+    }
+
+    /// The rate `λ` of term `k`.
+    pub(crate) fn rate(&self, k: usize) -> Complex {
+        let (vector, lane) = layout::place(k);
+        let vector = &self.vectors[vector];
+        Complex::new(vector.decay[lane], vector.frequency[lane])
     }
 }
 

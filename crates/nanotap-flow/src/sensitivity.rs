@@ -20,9 +20,9 @@ use nalgebra::{DMatrix, DVector};
 pub struct SystemTangent {
     /// `∂A`, `∂f` of each regime.
     pub regimes: Vec<RegimeTangent>,
-    /// `∂guard` of each exit of each regime.
+    /// `∂guard` of each transition of each regime.
     pub guards: Vec<Vec<Output>>,
-    /// `∂reset` of each exit of each regime, where the exit has a reset.
+    /// `∂reset` of each transition of each regime, where the transition has a reset.
     pub resets: Vec<Vec<Option<Reset>>>,
     /// `∂ ln T` of the drive period.
     pub log_period: f64,
@@ -48,11 +48,15 @@ impl SystemTangent {
         Self {
             regimes: vec![regime; system.regimes().len()],
             guards: system
-                .exits()
+                .transitions()
                 .iter()
                 .map(|e| e.iter().map(|e| e.guard.scaled(0.0)).collect())
                 .collect(),
-            resets: system.exits().iter().map(|e| vec![None; e.len()]).collect(),
+            resets: system
+                .transitions()
+                .iter()
+                .map(|e| vec![None; e.len()])
+                .collect(),
             log_period: 0.0,
         }
     }
@@ -208,12 +212,18 @@ impl Observer for Sensitivity<'_> {
             view.phase,
             x.as_mut_slice(),
         );
-        let saltation = system.saltation(view.switch.from, view.exit, view.stuck, &x, view.phase);
-        let exit = &system.exits()[view.switch.from][view.exit];
+        let saltation = system.saltation(
+            view.switch.from,
+            view.transition,
+            view.stuck,
+            &x,
+            view.phase,
+        );
+        let transition = &system.transitions()[view.switch.from][view.transition];
         let reset = if view.stuck {
-            exit.sticking.as_ref().map(|s| &s.reset)
+            transition.sticking.as_ref().map(|s| &s.reset)
         } else {
-            exit.reset.as_ref()
+            transition.reset.as_ref()
         };
         let n = system.dimension();
         let jump = reset.map_or_else(|| DMatrix::identity(n, n), |r| r.matrix.clone());
@@ -221,7 +231,7 @@ impl Observer for Sensitivity<'_> {
         for p in 0..self.tangents.len() {
             self.to_state(from, p, before.as_mut_slice());
             let tangent = &self.tangents[p];
-            let guard = tangent.guards[view.switch.from][view.exit].at(
+            let guard = tangent.guards[view.switch.from][view.transition].at(
                 system.drive(),
                 x.as_slice(),
                 view.phase,
@@ -230,14 +240,15 @@ impl Observer for Sensitivity<'_> {
             // The part of the saltation beyond the jump is u hᵀ with h s + ∂g in place
             // of h s: the switch moves with the guard as well.
             if guard != 0.0 {
-                let along = &exit.guard.row;
+                let along = &transition.guard.row;
                 let size = along.norm_squared();
                 let u = (&saltation - &jump) * along.transpose() / size;
                 after += u * guard;
             }
-            if let (Some(change), false) =
-                (&tangent.resets[view.switch.from][view.exit], view.stuck)
-            {
+            if let (Some(change), false) = (
+                &tangent.resets[view.switch.from][view.transition],
+                view.stuck,
+            ) {
                 after += &change.matrix * &x + change.offset.at(system.drive(), view.phase);
             }
             let stacked = &view.switch.to_modal * after;

@@ -1,9 +1,8 @@
 //! What any linear output is inside a regime: a constant plus a finite sum of
 //! decaying complex exponentials, with bounds on its derivatives.
 
-use crate::lattice::{Amplitude, Cell, Lattice};
-use crate::pack::{self, Library, Math, Pack, Plain, WIDTH};
 use crate::regime::{Kernel, ModalOutput};
+use crate::simd::{self, ComplexVector, Library, Plain, Simd, Vector, layout};
 use crate::{Complex, Drive, Regime};
 
 /// `g(s) = c + Re Σ_k a_k e^{λ_k s} + Re Σ_j b_j s^{p_j} e^{λ_j s}`, `s ≥ 0`.
@@ -18,7 +17,7 @@ pub struct Signal {
     pub powers: Vec<PowerTerm>,
     /// How many terms there are without one.
     count: usize,
-    packs: Vec<TermPack>,
+    vectors: Vec<TermVectors>,
     /// Bound on the third derivative of growing terms over the whole segment.
     third_constant: f64,
     /// How far it will be looked at.
@@ -30,11 +29,8 @@ pub struct Signal {
     /// Whether terms only decay, so that their amplitudes bound what is to come.
     relaxes: bool,
     /// `e^{λ_k s}` of the last evaluation that kept them, and its `s`.
-    factors: Vec<[Pack; 2]>,
+    factors: Vec<ComplexVector>,
     factors_at: Option<f64>,
-    /// Amplitudes of the terms that a lattice follows, and those at another point.
-    followed: Vec<Amplitude>,
-    other: Vec<Amplitude>,
 }
 
 /// `Re(amplitude · s^power · e^{rate s})` with `power ≥ 1`.
@@ -61,6 +57,9 @@ pub struct Jet {
     /// An upper bound of the third derivative's size from here to the end of the segment.
     pub third: f64,
 }
+
+/// A term's amplitude in value, rate and curvature, `[Re, Im]` each, the same in every lane.
+pub(crate) type Amplitude = [ComplexVector; 3];
 
 /// A [`Jet`] and jets of lower bounds of the signal, in which only the slowest terms are
 /// followed and every faster one is replaced by minus its amplitude. A fast term of
@@ -92,18 +91,18 @@ pub(crate) fn relaxation_masks(rates: &[Complex]) -> Vec<[f64; RELAXATIONS]> {
 }
 
 /// Four terms side by side: rates, the complex amplitudes of value, rate and curvature,
-/// and the size of the third derivative. Lanes that are not used are zero.
+/// and the size of the third derivative. Register that are not used are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct TermPack {
-    decay: Pack,
-    frequency: Pack,
-    value: [Pack; 2],
-    rate: [Pack; 2],
-    curvature: [Pack; 2],
-    third: Pack,
-    amplitude: Pack,
+struct TermVectors {
+    decay: Vector,
+    frequency: Vector,
+    value: ComplexVector,
+    rate: ComplexVector,
+    curvature: ComplexVector,
+    third: Vector,
+    amplitude: Vector,
     /// Which terms each lower bound follows.
-    masks: [Pack; RELAXATIONS],
+    masks: [Vector; RELAXATIONS],
 }
 
 impl Signal {
@@ -123,26 +122,27 @@ impl Signal {
             ..Self::default()
         };
         signal
-            .packs
-            .resize(terms.len().div_ceil(WIDTH), TermPack::default());
+            .vectors
+            .resize(layout::vectors_for(terms.len()), TermVectors::default());
         signal.size = constant.abs();
         let rates: Vec<Complex> = terms.iter().map(|t| t.0).collect();
         let masks = relaxation_masks(&rates);
         signal.relaxes = signal.powers.is_empty() && rates.iter().all(|r| r.re <= 0.0);
         for (k, &(rate, a)) in terms.iter().enumerate() {
-            let (pack, i) = (&mut signal.packs[k / WIDTH], k % WIDTH);
+            let (vector, i) = layout::place(k);
+            let vector = &mut signal.vectors[vector];
             let (b, norm) = (a * rate, rate.norm());
             let c = b * rate;
-            pack.decay[i] = rate.re;
-            pack.frequency[i] = rate.im;
-            pack.amplitude[i] = a.norm();
-            for (lanes, mask) in pack.masks.iter_mut().zip(masks[k]) {
+            vector.decay[i] = rate.re;
+            vector.frequency[i] = rate.im;
+            vector.amplitude[i] = a.norm();
+            for (lanes, mask) in vector.masks.iter_mut().zip(masks[k]) {
                 lanes[i] = mask;
             }
             for (lanes, z) in [
-                (&mut pack.value, a),
-                (&mut pack.rate, b),
-                (&mut pack.curvature, c),
+                (&mut vector.value, a),
+                (&mut vector.rate, b),
+                (&mut vector.curvature, c),
             ] {
                 lanes[0][i] = z.re;
                 lanes[1][i] = z.im;
@@ -150,7 +150,7 @@ impl Signal {
             if rate.re > 0.0 {
                 signal.third_constant += c.norm() * norm * (rate.re * length).exp();
             } else {
-                pack.third[i] = c.norm() * norm;
+                vector.third[i] = c.norm() * norm;
             }
             signal.size += a.norm();
             signal.fastest = signal.fastest.max(norm);
@@ -208,42 +208,46 @@ impl Signal {
     /// The signal of a regime without clusters, from packed modal coordinates and
     /// phasors, reusing this signal's memory.
     #[inline(always)]
-    pub(crate) fn refill<M: Math>(&mut self, kernel: &Kernel, q: &[[Pack; 2]], length: f64) {
+    pub(crate) fn refill<S: Simd>(&mut self, kernel: &Kernel, q: &[ComplexVector], length: f64) {
         self.constant = kernel.constant;
         self.count = kernel.count;
         self.fastest = kernel.fastest;
         self.powers.clear();
         self.factors_at = None;
-        self.packs.resize(kernel.packs.len(), TermPack::default());
-        self.factors.resize(kernel.packs.len(), [[0.0; WIDTH]; 2]);
-        let mut size = M::splat(0.0);
-        for (pack, (kernel, [qr, qi])) in self.packs.iter_mut().zip(kernel.packs.iter().zip(q)) {
-            let both = |z: &[Pack; 2]| [M::load(&z[0]), M::load(&z[1])];
-            let q = [M::load(qr), M::load(qi)];
-            let rate = [M::load(&kernel.decay), M::load(&kernel.frequency)];
-            let a = pack::complex_mul::<M>(both(&kernel.weight), q);
-            let b = pack::complex_mul::<M>(a, rate);
-            let c = pack::complex_mul::<M>(b, rate);
-            let norm = M::sqrt(M::fma(a[0], a[0], M::mul(a[1], a[1])));
-            size = M::add(size, norm);
-            pack.decay = kernel.decay;
-            pack.frequency = kernel.frequency;
-            pack.value = a.map(M::store);
-            pack.rate = b.map(M::store);
-            pack.curvature = c.map(M::store);
-            pack.third = M::store(M::mul(norm, M::load(&kernel.cube)));
-            pack.amplitude = M::store(norm);
-            pack.masks = kernel.masks;
+        self.vectors
+            .resize(kernel.vectors.len(), TermVectors::default());
+        self.factors
+            .resize(kernel.vectors.len(), ComplexVector::default());
+        let mut size = S::splat(0.0);
+        for (vector, (kernel, [qr, qi])) in
+            self.vectors.iter_mut().zip(kernel.vectors.iter().zip(q))
+        {
+            let both = |z: &ComplexVector| [S::load(&z[0]), S::load(&z[1])];
+            let q = [S::load(qr), S::load(qi)];
+            let rate = [S::load(&kernel.decay), S::load(&kernel.frequency)];
+            let a = simd::complex_mul::<S>(both(&kernel.weight), q);
+            let b = simd::complex_mul::<S>(a, rate);
+            let c = simd::complex_mul::<S>(b, rate);
+            let norm = S::sqrt(S::fma(a[0], a[0], S::mul(a[1], a[1])));
+            size = S::add(size, norm);
+            vector.decay = kernel.decay;
+            vector.frequency = kernel.frequency;
+            vector.value = a.map(S::store);
+            vector.rate = b.map(S::store);
+            vector.curvature = c.map(S::store);
+            vector.third = S::store(S::mul(norm, S::load(&kernel.cube)));
+            vector.amplitude = S::store(norm);
+            vector.masks = kernel.masks;
         }
-        self.size = pack::sum::<M>(size) + self.constant.abs();
+        self.size = simd::sum::<S>(size) + self.constant.abs();
         self.third_constant = 0.0;
         self.relaxes = !kernel.grows;
         if kernel.grows {
-            for pack in &mut self.packs {
-                for i in 0..WIDTH {
-                    if pack.decay[i] > 0.0 {
-                        self.third_constant += pack.third[i] * (pack.decay[i] * length).exp();
-                        pack.third[i] = 0.0;
+            for vector in &mut self.vectors {
+                for (third, decay) in vector.third.iter_mut().zip(vector.decay) {
+                    if decay > 0.0 {
+                        self.third_constant += *third * (decay * length).exp();
+                        *third = 0.0;
                     }
                 }
             }
@@ -253,15 +257,19 @@ impl Signal {
     /// Rate and amplitude of each term without a power.
     pub fn terms(&self) -> impl Iterator<Item = (Complex, Complex)> + '_ {
         (0..self.count).map(|k| {
-            let (pack, i) = (&self.packs[k / WIDTH], k % WIDTH);
-            let amplitude = Complex::new(pack.value[0][i], pack.value[1][i]);
-            (Complex::new(pack.decay[i], pack.frequency[i]), amplitude)
+            let (vector, i) = layout::place(k);
+            let vector = &self.vectors[vector];
+            let amplitude = Complex::new(vector.value[0][i], vector.value[1][i]);
+            (
+                Complex::new(vector.decay[i], vector.frequency[i]),
+                amplitude,
+            )
         })
     }
 
     /// Value, rate, curvature and third-derivative bound at `s`.
     pub fn jet(&self, s: f64) -> Jet {
-        if self.fastest * s.abs() < pack::LARGEST_ANGLE {
+        if self.fastest * s.abs() < simd::LARGEST_ANGLE {
             self.jet_with::<Plain>(s)
         } else {
             self.jet_with::<Library>(s)
@@ -269,93 +277,75 @@ impl Signal {
     }
 
     #[inline(always)]
-    pub(crate) fn jet_with<M: Math>(&self, s: f64) -> Jet {
-        self.enclosure::<M>(s).jet
+    pub(crate) fn jet_with<S: Simd>(&self, s: f64) -> Jet {
+        self.enclosure::<S>(s).jet
     }
 
     /// The jet at `s` and the third derivative itself; the exponentials are kept for
     /// [`Signal::kept_factors`].
     #[inline(always)]
-    pub(crate) fn jet_keeping_factors<M: Math>(&mut self, s: f64) -> (Jet, f64) {
-        let zero = M::splat(0.0);
+    pub(crate) fn jet_keeping_factors<S: Simd>(&mut self, s: f64) -> (Jet, f64) {
+        let zero = S::splat(0.0);
         let (mut sums, mut jerk) = ([zero; 4], zero);
-        let at = M::splat(s);
-        for (p, factor) in self.packs.iter().zip(&mut self.factors) {
-            let (decay, frequency) = (M::load(&p.decay), M::load(&p.frequency));
-            let [re, im] = pack::exp_complex::<M>(decay, frequency, at);
-            *factor = [M::store(re), M::store(im)];
+        let at = S::splat(s);
+        for (p, factor) in self.vectors.iter().zip(&mut self.factors) {
+            let (decay, frequency) = (S::load(&p.decay), S::load(&p.frequency));
+            let [re, im] = simd::exp_complex::<S>(decay, frequency, at);
+            *factor = [S::store(re), S::store(im)];
             for (sum, z) in sums.iter_mut().zip([&p.value, &p.rate]) {
-                *sum = M::fnma(M::load(&z[1]), im, M::fma(M::load(&z[0]), re, *sum));
+                *sum = S::fnma(S::load(&z[1]), im, S::fma(S::load(&z[0]), re, *sum));
             }
-            let c = [M::load(&p.curvature[0]), M::load(&p.curvature[1])];
-            let [cr, ci] = pack::complex_mul::<M>(c, [re, im]);
-            sums[2] = M::add(sums[2], cr);
-            jerk = M::fnma(ci, frequency, M::fma(cr, decay, jerk));
+            let c = [S::load(&p.curvature[0]), S::load(&p.curvature[1])];
+            let [cr, ci] = simd::complex_mul::<S>(c, [re, im]);
+            sums[2] = S::add(sums[2], cr);
+            jerk = S::fnma(ci, frequency, S::fma(cr, decay, jerk));
             // Bounds need no decay: it is slow.
-            sums[3] = M::add(sums[3], M::load(&p.third));
+            sums[3] = S::add(sums[3], S::load(&p.third));
         }
         self.factors_at = Some(s);
-        let sums = pack::sums::<M>(sums);
+        let sums = simd::sums::<S>(sums);
         let jet = Jet {
             value: self.constant + sums[0],
             rate: sums[1],
             curvature: sums[2],
             third: self.third_constant + sums[3],
         };
-        (jet, pack::sum::<M>(jerk))
+        (jet, simd::sum::<S>(jerk))
     }
 
     /// The exponentials `e^{λ_k s}` that were kept last, and `s`.
     #[inline(always)]
-    pub(crate) fn kept_factors(&self) -> Option<(f64, &[[Pack; 2]])> {
+    pub(crate) fn kept_factors(&self) -> Option<(f64, &[ComplexVector])> {
         self.factors_at.map(|s| (s, &self.factors[..]))
     }
 
-    /// Lays out the amplitudes of some terms for a lattice.
+    /// The amplitudes of some terms, each the same in every lane.
     #[inline(always)]
-    pub(crate) fn follow<M: Math>(&mut self, terms: &[usize]) {
-        self.followed.resize(terms.len(), Amplitude::default());
-        for (amplitude, &k) in self.followed.iter_mut().zip(terms) {
-            let (pack, i) = (&self.packs[k / WIDTH], k % WIDTH);
-            for (out, z) in amplitude
-                .iter_mut()
-                .zip([&pack.value, &pack.rate, &pack.curvature])
+    pub(crate) fn amplitudes<S: Simd>(&self, terms: &[usize], out: &mut Vec<Amplitude>) {
+        out.resize(terms.len(), Amplitude::default());
+        for (amplitude, &k) in out.iter_mut().zip(terms) {
+            let (vector, i) = layout::place(k);
+            let vector = &self.vectors[vector];
+            for (out, z) in
+                amplitude
+                    .iter_mut()
+                    .zip([&vector.value, &vector.rate, &vector.curvature])
             {
-                *out = [M::store(M::splat(z[0][i])), M::store(M::splat(z[1][i]))];
+                *out = [S::store(S::splat(z[0][i])), S::store(S::splat(z[1][i]))];
             }
         }
-    }
-
-    /// The amplitudes that were laid out last.
-    #[inline(always)]
-    pub(crate) fn followed(&self) -> &[Amplitude] {
-        &self.followed
-    }
-
-    /// Lays them out as they are at the start of a coarse cell, until
-    /// [`Signal::follow_from_start`].
-    #[inline(always)]
-    pub(crate) fn follow_from<M: Math>(&mut self, lattice: &Lattice, cell: &Cell) {
-        lattice.move_to::<M>(cell, &self.followed, &mut self.other);
-        std::mem::swap(&mut self.followed, &mut self.other);
-    }
-
-    /// Goes back to the amplitudes at the signal's own start.
-    #[inline(always)]
-    pub(crate) fn follow_from_start(&mut self) {
-        std::mem::swap(&mut self.followed, &mut self.other);
     }
 
     /// Sums of the terms' amplitudes, weighted in two ways.
     #[inline(always)]
-    pub(crate) fn weighted_amplitudes<M: Math>(&self, weights: &[[Pack; 2]]) -> [f64; 2] {
-        let mut sums = [M::splat(0.0); 4];
-        for (p, weights) in self.packs.iter().zip(weights) {
+    pub(crate) fn weighted_amplitudes<S: Simd>(&self, weights: &[ComplexVector]) -> [f64; 2] {
+        let mut sums = [S::splat(0.0); 4];
+        for (p, weights) in self.vectors.iter().zip(weights) {
             for (sum, weight) in sums.iter_mut().zip(weights) {
-                *sum = M::fma(M::load(&p.amplitude), M::load(weight), *sum);
+                *sum = S::fma(S::load(&p.amplitude), S::load(weight), *sum);
             }
         }
-        let sums = pack::sums::<M>(sums);
+        let sums = simd::sums::<S>(sums);
         [sums[0], sums[1]]
     }
 
@@ -367,33 +357,33 @@ impl Signal {
 
     /// The jet at `s` with the jets of the lower bounds.
     #[inline(always)]
-    pub(crate) fn enclosure<M: Math>(&self, s: f64) -> Enclosure {
-        let zero = M::splat(0.0);
+    pub(crate) fn enclosure<S: Simd>(&self, s: f64) -> Enclosure {
+        let zero = S::splat(0.0);
         let mut all = [zero; 4];
         let mut slow = [[zero; 4]; RELAXATIONS];
         let mut left_out = [zero; RELAXATIONS];
-        let at = M::splat(s);
-        for p in &self.packs {
-            let grown = pack::exp::<M>(M::mul(M::load(&p.decay), at));
-            let (sin, cos) = pack::sin_cos::<M>(M::mul(M::load(&p.frequency), at));
-            let (re, im) = (M::mul(grown, cos), M::mul(grown, sin));
-            let real = |z: &[Pack; 2]| M::fnma(M::load(&z[1]), im, M::mul(M::load(&z[0]), re));
+        let at = S::splat(s);
+        for p in &self.vectors {
+            let grown = simd::exp::<S>(S::mul(S::load(&p.decay), at));
+            let (sin, cos) = simd::sin_cos::<S>(S::mul(S::load(&p.frequency), at));
+            let (re, im) = (S::mul(grown, cos), S::mul(grown, sin));
+            let real = |z: &ComplexVector| S::fnma(S::load(&z[1]), im, S::mul(S::load(&z[0]), re));
             let terms = [
                 real(&p.value),
                 real(&p.rate),
                 real(&p.curvature),
-                M::mul(M::load(&p.third), grown),
+                S::mul(S::load(&p.third), grown),
             ];
-            let amplitude = M::mul(M::load(&p.amplitude), grown);
+            let amplitude = S::mul(S::load(&p.amplitude), grown);
             for i in 0..4 {
-                all[i] = M::add(all[i], terms[i]);
+                all[i] = S::add(all[i], terms[i]);
             }
             for r in 0..RELAXATIONS {
-                let mask = M::load(&p.masks[r]);
+                let mask = S::load(&p.masks[r]);
                 for i in 0..4 {
-                    slow[r][i] = M::fma(terms[i], mask, slow[r][i]);
+                    slow[r][i] = S::fma(terms[i], mask, slow[r][i]);
                 }
-                left_out[r] = M::add(left_out[r], M::fnma(amplitude, mask, amplitude));
+                left_out[r] = S::add(left_out[r], S::fnma(amplitude, mask, amplitude));
             }
         }
         let jet = |sums: [f64; 4], constant: f64| Jet {
@@ -403,13 +393,13 @@ impl Signal {
             third: self.third_constant + sums[3],
         };
         let mut enclosure = Enclosure {
-            jet: jet(pack::sums::<M>(all), self.constant),
+            jet: jet(simd::sums::<S>(all), self.constant),
             relaxed: [Jet::default(); RELAXATIONS],
         };
         if self.relaxes {
-            let left_out = pack::sums::<M>([left_out[0], left_out[1], zero, zero]);
+            let left_out = simd::sums::<S>([left_out[0], left_out[1], zero, zero]);
             for r in 0..RELAXATIONS {
-                enclosure.relaxed[r] = jet(pack::sums::<M>(slow[r]), self.constant - left_out[r]);
+                enclosure.relaxed[r] = jet(simd::sums::<S>(slow[r]), self.constant - left_out[r]);
             }
         }
         let jet = &mut enclosure.jet;
@@ -431,11 +421,11 @@ impl Signal {
             curvature: 0.0,
             third: self.third_constant,
         };
-        for p in &self.packs {
-            jet.value += pack::sum::<Plain>(p.value[0]);
-            jet.rate += pack::sum::<Plain>(p.rate[0]);
-            jet.curvature += pack::sum::<Plain>(p.curvature[0]);
-            jet.third += pack::sum::<Plain>(p.third);
+        for p in &self.vectors {
+            jet.value += simd::sum::<Plain>(p.value[0]);
+            jet.rate += simd::sum::<Plain>(p.rate[0]);
+            jet.curvature += simd::sum::<Plain>(p.curvature[0]);
+            jet.third += simd::sum::<Plain>(p.third);
         }
         for term in &self.powers {
             jet.value += term.derivative(0, 0.0);

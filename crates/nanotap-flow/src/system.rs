@@ -1,10 +1,11 @@
-//! A piecewise-linear system: its regimes and the exits between them.
+//! A piecewise-linear system: its regimes and the transitions between them.
 
-use crate::crossing::Start;
 use crate::harmonic::{HarmonicVector, Output};
-use crate::lattice::Lattice;
-use crate::pack::{Math, Pack, WIDTH};
 use crate::regime::{Kernel, ModalOutput, Regime};
+use crate::search::Start;
+use crate::search::table::Table;
+use crate::simd::affine::AffineMap;
+use crate::simd::{ComplexVector, layout};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
 
@@ -32,25 +33,25 @@ pub struct Sticking {
 /// exponentials know it to rounding only, which would make it cross at once or never.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Onset {
-    /// The guard of this exit starts with value and rate zero: two bodies part that no
-    /// longer press on each other. (Of a start beyond the guard of the exit taken, with
+    /// The guard of this transition starts with value and rate zero: two bodies part that no
+    /// longer press on each other. (Of a start beyond the guard of the transition taken, with
     /// value zero only.)
     AtRest(usize),
-    /// The guard of exit `exit` starts at `factor` times the rate of the guard of the exit
+    /// The guard of transition `transition` starts at `factor` times the rate of the guard of the transition
     /// taken: a damper is met. At a grazing touch that is zero.
     Proportional {
-        /// Which exit of the next regime.
-        exit: usize,
+        /// Which transition of the next regime.
+        transition: usize,
         /// Zero or negative, since the rate is.
         factor: f64,
     },
 }
 
 impl Onset {
-    /// The exit of the next regime that it speaks of.
-    pub const fn exit(self) -> usize {
+    /// The transition of the next regime that it speaks of.
+    pub const fn transition(self) -> usize {
         match self {
-            Self::AtRest(exit) | Self::Proportional { exit, .. } => exit,
+            Self::AtRest(transition) | Self::Proportional { transition, .. } => transition,
         }
     }
 }
@@ -58,24 +59,24 @@ impl Onset {
 /// A way out of a regime: when `guard` falls to zero, the motion goes on in
 /// `target`, after `reset` if there is one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exit {
+pub struct Transition {
     /// Positive inside the regime.
     pub guard: Output,
     /// The next regime.
     pub target: usize,
     /// The jump of the state, none if it is continuous.
     pub reset: Option<Reset>,
-    /// What ends chatter, if the exit can chatter.
+    /// What ends chatter, if the transition can chatter.
     pub sticking: Option<Sticking>,
     /// Whether the next regime begins with guard, rate and acceleration all zero
     /// by definition (release from sticking).
     pub release: bool,
-    /// What is known of the next regime's guards, where none of them is this exit's own
+    /// What is known of the next regime's guards, where none of them is this transition's own
     /// (which is recognised and starts at zero).
     pub onset: Option<Onset>,
 }
 
-impl Exit {
+impl Transition {
     /// A continuous switch to `target` when `guard` falls to zero.
     pub fn new(guard: Output, target: usize) -> Self {
         Self {
@@ -124,34 +125,34 @@ pub struct System {
     dimension: usize,
     drive: Drive,
     regimes: Vec<Regime>,
-    exits: Vec<Vec<Exit>>,
-    switches: Vec<Vec<PreparedExit>>,
-    /// How far the lattices of each regime's guards reach.
+    transitions: Vec<Vec<Transition>>,
+    switches: Vec<Vec<PreparedTransition>>,
+    /// How far the tables of each regime's guards reach.
     reaches: Vec<f64>,
     /// `[Re λ, Im λ]` of each regime's modal coordinates and tones, packed.
-    rates: Vec<Vec<[Pack; 2]>>,
+    rates: Vec<Vec<ComplexVector>>,
     /// The largest `|λ|` of any regime or tone.
     fastest: f64,
 }
 
-/// What an exit needs at run time.
+/// What a transition needs at run time.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct PreparedExit {
+pub(crate) struct PreparedTransition {
     /// The guard in modal coordinates of the regime it leaves.
     pub(crate) guard: ModalOutput,
     /// The same, packed.
     pub(crate) kernel: Kernel,
     /// The points at which it is tabulated, where that can be.
-    pub(crate) lattice: Option<Lattice>,
+    pub(crate) table: Option<Table>,
     /// The change of basis of the plain switch.
     pub(crate) switch: Switch,
     /// The change of basis into the sticking regime.
     pub(crate) sticking: Option<Switch>,
-    /// In the target regime, the exit whose guard is this one reversed (or the
+    /// In the target regime, the transition whose guard is this one reversed (or the
     /// same, at an impact), so that it starts at zero.
-    pub(crate) twin: Option<usize>,
+    pub(crate) reverse: Option<usize>,
     /// The same in the sticking regime.
-    pub(crate) sticking_twin: Option<usize>,
+    pub(crate) sticking_reverse: Option<usize>,
     /// The guard's acceleration in the target regime, for telling chatter.
     pub(crate) acceleration: Option<Output>,
 }
@@ -167,7 +168,7 @@ pub struct Switch {
     /// `2m⁺ × 2m⁻`, acting on `[Re q; Im q]`.
     pub(crate) matrix: DMatrix<f64>,
     /// The same with what the tones' phasors and the constant add, packed.
-    pub(crate) packed: PackedSwitch,
+    pub(crate) packed: AffineMap,
     /// The constant saltation `1 + u hᵀ` where the vector field's jump is
     /// proportional to the guard's rate; then the map is smooth through grazing.
     pub(crate) saltation: Option<DVector<f64>>,
@@ -179,97 +180,42 @@ pub struct Switch {
     pub(crate) to_modal: DMatrix<f64>,
 }
 
-/// A switch for packed coordinates: modal coordinates first, then phasors. The columns
-/// multiply, in this order, the real parts, the imaginary parts, and one.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct PackedSwitch {
-    /// `[re, im]` packs of each column, column after column.
-    pub(crate) columns: Vec<[Pack; 2]>,
-    /// Packs a column.
-    pub(crate) packs: usize,
-}
-
-impl PackedSwitch {
-    fn new(matrix: &DMatrix<f64>, to_modal: &DMatrix<f64>, shift: &HarmonicVector) -> Self {
-        let (to, from) = (matrix.nrows() / 2, matrix.ncols() / 2);
-        let tones = shift.tones.len();
-        let packs = (to + tones).div_ceil(WIDTH);
-        let count = 2 * (from + tones) + 1;
-        let mut switch = Self {
-            columns: Vec::with_capacity(count * packs),
-            packs,
-        };
-        let mut change = DVector::zeros(2 * to);
-        for part in 0..2 {
-            for k in 0..from {
-                switch.push(matrix.column(part * from + k).as_slice(), None);
-            }
-            for (tone, z) in shift.tones.iter().enumerate() {
-                // Re(z e^{iωt}) = Re z cos − Im z sin.
-                let part_of = |z: &Complex| if part == 0 { z.re } else { -z.im };
-                change.gemv(1.0, to_modal, &z.map(|z| part_of(&z)), 0.0);
-                // A phasor goes on as it is.
-                switch.push(change.as_slice(), Some((to + tone, part)));
-            }
+/// The switch of packed coordinates: modal coordinates first, then phasors.
+fn packed_switch(
+    matrix: &DMatrix<f64>,
+    to_modal: &DMatrix<f64>,
+    shift: &HarmonicVector,
+) -> AffineMap {
+    let (to, from) = (matrix.nrows() / 2, matrix.ncols() / 2);
+    let tones = shift.tones.len();
+    let mut switch = AffineMap::with_capacity(to + tones, 2 * (from + tones) + 1);
+    let mut change = DVector::zeros(2 * to);
+    for part in 0..2 {
+        for k in 0..from {
+            switch.push(matrix.column(part * from + k).as_slice(), None);
         }
-        change.gemv(1.0, to_modal, &shift.constant, 0.0);
-        switch.push(change.as_slice(), None);
-        switch
-    }
-
-    /// Writes the coordinates and phasors after the switch to `out`.
-    #[inline(always)]
-    pub(crate) fn apply<M: Math>(&self, packed: &[[Pack; 2]], out: &mut Vec<[Pack; 2]>) {
-        let packs = self.packs;
-        let (linear, constant) = self.columns.split_at(self.columns.len() - packs);
-        let (real, imaginary) = linear.split_at(linear.len() / 2);
-        out.resize(packs, [[0.0; WIDTH]; 2]);
-        for (i, out) in out.iter_mut().enumerate() {
-            // A sum for each part of the inputs: two short chains instead of a long one.
-            let mut sums = [
-                [M::load(&constant[i][0]), M::load(&constant[i][1])],
-                [M::splat(0.0); 2],
-            ];
-            for (part, (columns, sum)) in [real, imaginary].into_iter().zip(&mut sums).enumerate() {
-                for (columns, inputs) in columns.chunks(WIDTH * packs).zip(packed) {
-                    for (column, &x) in columns.chunks_exact(packs).zip(&inputs[part]) {
-                        let x = M::splat(x);
-                        sum[0] = M::fma(M::load(&column[i][0]), x, sum[0]);
-                        sum[1] = M::fma(M::load(&column[i][1]), x, sum[1]);
-                    }
-                }
-            }
-            let [a, b] = sums;
-            *out = [M::store(M::add(a[0], b[0])), M::store(M::add(a[1], b[1]))];
+        for (tone, z) in shift.tones.iter().enumerate() {
+            // Re(z e^{iωt}) = Re z cos − Im z sin.
+            let part_of = |z: &Complex| if part == 0 { z.re } else { -z.im };
+            change.gemv(1.0, to_modal, &z.map(|z| part_of(&z)), 0.0);
+            // A phasor goes on as it is.
+            switch.push(change.as_slice(), Some((to + tone, part)));
         }
     }
-
-    /// Adds a column, real parts first, with a one in coordinate and part `one`.
-    fn push(&mut self, column: &[f64], one: Option<(usize, usize)>) {
-        let start = self.columns.len();
-        self.columns.resize(start + self.packs, [[0.0; WIDTH]; 2]);
-        let packs = &mut self.columns[start..];
-        let (real, imaginary) = column.split_at(column.len() / 2);
-        for (part, values) in [real, imaginary].into_iter().enumerate() {
-            for (values, pack) in values.chunks(WIDTH).zip(packs.iter_mut()) {
-                pack[part][..values.len()].copy_from_slice(values);
-            }
-        }
-        if let Some((k, part)) = one {
-            packs[k / WIDTH][part][k % WIDTH] = 1.0;
-        }
-    }
+    change.gemv(1.0, to_modal, &shift.constant, 0.0);
+    switch.push(change.as_slice(), None);
+    switch
 }
 
 impl System {
-    /// Joins regimes and exits (`exits[r]` lead out of regime `r`).
+    /// Joins regimes and transitions (`transitions[r]` lead out of regime `r`).
     ///
     /// # Errors
-    /// When sizes do not fit or an exit leads nowhere.
+    /// When sizes do not fit or a transition leads nowhere.
     pub fn new(
         drive: Drive,
         regimes: Vec<Regime>,
-        exits: Vec<Vec<Exit>>,
+        transitions: Vec<Vec<Transition>>,
     ) -> Result<Self, FlowError> {
         let dimension = regimes.first().map_or(0, |r| r.matrix().nrows());
         if dimension == 0 {
@@ -279,10 +225,10 @@ impl System {
                 expected: 1,
             });
         }
-        if exits.len() != regimes.len() {
+        if transitions.len() != regimes.len() {
             return Err(FlowError::Shape {
-                what: "the list of exits",
-                found: exits.len(),
+                what: "the list of transitions",
+                found: transitions.len(),
                 expected: regimes.len(),
             });
         }
@@ -297,10 +243,10 @@ impl System {
                 });
             }
         }
-        for exit in exits.iter().flatten() {
-            exit.guard.check("a guard", dimension, tones)?;
-            let targets =
-                std::iter::once(exit.target).chain(exit.sticking.as_ref().map(|s| s.regime));
+        for transition in transitions.iter().flatten() {
+            transition.guard.check("a guard", dimension, tones)?;
+            let targets = std::iter::once(transition.target)
+                .chain(transition.sticking.as_ref().map(|s| s.regime));
             for target in targets {
                 if target >= regimes.len() {
                     return Err(FlowError::Target {
@@ -309,19 +255,19 @@ impl System {
                     });
                 }
             }
-            if let Some(onset) = exit.onset
-                && onset.exit() >= exits[exit.target].len()
+            if let Some(onset) = transition.onset
+                && onset.transition() >= transitions[transition.target].len()
             {
                 return Err(FlowError::Shape {
-                    what: "the exits of a regime whose guard's onset is known",
-                    found: exits[exit.target].len(),
-                    expected: onset.exit() + 1,
+                    what: "the transitions of a regime whose guard's onset is known",
+                    found: transitions[transition.target].len(),
+                    expected: onset.transition() + 1,
                 });
             }
-            for reset in exit
+            for reset in transition
                 .reset
                 .iter()
-                .chain(exit.sticking.as_ref().map(|s| &s.reset))
+                .chain(transition.sticking.as_ref().map(|s| &s.reset))
             {
                 let (rows, columns) = reset.matrix.shape();
                 for found in [rows, columns] {
@@ -340,7 +286,7 @@ impl System {
             dimension,
             drive,
             regimes,
-            exits,
+            transitions,
             switches: Vec::new(),
             reaches: Vec::new(),
             rates: Vec::new(),
@@ -348,20 +294,20 @@ impl System {
         };
         system.switches = (0..system.regimes.len())
             .map(|r| {
-                system.exits[r]
+                system.transitions[r]
                     .iter()
-                    .map(|exit| system.prepare(r, exit))
+                    .map(|transition| system.prepare(r, transition))
                     .collect()
             })
             .collect();
         system.reaches = system
             .switches
             .iter()
-            .map(|exits| {
-                exits
+            .map(|transitions| {
+                transitions
                     .iter()
-                    .filter_map(|exit| exit.lattice.as_ref())
-                    .map(Lattice::reach)
+                    .filter_map(|transition| transition.table.as_ref())
+                    .map(Table::reach)
                     .fold(f64::INFINITY, f64::min)
             })
             .collect();
@@ -403,9 +349,9 @@ impl System {
         &self.regimes
     }
 
-    /// The exits of each regime.
-    pub fn exits(&self) -> &[Vec<Exit>] {
-        &self.exits
+    /// The transitions of each regime.
+    pub fn transitions(&self) -> &[Vec<Transition>] {
+        &self.transitions
     }
 
     /// The largest angle that any term turns through in a drive period.
@@ -418,16 +364,16 @@ impl System {
         self.fastest
     }
 
-    pub(crate) fn packed_rates(&self) -> &[Vec<[Pack; 2]>] {
+    pub(crate) fn packed_rates(&self) -> &[Vec<ComplexVector>] {
         &self.rates
     }
 
-    /// How far the lattices of a regime's guards reach.
-    pub(crate) fn lattice_reach(&self, regime: usize) -> f64 {
+    /// How far the tables of a regime's guards reach.
+    pub(crate) fn table_reach(&self, regime: usize) -> f64 {
         self.reaches[regime]
     }
 
-    pub(crate) fn prepared(&self, regime: usize) -> &[PreparedExit] {
+    pub(crate) fn prepared(&self, regime: usize) -> &[PreparedTransition] {
         &self.switches[regime]
     }
 
@@ -435,14 +381,14 @@ impl System {
     /// whose guards are all positive, a guard that is zero within rounding counting
     /// as positive when its first non-zero derivative is. Says as well which guard
     /// starts at zero. A sticking regime is entered only from a state that sticks. Where
-    /// no regime holds the state, it is one whose passed exit resets it to a state that
-    /// the next regime holds; the exit is taken at once.
+    /// no regime holds the state, it is one whose passed transition resets it to a state that
+    /// the next regime holds; the transition is taken at once.
     ///
     /// # Errors
     /// [`FlowError::NoRegime`] when there is none.
     pub fn regime_at(&self, x: &[f64], t: f64) -> Result<(usize, Option<usize>), FlowError> {
         let (regime, surface) = self.start_at(x, t)?;
-        Ok((regime, surface.map(|(exit, _)| exit)))
+        Ok((regime, surface.map(|(transition, _)| transition)))
     }
 
     /// The same, with how the guard that starts at zero rises.
@@ -469,9 +415,9 @@ impl System {
         (0..self.regimes.len())
             .find(|&r| {
                 self.may_stick(r, x, t, &computed)
-                    && self.exits[r]
-                        .iter()
-                        .all(|exit| exit.guard.at(&self.drive, x, t) >= -computed(r, &exit.guard))
+                    && self.transitions[r].iter().all(|transition| {
+                        transition.guard.at(&self.drive, x, t) >= -computed(r, &transition.guard)
+                    })
             })
             .map(|r| (r, None))
             .ok_or(FlowError::NoRegime)
@@ -484,25 +430,28 @@ impl System {
         t: f64,
         tolerance: &impl Fn(usize, &Output) -> f64,
     ) -> Option<(usize, Option<(usize, Start)>)> {
-        self.exits.iter().enumerate().find_map(|(r, exits)| {
-            if !self.may_stick(r, x, t, tolerance) {
-                return None;
-            }
-            let mut surface = None;
-            let inside = exits.iter().enumerate().all(|(e, exit)| {
-                let value = exit.guard.at(&self.drive, x, t);
-                if value.abs() <= tolerance(r, &exit.guard) {
-                    let start = self.rises(r, &exit.guard, x, t, tolerance);
-                    surface = start.map(|start| (e, start));
-                    return start.is_some();
+        self.transitions
+            .iter()
+            .enumerate()
+            .find_map(|(r, transitions)| {
+                if !self.may_stick(r, x, t, tolerance) {
+                    return None;
                 }
-                value > 0.0
-            });
-            inside.then_some((r, surface))
-        })
+                let mut surface = None;
+                let inside = transitions.iter().enumerate().all(|(e, transition)| {
+                    let value = transition.guard.at(&self.drive, x, t);
+                    if value.abs() <= tolerance(r, &transition.guard) {
+                        let start = self.rises(r, &transition.guard, x, t, tolerance);
+                        surface = start.map(|start| (e, start));
+                        return start.is_some();
+                    }
+                    value > 0.0
+                });
+                inside.then_some((r, surface))
+            })
     }
 
-    /// The regime whose passed exit resets the state to one that the next regime holds.
+    /// The regime whose passed transition resets the state to one that the next regime holds.
     fn left_at_once(
         &self,
         x: &[f64],
@@ -510,15 +459,20 @@ impl System {
         tolerance: &impl Fn(usize, &Output) -> f64,
     ) -> Option<usize> {
         let state = DVector::from_column_slice(x);
-        let leads_on = |exit: &Exit| {
-            let Some(reset) = exit.reset.as_ref().filter(|_| exit.sticking.is_none()) else {
+        let leads_on = |transition: &Transition| {
+            let Some(reset) = transition
+                .reset
+                .as_ref()
+                .filter(|_| transition.sticking.is_none())
+            else {
                 return false;
             };
             let after = &reset.matrix * &state + reset.offset.at(&self.drive, t);
             let held = self.regime_within(after.as_slice(), t, tolerance);
-            exit.guard.at(&self.drive, x, t) <= 0.0 && held.is_some_and(|(r, _)| r == exit.target)
+            transition.guard.at(&self.drive, x, t) <= 0.0
+                && held.is_some_and(|(r, _)| r == transition.target)
         };
-        (0..self.regimes.len()).find(|&r| self.exits[r].iter().any(leads_on))
+        (0..self.regimes.len()).find(|&r| self.transitions[r].iter().any(leads_on))
     }
 
     /// Whether regime `r` is no sticking regime, or one in which this state sticks:
@@ -530,10 +484,18 @@ impl System {
         t: f64,
         tolerance: &impl Fn(usize, &Output) -> f64,
     ) -> bool {
-        let mut impacts = self.exits.iter().enumerate().flat_map(|(from, exits)| {
-            let leads_here = move |e: &&Exit| e.sticking.as_ref().is_some_and(|s| s.regime == r);
-            exits.iter().filter(leads_here).map(move |e| (from, e))
-        });
+        let mut impacts = self
+            .transitions
+            .iter()
+            .enumerate()
+            .flat_map(|(from, transitions)| {
+                let leads_here =
+                    move |e: &&Transition| e.sticking.as_ref().is_some_and(|s| s.regime == r);
+                transitions
+                    .iter()
+                    .filter(leads_here)
+                    .map(move |e| (from, e))
+            });
         let Some((from, impact)) = impacts.next() else {
             return true;
         };
@@ -592,47 +554,53 @@ impl System {
         f64::EPSILON * (own + forced + modal.constant.abs()) + rounding(output, x)
     }
 
-    fn prepare(&self, from: usize, exit: &Exit) -> PreparedExit {
-        let acceleration = exit.sticking.as_ref().map(|_| {
-            let target = &self.regimes[exit.target];
-            exit.guard
+    fn prepare(&self, from: usize, transition: &Transition) -> PreparedTransition {
+        let acceleration = transition.sticking.as_ref().map(|_| {
+            let target = &self.regimes[transition.target];
+            transition
+                .guard
                 .rate(target.matrix(), target.forcing(), &self.drive)
                 .rate(target.matrix(), target.forcing(), &self.drive)
         });
-        let guard = self.regimes[from].project(&exit.guard);
+        let guard = self.regimes[from].project(&transition.guard);
         let kernel = Kernel::new(&self.regimes[from], &self.drive, &guard);
         let clustered = !self.regimes[from].basis().clusters.is_empty();
-        PreparedExit {
-            lattice: (!clustered)
-                .then(|| Lattice::new(&kernel, self.drive.period()))
+        PreparedTransition {
+            table: (!clustered)
+                .then(|| Table::new(&kernel, self.drive.period()))
                 .flatten(),
             kernel,
             guard,
-            switch: self.switch(from, exit.target, exit.reset.as_ref(), &exit.guard),
-            sticking: exit
+            switch: self.switch(
+                from,
+                transition.target,
+                transition.reset.as_ref(),
+                &transition.guard,
+            ),
+            sticking: transition
                 .sticking
                 .as_ref()
-                .map(|s| self.switch(from, s.regime, Some(&s.reset), &exit.guard)),
-            twin: if exit.release {
+                .map(|s| self.switch(from, s.regime, Some(&s.reset), &transition.guard)),
+            reverse: if transition.release {
                 // After release the guard that starts at zero is the impact's.
-                self.exits[exit.target]
+                self.transitions[transition.target]
                     .iter()
                     .position(|e| e.sticking.as_ref().is_some_and(|s| s.regime == from))
             } else {
-                self.twin(&exit.guard, exit.target)
+                self.reverse(&transition.guard, transition.target)
             },
-            sticking_twin: exit
+            sticking_reverse: transition
                 .sticking
                 .as_ref()
-                .and_then(|s| self.twin(&exit.guard, s.regime)),
+                .and_then(|s| self.reverse(&transition.guard, s.regime)),
             acceleration,
         }
     }
 
-    /// The exit of `target` whose guard is `guard` or its negative.
-    fn twin(&self, guard: &Output, target: usize) -> Option<usize> {
+    /// The transition of `target` whose guard is `guard` or its negative.
+    fn reverse(&self, guard: &Output, target: usize) -> Option<usize> {
         let reversed = guard.scaled(-1.0);
-        self.exits[target]
+        self.transitions[target]
             .iter()
             .position(|e| e.guard == reversed || e.guard == *guard)
     }
@@ -665,7 +633,7 @@ impl System {
             ),
         };
         let shift = shift.plus(-1.0, b.response());
-        let packed = PackedSwitch::new(&matrix, &to_modal, &shift);
+        let packed = packed_switch(&matrix, &to_modal, &shift);
         let saltation = self.constant_saltation(from, to, reset, guard);
         // With J the jump, L (J + u hᵀ) R = L J R + (L u)(hᵀ R).
         let tangent = saltation.as_ref().map(|u| {
@@ -746,7 +714,7 @@ impl System {
         }
     }
 
-    /// The saltation matrix (`n × n`) of exit `exit` of regime `from` (into its
+    /// The saltation matrix (`n × n`) of transition `transition` of regime `from` (into its
     /// sticking regime if `stuck`) at state `x` before the switch and time `t`.
     ///
     /// Constant wherever the field's jump is proportional to the guard's rate;
@@ -754,13 +722,13 @@ impl System {
     pub fn saltation(
         &self,
         from: usize,
-        exit: usize,
+        transition: usize,
         stuck: bool,
         x: &DVector<f64>,
         t: f64,
     ) -> DMatrix<f64> {
-        let description = &self.exits[from][exit];
-        let prepared = &self.switches[from][exit];
+        let description = &self.transitions[from][transition];
+        let prepared = &self.switches[from][transition];
         let (switch, reset) = match (&description.sticking, &prepared.sticking) {
             (Some(sticking), Some(switch)) if stuck => (switch, Some(&sticking.reset)),
             _ => (&prepared.switch, description.reset.as_ref()),
@@ -781,7 +749,7 @@ impl System {
     }
 }
 
-fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<[Pack; 2]> {
+fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
     let tones = drive.frequencies().iter().map(|&w| Complex::new(0.0, w));
     let rates: Vec<Complex> = regime
         .basis()
@@ -790,12 +758,7 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<[Pack; 2]> {
         .copied()
         .chain(tones)
         .collect();
-    let mut packs = vec![[[0.0; WIDTH]; 2]; rates.len().div_ceil(WIDTH)];
-    for (k, rate) in rates.into_iter().enumerate() {
-        packs[k / WIDTH][0][k % WIDTH] = rate.re;
-        packs[k / WIDTH][1][k % WIDTH] = rate.im;
-    }
-    packs
+    layout::list(&rates)
 }
 
 /// Oscillations of a mode in one drive period that are followed.

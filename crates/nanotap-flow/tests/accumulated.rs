@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::accumulate::{Accumulator, Request};
 use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Drive, Exit, Flow, HarmonicVector, Output, Regime, Reset, System};
+use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, Reset, System, Transition};
 use proptest::prelude::*;
 
 const OMEGA: f64 = 1.7;
@@ -87,12 +87,12 @@ impl Example {
                 let touching = &free - &along * (self.row(0) * k) - &along * (self.row(1) * c);
                 let pressed = forcing.clone().with_constant(&(-k * self.offset * &along));
                 let regimes = vec![regime(0, free, forcing)?, regime(1, touching, pressed)?];
-                let exits = vec![
-                    vec![Exit::new(gap.clone(), 1)],
-                    vec![Exit::new(gap.scaled(-1.0), 0)],
+                let transitions = vec![
+                    vec![Transition::new(gap.clone(), 1)],
+                    vec![Transition::new(gap.scaled(-1.0), 0)],
                 ];
                 Some(Arc::new(
-                    System::new(drive.clone(), regimes, exits).unwrap(),
+                    System::new(drive.clone(), regimes, transitions).unwrap(),
                 ))
             }
             Stop::Rigid { e } => {
@@ -104,9 +104,10 @@ impl Example {
                     matrix,
                     offset: HarmonicVector::zeros(n, 1),
                 };
-                let exits = vec![vec![Exit::new(gap, 0).with_reset(reset)]];
+                let transitions = vec![vec![Transition::new(gap, 0).with_reset(reset)]];
                 Some(Arc::new(
-                    System::new(drive.clone(), vec![regime(0, free, forcing)?], exits).unwrap(),
+                    System::new(drive.clone(), vec![regime(0, free, forcing)?], transitions)
+                        .unwrap(),
                 ))
             }
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::fixed_step::{FixedStep, Switching};
-use nanotap_flow::{Drive, Exit, Flow, FlowError, HarmonicVector, Output, Regime, System};
+use nanotap_flow::{Drive, Flow, FlowError, HarmonicVector, Output, Regime, System, Transition};
 
 /// m = 1 between two springy stops at ±0.5 of different stiffness: three regimes, driven
 /// by a tone and its third harmonic.
@@ -32,9 +32,12 @@ fn between_stops(damping: f64, stops: [f64; 2]) -> System {
             regime(2, stops[1], -0.5),
         ],
         vec![
-            vec![Exit::new(right.clone(), 1), Exit::new(left.clone(), 2)],
-            vec![Exit::new(right.scaled(-1.0), 0)],
-            vec![Exit::new(left.scaled(-1.0), 0)],
+            vec![
+                Transition::new(right.clone(), 1),
+                Transition::new(left.clone(), 2),
+            ],
+            vec![Transition::new(right.scaled(-1.0), 0)],
+            vec![Transition::new(left.scaled(-1.0), 0)],
         ],
     )
     .unwrap()
@@ -155,7 +158,7 @@ fn bad_input_is_refused() {
     let lost = System::new(
         drive.clone(),
         vec![one.clone()],
-        vec![vec![Exit::new(guard, 7)]],
+        vec![vec![Transition::new(guard, 7)]],
     );
     assert!(matches!(
         lost,

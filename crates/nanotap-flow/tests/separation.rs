@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Drive, Exit, Flow, HarmonicVector, Onset, Output, Regime, Reset, System};
+use nanotap_flow::{Drive, Flow, HarmonicVector, Onset, Output, Regime, Reset, System, Transition};
 
 /// ẍ + 0.1 ẋ + x = 2 sin ωt above a surface at rest at 0 of stiffness `k`, damper `c`.
 #[derive(Clone, Copy)]
@@ -45,18 +45,18 @@ impl Body {
         };
         let regimes = vec![regime(0, 0.0, 0.0), regime(1, k, c)];
         let met = Onset::Proportional {
-            exit: 0,
+            transition: 0,
             factor: -c,
         };
-        let exits = vec![
-            vec![Exit::new(gap, 1).with_onset(met)],
+        let transitions = vec![
+            vec![Transition::new(gap, 1).with_onset(met)],
             vec![
-                Exit::new(force, 0)
+                Transition::new(force, 0)
                     .with_reset(left)
                     .with_onset(Onset::AtRest(0)),
             ],
         ];
-        System::new(drive, regimes, exits).unwrap()
+        System::new(drive, regimes, transitions).unwrap()
     }
 
     /// Runge–Kutta of fourth order with switches located by bisection of the step; returns

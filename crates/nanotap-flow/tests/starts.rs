@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::trajectory::{Recorder, Trajectory};
-use nanotap_flow::{Drive, Exit, Flow, FlowError, HarmonicVector, Output, Regime, System};
+use nanotap_flow::{Drive, Flow, FlowError, HarmonicVector, Output, Regime, System, Transition};
 use proptest::prelude::*;
 
 /// ẍ + c ẋ + k x = F sin ωt, m = 1, with a soft stop of spring and damper at x = gap.
@@ -36,11 +36,11 @@ impl SoftStop {
         ];
         let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
         let gap = x.scaled(-1.0).with_constant(self.gap);
-        let exits = vec![
-            vec![Exit::new(gap.clone(), 1)],
-            vec![Exit::new(gap.scaled(-1.0), 0)],
+        let transitions = vec![
+            vec![Transition::new(gap.clone(), 1)],
+            vec![Transition::new(gap.scaled(-1.0), 0)],
         ];
-        Ok(Arc::new(System::new(drive, regimes, exits)?))
+        Ok(Arc::new(System::new(drive, regimes, transitions)?))
     }
 
     fn record(self, start: [f64; 2], periods: usize) -> Result<Trajectory, FlowError> {

@@ -5,8 +5,8 @@ mod common;
 use common::beam;
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::{
-    Drive as ExactDrive, Exit, Flow as ExactFlow, HarmonicVector, Output, Regime,
-    System as ExactSystem,
+    Drive as ExactDrive, Flow as ExactFlow, HarmonicVector, Output, Regime, System as ExactSystem,
+    Transition,
 };
 use nanotap_volterra::{Flow, laws};
 use std::f64::consts::TAU;
@@ -55,8 +55,11 @@ fn exact(count: usize, stiffness: f64, damping: f64, a0: f64, zc: f64) -> ExactS
         Regime::new(0, free, forcing, &drive).unwrap(),
         Regime::new(1, contact, pushed, &drive).unwrap(),
     ];
-    let exits = vec![vec![Exit::new(outside, 1)], vec![Exit::new(inside, 0)]];
-    ExactSystem::new(drive, regimes, exits).unwrap()
+    let transitions = vec![
+        vec![Transition::new(outside, 1)],
+        vec![Transition::new(inside, 0)],
+    ];
+    ExactSystem::new(drive, regimes, transitions).unwrap()
 }
 
 #[test]

@@ -1,11 +1,10 @@
 //! nanotap on the works of `peers/README.md`, from the command line that all peers have:
 //!
 //! ```text
-//! peer first|long|sweep|basin [--method one|ensemble] [--threads K] [--seconds S]
+//! peer first|long|sweep|basin [--threads K] [--seconds S]
 //! ```
 //!
 //! `cargo xtask peers` runs it beside the others. There is no setting: nothing is stepped.
-//! Method `one` follows a motion at a time, `ensemble` eight side by side.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -14,13 +13,11 @@ use std::time::Instant;
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap_flow::{Ensemble, Flow, System};
+use nanotap_flow::{Flow, System};
 
 /// Modes, and the dimension of a state.
 const MODES: usize = 3;
 const DIMENSION: usize = 2 * MODES;
-/// Motions that an ensemble has.
-const LANES: usize = 8;
 /// The sweep: 400 values of Ω by 8 starts, 500 periods each, the last 100 kept.
 const SWEEP: (usize, usize) = (400, 8);
 const SWEEP_PERIODS: usize = 500;
@@ -35,8 +32,6 @@ type Failure = Box<dyn std::error::Error>;
 /// What the command line asks for.
 struct Options {
     work: String,
-    /// Motions side by side.
-    lanes: usize,
     threads: usize,
     seconds: f64,
 }
@@ -50,11 +45,6 @@ impl Options {
         };
         Ok(Self {
             work: words.first().cloned().unwrap_or_default(),
-            lanes: match value("--method").map(String::as_str) {
-                None | Some("one") => 1,
-                Some("ensemble") => LANES,
-                Some(other) => return Err(format!("no method `{other}`: one or ensemble").into()),
-            },
             threads: value("--threads").map_or(Ok(1), |text| text.parse())?,
             seconds: value("--seconds").map_or(Ok(1.0), |text| text.parse())?,
         })
@@ -82,81 +72,45 @@ fn model(omega: f64) -> Result<Model, Failure> {
     Ok(Model::cantilever(&case)?)
 }
 
-/// Motions of one system, side by side: an ensemble, or a single one by the engine for
-/// single ones.
-enum Motions {
-    One(Box<Flow>),
-    Several(Ensemble),
+/// A motion of a system of its own: threads that share one count references to it and wait for
+/// each other.
+fn motion(model: &Model) -> Flow {
+    Flow::new(Arc::new(System::clone(&model.system)))
 }
 
-impl Motions {
-    /// So many motions of a system of their own: threads that share one count references
-    /// to it and wait for each other.
-    fn new(model: &Model, lanes: usize) -> Self {
-        let system = Arc::new(System::clone(&model.system));
-        if lanes == 1 {
-            Self::One(Box::new(Flow::new(system)))
-        } else {
-            Self::Several(Ensemble::new(&system, lanes))
-        }
-    }
-
-    fn start(&mut self, lane: usize, state: &State) -> Result<(), Failure> {
-        match self {
-            Self::One(flow) => flow.start(state, 0.0)?,
-            Self::Several(ensemble) => ensemble.start(lane, state)?,
-        }
-        Ok(())
-    }
-
-    fn run_periods(&mut self, periods: usize) -> Result<(), Failure> {
-        match self {
-            Self::One(flow) => flow.run_periods(periods)?,
-            Self::Several(ensemble) => ensemble
-                .run_periods(periods)
-                .map_err(|(lane, error)| format!("motion {lane}: {error}"))?,
-        }
-        Ok(())
-    }
-
-    fn state(&self, lane: usize) -> State {
-        let mut state = [0.0; DIMENSION];
-        match self {
-            Self::One(flow) => flow.state(&mut state),
-            Self::Several(ensemble) => ensemble.flow(lane).state(&mut state),
-        }
-        state
-    }
+/// Its state.
+fn state(flow: &Flow) -> State {
+    let mut state = [0.0; DIMENSION];
+    flow.state(&mut state);
+    state
 }
 
-/// The best time of many for what `run` does with motions from rest, a motion.
+/// The best time of many for what `run` does with motions from rest.
 fn best_from_rest(
     options: &Options,
-    mut run: impl FnMut(&mut Motions) -> Result<(), Failure>,
+    mut run: impl FnMut(&mut Flow) -> Result<(), Failure>,
 ) -> Result<f64, Failure> {
     let model = model(Cantilever::paper().omega)?;
-    let mut motions = Motions::new(&model, options.lanes);
+    let mut flow = motion(&model);
     let (begin, mut best, mut repeats) = (Instant::now(), f64::INFINITY, 0);
     while repeats < 3 || (repeats < 1000 && begin.elapsed().as_secs_f64() < options.seconds) {
         let start = Instant::now();
-        for lane in 0..options.lanes {
-            motions.start(lane, &[0.0; DIMENSION])?;
-        }
-        run(&mut motions)?;
+        flow.start(&[0.0; DIMENSION], 0.0)?;
+        run(&mut flow)?;
         best = best.min(start.elapsed().as_secs_f64());
         repeats += 1;
     }
-    Ok(best / options.lanes as f64)
+    Ok(best)
 }
 
 /// The first 20 periods from rest.
 fn first(options: &Options) -> Result<(), Failure> {
     let mut states = Vec::new();
-    let seconds = best_from_rest(options, |motions| {
+    let seconds = best_from_rest(options, |flow| {
         states.clear();
         for _ in 0..20 {
-            motions.run_periods(1)?;
-            states.push(motions.state(0));
+            flow.run_periods(1)?;
+            states.push(state(flow));
         }
         Ok(())
     })?;
@@ -164,19 +118,15 @@ fn first(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// 2000 periods from rest, dealt out to the motions side by side.
+/// 2000 periods from rest.
 fn long(options: &Options) -> Result<(), Failure> {
     const PERIODS: usize = 2000;
-    // What is told is the time a motion; all of them together do the 2000 periods.
-    let seconds = best_from_rest(options, |motions| {
-        motions.run_periods(PERIODS / options.lanes)?;
-        black_box(motions.state(0));
+    let seconds = best_from_rest(options, |flow| {
+        flow.run_periods(PERIODS)?;
+        black_box(state(flow));
         Ok(())
     })?;
-    println!(
-        "{{\"seconds\": {:e}, \"periods\": {PERIODS}}}",
-        seconds * options.lanes as f64
-    );
+    println!("{{\"seconds\": {seconds:e}, \"periods\": {PERIODS}}}");
     Ok(())
 }
 
@@ -186,16 +136,14 @@ fn sweep(options: &Options) -> Result<(), Failure> {
     let values = as_many_as_fit(options, SWEEP.0, |k| {
         let value = (k * 247 % SWEEP.0) as f64 / (SWEEP.0 - 1) as f64;
         let model = model(2.0 + 2.0 * value)?;
-        let mut motions = Motions::new(&model, options.lanes);
-        for starts in starts.chunks(options.lanes) {
-            for (lane, start) in starts.iter().enumerate() {
-                motions.start(lane, start)?;
-            }
-            motions.run_periods(SWEEP_PERIODS - SWEEP_KEPT)?;
-            let mut kept = Vec::with_capacity(SWEEP_KEPT * starts.len());
+        let mut flow = motion(&model);
+        for start in &starts {
+            flow.start(start, 0.0)?;
+            flow.run_periods(SWEEP_PERIODS - SWEEP_KEPT)?;
+            let mut kept = Vec::with_capacity(SWEEP_KEPT);
             for _ in 0..SWEEP_KEPT {
-                motions.run_periods(1)?;
-                kept.extend((0..starts.len()).map(|lane| motions.state(lane)));
+                flow.run_periods(1)?;
+                kept.push(state(&flow));
             }
             black_box(&kept);
         }
@@ -216,19 +164,15 @@ fn basin(options: &Options) -> Result<(), Failure> {
     let count = BASIN_SIDE * BASIN_SIDE;
     let along = |k: usize| k as f64 / (BASIN_SIDE - 1) as f64;
     let packets = as_many_as_fit(options, count / PACKET, |packet| {
-        let mut motions = Motions::new(&model, options.lanes);
-        for first in (packet * PACKET..(packet + 1) * PACKET).step_by(options.lanes) {
-            for lane in 0..options.lanes {
-                let point = (first + lane) * 24721 % count;
-                let mut start = [0.0; DIMENSION];
-                start[0] = -1.0 + 2.0 * along(point / BASIN_SIDE);
-                start[MODES] = -4.0 + 8.0 * along(point % BASIN_SIDE);
-                motions.start(lane, &start)?;
-            }
-            motions.run_periods(BASIN_PERIODS)?;
-            for lane in 0..options.lanes {
-                black_box(motions.state(lane));
-            }
+        let mut flow = motion(&model);
+        for number in packet * PACKET..(packet + 1) * PACKET {
+            let point = number * 24721 % count;
+            let mut start = [0.0; DIMENSION];
+            start[0] = -1.0 + 2.0 * along(point / BASIN_SIDE);
+            start[MODES] = -4.0 + 8.0 * along(point % BASIN_SIDE);
+            flow.start(&start, 0.0)?;
+            flow.run_periods(BASIN_PERIODS)?;
+            black_box(state(&flow));
         }
         Ok(())
     })?;

@@ -9,10 +9,10 @@ use super::stretch::Stretch;
 use crate::Complex;
 use crate::flow::{Observer, SegmentView, SwitchView};
 use crate::integral::{fourier_integral, integral, product_integral};
-use crate::lattice::Lattice;
-use crate::pack::{LARGEST_ANGLE, Pack, WIDTH};
-use crate::range::{Range, RangeWork, extend, extend_by_certified_steps};
+use crate::search::range::{Extend, Range, RangeWork, extend_by_certified_steps};
+use crate::search::table::Table;
 use crate::signal::Signal;
+use crate::simd::{self, LARGEST_ANGLE, layout};
 
 /// Switches from one regime to another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -151,14 +151,11 @@ impl Accumulator {
         let (regime, drive) = (&plan.regimes[segment.regime], segment.system.drive());
         let (length, modes) = (segment.length, segment.modal.len());
         let tones = drive.frequencies().len();
-        let of = |packed: &[[Pack; 2]], k: usize| {
-            let [re, im] = &packed[k / WIDTH];
-            Complex::new(re[k % WIDTH], im[k % WIDTH])
-        };
         let stretch = &mut self.stretch;
         stretch.length = length;
         stretch.terms.clear();
-        let terms = (0..modes + tones).map(|k| [of(segment.packed, k), of(segment.turns, k)]);
+        let terms = (0..modes + tones)
+            .map(|k| [segment.packed, segment.turns].map(|list| layout::get(list, k)));
         stretch
             .terms
             .extend(terms.chain([[Complex::new(1.0, 0.0); 2]]));
@@ -257,7 +254,14 @@ impl Accumulator {
                     least: if lower { f64::MIN } else { range.least },
                     greatest: if upper { f64::MAX } else { range.greatest },
                 };
-                extend(&mut within, table, kernel, packed, length, &mut self.search);
+                simd::dispatch(Extend {
+                    range: &mut within,
+                    table,
+                    kernel,
+                    packed,
+                    length,
+                    work: &mut self.search,
+                });
                 if !lower {
                     range.least = within.least;
                 }
@@ -279,12 +283,16 @@ impl Accumulator {
 
     /// The table for the outputs of a regime: its guards', or its own.
     #[inline(always)]
-    fn table<'a>(regime: &'a RegimePlan, segment: &SegmentView<'a>) -> Option<&'a Lattice> {
+    fn table<'a>(regime: &'a RegimePlan, segment: &SegmentView<'a>) -> Option<&'a Table> {
         if segment.system.largest_angle() > LARGEST_ANGLE {
             return None;
         }
-        let exits = segment.system.prepared(segment.regime);
-        let guards = || exits.iter().find_map(|exit| exit.lattice.as_ref());
+        let transitions = segment.system.prepared(segment.regime);
+        let guards = || {
+            transitions
+                .iter()
+                .find_map(|transition| transition.table.as_ref())
+        };
         regime.table.as_ref().or_else(guards)
     }
 }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::stretch::{Rate, Rates};
-use crate::lattice::Lattice;
 use crate::regime::{Kernel, ModalOutput};
+use crate::search::table::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};
 
 /// An output of a [`Request`].
@@ -125,7 +125,7 @@ impl Request {
                 });
             }
             for (r, (regime, modal)) in regimes.iter().zip(&mut outputs).enumerate() {
-                let guards = &system.exits()[r];
+                let guards = &system.transitions()[r];
                 let output = match channel {
                     Outputs::Same(output) => output,
                     Outputs::ByRegime(all) => &all[r],
@@ -133,11 +133,11 @@ impl Request {
                 output.check("an output", n, tones)?;
                 modal.push(regime.project(output));
                 let reversed = output.scaled(-1.0);
-                signs[r].push(guards.iter().find_map(|exit| {
-                    if exit.guard == *output {
+                signs[r].push(guards.iter().find_map(|transition| {
+                    if transition.guard == *output {
                         Some(Sign::NotNegative)
                     } else {
-                        (exit.guard == reversed).then_some(Sign::NotPositive)
+                        (transition.guard == reversed).then_some(Sign::NotPositive)
                     }
                 }));
             }
@@ -171,7 +171,7 @@ impl Request {
                 let tabulated = system
                     .prepared(r)
                     .iter()
-                    .any(|exit| exit.lattice.as_ref().is_some_and(Lattice::is_complete));
+                    .any(|transition| transition.table.as_ref().is_some_and(Table::is_complete));
                 let drive = system.drive();
                 let plan =
                     RegimePlan::new(regime, drive, outputs, &frequencies, products, tabulated);
@@ -238,7 +238,7 @@ pub(super) struct RegimePlan {
     /// negative.
     pub(super) signs: Vec<Option<Sign>>,
     /// The table of a regime whose guards have none that follows every term.
-    pub(super) table: Option<Lattice>,
+    pub(super) table: Option<Table>,
 }
 
 impl RegimePlan {
@@ -260,7 +260,7 @@ impl RegimePlan {
             .collect();
         let clustered = !regime.basis().clusters.is_empty();
         let table = kernels.first().filter(|_| !tabulated && !clustered);
-        let table = table.and_then(|kernel| Lattice::for_extrema(kernel, drive.period()));
+        let table = table.and_then(|kernel| Table::for_extrema(kernel, drive.period()));
         Self {
             outputs,
             weights,

@@ -4,14 +4,12 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::observe::{Set, measure};
-use nanotap_flow::{Ensemble, Flow};
+use nanotap_flow::Flow;
 
 use crate::cases::{self, DAMPINGS, MODES};
 
 /// Periods a run: chaotic motion differs from period to period.
 const PERIODS: usize = 100;
-/// Motions of an ensemble.
-const LANES: usize = 8;
 
 /// Times [`PERIODS`] periods from where `flow` is.
 fn periods(bencher: Bencher<'_, '_>, flow: &Flow) {
@@ -68,23 +66,6 @@ fn recorded(bencher: Bencher<'_, '_>, modes: usize, set: Set) {
     bencher
         .counter(ItemsCount::new(PERIODS))
         .bench_local(|| measure(&model, &state, PERIODS, set).expect("a bounded motion"));
-}
-
-/// The same for eight motions side by side. Items are periods of any motion.
-#[divan::bench(args = MODES)]
-fn ensemble_of_8(bencher: Bencher<'_, '_>, modes: usize) {
-    let mut flow = damped(modes, DAMPINGS[1]);
-    let mut ensemble = Ensemble::new(flow.system(), LANES);
-    let mut state = vec![0.0; 2 * modes];
-    for lane in 0..LANES {
-        cases::run(&mut flow, 1);
-        flow.state(&mut state);
-        ensemble.start(lane, &state).expect("a state of the motion");
-    }
-    bencher
-        .counter(ItemsCount::new(LANES * PERIODS))
-        .with_inputs(|| ensemble.clone())
-        .bench_local_refs(|ensemble| ensemble.run_periods(PERIODS).expect("bounded motions"));
 }
 
 /// A fast drive: Ω = 20.

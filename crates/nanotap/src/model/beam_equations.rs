@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::sensitivity::RegimeTangent;
 use nanotap_flow::{
-    Complex, Drive, Exit, FlowError, HarmonicVector, Output, Reset, SpectralBasis, System,
+    Complex, Drive, FlowError, HarmonicVector, Output, Reset, SpectralBasis, System, Transition,
 };
 
 use crate::model::cantilever::CosineTerm;
@@ -235,9 +235,9 @@ impl<'a> Beam<'a> {
     }
 
     /// The way out of flight, and out of contact.
-    pub(crate) fn exits(&self, law: &Law) -> Vec<Vec<Exit>> {
-        let mut begins = Exit::new(self.combined(&law.gap), 1);
-        let mut ends = Exit::new(self.combined(&law.hold), 0);
+    pub(crate) fn transitions(&self, law: &Law) -> Vec<Vec<Transition>> {
+        let mut begins = Transition::new(self.combined(&law.gap), 1);
+        let mut ends = Transition::new(self.combined(&law.hold), 0);
         if let Some([met, left]) = law.onsets {
             begins = begins.with_onset(met);
             ends = ends.with_onset(left);

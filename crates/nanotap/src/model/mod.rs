@@ -187,7 +187,7 @@ impl Model {
             beam.regime(Regime::Free, &law.flight, true)?,
             beam.regime(Regime::Contact, &law.contact, law.plain_contact)?,
         ];
-        let system = Arc::new(System::new(drive.clone(), regimes, beam.exits(&law))?);
+        let system = Arc::new(System::new(drive.clone(), regimes, beam.transitions(&law))?);
         let outputs = beam.outputs(&law);
         Ok(Self {
             contact: vec![false, true],

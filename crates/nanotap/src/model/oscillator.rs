@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::sensitivity::SystemTangent;
-use nanotap_flow::{Drive, Exit, HarmonicVector, Output, Reset, Sticking, System};
+use nanotap_flow::{Drive, HarmonicVector, Output, Reset, Sticking, System, Transition};
 use serde::Serialize;
 
 use crate::model::{Model, ModelError, Powers, Product};
@@ -204,18 +204,18 @@ impl Oscillator {
         let drive = Drive::single(self.omega)?;
         let free = self.regime(0, 0.0, 0.0, &drive)?;
         let gap = self.gap_output();
-        let (regimes, exits) = match self.stop {
+        let (regimes, transitions) = match self.stop {
             Stop::Soft { stiffness, damping } => {
                 let contact = self.regime(1, stiffness, damping, &drive)?;
-                let exits = vec![
-                    vec![Exit::new(gap.clone(), 1)],
-                    vec![Exit::new(gap.scaled(-1.0), 0)],
+                let transitions = vec![
+                    vec![Transition::new(gap.clone(), 1)],
+                    vec![Transition::new(gap.scaled(-1.0), 0)],
                 ];
-                (vec![free, contact], exits)
+                (vec![free, contact], transitions)
             }
             Stop::Rigid { restitution } => Self::rigid(restitution, free, &gap, &drive)?,
         };
-        let system = Arc::new(System::new(drive, regimes, exits)?);
+        let system = Arc::new(System::new(drive, regimes, transitions)?);
         Ok(self.outputs(system, gap))
     }
 
@@ -242,7 +242,7 @@ impl Oscillator {
         free: nanotap_flow::Regime,
         gap: &Output,
         drive: &Drive,
-    ) -> Result<(Vec<nanotap_flow::Regime>, Vec<Vec<Exit>>), ModelError> {
+    ) -> Result<(Vec<nanotap_flow::Regime>, Vec<Vec<Transition>>), ModelError> {
         let bounce = |r: f64| Reset {
             matrix: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, -r]),
             offset: HarmonicVector::zeros(2, 1),
@@ -255,13 +255,13 @@ impl Oscillator {
         );
         let still =
             nanotap_flow::Regime::new(1, DMatrix::zeros(2, 2), HarmonicVector::zeros(2, 1), drive)?;
-        let impact = Exit::new(gap.clone(), 0)
+        let impact = Transition::new(gap.clone(), 0)
             .with_reset(bounce(restitution))
             .with_sticking(Sticking {
                 regime: 1,
                 reset: bounce(0.0),
             });
-        let release = Exit::new(acceleration.scaled(-1.0), 0).as_release();
+        let release = Transition::new(acceleration.scaled(-1.0), 0).as_release();
         Ok((vec![free, still], vec![vec![impact], vec![release]]))
     }
 

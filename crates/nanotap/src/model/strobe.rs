@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use nanotap_dynamics::{StroboscopicMap, Tangency};
-use nanotap_flow::extrema::sign_changes;
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
+use nanotap_flow::search::sign_changes;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::signal::Signal;
-use nanotap_flow::system::Exit;
+use nanotap_flow::system::Transition;
 use nanotap_flow::{Flow, FlowError, Output, System};
 
 use crate::model::Model;
@@ -132,10 +132,10 @@ impl StroboscopicMap for Strobe {
     fn log_determinant_bound(&self) -> f64 {
         let system = self.flow.system();
         let expands = system
-            .exits()
+            .transitions()
             .iter()
             .flatten()
-            .any(|exit| log_impact(exit) > 0.0);
+            .any(|transition| log_impact(transition) > 0.0);
         if expands {
             return f64::INFINITY;
         }
@@ -167,8 +167,9 @@ impl StroboscopicMap for Strobe {
 
 /// log|det| of what an impact does to volumes: the reset itself, and once more as much
 /// for the times at which neighbouring motions meet the stop.
-fn log_impact(exit: &Exit) -> f64 {
-    exit.reset
+fn log_impact(transition: &Transition) -> f64 {
+    transition
+        .reset
         .as_ref()
         .map_or(0.0, |r| 2.0 * r.matrix.determinant().abs().ln())
 }
@@ -182,8 +183,8 @@ impl Observer for LogDeterminant {
     }
 
     fn switch(&mut self, switch: &SwitchView<'_>) {
-        let exits = &switch.system.exits()[switch.switch.from];
-        self.0 += exits.get(switch.exit).map_or(0.0, log_impact);
+        let transitions = &switch.system.transitions()[switch.switch.from];
+        self.0 += transitions.get(switch.transition).map_or(0.0, log_impact);
     }
 }
 

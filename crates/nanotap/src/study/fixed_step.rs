@@ -160,7 +160,7 @@ pub fn fixed_step_run(
     }
     if model
         .system
-        .exits()
+        .transitions()
         .iter()
         .flatten()
         .any(|e| e.reset.is_some())

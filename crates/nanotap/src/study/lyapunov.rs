@@ -181,10 +181,10 @@ fn sum_by_trace(
             .events()
             .iter()
             .filter_map(|e| {
-                let exit = model.system.exits()[e.from]
+                let transition = model.system.transitions()[e.from]
                     .iter()
                     .find(|x| x.target == e.to)?;
-                Some(2.0 * exit.reset.as_ref()?.matrix.determinant().abs().ln())
+                Some(2.0 * transition.reset.as_ref()?.matrix.determinant().abs().ln())
             })
             .sum::<f64>();
     }

@@ -377,10 +377,10 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
         .events()
         .iter()
         .filter_map(|e| {
-            let exit = model.system.exits()[e.from]
+            let transition = model.system.transitions()[e.from]
                 .iter()
                 .find(|x| x.target == e.to)?;
-            let reset = exit.reset.as_ref().filter(|_| forgets.is_none())?;
+            let reset = transition.reset.as_ref().filter(|_| forgets.is_none())?;
             Some(2.0 * reset.matrix.determinant().abs().ln())
         })
         .sum();

@@ -130,7 +130,7 @@ fn widening(swing: f64, damping: f64, omega: f64) -> f64 {
 fn rigid_stop(model: &Model) -> Option<f64> {
     let rigid = model
         .system
-        .exits()
+        .transitions()
         .iter()
         .flatten()
         .any(|e| e.reset.is_some());

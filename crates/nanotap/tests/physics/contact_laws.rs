@@ -178,7 +178,7 @@ proptest! {
             let t = f64::from(k) * model.period();
             let segment = run.segment_at(t).unwrap();
             let (regime, _) = model.system.regime_at(&run.state_at(t).unwrap(), 0.0).unwrap();
-            let guard = &model.system.exits()[segment.regime][0].guard;
+            let guard = &model.system.transitions()[segment.regime][0].guard;
             let inside = guard.at(model.system.drive(), &run.state_at(t).unwrap(), 0.0);
             prop_assert!(regime == segment.regime || inside.abs() < 1e-9, "{k}: {inside}");
         }

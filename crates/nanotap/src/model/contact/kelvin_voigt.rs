@@ -47,7 +47,7 @@ pub(super) fn law(stiffness: Dual, damping: Dual) -> Law {
         left: Some(Combination::height(one)),
         onsets: Some([
             Onset::Proportional {
-                exit: 0,
+                transition: 0,
                 factor: -damping.value,
             },
             Onset::AtRest(0),

@@ -1,431 +1,45 @@
-//! The certified first zero of a signal: no contact can be missed, however brief
-//! or grazing.
-//!
-//! Value, rate and curvature at a point and a bound `B` on the third derivative
-//! from there on enclose the signal between two cubics,
-//! `g + ġh + ½g̈h² ∓ ⅙Bh³`. The signal is positive for certain up to the first
-//! zero of the lower cubic, so a step of that length cannot jump over a zero; it
-//! turns into a third-order root finder close to one. When the upper cubic crosses
-//! zero and the rate is negative for certain up to there, the zero is bracketed
-//! and unique, and a safeguarded Newton–Halley iteration finishes, its own last
-//! error bounded by `B`.
-//!
-//! Far from zero longer steps come from lower bounds of the signal that follow only its
-//! slowest terms and replace each faster one by minus its amplitude.
-//!
-//! Two places need more than double precision's plain sums. Near a tangency the
-//! sign of the extremum can drown in rounding: it is then found in twice double
-//! precision, so a dip of 1e-17 is seen for what it is. Right after a switch the
-//! signal is zero *by definition* and the next zero may be arbitrarily close: the
-//! zero is divided out of the Taylor series, whose remainder is bounded, and the
-//! quotient is searched.
-//!
-//! What it cannot do: tell a triple zero (value, rate and curvature all zero
-//! within rounding) from a near miss; it then decides by the value in twice double
-//! precision at the points it visits and reports the crossing as grazing.
+//! Certified steps towards the first zero, and the finish.
 
-use crate::double_double;
-use crate::lattice::{Cell, FallingZero, Lattice, Stretch};
-#[cfg(target_arch = "x86_64")]
-use crate::pack::Fused;
-use crate::pack::{LARGEST_ANGLE, Library, Math, Plain};
-use crate::signal::{Enclosure, Jet, Signal};
 use std::marker::PhantomData;
 
-/// Where the search starts from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
-    /// Inside the regime, the signal positive.
-    Inside,
-    /// On the surface, the signal zero and rising. `rate` overrides its first
-    /// derivative where the caller knows it better than the signal does.
-    Surface {
-        /// The rate of leaving the surface, if known.
-        rate: Option<f64>,
-    },
-    /// On the surface with rate and curvature zero as well: release from sticking.
-    Release,
-    /// On the surface, with further derivatives zero by what is known of the start.
-    Flat {
-        /// How many derivatives vanish, the value counted as the first.
-        vanishing: usize,
-        /// The first that does not.
-        derivative: f64,
-    },
+use super::{Crossing, Start, Statistics};
+use crate::signal::{Enclosure, Jet, Signal};
+use crate::simd::{Simd, Work};
+
+/// A search by certified steps alone.
+pub(crate) struct BySteps<'a> {
+    pub(crate) signal: &'a Signal,
+    /// How long the stretch can be: what times are measured against.
+    pub(crate) length: f64,
+    /// From where it is searched; if beyond zero, the signal is positive there.
+    pub(crate) from: f64,
+    /// Up to where it is searched.
+    pub(crate) limit: f64,
+    /// How it starts at zero.
+    pub(crate) start: Start,
+    pub(crate) statistics: &'a mut Statistics,
 }
 
-/// A zero of a signal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing {
-    /// Where.
-    pub at: f64,
-    /// The signal's rate there, negative or (at a grazing touch) zero.
-    pub rate: f64,
-    /// Whether value and rate vanish together within rounding.
-    pub grazing: bool,
-    /// Whether the rate is known better than the signal's own sum tells it.
-    pub refined: bool,
-}
+impl Work for BySteps<'_> {
+    type Output = Option<Crossing>;
 
-/// What a search cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Statistics {
-    /// Evaluations of the signal with its derivatives.
-    pub evaluations: u64,
-    /// Certified steps.
-    pub steps: u64,
-    /// Tangencies decided in twice double precision.
-    pub tangencies: u64,
-    /// Points of lattices at which exponentials were looked up, not computed.
-    pub points: u64,
-}
-
-/// The first `s` in `(0, length]` where the signal falls to zero, or `None` when it
-/// stays positive for certain.
-pub fn first_crossing(
-    signal: &Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Option<Crossing> {
-    if signal.fastest() * length < LARGEST_ANGLE {
-        first_crossing_with::<Plain>(signal, length, start, statistics)
-    } else {
-        first_crossing_with::<Library>(signal, length, start, statistics)
-    }
-}
-
-/// The same for a signal whose exponentials are tabulated on a lattice, which certifies
-/// most of the way. Exponentials of the last evaluation are kept in the signal.
-#[inline(always)]
-pub(crate) fn first_crossing_on_lattice<M: Math>(
-    lattice: &Lattice,
-    signal: &mut Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Option<Crossing> {
-    let Some(whole) = whole_stretch(signal, length, start) else {
-        return first_crossing_with::<M>(signal, length, start, statistics);
-    };
-    signal.follow::<M>(lattice.followed());
-    let search = CellSearch {
-        lattice,
-        length,
-        start,
-    };
-    let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {
-        return search
-            .stretch::<M>(whole, signal, statistics)
-            .and_then(Decision::crossing);
-    };
-    let mut found = None;
-    while found.is_none()
-        && let Some(cell) = coarse.next_open(signal.followed())
-    {
-        signal.follow_from::<M>(lattice, &cell);
-        let stretch = Lattice::within(&cell, whole);
-        found = search.stretch::<M>(stretch, signal, statistics);
-        signal.follow_from_start();
-    }
-    statistics.points += coarse.points;
-    found.and_then(Decision::crossing)
-}
-
-/// All of a signal up to `length`, for a lattice; `None` for a start that only the Taylor
-/// series can leave.
-#[inline(always)]
-fn whole_stretch(signal: &Signal, length: f64, start: Start) -> Option<Stretch> {
-    let surface = match start {
-        Start::Inside => None,
-        Start::Surface { rate } => Some(rate.unwrap_or_else(|| signal.first_jet().rate)),
-        Start::Release | Start::Flat { .. } => return None,
-    };
-    Some(Stretch {
-        start: 0.0,
-        end: length,
-        surface,
-    })
-}
-
-/// What ends a search through cells.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Decision {
-    /// The crossing.
-    Crossing(Crossing),
-    /// There is one, but beyond the end.
-    TooLate,
-}
-
-impl Decision {
-    /// The crossing, unless it comes too late.
-    pub(crate) fn crossing(self) -> Option<Crossing> {
-        match self {
-            Self::Crossing(crossing) => Some(crossing),
-            Self::TooLate => None,
-        }
-    }
-}
-
-/// What a lattice says of a stretch before anything is evaluated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Prospect {
-    /// The crossing, or that there is none.
-    Settled(Option<Crossing>),
-    /// Where the first crossing is, all but certainly.
-    Zero(FallingZero),
-}
-
-/// The first half of [`first_crossing_on_lattice`]: all that comes before an exponential is
-/// computed. [`evaluate_zero`] and [`confirm_zero`] go on from there; if that does not settle
-/// it, the whole search does.
-#[inline(always)]
-pub(crate) fn prospect_on_lattice<M: Math>(
-    lattice: &Lattice,
-    signal: &mut Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Prospect {
-    let Some(whole) = whole_stretch(signal, length, start) else {
-        let found = first_crossing_with::<M>(signal, length, start, statistics);
-        return Prospect::Settled(found);
-    };
-    signal.follow::<M>(lattice.followed());
-    let Some(mut coarse) = lattice.coarse::<M>(signal, whole) else {
-        let mut fine = lattice.fine::<M>(signal, whole);
-        let open = fine.next_open(signal.followed());
-        statistics.points += fine.points;
-        let Some(cell) = open else {
-            return Prospect::Settled(None);
-        };
-        return prospect_in::<M>(&cell, lattice, signal, length, start, statistics);
-    };
-    while let Some(cell) = coarse.next_open(signal.followed()) {
-        signal.follow_from::<M>(lattice, &cell);
-        let mut fine = lattice.fine::<M>(signal, Lattice::within(&cell, whole));
-        let open = fine.next_open(signal.followed());
-        signal.follow_from_start();
-        statistics.points += fine.points;
-        if let Some(cell) = open {
-            statistics.points += coarse.points;
-            return prospect_in::<M>(&cell, lattice, signal, length, start, statistics);
-        }
-    }
-    statistics.points += coarse.points;
-    Prospect::Settled(None)
-}
-
-#[inline(always)]
-fn prospect_in<M: Math>(
-    cell: &Cell,
-    lattice: &Lattice,
-    signal: &mut Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Prospect {
-    match cell.falling_zero() {
-        Some(zero) => Prospect::Zero(zero),
-        None => Prospect::Settled(whole_search::<M>(
-            lattice, signal, length, start, statistics,
-        )),
-    }
-}
-
-/// [`first_crossing_on_lattice`], outlined. There are no lattices for [`Library`].
-#[inline(always)]
-pub(crate) fn whole_search<M: Math>(
-    lattice: &Lattice,
-    signal: &mut Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Option<Crossing> {
-    #[cfg(target_arch = "x86_64")]
-    if M::FUSED {
-        // SAFETY: this arithmetic is in use only where the machine has it.
-        return unsafe { whole_search_fused(lattice, signal, length, start, statistics) };
-    }
-    whole_search_plain(lattice, signal, length, start, statistics)
-}
-
-#[inline(never)]
-fn whole_search_plain(
-    lattice: &Lattice,
-    signal: &mut Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Option<Crossing> {
-    first_crossing_on_lattice::<Plain>(lattice, signal, length, start, statistics)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-#[inline(never)]
-fn whole_search_fused(
-    lattice: &Lattice,
-    signal: &mut Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Option<Crossing> {
-    first_crossing_on_lattice::<Fused>(lattice, signal, length, start, statistics)
-}
-
-/// The signal itself where a cell's quintic falls through zero, and its third derivative
-/// there; the exponentials are kept.
-#[inline(always)]
-pub(crate) fn evaluate_zero<M: Math>(
-    zero: &FallingZero,
-    signal: &mut Signal,
-    statistics: &mut Statistics,
-) -> (Jet, f64) {
-    statistics.evaluations += 1;
-    signal.jet_keeping_factors::<M>(zero.at)
-}
-
-/// The crossing at a quintic's zero, if it is certain to be the only one in its cell and one
-/// step away.
-#[inline(always)]
-pub(crate) fn confirm_zero(
-    zero: &FallingZero,
-    (jet, jerk): (Jet, f64),
-    signal: &Signal,
-    length: f64,
-) -> Option<Decision> {
-    // Every zero in the cell is as near as this, and the rate keeps its sign up to there.
-    let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
-    let unique = near * signal.fastest() < 0.1
-        && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
-    if !unique {
-        return None;
-    }
-    let crossing = last_cubic_step(&jet, jerk, zero.at, length, signal)?;
-    Some(if crossing.at <= length {
-        Decision::Crossing(crossing)
-    } else {
-        Decision::TooLate
-    })
-}
-
-/// A search through the cells of a lattice's fine level.
-struct CellSearch<'a> {
-    lattice: &'a Lattice,
-    length: f64,
-    start: Start,
-}
-
-impl CellSearch<'_> {
-    /// The crossing in a stretch.
     #[inline(always)]
-    fn stretch<M: Math>(
-        &self,
-        stretch: Stretch,
-        signal: &mut Signal,
-        statistics: &mut Statistics,
-    ) -> Option<Decision> {
-        let mut fine = self.lattice.fine::<M>(signal, stretch);
-        let mut found = None;
-        while found.is_none()
-            && let Some(cell) = fine.next_open(signal.followed())
-        {
-            found = self.cell::<M>(&cell, signal, statistics);
-        }
-        statistics.points += fine.points;
-        found
-    }
-
-    /// The crossing in a cell that may hold one.
-    #[inline(always)]
-    fn cell<M: Math>(
-        &self,
-        cell: &Cell,
-        signal: &mut Signal,
-        statistics: &mut Statistics,
-    ) -> Option<Decision> {
-        if let Some(zero) = cell.falling_zero() {
-            let evaluated = evaluate_zero::<M>(&zero, signal, statistics);
-            let confirmed = confirm_zero(&zero, evaluated, signal, self.length);
-            if confirmed.is_some() {
-                return confirmed;
-            }
-        }
-        #[cfg(target_arch = "x86_64")]
-        if M::FUSED {
-            // SAFETY: this arithmetic is in use only where the machine has it.
-            return unsafe { self.cell_in_steps_fused(cell, signal, statistics) }
-                .map(Decision::Crossing);
-        }
-        self.cell_in_steps_plain(cell, signal, statistics)
-            .map(Decision::Crossing)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    #[inline(never)]
-    fn cell_in_steps_fused(
-        &self,
-        cell: &Cell,
-        signal: &Signal,
-        statistics: &mut Statistics,
-    ) -> Option<Crossing> {
-        self.cell_in_steps::<Fused>(cell, signal, statistics)
-    }
-
-    #[inline(never)]
-    fn cell_in_steps_plain(
-        &self,
-        cell: &Cell,
-        signal: &Signal,
-        statistics: &mut Statistics,
-    ) -> Option<Crossing> {
-        self.cell_in_steps::<Plain>(cell, signal, statistics)
-    }
-
-    /// The same by certified steps.
-    #[inline(always)]
-    fn cell_in_steps<M: Math>(
-        &self,
-        cell: &Cell,
-        signal: &Signal,
-        statistics: &mut Statistics,
-    ) -> Option<Crossing> {
+    fn run<S: Simd>(self) -> Option<Crossing> {
         let mut search = Search {
-            signal,
+            signal: self.signal,
             length: self.length,
-            limit: cell.end.min(self.length),
-            noise: signal.noise(),
-            statistics,
-            arithmetic: PhantomData::<M>,
+            limit: self.limit,
+            noise: self.signal.noise(),
+            statistics: self.statistics,
+            arithmetic: PhantomData::<S>,
         };
-        if cell.start > 0.0 {
-            let jet = search.jet(cell.start);
-            search.run(cell.start, jet)
+        if self.from > 0.0 {
+            let jet = search.jet(self.from);
+            search.run(self.from, jet)
         } else {
             search.from(self.start)
         }
     }
-}
-
-/// The same in the arithmetic `M`.
-#[inline(always)]
-pub(crate) fn first_crossing_with<M: Math>(
-    signal: &Signal,
-    length: f64,
-    start: Start,
-    statistics: &mut Statistics,
-) -> Option<Crossing> {
-    let mut search = Search {
-        signal,
-        length,
-        limit: length,
-        noise: signal.noise(),
-        statistics,
-        arithmetic: PhantomData::<M>,
-    };
-    search.from(start)
 }
 
 enum Departure {
@@ -433,7 +47,7 @@ enum Departure {
     Inside(f64, Jet),
 }
 
-struct Search<'a, M> {
+struct Search<'a, S> {
     signal: &'a Signal,
     /// How long the segment can be: what times are measured against.
     length: f64,
@@ -441,7 +55,7 @@ struct Search<'a, M> {
     limit: f64,
     noise: f64,
     statistics: &'a mut Statistics,
-    arithmetic: PhantomData<M>,
+    arithmetic: PhantomData<S>,
 }
 
 /// Dips shallower than this many rounding errors are measured in twice double precision.
@@ -455,17 +69,17 @@ const TAYLOR_ORDER: usize = 10;
 /// Its reach, as an angle of the fastest term.
 const TAYLOR_REACH: f64 = 0.25;
 
-impl<M: Math> Search<'_, M> {
+impl<S: Simd> Search<'_, S> {
     #[inline(always)]
     fn jet(&mut self, s: f64) -> Jet {
         self.statistics.evaluations += 1;
-        self.signal.jet_with::<M>(s)
+        self.signal.jet_with::<S>(s)
     }
 
     #[inline(always)]
     fn enclosure(&mut self, s: f64) -> Enclosure {
         self.statistics.evaluations += 1;
-        self.signal.enclosure::<M>(s)
+        self.signal.enclosure::<S>(s)
     }
 
     #[inline(always)]
@@ -552,7 +166,7 @@ impl<M: Math> Search<'_, M> {
     /// rounding, or a crossing within it.
     #[cold]
     fn at_or_below_zero(&mut self, s: f64, jet: &mut Jet) -> Option<Crossing> {
-        let value = double_double::signal_value(self.signal, s);
+        let value = self.signal.accurate_at(s);
         self.statistics.tangencies += 1;
         if value > 0.0 {
             jet.value = value;
@@ -593,7 +207,7 @@ impl<M: Math> Search<'_, M> {
             jet = self.jet(s);
         }
         self.statistics.tangencies += 1;
-        jet.value = double_double::signal_value(self.signal, s);
+        jet.value = self.signal.accurate_at(s);
         jet.rate = 0.0;
         if jet.value >= 0.0 {
             return Departure::Inside(s, jet);
@@ -821,7 +435,7 @@ fn certain_crossing(jet: &Jet, root: f64, noise: f64) -> Option<f64> {
 }
 
 /// Times are known to this part of the segment's length.
-const RESOLUTION: f64 = 0.25 * f64::EPSILON;
+pub(super) const RESOLUTION: f64 = 0.25 * f64::EPSILON;
 
 /// The crossing one Halley step from `at`, if that step is certain to be the last one.
 #[inline(always)]
@@ -839,34 +453,8 @@ fn last_step(jet: &Jet, at: f64, length: f64, noise: f64) -> Option<Crossing> {
     })
 }
 
-/// The same with the third derivative, `jerk`, known and not only bounded: the cubic's zero.
-#[inline(always)]
-fn last_cubic_step(
-    jet: &Jet,
-    jerk: f64,
-    at: f64,
-    length: f64,
-    signal: &Signal,
-) -> Option<Crossing> {
-    let slope = |h: f64| jet.rate + h * (jet.curvature + 0.5 * jerk * h);
-    let first = quadratic_root(jet);
-    let step = first - jerk * first.powi(3) / (6.0 * slope(first));
-    let rate = slope(step);
-    let cubic =
-        jet.value + step * (jet.rate + step * (0.5 * jet.curvature + step * jerk * (1.0 / 6.0)));
-    // |g(at + step)| ≤ B₄ step⁴ / 24 where the cubic vanishes, and B₄ ≤ B max|λ|.
-    let error = jet.third * signal.fastest() * step.powi(4) / 24.0;
-    let solved = cubic.abs() <= signal.noise();
-    (solved && error <= RESOLUTION * length * rate.abs()).then_some(Crossing {
-        at: at + step,
-        rate: rate.min(0.0),
-        grazing: false,
-        refined: false,
-    })
-}
-
 /// The zero of `g + vh + ½ch²` nearest to `h = 0` (a Newton step where there is none).
-fn quadratic_root(jet: &Jet) -> f64 {
+pub(super) fn quadratic_root(jet: &Jet) -> f64 {
     let (g, v, c) = (jet.value, jet.rate, jet.curvature);
     let discriminant = v * v - 2.0 * g * c;
     if discriminant >= 0.0 {

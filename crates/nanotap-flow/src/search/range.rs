@@ -2,7 +2,7 @@
 //! quintics that certify a flight.
 //!
 //! Between two points the signal lies within the Bernstein coefficients of its quintic, give
-//! or take the quintic's error (see [`lattice`](crate::lattice)). Most intervals therefore
+//! or take the quintic's error (see [`walk`](super::walk)). Most intervals therefore
 //! cannot hold an extremum: they do not reach what was found before, or the best of the points.
 //! In one that can, the quintic's own extremum is where Newton's method on the signal's rate
 //! begins. What it finds is proved to be the interval's extremum: with curvature `κ` there and
@@ -10,13 +10,12 @@
 //! either side, and beyond that the quintic's coefficients are not beyond it. What cannot be
 //! proved so is left to the roots of the rate, found by certified steps.
 
-use crate::extrema::sign_changes;
-use crate::lattice::{Cell, Lattice, Level, Point, ROUNDING};
-#[cfg(target_arch = "x86_64")]
-use crate::pack::Fused;
-use crate::pack::{self, Math, Pack, Plain, WIDTH};
+use super::sign_changes;
+use super::table::{Followed, Grid, ROUNDING, Table};
+use super::walk::{Interval, Point};
 use crate::regime::Kernel;
 use crate::signal::Signal;
+use crate::simd::{ComplexVector, Simd, Vector, WIDTH, Work, layout};
 
 /// Least and greatest value; not looked for where it is minus or plus infinity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +33,8 @@ impl Range {
     }
 }
 
-/// Value, rate and curvature at the points of a stretch, four to a pack.
-pub(crate) type Points = Vec<[Pack; 3]>;
+/// Value, rate and curvature at the points of a stretch, four to a vector.
+pub(crate) type Points = Vec<[Vector; 3]>;
 
 /// The rounding of a value that is known to be zero, in units of a signal's noise.
 const DROWNED: f64 = 32.0;
@@ -49,53 +48,42 @@ const MOST_STEPS: usize = 5;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RangeWork {
     signal: Signal,
+    followed: Followed,
     points: Points,
 }
 
-/// Extends `range` by the extrema in `(0, length)` of an output that starts with these
-/// coordinates and phasors.
-pub(crate) fn extend(
-    range: &mut Range,
-    lattice: &Lattice,
-    kernel: &Kernel,
-    packed: &[[Pack; 2]],
-    length: f64,
-    work: &mut RangeWork,
-) {
-    #[cfg(target_arch = "x86_64")]
-    if pack::fused_available() {
-        // SAFETY: the machine has these instructions.
-        return unsafe { extend_fused(range, lattice, kernel, packed, length, work) };
-    }
-    extend_in::<Plain>(range, lattice, kernel, packed, length, work);
+/// A search for the extrema in `(0, length)` of an output that starts with these coordinates
+/// and phasors: `range` is extended by them.
+pub(crate) struct Extend<'a> {
+    pub(crate) range: &'a mut Range,
+    pub(crate) table: &'a Table,
+    pub(crate) kernel: &'a Kernel,
+    pub(crate) packed: &'a [ComplexVector],
+    pub(crate) length: f64,
+    pub(crate) work: &'a mut RangeWork,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn extend_fused(
-    range: &mut Range,
-    lattice: &Lattice,
-    kernel: &Kernel,
-    packed: &[[Pack; 2]],
-    length: f64,
-    work: &mut RangeWork,
-) {
-    extend_in::<Fused>(range, lattice, kernel, packed, length, work);
-}
+impl Work for Extend<'_> {
+    type Output = ();
 
-#[inline(always)]
-fn extend_in<M: Math>(
-    range: &mut Range,
-    lattice: &Lattice,
-    kernel: &Kernel,
-    packed: &[[Pack; 2]],
-    length: f64,
-    work: &mut RangeWork,
-) {
-    let RangeWork { signal, points } = work;
-    signal.refill::<M>(kernel, packed, length);
-    if signal.is_finite() {
-        extend_with::<M>(range, lattice, signal, length, points);
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let RangeWork {
+            signal,
+            followed,
+            points,
+        } = self.work;
+        signal.refill::<S>(self.kernel, self.packed, self.length);
+        if signal.is_finite() {
+            extend_with::<S>(
+                self.range,
+                self.table,
+                signal,
+                followed,
+                self.length,
+                points,
+            );
+        }
     }
 }
 
@@ -115,32 +103,36 @@ pub(crate) fn extend_by_certified_steps(range: &mut Range, signal: &Signal, leng
 }
 
 #[inline(always)]
-fn extend_with<M: Math>(
+fn extend_with<S: Simd>(
     range: &mut Range,
-    lattice: &Lattice,
+    table: &Table,
     signal: &mut Signal,
+    followed: &mut Followed,
     length: f64,
     points: &mut Points,
 ) {
-    signal.follow::<M>(lattice.followed());
-    let Some(coarse) = &lattice.coarse else {
-        let mut search = RangeSearch::new::<M>(&lattice.fine, signal, 0.0, length, points, range);
-        while let Some(open) = search.next_open::<M>(points, range) {
-            settle::<M>(&open, lattice.is_complete(), signal, length, range);
+    followed.follow::<S>(table, signal);
+    let Some(coarse) = &table.coarse else {
+        let mut search =
+            RangeSearch::new::<S>(&table.fine, signal, followed, 0.0, length, points, range);
+        while let Some(open) = search.next_open::<S>(points, range) {
+            extend_within::<S>(&open, table.is_complete(), signal, length, range);
         }
         return;
     };
-    let mut walk = RangeSearch::new::<M>(&coarse.level, signal, 0.0, length, points, range);
-    // The fine level's points need the space: the coarse walk's are set aside.
+    let mut walk =
+        RangeSearch::new::<S>(&coarse.grid, signal, followed, 0.0, length, points, range);
+    // The fine grid's points need the space: the coarse walk's are set aside.
     let aside = std::mem::take(points);
-    while let Some(open) = walk.next_open::<M>(&aside, range) {
-        signal.follow_from::<M>(lattice, &open.cell);
-        let (start, end) = (open.cell.start, open.cell.end.min(length));
-        let mut search = RangeSearch::new::<M>(&lattice.fine, signal, start, end, points, range);
-        while let Some(open) = search.next_open::<M>(points, range) {
-            settle::<M>(&open, lattice.is_complete(), signal, length, range);
+    while let Some(open) = walk.next_open::<S>(&aside, range) {
+        followed.move_to::<S>(table, &open.interval);
+        let (start, end) = (open.interval.start, open.interval.end.min(length));
+        let mut search =
+            RangeSearch::new::<S>(&table.fine, signal, followed, start, end, points, range);
+        while let Some(open) = search.next_open::<S>(points, range) {
+            extend_within::<S>(&open, table.is_complete(), signal, length, range);
         }
-        signal.follow_from_start();
+        followed.move_back();
     }
     *points = aside;
 }
@@ -148,7 +140,7 @@ fn extend_with<M: Math>(
 /// An interval that may hold an extremum.
 #[derive(Clone, Copy, Debug)]
 struct Open {
-    cell: Cell,
+    interval: Interval,
     /// Whether it may reach above, and below, what is known.
     above: bool,
     below: bool,
@@ -158,17 +150,17 @@ struct Open {
     reached: Range,
 }
 
-/// A walk along the intervals of one level.
+/// A walk along the intervals of one grid.
 struct RangeSearch<'a> {
-    level: &'a Level,
+    grid: &'a Grid,
     start: f64,
     end: f64,
     sixth: f64,
     error: f64,
     /// The range or, if wider, that of the points: what an interval must exceed.
     reached: Range,
-    pack: usize,
-    packs: usize,
+    vector: usize,
+    vectors: usize,
     above: u32,
     below: u32,
 }
@@ -176,61 +168,63 @@ struct RangeSearch<'a> {
 impl<'a> RangeSearch<'a> {
     /// Evaluates the points of the stretch.
     #[inline(always)]
-    fn new<M: Math>(
-        level: &'a Level,
+    fn new<S: Simd>(
+        grid: &'a Grid,
         signal: &Signal,
+        followed: &Followed,
         start: f64,
         end: f64,
         points: &mut Points,
         range: &Range,
     ) -> Self {
-        let [sixth, outside] = signal.weighted_amplitudes::<M>(&level.weights);
+        let [sixth, outside] = signal.weighted_amplitudes::<S>(&grid.weights);
         let floor = outside + ROUNDING * signal.size();
-        let most = level.table.len() / level.terms;
+        let most = grid.table.len() / grid.terms;
         // Point 0 is the start; the last interval is the one that holds the end.
-        let last = ((end - start) / level.step) as usize;
-        let packs = most.min((last + 1) / WIDTH + 1);
+        let last = ((end - start) / grid.step) as usize;
+        let vectors = most.min((last + 1) / WIDTH + 1);
         points.clear();
-        let zero = M::splat(0.0);
-        let (mut highest, mut lowest) = (M::splat(f64::MIN), M::splat(f64::MAX));
-        for pack in 0..packs {
-            let (mut g, mut v, mut c) = (M::splat(signal.constant), zero, zero);
-            let table = &level.table[pack * level.terms..][..level.terms];
-            for (amplitude, [re, im]) in signal.followed().iter().zip(table) {
-                let (re, im) = (M::load(re), M::load(im));
+        let zero = S::splat(0.0);
+        let (mut highest, mut lowest) = (S::splat(f64::MIN), S::splat(f64::MAX));
+        for vector in 0..vectors {
+            let (mut g, mut v, mut c) = (S::splat(signal.constant), zero, zero);
+            let table = &grid.table[vector * grid.terms..][..grid.terms];
+            for (amplitude, [re, im]) in followed.amplitudes().iter().zip(table) {
+                let (re, im) = (S::load(re), S::load(im));
                 let [[gr, gi], [vr, vi], [cr, ci]] = amplitude;
-                g = M::fnma(M::load(gi), im, M::fma(M::load(gr), re, g));
-                v = M::fnma(M::load(vi), im, M::fma(M::load(vr), re, v));
-                c = M::fnma(M::load(ci), im, M::fma(M::load(cr), re, c));
+                g = S::fnma(S::load(gi), im, S::fma(S::load(gr), re, g));
+                v = S::fnma(S::load(vi), im, S::fma(S::load(vr), re, v));
+                c = S::fnma(S::load(ci), im, S::fma(S::load(cr), re, c));
             }
-            points.push([M::store(g), M::store(v), M::store(c)]);
-            if (pack + 1) * WIDTH <= last + 1 {
-                highest = M::max(highest, g);
-                lowest = M::min(lowest, g);
+            points.push([S::store(g), S::store(v), S::store(c)]);
+            if (vector + 1) * WIDTH <= last + 1 {
+                highest = S::max(highest, g);
+                lowest = S::min(lowest, g);
             }
         }
-        let (highest, lowest) = (M::store(highest), M::store(lowest));
+        let (highest, lowest) = (S::store(highest), S::store(lowest));
         let mut reached = Range {
             least: lowest.into_iter().fold(f64::MAX, f64::min) + floor,
             greatest: highest.into_iter().fold(f64::MIN, f64::max) - floor,
         };
-        // A pack that reaches beyond the end.
-        for k in (last + 1) / WIDTH * WIDTH..=last.min(packs * WIDTH - 1) {
-            let value = points[k / WIDTH][0][k % WIDTH];
+        // A vector that reaches beyond the end.
+        for k in (last + 1) / WIDTH * WIDTH..=last.min(vectors * WIDTH - 1) {
+            let (vector, lane) = layout::place(k);
+            let value = points[vector][0][lane];
             reached.least = reached.least.min(value + floor);
             reached.greatest = reached.greatest.max(value - floor);
         }
         reached.least = reached.least.min(range.least);
         reached.greatest = reached.greatest.max(range.greatest);
         Self {
-            level,
+            grid,
             start,
             end,
             sixth,
             error: sixth / 6.4 + floor,
             reached,
-            pack: 0,
-            packs,
+            vector: 0,
+            vectors,
             above: 0,
             below: 0,
         }
@@ -238,41 +232,42 @@ impl<'a> RangeSearch<'a> {
 
     /// The next interval that may reach beyond `range` or the points.
     #[inline(always)]
-    fn next_open<M: Math>(&mut self, points: &Points, range: &Range) -> Option<Open> {
+    fn next_open<S: Simd>(&mut self, points: &Points, range: &Range) -> Option<Open> {
         self.reached.least = self.reached.least.min(range.least);
         self.reached.greatest = self.reached.greatest.max(range.greatest);
         while self.above | self.below == 0 {
-            if self.pack >= self.packs {
+            if self.vector >= self.vectors {
                 return None;
             }
-            self.look_at_pack::<M>(points);
+            self.look_at_next::<S>(points);
         }
         let lane = (self.above | self.below).trailing_zeros() as usize;
         let bit = 1_u32 << lane;
         let (above, below) = (self.above & bit != 0, self.below & bit != 0);
         self.above &= !bit;
         self.below &= !bit;
-        let right = (self.pack - 1) * WIDTH + lane;
-        let start = self.start + (right - 1) as f64 * self.level.step;
+        let right = (self.vector - 1) * WIDTH + lane;
+        let start = self.start + (right - 1) as f64 * self.grid.step;
         if start >= self.end {
-            self.pack = self.packs;
+            self.vector = self.vectors;
             (self.above, self.below) = (0, 0);
             return None;
         }
         let point = |k: usize| {
-            let [g, v, c] = &points[k / WIDTH];
+            let (vector, lane) = layout::place(k);
+            let [value, rate, curvature] = points[vector].map(|lanes| lanes[lane]);
             Point {
-                value: g[k % WIDTH],
-                rate: v[k % WIDTH],
-                curvature: c[k % WIDTH],
+                value,
+                rate,
+                curvature,
             }
         };
         Some(Open {
-            cell: Cell {
+            interval: Interval {
                 start,
-                end: self.start + right as f64 * self.level.step,
+                end: self.start + right as f64 * self.grid.step,
                 point: right - 1,
-                width: self.level.step,
+                width: self.grid.step,
                 ends: [point(right - 1), point(right)],
                 error: self.error,
             },
@@ -283,44 +278,44 @@ impl<'a> RangeSearch<'a> {
         })
     }
 
-    /// Finds which of the intervals that end at the next pack's points may reach beyond.
+    /// Finds which of the intervals that end at the next vector's points may reach beyond.
     #[inline(always)]
-    fn look_at_pack<M: Math>(&mut self, points: &Points) {
-        let h = self.level.step;
-        let (fifth, two_fifths) = (M::splat(0.2 * h), M::splat(0.4 * h));
-        let twentieth = M::splat(h * h / 20.0);
-        let load = |pack: usize| {
-            let [g, v, c] = &points[pack];
-            let (g, v) = (M::load(g), M::load(v));
-            (g, v, M::fma(M::load(c), twentieth, g))
+    fn look_at_next<S: Simd>(&mut self, points: &Points) {
+        let h = self.grid.step;
+        let (fifth, two_fifths) = (S::splat(0.2 * h), S::splat(0.4 * h));
+        let twentieth = S::splat(h * h / 20.0);
+        let load = |vector: usize| {
+            let [g, v, c] = &points[vector];
+            let (g, v) = (S::load(g), S::load(v));
+            (g, v, S::fma(S::load(c), twentieth, g))
         };
-        let (g, v, bent) = load(self.pack);
-        let (g0, v0, bent0) = load(self.pack.saturating_sub(1));
-        let left = |g, v, bent| (M::fma(v, fifth, g), M::fma(v, two_fifths, bent));
+        let (g, v, bent) = load(self.vector);
+        let (g0, v0, bent0) = load(self.vector.saturating_sub(1));
+        let left = |g, v, bent| (S::fma(v, fifth, g), S::fma(v, two_fifths, bent));
         let ((b1, b2), (p1, p2)) = (left(g, v, bent), left(g0, v0, bent0));
-        let (b4, b3) = (M::fnma(v, fifth, g), M::fnma(v, two_fifths, bent));
-        let highest = M::max(
-            M::shifted_in(M::max(g0, M::max(p1, p2)), M::max(g, M::max(b1, b2))),
-            M::max(g, M::max(b4, b3)),
+        let (b4, b3) = (S::fnma(v, fifth, g), S::fnma(v, two_fifths, bent));
+        let highest = S::max(
+            S::shifted_in(S::max(g0, S::max(p1, p2)), S::max(g, S::max(b1, b2))),
+            S::max(g, S::max(b4, b3)),
         );
-        let lowest = M::min(
-            M::shifted_in(M::min(g0, M::min(p1, p2)), M::min(g, M::min(b1, b2))),
-            M::min(g, M::min(b4, b3)),
+        let lowest = S::min(
+            S::shifted_in(S::min(g0, S::min(p1, p2)), S::min(g, S::min(b1, b2))),
+            S::min(g, S::min(b4, b3)),
         );
-        self.above = M::below(M::splat(self.reached.greatest - self.error), highest);
-        self.below = M::below(lowest, M::splat(self.reached.least + self.error));
-        if self.pack == 0 {
+        self.above = S::below(S::splat(self.reached.greatest - self.error), highest);
+        self.below = S::below(lowest, S::splat(self.reached.least + self.error));
+        if self.vector == 0 {
             // There is no interval before the first point.
             self.above &= !1;
             self.below &= !1;
         }
-        self.pack += 1;
+        self.vector += 1;
     }
 }
 
 /// Extends `range` by the extrema of an interval that may hold some.
 #[inline(always)]
-fn settle<M: Math>(
+fn extend_within<S: Simd>(
     open: &Open,
     complete: bool,
     signal: &mut Signal,
@@ -331,10 +326,10 @@ fn settle<M: Math>(
         if !wanted {
             continue;
         }
-        match extremum::<M>(open, side, complete, signal, length) {
+        match extremum::<S>(open, side, complete, signal, length) {
             Extremum::Value(value) => range.hold(value),
             Extremum::None => {}
-            Extremum::Unknown => by_certified_steps(&open.cell, signal, length, range),
+            Extremum::Unknown => by_certified_steps(&open.interval, signal, length, range),
         }
     }
 }
@@ -351,16 +346,16 @@ enum Extremum {
 
 /// The greatest value in an interval (`side` 1), or the least (`side` −1).
 #[inline(always)]
-fn extremum<M: Math>(
+fn extremum<S: Simd>(
     open: &Open,
     side: f64,
     complete: bool,
     signal: &mut Signal,
     length: f64,
 ) -> Extremum {
-    let cell = &open.cell;
-    let h = cell.width;
-    let [p, q] = cell.ends;
+    let interval = &open.interval;
+    let h = interval.width;
+    let [p, q] = interval.ends;
     let (u, v) = (side * h * p.rate, side * h * q.rate);
     let (a, c) = (side * h * h * p.curvature, side * h * h * q.curvature);
     let (first, last) = (side * p.value, side * q.value);
@@ -407,9 +402,9 @@ fn extremum<M: Math>(
         };
     }
     // The signal's.
-    let mut at = cell.start + t * h;
+    let mut at = interval.start + t * h;
     for _ in 0..MOST_STEPS {
-        let (jet, jerk) = signal.jet_keeping_factors::<M>(at);
+        let (jet, jerk) = signal.jet_keeping_factors::<S>(at);
         let (rate, curvature, jerk) = (side * jet.rate, side * jet.curvature, side * jerk);
         if curvature >= 0.0 || curvature.is_nan() {
             return Extremum::Unknown;
@@ -418,7 +413,7 @@ fn extremum<M: Math>(
         let step = -rate / (curvature + 0.5 * jerk * step);
         let angle = step.abs() * signal.fastest();
         if angle.is_nan() || angle > LAST_STEP {
-            at = (at + step).clamp(cell.start - h, cell.end + h);
+            at = (at + step).clamp(interval.start - h, interval.end + h);
             continue;
         }
         at += step;
@@ -426,9 +421,9 @@ fn extremum<M: Math>(
         let inside = at >= 0.0 && at <= length;
         // Concave this far on either side, and beyond that not higher.
         let reach = 0.99 * -(curvature + jerk * step) / jet.third;
-        let limit = if inside { value.max(reached) } else { reached } - cell.error;
-        let before = (at - reach - cell.start) / h;
-        let after = (at + reach - cell.start) / h;
+        let limit = if inside { value.max(reached) } else { reached } - interval.error;
+        let before = (at - reach - interval.start) / h;
+        let after = (at + reach - interval.start) / h;
         let proved = (before <= 0.0 || part(&hull, 0.0, before.min(1.0)) <= limit)
             && (after >= 1.0 || part(&hull, after.max(0.0), 1.0) <= limit);
         return match (proved, inside) {
@@ -444,8 +439,8 @@ fn extremum<M: Math>(
 fn part(hull: &[f64; 6], from: f64, to: f64) -> f64 {
     let mut right = *hull;
     // De Casteljau's triangle: its last entries are the coefficients beyond `from` …
-    for level in 1..6 {
-        for i in 0..6 - level {
+    for grid in 1..6 {
+        for i in 0..6 - grid {
             right[i] += from * (right[i + 1] - right[i]);
         }
     }
@@ -456,8 +451,8 @@ fn part(hull: &[f64; 6], from: f64, to: f64) -> f64 {
         1.0
     };
     let mut highest = right[0];
-    for level in 1..6 {
-        for i in 0..6 - level {
+    for grid in 1..6 {
+        for i in 0..6 - grid {
             right[i] += until * (right[i + 1] - right[i]);
         }
         highest = highest.max(right[0]);
@@ -467,9 +462,9 @@ fn part(hull: &[f64; 6], from: f64, to: f64) -> f64 {
 
 /// The same from every root of the rate, found by certified steps.
 #[cold]
-fn by_certified_steps(cell: &Cell, signal: &Signal, length: f64, range: &mut Range) {
-    let start = cell.start.max(0.0);
-    let width = cell.end.min(length) - start;
+fn by_certified_steps(interval: &Interval, signal: &Signal, length: f64, range: &mut Range) {
+    let start = interval.start.max(0.0);
+    let width = interval.end.min(length) - start;
     if width <= 0.0 {
         return;
     }

@@ -1,0 +1,256 @@
+//! Exponentials of a regime's slowest terms, tabulated at equidistant points.
+//!
+//! Terms too fast for the table are bounded by their amplitude. A coarse grid that follows only
+//! the slowest terms certifies most of a flight; where it cannot, the interval is looked at on a
+//! finer grid. [`walk`](super::walk) says what is concluded from the points.
+
+use super::walk::Interval;
+use crate::regime::Kernel;
+use crate::signal::{Amplitude, Signal};
+use crate::simd::{self, ComplexVector, Simd, WIDTH, layout};
+
+/// Angle through which the fastest followed term turns from point to point: a larger one
+/// needs fewer points, a smaller one leaves fewer intervals open.
+const ANGLE: f64 = 2.4;
+/// The least number of intervals in a period, on the fine grid and on the coarse one.
+const INTERVALS: [f64; 2] = [24.0, 8.0];
+/// The most terms that are followed, on the fine grid and on the coarse one.
+const FOLLOWED: [usize; 2] = [8, 3];
+/// The most terms that are followed on the fine grid where extrema are looked for.
+const FOLLOWED_FOR_EXTREMA: usize = 32;
+/// How much faster the fine grid's fastest term must be than the coarse grid's.
+const COARSER: f64 = 2.0;
+/// What a period may cost on the fine grid alone, in multiplications of vectors, before a
+/// coarse one is worth while.
+const CHEAP: f64 = 1500.0;
+/// The most vectors of points: longer stretches are searched in pieces.
+const LARGEST: usize = 64;
+/// The most points of the fine grid: faster terms are not followed. With that many the tables of
+/// a regime stay below 16 MiB.
+const MOST_POINTS: f64 = 8192.0;
+/// What rounding, in table and sums, could take from a value, in units of the terms' size.
+pub(crate) const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// The tabulated exponentials of a regime, as one guard or output sees them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Table {
+    /// Which terms are followed, slowest first.
+    followed: Vec<usize>,
+    /// Over the whole reach, or from one coarse point to the next.
+    pub(crate) fine: Grid,
+    pub(crate) coarse: Option<Coarse>,
+    /// How far it reaches.
+    reach: f64,
+}
+
+/// The coarse grid.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Coarse {
+    pub(crate) grid: Grid,
+    /// Of every followed term, the exponential at each point.
+    powers: Vec<Vec<Pair>>,
+}
+
+/// Equidistant points with the exponentials of the slowest terms.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Grid {
+    /// Distance of the points, `h`, and its inverse.
+    pub(crate) step: f64,
+    pub(crate) density: f64,
+    /// How many terms it follows.
+    pub(crate) terms: usize,
+    /// Whether these are all.
+    pub(crate) complete: bool,
+    /// `[Re, Im]` of each followed term's exponential at four points, vector after vector.
+    pub(crate) table: Vec<ComplexVector>,
+    /// For vectors of terms: the weight of their amplitudes in `M₆h⁶/7200`, and 1 where a
+    /// term is not followed.
+    pub(crate) weights: Vec<ComplexVector>,
+}
+
+/// A complex number as `[Re, Im]`.
+type Pair = [f64; 2];
+
+impl Table {
+    /// The table for the guard `kernel` over stretches of up to `period`, if one makes sense.
+    pub(crate) fn new(kernel: &Kernel, period: f64) -> Option<Self> {
+        Self::following(FOLLOWED[0], kernel, period)
+    }
+
+    /// The table for outputs whose extrema are looked for.
+    pub(crate) fn for_extrema(kernel: &Kernel, period: f64) -> Option<Self> {
+        Self::following(FOLLOWED_FOR_EXTREMA, kernel, period)
+    }
+
+    /// The table that follows so many terms at most.
+    fn following(most: usize, kernel: &Kernel, period: f64) -> Option<Self> {
+        if kernel.grows || kernel.fastest <= 0.0 {
+            return None;
+        }
+        let mut order: Vec<usize> = (0..kernel.count).collect();
+        order.sort_by(|&a, &b| kernel.rate(a).norm().total_cmp(&kernel.rate(b).norm()));
+        let step_of = |term: usize, grid: usize| {
+            (ANGLE / kernel.rate(order[term]).norm()).min(period / INTERVALS[grid])
+        };
+        // The slowest term sets how coarse the coarse grid can be.
+        let slowest = step_of(0, 1);
+        let follows = |term: &usize| slowest <= MOST_POINTS * step_of(*term, 0);
+        let fine_terms = (1..order.len().min(most)).take_while(follows).count() + 1;
+        let fastest = kernel.rate(order[fine_terms - 1]).norm();
+        let slow = order
+            .iter()
+            .filter(|&&k| kernel.rate(k).norm() * COARSER < fastest);
+        let terms = [fine_terms, slow.count().clamp(1, FOLLOWED[1])];
+        let [fine_step, coarse_step] = [step_of(terms[0] - 1, 0), step_of(terms[1] - 1, 1)];
+        let vectors =
+            |length: f64, step: f64| ((length / step / WIDTH as f64) as usize + 1).min(LARGEST);
+        let cost = period / fine_step / WIDTH as f64 * (6 * terms[0] + 20) as f64;
+        let single = cost < CHEAP || coarse_step < COARSER * fine_step;
+        order.truncate(terms[0]);
+        let columns = |step: f64, vectors: usize| -> Vec<Vec<Pair>> {
+            let column = |&k: &usize| exponentials(kernel, k, step, vectors * WIDTH);
+            order.iter().map(column).collect()
+        };
+        if single {
+            let vectors = vectors(period, fine_step);
+            return Some(Self {
+                fine: Grid::new(kernel, &order, fine_step, &columns(fine_step, vectors)),
+                coarse: None,
+                reach: (vectors * WIDTH - 1) as f64 * fine_step,
+                followed: order,
+            });
+        }
+        let divided = (coarse_step / fine_step).ceil();
+        let fine_step = coarse_step / divided;
+        let fine_columns = columns(fine_step, divided as usize / WIDTH + 1);
+        let vectors = vectors(period, coarse_step);
+        let powers = columns(coarse_step, vectors);
+        let coarse = &order[..terms[1]];
+        Some(Self {
+            fine: Grid::new(kernel, &order, fine_step, &fine_columns),
+            coarse: Some(Coarse {
+                grid: Grid::new(kernel, coarse, coarse_step, &powers),
+                powers,
+            }),
+            reach: (vectors * WIDTH - 1) as f64 * coarse_step,
+            followed: order,
+        })
+    }
+
+    /// How far from its first point it reaches.
+    pub(crate) fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Whether every term is followed, on the fine grid at least.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.fine.complete
+    }
+}
+
+/// Work space: the amplitudes of the terms that a table follows, and those at another point.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Followed {
+    here: Vec<Amplitude>,
+    other: Vec<Amplitude>,
+}
+
+impl Followed {
+    /// Lays out the amplitudes of the terms that `table` follows.
+    #[inline(always)]
+    pub(crate) fn follow<S: Simd>(&mut self, table: &Table, signal: &Signal) {
+        signal.amplitudes::<S>(&table.followed, &mut self.here);
+    }
+
+    /// The amplitudes.
+    #[inline(always)]
+    pub(crate) fn amplitudes(&self) -> &[Amplitude] {
+        &self.here
+    }
+
+    /// Lays them out as they are at the start of a coarse interval, until [`Followed::move_back`].
+    #[inline(always)]
+    pub(crate) fn move_to<S: Simd>(&mut self, table: &Table, interval: &Interval) {
+        self.other.clear();
+        let Some(coarse) = &table.coarse else {
+            return;
+        };
+        for (amplitude, column) in self.here.iter().zip(&coarse.powers) {
+            let power = column[interval.point].map(S::splat);
+            let mut moved = *amplitude;
+            for z in &mut moved {
+                let product = simd::complex_mul::<S>([S::load(&z[0]), S::load(&z[1])], power);
+                *z = product.map(S::store);
+            }
+            self.other.push(moved);
+        }
+        std::mem::swap(&mut self.here, &mut self.other);
+    }
+
+    /// Goes back to the amplitudes at the signal's own start.
+    #[inline(always)]
+    pub(crate) fn move_back(&mut self) {
+        std::mem::swap(&mut self.here, &mut self.other);
+    }
+}
+
+impl Grid {
+    /// The grid that follows the terms `followed`, from a column of exponentials for each
+    /// (of at least as many terms).
+    fn new(kernel: &Kernel, followed: &[usize], step: f64, columns: &[Vec<Pair>]) -> Self {
+        let terms = followed.len();
+        let points = columns.first().map_or(0, Vec::len);
+        let mut table = vec![ComplexVector::default(); points / WIDTH * terms];
+        for (j, column) in columns.iter().take(terms).enumerate() {
+            for (p, &[re, im]) in column.iter().enumerate() {
+                let (vector, lane) = layout::place(p);
+                let entry = &mut table[vector * terms + j];
+                entry[0][lane] = re;
+                entry[1][lane] = im;
+            }
+        }
+        let mut weights = vec![ComplexVector::default(); kernel.vectors.len()];
+        for k in 0..kernel.count {
+            let (vector, lane) = layout::place(k);
+            let entry = &mut weights[vector];
+            if followed.contains(&k) {
+                entry[0][lane] = (kernel.rate(k).norm() * step).powi(6) / 7200.0;
+            } else {
+                entry[1][lane] = 1.0;
+            }
+        }
+        Self {
+            step,
+            density: 1.0 / step,
+            terms,
+            complete: terms == kernel.count,
+            table,
+            weights,
+        }
+    }
+}
+
+/// `e^{λ h p}` of a term for `p = 0 … count − 1`. Each is a product of at most as many
+/// factors as `p` has binary digits, so that rounding does not pile up along the table.
+fn exponentials(kernel: &Kernel, k: usize, step: f64, count: usize) -> Vec<Pair> {
+    let rate = kernel.rate(k);
+    let mut powers = Vec::with_capacity(count);
+    powers.push([1.0, 0.0]);
+    let mut highest = 1;
+    while powers.len() < count {
+        let s = step * highest as f64;
+        let (sin, cos) = (rate.im * s).sin_cos();
+        let grown = (rate.re * s).exp();
+        for p in 0..highest.min(count - highest) {
+            powers.push(product(powers[p], [grown * cos, grown * sin]));
+        }
+        highest *= 2;
+    }
+    powers
+}
+
+/// `a b` of complex numbers.
+#[inline(always)]
+fn product([ar, ai]: Pair, [br, bi]: Pair) -> Pair {
+    [ar * br - ai * bi, ar * bi + ai * br]
+}

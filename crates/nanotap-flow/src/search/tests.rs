@@ -1,0 +1,150 @@
+//! The search on a table against certified steps.
+
+use super::on_table;
+use super::table::{Followed, Table};
+use super::{Start, Statistics, first_crossing};
+use crate::regime::Kernel;
+use crate::signal::Signal;
+use crate::simd::{Plain, WIDTH, layout};
+use crate::{Complex, Drive, HarmonicVector, Output, Regime};
+use nalgebra::{DMatrix, DVector, RowDVector};
+use proptest::prelude::*;
+
+/// Oscillators side by side, seen through one output; each is (frequency, damping,
+/// displacement, velocity, weight).
+type Oscillators = Vec<(f64, f64, f64, f64, f64)>;
+
+/// The table of the output, taken positive at the start, its signal from there and how
+/// far to look; and the output's sign.
+fn example(oscillators: &Oscillators, tone: f64, constant: f64) -> (Table, Signal, f64, f64) {
+    let n = oscillators.len();
+    let drive = Drive::single(1.7).unwrap();
+    let mut matrix = DMatrix::zeros(2 * n, 2 * n);
+    let mut row = RowDVector::zeros(2 * n);
+    let mut state = DVector::zeros(2 * n);
+    for (j, &(frequency, damping, x, v, weight)) in oscillators.iter().enumerate() {
+        matrix[(2 * j, 2 * j + 1)] = 1.0;
+        matrix[(2 * j + 1, 2 * j)] = -frequency * frequency;
+        matrix[(2 * j + 1, 2 * j + 1)] = -2.0 * damping * frequency;
+        row[2 * j] = weight;
+        state[2 * j] = x;
+        state[2 * j + 1] = v * frequency;
+    }
+    let output = Output::linear(row, 1)
+        .with_tone(0, tone, 0.0)
+        .with_constant(constant);
+    let side = if output.at(&drive, state.as_slice(), 0.0) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
+    let regime = Regime::new(0, matrix, HarmonicVector::zeros(2 * n, 1), &drive).unwrap();
+    let kernel = Kernel::new(&regime, &drive, &regime.project(&output.scaled(side)));
+    let mut modal = vec![Complex::new(0.0, 0.0); n];
+    let mut rest = vec![0.0; 2 * n];
+    regime.to_modal(&drive, state.as_slice(), 0.0, &mut rest, &mut modal);
+    modal.push(Complex::new(1.0, 0.0));
+    let packed = layout::list(&modal);
+    let table = Table::new(&kernel, drive.period()).unwrap();
+    let length = table.reach().min(drive.period());
+    let mut signal = Signal::default();
+    signal.refill::<Plain>(&kernel, &packed, length);
+    (table, signal, length, side)
+}
+
+fn oscillators(most: usize) -> impl Strategy<Value = Oscillators> {
+    let one = (
+        (-0.7..5.0_f64).prop_map(f64::exp),
+        0.001..0.3,
+        -1.0..1.0_f64,
+        -1.0..1.0_f64,
+        -1.0..1.0_f64,
+    );
+    proptest::collection::vec(one, 1..most)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// The table finds the crossing that certified steps find, and no other: with few
+    /// terms and one grid, and with more than are followed.
+    #[test]
+    fn table_and_certified_steps_agree(
+        oscillators in oscillators(12),
+        tone in -1.0..1.0_f64,
+        constant in -1.0..1.0_f64,
+    ) {
+        let (table, mut signal, length, _) = example(&oscillators, tone, constant);
+        let mut statistics = Statistics::default();
+        let start = Start::Inside;
+        let found = on_table::first_crossing::<Plain>(
+            &table, &mut signal, &mut Followed::default(), length, start, &mut statistics,
+        );
+        let expected = first_crossing(&signal, length, start, &mut statistics);
+        match (found, expected) {
+            (None, None) => {}
+            (Some(a), Some(b)) => {
+                // A crossing at speed r is known to the value's rounding over r.
+                let known = 1e-14 + signal.noise() / b.rate.abs();
+                prop_assert!((a.at - b.at).abs() <= 4.0 * known, "{a:?} {b:?}");
+                let slack = 1e-9 * (1.0 + signal.fastest() * signal.size());
+                prop_assert!((a.rate - b.rate).abs() <= slack, "{a:?} {b:?}");
+            }
+            // At the very end, rounding decides.
+            (Some(one), None) | (None, Some(one)) => {
+                prop_assert!(length - one.at < 1e-12, "{found:?} {expected:?} of {length}");
+            }
+        }
+    }
+
+    /// From the surface, with the rate known.
+    #[test]
+    fn leaving_the_surface_agrees(
+        oscillators in oscillators(7),
+        tone in -1.0..1.0_f64,
+    ) {
+        // The constant puts the start on the surface.
+        let (_, signal, _, side) = example(&oscillators, tone, 0.0);
+        let at_start = side * signal.first_jet().value;
+        let (table, mut signal, length, _) = example(&oscillators, tone, -at_start);
+        let start = Start::Surface { rate: None };
+        let mut statistics = Statistics::default();
+        let found = on_table::first_crossing::<Plain>(
+            &table, &mut signal, &mut Followed::default(), length, start, &mut statistics,
+        );
+        let expected = first_crossing(&signal, length, start, &mut statistics);
+        match (found, expected) {
+            (None, None) => {}
+            (Some(a), Some(b)) => {
+                let known = 1e-14 + signal.noise() / b.rate.abs();
+                prop_assert!((a.at - b.at).abs() <= 4.0 * known, "{a:?} {b:?}");
+            }
+            (Some(one), None) | (None, Some(one)) => {
+                prop_assert!(length - one.at < 1e-12, "{found:?} {expected:?} of {length}");
+            }
+        }
+    }
+}
+
+/// The table's exponentials against the library's.
+#[test]
+fn tabulated_exponentials_are_accurate() {
+    let (table, _, _, _) = example(&vec![(3.0, 0.01, 1.0, 0.0, 1.0)], 0.3, 1.0);
+    let grid = &table.fine;
+    // Its two terms: the drive's, and the oscillator's.
+    let rates = [
+        Complex::new(0.0, 1.7),
+        Complex::new(-0.03, 3.0 * (1.0_f64 - 1e-4).sqrt()),
+    ];
+    for (i, entries) in grid.table.chunks(grid.terms).enumerate() {
+        for (entry, rate) in entries.iter().zip(rates) {
+            for lane in 0..WIDTH {
+                let s = (i * WIDTH + lane) as f64 * grid.step;
+                let exact = (rate * s).exp();
+                let imaginary = entry[1][lane].abs();
+                assert!((entry[0][lane] - exact.re).abs() < 4e-15, "{i} {lane}");
+                assert!((imaginary - exact.im.abs()).abs() < 4e-15, "{i} {lane}");
+            }
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Whole flights are certified on a table's points, without computing an exponential.
+//!
+//! At the points value, rate and curvature are plain sums over the terms. Between two of
+//! them, at distance `h`, the quintic that agrees with all six numbers has the Bernstein
+//! coefficients
+//!
+//! ```text
+//! b₀ = g₀    b₁ = g₀ + hġ₀/5    b₂ = g₀ + 2hġ₀/5 + h²g̈₀/20
+//! b₅ = g₁    b₄ = g₁ − hġ₁/5    b₃ = g₁ − 2hġ₁/5 + h²g̈₁/20
+//! ```
+//!
+//! and its error is at most `M₆/720 · (t(1 − t)h²)³`, `M₆` being a bound of the sixth
+//! derivative. In degree six that error is a multiple of the single Bernstein polynomial
+//! `20 t³(1 − t)³`, so the signal is positive in the interval for certain when all
+//! coefficients are and `½(b₂ + b₃) ≥ M₆h⁶/14400`. This holds up to a zero at either end,
+//! for instance right after a switch. Terms that the grid does not follow are replaced by minus
+//! their amplitude. What is left open is for certified steps ([`steps`](super::steps)).
+
+use super::table::{Grid, ROUNDING, Table};
+use crate::signal::{Amplitude, Signal};
+use crate::simd::{Simd, WIDTH};
+
+/// Value, rate and curvature.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Point {
+    pub(crate) value: f64,
+    pub(crate) rate: f64,
+    pub(crate) curvature: f64,
+}
+
+/// Two neighbouring points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interval {
+    /// Where it begins.
+    pub(crate) start: f64,
+    /// Where it ends.
+    pub(crate) end: f64,
+    /// The number of the point where it begins.
+    pub(crate) point: usize,
+    /// Its width.
+    pub(crate) width: f64,
+    /// Its ends.
+    pub(crate) ends: [Point; 2],
+    /// Bound on the distance from the quintic to the signal within.
+    pub(crate) error: f64,
+}
+
+/// A zero of an interval's quintic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FallingZero {
+    /// Where.
+    pub(crate) at: f64,
+    /// How fast the quintic falls at least, anywhere in the interval.
+    pub(crate) gentlest: f64,
+    /// How far the signal can be from the quintic.
+    pub(crate) error: f64,
+}
+
+/// A part of a regime that is to be searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Span {
+    /// Where the first point lies.
+    pub(crate) start: f64,
+    /// How far to look.
+    pub(crate) end: f64,
+    /// The rate at the start, if the signal is zero there by definition.
+    pub(crate) surface: Option<f64>,
+}
+
+/// A walk along the intervals of one grid.
+pub(crate) struct Scan<'a, S: Simd> {
+    grid: &'a Grid,
+    constant: f64,
+    /// What Bernstein coefficients must not fall below.
+    floor: f64,
+    /// The same for the sum of the middle two.
+    tension: f64,
+    /// Bound on the distance from the quintic to the signal within an interval.
+    error: f64,
+    span: Span,
+    /// The next vector of points, and how many there are to look at.
+    vector: usize,
+    vectors: usize,
+    /// Intervals that end at the last vector's points and are not certified, a bit each.
+    open: u32,
+    /// Value, rate and curvature at the last two vectors of points.
+    ends: [[S::Register; 3]; 2],
+    /// Of the last vector's intervals, what their left ends give: the smallest coefficient, and b₂.
+    lefts: [S::Register; 2],
+    /// Points looked at so far.
+    pub(crate) points: u64,
+}
+
+impl<'a, S: Simd> Scan<'a, S> {
+    #[inline(always)]
+    fn new(grid: &'a Grid, signal: &Signal, span: Span) -> Self {
+        let [sixth, outside] = signal.weighted_amplitudes::<S>(&grid.weights);
+        let floor = outside + ROUNDING * signal.size();
+        let intervals = (span.end - span.start) * grid.density;
+        let most = grid.table.len() / grid.terms;
+        Self {
+            grid,
+            constant: signal.constant,
+            floor,
+            tension: sixth + 2.0 * floor,
+            error: sixth / 6.4 + floor,
+            span,
+            vector: 0,
+            vectors: most.min((intervals * (1.0 / WIDTH as f64)) as usize + 2),
+            open: 0,
+            ends: [[S::splat(0.0); 3]; 2],
+            lefts: [S::splat(f64::MAX); 2],
+            points: 0,
+        }
+    }
+
+    /// Where a point lies.
+    #[inline(always)]
+    fn at(&self, point: usize) -> f64 {
+        self.span.start + point as f64 * self.grid.step
+    }
+
+    /// The next interval that is not certified.
+    #[inline(always)]
+    pub(crate) fn next_open(&mut self, amplitudes: &[Amplitude]) -> Option<Interval> {
+        while self.open == 0 {
+            if self.vector >= self.vectors {
+                return None;
+            }
+            self.look_at_next(amplitudes);
+        }
+        let lane = self.open.trailing_zeros() as usize;
+        self.open &= self.open - 1;
+        let point = (self.vector - 1) * WIDTH + lane - 1;
+        if self.at(point) >= self.span.end {
+            // It lies beyond the end, and so do all that follow.
+            self.vector = self.vectors;
+            self.open = 0;
+            return None;
+        }
+        let before = if lane == 0 {
+            Point::of::<S>(&self.ends[0], WIDTH - 1)
+        } else {
+            Point::of::<S>(&self.ends[1], lane - 1)
+        };
+        Some(Interval {
+            start: self.at(point),
+            end: self.at(point + 1),
+            point,
+            width: self.grid.step,
+            ends: [before, Point::of::<S>(&self.ends[1], lane)],
+            error: self.error,
+        })
+    }
+
+    /// Certifies the intervals that end at the next vector's points, or finds which are open.
+    #[inline(always)]
+    fn look_at_next(&mut self, amplitudes: &[Amplitude]) {
+        let h = self.grid.step;
+        let [g, v, c] = self.sums(amplitudes);
+        let bent = S::fma(c, S::splat(h * h / 20.0), g);
+        let (fifth, two_fifths) = (S::splat(0.2 * h), S::splat(0.4 * h));
+        let (b1, b2) = (S::fma(v, fifth, g), S::fma(v, two_fifths, bent));
+        let (b4, b3) = (S::fnma(v, fifth, g), S::fnma(v, two_fifths, bent));
+        let inner = S::min(b1, b2);
+        let mut left = S::min(g, inner);
+        if self.vector == 0 && self.span.surface.is_some() && self.grid.complete {
+            // Zero there by definition, which is allowed.
+            left = S::with_first(left, inner);
+        }
+        let right = S::min(g, S::min(b4, b3));
+        let low = S::min(S::shifted_in(self.lefts[0], left), right);
+        let middle = S::add(S::shifted_in(self.lefts[1], b2), b3);
+        let below = S::below(low, S::splat(self.floor));
+        self.open = below | S::below(middle, S::splat(self.tension));
+        if self.vector == 0 {
+            // There is no interval before the first point.
+            self.open &= !1;
+        }
+        self.ends = [self.ends[1], [g, v, c]];
+        self.lefts = [left, b2];
+        self.vector += 1;
+        self.points += WIDTH as u64;
+    }
+
+    /// Value, rate and curvature at the next vector's points.
+    #[inline(always)]
+    fn sums(&self, amplitudes: &[Amplitude]) -> [S::Register; 3] {
+        let zero = S::splat(0.0);
+        let (mut g, mut v, mut c) = (S::splat(self.constant), zero, zero);
+        let terms = self.grid.terms;
+        let table = &self.grid.table[self.vector * terms..][..terms];
+        for (amplitude, [re, im]) in amplitudes.iter().zip(table) {
+            let (re, im) = (S::load(re), S::load(im));
+            let [[gr, gi], [vr, vi], [cr, ci]] = amplitude;
+            g = S::fnma(S::load(gi), im, S::fma(S::load(gr), re, g));
+            v = S::fnma(S::load(vi), im, S::fma(S::load(vr), re, v));
+            c = S::fnma(S::load(ci), im, S::fma(S::load(cr), re, c));
+        }
+        if let (0, Some(rate)) = (self.vector, self.span.surface) {
+            g = S::with_first(g, zero);
+            v = S::with_first(v, S::splat(rate));
+        }
+        [g, v, c]
+    }
+}
+
+impl Point {
+    #[inline(always)]
+    fn of<S: Simd>(sums: &[S::Register; 3], lane: usize) -> Self {
+        Self {
+            value: S::store(sums[0])[lane],
+            rate: S::store(sums[1])[lane],
+            curvature: S::store(sums[2])[lane],
+        }
+    }
+}
+
+impl Interval {
+    /// Where the quintic falls through zero; `None` unless it falls all the way, from above
+    /// zero to below it.
+    #[inline(always)]
+    pub(crate) fn falling_zero(&self) -> Option<FallingZero> {
+        let [p, q] = self.ends;
+        let h = self.width;
+        if p.value <= self.error || q.value >= -self.error {
+            return None;
+        }
+        let (u, v) = (h * p.rate, h * q.rate);
+        let (a, b) = (h * h * p.curvature, h * h * q.curvature);
+        // The differences of the Bernstein coefficients: the rate's, a fifth of them.
+        let first = 0.2 * u;
+        let second = 0.2 * u + 0.05 * a;
+        let last = 0.2 * v;
+        let last_but_one = 0.2 * v - 0.05 * b;
+        let rest = (q.value - p.value) - (first + second) - (last + last_but_one);
+        let gentlest = first.max(second).max(rest).max(last.max(last_but_one));
+        if gentlest >= 0.0 {
+            return None;
+        }
+        // A first guess from the inverse function's cubic through both ends.
+        let fall = p.value - q.value;
+        let part = p.value / fall;
+        let (left, right) = (-fall / u, -fall / v);
+        let other = 1.0 - part;
+        let guess = part * part * (3.0 - 2.0 * part) + part * other * (other * left - part * right);
+        let t = guess.clamp(0.0, 1.0);
+        // One Newton step on the quintic in powers of t.
+        let (c1, c2) = (u, 0.5 * a);
+        let r0 = q.value - p.value - c1 - c2;
+        let r1 = v - c1 - 2.0 * c2;
+        let r2 = b - 2.0 * c2;
+        let c3 = 10.0 * r0 - 4.0 * r1 + 0.5 * r2;
+        let c4 = -15.0 * r0 + 7.0 * r1 - r2;
+        let c5 = 6.0 * r0 - 3.0 * r1 + 0.5 * r2;
+        let t2 = t * t;
+        let value = (p.value + c1 * t) + t2 * ((c2 + c3 * t) + t2 * (c4 + c5 * t));
+        let slope = (c1 + 2.0 * c2 * t) + t2 * ((3.0 * c3 + 4.0 * c4 * t) + 5.0 * c5 * t2);
+        let t = (t - value / slope).clamp(0.0, 1.0);
+        Some(FallingZero {
+            at: self.start + t * h,
+            gentlest: -5.0 * gentlest / h,
+            error: self.error,
+        })
+    }
+}
+
+impl Table {
+    /// A walk along the intervals of the coarse grid, if there is one; what it leaves open is
+    /// to be looked at in [`Table::fine`].
+    #[inline(always)]
+    pub(crate) fn coarse<S: Simd>(&self, signal: &Signal, span: Span) -> Option<Scan<'_, S>> {
+        let coarse = self.coarse.as_ref()?;
+        Some(Scan::new(&coarse.grid, signal, span))
+    }
+
+    /// A walk along the intervals of the fine grid.
+    #[inline(always)]
+    pub(crate) fn fine<S: Simd>(&self, signal: &Signal, span: Span) -> Scan<'_, S> {
+        Scan::new(&self.fine, signal, span)
+    }
+}
+
+impl Span {
+    /// The part within a coarse interval.
+    #[inline(always)]
+    pub(crate) fn within(self, interval: &Interval) -> Self {
+        Self {
+            start: interval.start,
+            end: interval.end.min(self.end),
+            surface: if interval.point == 0 {
+                self.surface
+            } else {
+                None
+            },
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Real-linear maps, with a constant, of complex numbers in vectors.
+
+use super::{ComplexVector, Simd, WIDTH, layout};
+
+/// `z ↦ Σ_k (a_k Re z_k + b_k Im z_k) + c` with complex vectors `a_k`, `b_k`, `c`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct AffineMap {
+    /// The columns one after the other: all `a_k`, all `b_k`, then `c`.
+    columns: Vec<ComplexVector>,
+    /// Vectors a column.
+    vectors: usize,
+}
+
+impl AffineMap {
+    /// An empty map to `rows` numbers, with room for so many columns.
+    pub(crate) fn with_capacity(rows: usize, columns: usize) -> Self {
+        let vectors = layout::vectors_for(rows);
+        Self {
+            columns: Vec::with_capacity(columns * vectors),
+            vectors,
+        }
+    }
+
+    /// Adds a column: real parts, then as many imaginary parts, and zero in the rows left over
+    /// but for a one in the real (0) or imaginary (1) part of a row.
+    pub(crate) fn push(&mut self, column: &[f64], one: Option<(usize, usize)>) {
+        let start = self.columns.len();
+        let end = start + self.vectors;
+        self.columns.resize(end, ComplexVector::default());
+        let vectors = &mut self.columns[start..];
+        let (real, imaginary) = column.split_at(column.len() / 2);
+        for (part, values) in [real, imaginary].into_iter().enumerate() {
+            for (values, vector) in values.chunks(WIDTH).zip(vectors.iter_mut()) {
+                vector[part][..values.len()].copy_from_slice(values);
+            }
+        }
+        if let Some((row, part)) = one {
+            let (vector, lane) = layout::place(row);
+            vectors[vector][part][lane] = 1.0;
+        }
+    }
+
+    /// Writes the image of `z` to `out`.
+    #[inline(always)]
+    pub(crate) fn apply<S: Simd>(&self, z: &[ComplexVector], out: &mut Vec<ComplexVector>) {
+        let vectors = self.vectors;
+        let (linear, constant) = self.columns.split_at(self.columns.len() - vectors);
+        let (real, imaginary) = linear.split_at(linear.len() / 2);
+        out.resize(vectors, ComplexVector::default());
+        for (i, out) in out.iter_mut().enumerate() {
+            // A sum for each part of the inputs: two short chains instead of a long one.
+            let mut sums = [
+                [S::load(&constant[i][0]), S::load(&constant[i][1])],
+                [S::splat(0.0); 2],
+            ];
+            for (part, (columns, sum)) in [real, imaginary].into_iter().zip(&mut sums).enumerate() {
+                for (columns, inputs) in columns.chunks(WIDTH * vectors).zip(z) {
+                    for (column, &x) in columns.chunks_exact(vectors).zip(&inputs[part]) {
+                        let x = S::splat(x);
+                        sum[0] = S::fma(S::load(&column[i][0]), x, sum[0]);
+                        sum[1] = S::fma(S::load(&column[i][1]), x, sum[1]);
+                    }
+                }
+            }
+            let [a, b] = sums;
+            *out = [S::store(S::add(a[0], b[0])), S::store(S::add(a[1], b[1]))];
+        }
+    }
+}

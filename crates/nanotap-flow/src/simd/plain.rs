@@ -1,0 +1,119 @@
+//! Four numbers in an array, on any machine.
+
+use super::{Simd, Vector, WIDTH, Work};
+
+/// On any machine.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain;
+
+/// With the standard library's functions, for angles beyond [`LARGEST_ANGLE`](super::LARGEST_ANGLE).
+#[derive(Clone, Copy)]
+pub(crate) struct Library;
+
+/// The arithmetic of arrays, shared by [`Plain`] and [`Library`].
+macro_rules! arrays {
+    () => {
+        type Register = Vector;
+
+        #[inline(always)]
+        fn apart<W: Work>(work: W) -> W::Output {
+            run_apart::<Self, W>(work)
+        }
+
+        #[inline(always)]
+        fn load(a: &Vector) -> Vector {
+            *a
+        }
+        #[inline(always)]
+        fn store(a: Vector) -> Vector {
+            a
+        }
+        #[inline(always)]
+        fn splat(a: f64) -> Vector {
+            [a; WIDTH]
+        }
+        #[inline(always)]
+        fn add(a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| a[i] + b[i])
+        }
+        #[inline(always)]
+        fn sub(a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| a[i] - b[i])
+        }
+        #[inline(always)]
+        fn mul(a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| a[i] * b[i])
+        }
+        #[inline(always)]
+        fn fma(a: Vector, b: Vector, c: Vector) -> Vector {
+            std::array::from_fn(|i| a[i] * b[i] + c[i])
+        }
+        #[inline(always)]
+        fn fnma(a: Vector, b: Vector, c: Vector) -> Vector {
+            std::array::from_fn(|i| c[i] - a[i] * b[i])
+        }
+        #[inline(always)]
+        fn sums(a: [Vector; 4]) -> Vector {
+            a.map(|a| (a[0] + a[1]) + (a[2] + a[3]))
+        }
+        #[inline(always)]
+        fn sqrt(a: Vector) -> Vector {
+            a.map(f64::sqrt)
+        }
+        #[inline(always)]
+        fn min(a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
+        }
+        #[inline(always)]
+        fn max(a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
+        }
+        #[inline(always)]
+        fn below(a: Vector, b: Vector) -> u32 {
+            let at_least = |i: usize| a[i] >= b[i];
+            (0..WIDTH).fold(0, |bits, i| bits | (u32::from(!at_least(i)) << i))
+        }
+        #[inline(always)]
+        fn with_first(a: Vector, b: Vector) -> Vector {
+            [b[0], a[1], a[2], a[3]]
+        }
+        #[inline(always)]
+        fn shifted_in(before: Vector, a: Vector) -> Vector {
+            [before[3], a[0], a[1], a[2]]
+        }
+        #[inline(always)]
+        fn clamp(a: Vector, low: f64, high: f64) -> Vector {
+            a.map(|a| a.max(low).min(high))
+        }
+        #[inline(always)]
+        fn power_of_two(shifted: Vector) -> Vector {
+            shifted.map(|s| f64::from_bits((s.to_bits() << 52).wrapping_add(1.0_f64.to_bits())))
+        }
+        #[inline(always)]
+        fn turn(shifted: Vector, sine: Vector, cosine: Vector) -> (Vector, Vector) {
+            let turned = |i: usize, quarter: u64, even: Vector, odd: Vector| {
+                let quadrant = shifted[i].to_bits();
+                let value = if quadrant & 1 == 0 { even[i] } else { odd[i] };
+                f64::from_bits(value.to_bits() ^ ((quadrant.wrapping_add(quarter) & 2) << 62))
+            };
+            (
+                std::array::from_fn(|i| turned(i, 0, sine, cosine)),
+                std::array::from_fn(|i| turned(i, 1, cosine, sine)),
+            )
+        }
+    };
+}
+
+#[inline(never)]
+fn run_apart<S: Simd, W: Work>(work: W) -> W::Output {
+    work.run::<S>()
+}
+
+impl Simd for Plain {
+    arrays!();
+}
+
+impl Simd for Library {
+    const LIBRARY: bool = true;
+    arrays!();
+}

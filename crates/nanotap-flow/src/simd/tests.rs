@@ -1,0 +1,89 @@
+#[cfg(target_arch = "x86_64")]
+use super::avx2::Avx2;
+use super::*;
+use proptest::prelude::*;
+
+fn all<S: Simd>(x: f64, y: f64) -> (f64, f64, f64) {
+    let (s, c) = sin_cos::<S>(S::splat(y));
+    (
+        S::store(exp::<S>(S::splat(x)))[1],
+        S::store(s)[2],
+        S::store(c)[3],
+    )
+}
+
+fn each(x: f64, y: f64) -> Vec<(f64, f64, f64)> {
+    let mut results = vec![all::<Plain>(x, y)];
+    #[cfg(target_arch = "x86_64")]
+    if avx2_available() {
+        results.push(all::<Avx2>(x, y));
+    }
+    results
+}
+
+proptest! {
+    /// Against the standard library's functions, to a few units in the last place.
+    #[test]
+    fn functions_agree_with_the_standard_library(x in -700.0..700.0_f64, y in -1e6..1e6_f64) {
+        for (e, s, c) in each(x, y) {
+            prop_assert!((e / x.exp() - 1.0).abs() < 4e-16, "exp {x}: {e}");
+            prop_assert!((s - y.sin()).abs() < 3e-16, "sin {y}: {s} {}", y.sin());
+            prop_assert!((c - y.cos()).abs() < 3e-16, "cos {y}: {c} {}", y.cos());
+        }
+    }
+}
+
+fn rows<S: Simd>() -> [f64; 4] {
+    let a: [Vector; 4] = std::array::from_fn(|i| std::array::from_fn(|j| (10 * i + j * j) as f64));
+    sums::<S>(a.map(|a| S::load(&a)))
+}
+
+fn moved<S: Simd>() -> (Vector, Vector, Vector, u32) {
+    let (a, b) = (
+        S::load(&[1.0, 2.0, 3.0, 4.0]),
+        S::load(&[5.0, 1.0, f64::NAN, 4.0]),
+    );
+    (
+        S::store(S::min(a, S::splat(2.5))),
+        S::store(S::with_first(a, b)),
+        S::store(S::shifted_in(b, a)),
+        S::below(a, b),
+    )
+}
+
+#[test]
+fn lanes_are_moved_and_compared() {
+    let expected = (
+        [1.0, 2.0, 2.5, 2.5],
+        [5.0, 2.0, 3.0, 4.0],
+        [4.0, 1.0, 2.0, 3.0],
+        0b0101,
+    );
+    assert_eq!(moved::<Plain>(), expected);
+    #[cfg(target_arch = "x86_64")]
+    if avx2_available() {
+        assert_eq!(moved::<Avx2>(), expected);
+    }
+}
+
+#[test]
+fn sums_of_packs() {
+    let expected = [14.0, 54.0, 94.0, 134.0];
+    assert_eq!(rows::<Plain>(), expected);
+    #[cfg(target_arch = "x86_64")]
+    if avx2_available() {
+        assert_eq!(rows::<Avx2>(), expected);
+    }
+}
+
+#[test]
+fn small_arguments_keep_their_relative_accuracy() {
+    for x in [0.0, 1e-300, 1e-17, 1e-9, 0.3] {
+        for (e, s, c) in each(x, x) {
+            assert!((s - x.sin()).abs() <= 2e-16 * x, "{x}");
+            assert!((c - x.cos()).abs() <= 2e-16);
+            assert!((e - x.exp()).abs() <= 3e-16 * x.exp());
+        }
+    }
+    assert!(each(-1e4, 0.0).iter().all(|(e, _, _)| *e < 1e-300));
+}

@@ -1,0 +1,91 @@
+//! Many periods run in one go are the same motion as one after the other.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System, Transition};
+
+/// Two coupled masses, one of which hits springy stops on both sides: regimes with two transitions
+/// and with one.
+fn system() -> Arc<System> {
+    let drive = Drive::new(TAU / 1.1, &[1]).unwrap();
+    let regime = |index: usize, stiffness: f64, at: f64| {
+        let matrix = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                0.0,
+                0.0,
+                1.0,
+                0.0, //
+                0.0,
+                0.0,
+                0.0,
+                1.0, //
+                -2.0 - stiffness,
+                1.0,
+                -0.2,
+                0.05, //
+                1.0,
+                -9.0,
+                0.05,
+                -0.2,
+            ],
+        );
+        let force = |v: f64| DVector::from_vec(vec![0.0, 0.0, v, 0.0]);
+        let forcing = HarmonicVector::zeros(4, 1)
+            .with_tone(0, &force(1.5), &force(0.3))
+            .with_constant(&force(stiffness * at));
+        Regime::new(index, matrix, forcing, &drive).unwrap()
+    };
+    let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0, 0.0, 0.0]), 1);
+    let (right, left) = (x.scaled(-1.0).with_constant(0.4), x.with_constant(0.5));
+    let transitions = vec![
+        vec![
+            Transition::new(right.clone(), 1),
+            Transition::new(left.clone(), 2),
+        ],
+        vec![Transition::new(right.scaled(-1.0), 0)],
+        vec![Transition::new(left.scaled(-1.0), 0)],
+    ];
+    let regimes = vec![
+        regime(0, 0.0, 0.0),
+        regime(1, 30.0, 0.4),
+        regime(2, 12.0, -0.5),
+    ];
+    Arc::new(System::new(drive.clone(), regimes, transitions).unwrap())
+}
+
+fn start(i: usize) -> [f64; 4] {
+    let i = i as f64;
+    [
+        0.3 * (1.3 * i).sin(),
+        0.2 * (0.7 * i).cos(),
+        (2.1 * i).sin(),
+        -(0.4 * i).cos(),
+    ]
+}
+
+/// Running on over the ends of periods is the same motion as stopping at each.
+#[test]
+fn periods_may_be_run_in_one_go() {
+    let system = system();
+    for i in 0..6 {
+        let (mut one_go, mut stopping) = (Flow::new(system.clone()), Flow::new(system.clone()));
+        one_go.start(&start(i), 0.0).unwrap();
+        stopping.start(&start(i), 0.0).unwrap();
+        one_go.run_periods(12).unwrap();
+        for _ in 0..12 {
+            stopping.run_period(&mut ()).unwrap();
+        }
+        let (mut a, mut b) = ([0.0; 4], [0.0; 4]);
+        one_go.state(&mut a);
+        stopping.state(&mut b);
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() < 1e-10, "{i}: {a} {b}");
+        }
+        assert_eq!(one_go.switches(), stopping.switches());
+        assert_eq!(one_go.phase(), 0.0);
+    }
+}

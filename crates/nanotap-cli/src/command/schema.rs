@@ -1,45 +1,49 @@
-//! `nanotap schema`: what a study is asked for, as JSON schema.
+//! `nanotap schema`: what studies are asked for and report, and what a case states, as JSON
+//! schema.
 
 use clap::Args;
-use nanotap::study::registry::{STUDIES, study};
+use nanotap::case::schema;
+use nanotap::study::registry::{STUDIES, StudyEntry};
 use serde_json::{Map, Value, json};
 
 use crate::failure::Failure;
 use crate::output;
 
-/// The JSON schema of what a study is asked for.
+/// What the schema of a case is called beside those of the studies.
+const CASE: &str = "case";
+
+/// The JSON schema of what a study is asked for and reports, or of a case.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The study; without it, all of them by name
+    /// A study, or `case` for the keys of a case; without it, all of them by name
     #[arg(value_name = "STUDY")]
     study: Option<String>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut all: Map<String, Value> = STUDIES
+        .iter()
+        .map(|entry| (entry.name.to_owned(), described(entry)))
+        .collect();
+    all.insert(CASE.to_owned(), schema::schema().to_value());
     let document = match &arguments.study {
-        Some(name) => {
-            let entry = study(name).ok_or_else(|| {
-                let known: Vec<&str> = STUDIES.iter().map(|entry| entry.name).collect();
-                Failure::input(
-                    format!("there is no study `{name}`"),
-                    format!("there are {}", known.join(", ")),
-                )
-            })?;
-            described(entry)
-        }
-        None => STUDIES
-            .iter()
-            .map(|entry| (entry.name.to_owned(), described(entry)))
-            .collect::<Map<_, _>>()
-            .into(),
+        None => all.into(),
+        Some(name) => all.remove(name).ok_or_else(|| {
+            let known: Vec<&str> = all.keys().map(String::as_str).collect();
+            Failure::input(
+                format!("there is no study `{name}`"),
+                format!("there are {}", known.join(", ")),
+            )
+        })?,
     };
     output::print(&format!("{document:#}\n"))
 }
 
-fn described(entry: &nanotap::study::registry::StudyEntry) -> Value {
+fn described(entry: &StudyEntry) -> Value {
     json!({
         "name": entry.name,
         "about": entry.about,
         "request": (entry.request)(),
+        "report": (entry.report)(),
     })
 }

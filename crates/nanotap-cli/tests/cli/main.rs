@@ -9,6 +9,7 @@ mod motions;
 mod paper;
 mod physical;
 mod samples;
+mod schema;
 mod sweeps;
 mod terminal;
 mod util;

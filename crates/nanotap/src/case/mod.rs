@@ -27,6 +27,7 @@ mod keys;
 pub mod near_name;
 pub mod physical;
 pub mod quantity;
+pub mod schema;
 mod stated;
 pub mod units;
 
@@ -35,6 +36,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nanotap_flow::sensitivity::SystemTangent;
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 pub use error::{CaseError, NoSuchKey, ValueOfKeyError};
@@ -87,7 +89,7 @@ struct Quantities {
 }
 
 /// What a key of the dimensionless model is in SI.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct ParameterUnit {
     /// The quantity: "drive frequency f".
     pub quantity: &'static str,

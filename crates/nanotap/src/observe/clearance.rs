@@ -18,6 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, FlowError, Output, Trajectory};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::measure::measure_clearance;
@@ -25,7 +26,7 @@ use crate::model::beam::Modes;
 use crate::model::{BeamOutputs, Model};
 
 /// Where a beam comes nearest to the sample.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Clearance {
     /// The least V(ξ, τ), in units of g₀; below zero the beam would pass through the
     /// sample.

@@ -2,13 +2,14 @@
 
 use nanotap_flow::flow::{Observer, SwitchView};
 use nanotap_flow::regime::ModalOutput;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::begins_contact;
 use crate::model::Model;
 
 /// A switch between flight and contact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ContactEvent {
     /// When, counted from the end of the transient.
     pub tau: f64,
@@ -20,7 +21,7 @@ pub struct ContactEvent {
 }
 
 /// Which way a switch goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactEventKind {
     /// The tip meets the sample.

@@ -5,12 +5,13 @@
 use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, Output};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::{Model, Powers, Product};
 
 /// Energies over a recording, in the model's own units or in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EnergyBalance {
     /// Work of the drive.
     pub drive_work: f64,

@@ -1,12 +1,13 @@
 //! Harmonics of tip deflection, slope and force, in closed form.
 
 use nanotap_flow::{Complex, Trajectory};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Model;
 
 /// One component of a periodic motion.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Harmonic {
     /// Frequency as a multiple of the drive's; not whole for a subharmonic motion.
     pub order: f64,
@@ -24,7 +25,7 @@ pub struct Harmonic {
 }
 
 /// The spectrum of a periodic motion.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Spectrum {
     /// Components at `j Ω/n`, `j = 1, 2, …`, of a motion of period `n`.
     pub harmonics: Vec<Harmonic>,

@@ -2,13 +2,14 @@
 //! each mode has in a motion's energy, in its tip signal and in the work of the contact.
 
 use nanotap_flow::{Output, Trajectory};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Model;
 use crate::study::orbit::OrbitReport;
 
 /// What an experimenter reads off an orbit, in the model's units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Reading {
     /// Amplitude at the drive's frequency, A.
     pub first_harmonic: f64,
@@ -21,7 +22,7 @@ pub struct Reading {
 }
 
 /// Differences of a reading to that with the most modes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ReadingDifference {
     /// Of A, as a part of it.
     pub first_harmonic: f64,
@@ -35,7 +36,7 @@ pub struct ReadingDifference {
 
 /// The least numbers of modes from which on a reading stays within the tolerance; none where
 /// the modes computed do not show it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct EnoughReadings {
     /// For A.
     pub first_harmonic: Option<usize>,
@@ -52,7 +53,7 @@ pub struct EnoughReadings {
 /// The part of one mode in the motion with the most modes. The parts of all modes sum to 1;
 /// those in the tip signal and in the force may be negative, where a mode works against the
 /// others.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModeShare {
     /// Number of the mode, from 1.
     pub mode: usize,
@@ -67,7 +68,7 @@ pub struct ModeShare {
 }
 
 /// Which modes matter for what an experimenter reads.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ReadingsReport {
     /// The readings, one a number of modes; null where no orbit was found.
     pub readings: Vec<Option<Reading>>,

@@ -1,7 +1,11 @@
 //! A motion in SI units, in the words of experimenters.
 
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
+use serde_json::{Map, Value as Json, json};
 
 use super::table::{OBSERVABLES, Observables};
 use super::value::Value;
@@ -22,7 +26,7 @@ pub struct PhysicalMotion {
 }
 
 /// What belongs to the case and not to the motion, and the motion's harmonics.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Setting {
     /// What the phase is counted from.
     pub phase_reference: &'static str,
@@ -34,7 +38,7 @@ pub struct Setting {
 }
 
 /// One component of a periodic motion; SI units, angles in degrees.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PhysicalHarmonic {
     /// Frequency as a multiple of the drive's.
     pub order: f64,
@@ -108,6 +112,36 @@ impl Serialize for PhysicalMotion {
             }
         }
         map.end()
+    }
+}
+
+impl JsonSchema for PhysicalMotion {
+    fn schema_name() -> Cow<'static, str> {
+        "PhysicalMotion".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut properties = Map::new();
+        for observable in OBSERVABLES {
+            let schema = observable.described(generator, observable.dimension.si_unit());
+            properties.insert(observable.si_name.to_owned(), schema.to_value());
+            if observable.is_number && observable.dimension == Dimension::Energy {
+                let schema = observable.described(generator, "eV");
+                let name = format!("{}_eV", observable.si_name);
+                properties.insert(name, schema.to_value());
+            }
+        }
+        let ratio = json!({"type": "number", "description": "A over the free amplitude"});
+        properties.insert("A_ratio".to_owned(), ratio);
+        let setting = Setting::json_schema(generator).to_value();
+        if let Some(Json::Object(beside)) = setting.get("properties") {
+            properties.extend(beside.clone());
+        }
+        json_schema!({
+            "type": "object",
+            "description": "What an experimenter would measure of the motion, in SI",
+            "properties": properties,
+        })
     }
 }
 

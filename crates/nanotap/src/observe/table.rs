@@ -9,7 +9,11 @@
 //! base lags by a little more than 180° far above resonance; so text and figures show them
 //! in (−90°, 270°], where a response to tapping never jumps: see [`shown_phase`].
 
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer, ser::SerializeMap};
+use serde_json::Map;
 
 use super::measure::{Measured, Signal, Tone};
 use super::value::{Measurable, Value};
@@ -35,6 +39,8 @@ pub struct Observable {
     pub of: fn(&Observables) -> Value,
     /// Whether it is one number, as a curve needs it.
     pub is_number: bool,
+    /// The JSON schema of its value.
+    pub(super) schema: fn(&mut SchemaGenerator) -> Schema,
     row: usize,
 }
 
@@ -120,6 +126,7 @@ macro_rules! observables {
             words: $words,
             of: |o| o.$name.value(),
             is_number: <$type as Measurable>::IS_NUMBER,
+            schema: <$type as JsonSchema>::json_schema,
             row: Row::$name as usize,
         }),*];
 
@@ -299,5 +306,34 @@ impl Serialize for Observables {
             }
         }
         map.end()
+    }
+}
+
+impl Observable {
+    /// The JSON schema of its value, with what it is and its `x-unit`.
+    pub(super) fn described(&self, generator: &mut SchemaGenerator, unit: &str) -> Schema {
+        let mut schema = (self.schema)(generator);
+        schema.insert("description".into(), self.words.into());
+        schema.insert("x-unit".into(), unit.into());
+        schema
+    }
+}
+
+impl JsonSchema for Observables {
+    fn schema_name() -> Cow<'static, str> {
+        "Observables".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let entries = OBSERVABLES.iter().map(|o| {
+            let schema = o.described(generator, o.dimension.model_unit());
+            (o.name.to_owned(), schema.to_value())
+        });
+        let properties: Map<_, _> = entries.collect();
+        json_schema!({
+            "type": "object",
+            "description": "What is observed of the motion, in the model's own units",
+            "properties": properties,
+        })
     }
 }

@@ -109,7 +109,7 @@ pub enum ApproachError {
 }
 
 /// Which way the sample moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
     /// Towards the tip.
@@ -129,7 +129,7 @@ impl Way {
 }
 
 /// The motion at one distance on one way.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ApproachPoint {
     /// Which way.
     pub way: Way,
@@ -159,7 +159,7 @@ pub struct ApproachPoint {
 }
 
 /// An interval of distances in which approach and retract show different motions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Hysteresis {
     /// Nearest distance of the interval, in the model's unit of length.
     pub near: f64,
@@ -170,7 +170,7 @@ pub struct Hysteresis {
 }
 
 /// Approach and retract curves, with the branches behind them.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ApproachReport {
     /// The key of the distance in a case file.
     pub parameter: &'static str,

@@ -90,7 +90,7 @@ pub enum AttractorsError {
 }
 
 /// What a census found.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Attractors {
     /// Starts.
     pub starts: usize,
@@ -123,7 +123,7 @@ pub struct Attractors {
 }
 
 /// What became of the starts of one size.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SizeReport {
     /// Size of their box, as a part of the largest.
     pub scale: f64,
@@ -134,7 +134,7 @@ pub struct SizeReport {
 }
 
 /// How much of the set of starts may lead to motions that were not found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct UnseenReport {
     /// Motions found.
     pub motions: usize,
@@ -145,7 +145,7 @@ pub struct UnseenReport {
 }
 
 /// A side of the box of starts.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Side {
     /// The coordinate.
     pub coordinate: String,
@@ -156,7 +156,7 @@ pub struct Side {
 }
 
 /// A part of the starts.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
     /// How many.
     pub count: usize,
@@ -177,7 +177,7 @@ impl From<Fraction> for Share {
 }
 
 /// One attractor.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AttractorReport {
     /// What it is.
     pub classification: Classification,
@@ -222,7 +222,7 @@ impl Attractors {
 }
 
 /// A motion that does not repeat.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Wandering {
     /// None.
     pub period: Option<usize>,
@@ -234,7 +234,7 @@ pub struct Wandering {
 }
 
 /// A start without a verdict.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UndecidedStart {
     /// Its number.
     pub start: usize,
@@ -245,7 +245,7 @@ pub struct UndecidedStart {
 }
 
 /// Chaos that ends.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TransientChaosReport {
     /// Lyapunov exponents per drive period while it lasts.
     pub lyapunov: Vec<f64>,

@@ -548,7 +548,7 @@ fn schema(
 }
 
 /// What part of a slice goes where.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
     /// Points of the slice.
     pub points: usize,
@@ -563,7 +563,7 @@ pub struct Shares {
 }
 
 /// An attractor and its part of a slice.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AttractorShare {
     /// What it is.
     pub classification: String,
@@ -765,10 +765,15 @@ impl DatasetStudy for BasinStudy {
     const ABOUT: &'static str = "Basins of attraction on a two-dimensional slice of initial states";
     const COUNTED: &'static str = "rows";
     type Request = BasinRequest;
+    type Report = Shares;
 
     fn recipe(case: &Case, request: &BasinRequest, control: &Control<'_>) -> Result<Recipe, Error> {
         let basin = Basin::new(case, &request.options()?, control)?;
         Ok(Recipe::Basin(Box::new(basin)))
+    }
+
+    fn report(store: &Store) -> Result<Shares, StoreError> {
+        shares(store)
     }
 }
 

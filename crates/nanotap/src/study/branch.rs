@@ -183,7 +183,7 @@ pub enum BranchError {
 }
 
 /// Branches with their points and bifurcations.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct BranchReport {
     /// The parameter's key.
     pub parameter: &'static str,
@@ -213,7 +213,7 @@ pub struct BranchReport {
 }
 
 /// One branch.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BranchSummary {
     /// Period of its orbits.
     pub period: usize,
@@ -230,7 +230,7 @@ pub struct BranchSummary {
 }
 
 /// One orbit of a branch.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PointReport {
     /// Index of its branch.
     pub branch: usize,
@@ -253,7 +253,7 @@ pub struct PointReport {
 }
 
 /// A bifurcation.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BifurcationReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
     pub kind: &'static str,
@@ -284,7 +284,7 @@ pub struct BifurcationReport {
 }
 
 /// Loci of bifurcations in two parameters.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Loci {
     /// The second parameter's key.
     pub second: &'static str,
@@ -298,7 +298,7 @@ pub struct Loci {
 }
 
 /// One locus.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct LocusReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
     pub kind: &'static str,
@@ -313,7 +313,7 @@ pub struct LocusReport {
 }
 
 /// Something that could not be followed.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FailureReport {
     /// Where.
     pub parameter: f64,

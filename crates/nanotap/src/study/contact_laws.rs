@@ -9,6 +9,7 @@ use nanotap_dynamics::{Control, SettleOptions, ShootingOptions, close_orbit, set
 use nanotap_flow::trajectory::PiecewiseSignal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 use crate::Error;
 use crate::case::Case;
@@ -67,11 +68,12 @@ pub enum ComparisonError {
 }
 
 /// The motion on one sample.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SampleMotion {
     /// The law.
     pub contact: ContactLaw,
     /// The case with this law.
+    #[schemars(with = "Map<String, Value>")]
     pub case: Cantilever,
     /// What a run from rest goes to.
     pub from_rest: Classification,
@@ -89,7 +91,7 @@ pub struct SampleMotion {
 }
 
 /// What an orbit looks like.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OrbitLook {
     /// Minimal period in drive periods.
     pub period: usize,
@@ -108,7 +110,7 @@ pub struct OrbitLook {
 }
 
 /// The motions on all samples.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Comparison {
     /// Drive frequency Ω.
     pub omega: f64,

@@ -17,7 +17,7 @@ use crate::study::registry::{Study, cantilever};
 use crate::study::simulate::Classification;
 
 /// A motion at each number of modes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Convergence {
     /// Numbers of modes N.
     pub modes: Vec<usize>,
@@ -46,7 +46,7 @@ pub struct Convergence {
 }
 
 /// The motion with one number of modes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Motion {
     /// N.
     pub modes: usize,

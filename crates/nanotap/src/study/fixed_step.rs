@@ -12,6 +12,7 @@ use std::time::Instant;
 use nanotap_dynamics::{SettleOptions, settle};
 use nanotap_flow::fixed_step::FixedStep;
 pub use nanotap_flow::fixed_step::Switching;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Model;
@@ -74,7 +75,7 @@ pub enum FixedStepError {
 }
 
 /// A switch, where the grid noticed it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct GridEvent {
     /// When, counted from the end of the transient.
     pub tau: f64,
@@ -83,7 +84,7 @@ pub struct GridEvent {
 }
 
 /// A finished run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct FixedStepRun {
     /// `rk4`.
     pub method: &'static str,
@@ -129,7 +130,7 @@ pub struct FixedStepRun {
 }
 
 /// What the exact flow makes of a motion.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ExactVerdict {
     /// Its class.
     pub classification: Classification,

@@ -1,11 +1,12 @@
 //! A motion with what it is in SI.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::observe::PhysicalMotion;
 
 /// A motion in the model's units and, of a physical case, in SI.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct InSi<M> {
     /// In the model's units.
     #[serde(flatten)]

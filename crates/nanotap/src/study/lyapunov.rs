@@ -54,7 +54,7 @@ impl Default for LyapunovOptions {
 }
 
 /// Where a motion is cut.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Section {
     /// Once a drive period at this phase, 0 … 1.
@@ -79,7 +79,7 @@ pub struct SectionPoint {
 }
 
 /// The spectrum and the section.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LyapunovReport {
     /// What the motion was found to be.
     pub classification: Classification,

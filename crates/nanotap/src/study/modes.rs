@@ -18,7 +18,7 @@ use crate::study::limits::MOST_POINTS;
 use crate::study::registry::{Study, cantilever};
 
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModeTable {
     /// N.
     pub modes: usize,

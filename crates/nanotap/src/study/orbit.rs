@@ -90,7 +90,7 @@ pub enum OrbitError {
 }
 
 /// A periodic orbit and everything that is known about it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OrbitReport {
     /// Minimal period in drive periods.
     pub period: usize,

@@ -4,14 +4,15 @@ use nanotap_dynamics::Control;
 use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::Error;
 use crate::case::Case;
 use crate::case::document::CaseDocument;
+use crate::dataset::{Store, StoreError};
 use crate::model::cantilever::Cantilever;
 use crate::study::recipe::Recipe;
-use crate::study::request::{read, schema};
+use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
 
 /// A study: what it is asked for, how it runs, what it reports.
@@ -23,7 +24,7 @@ pub trait Study {
     /// What it is asked for.
     type Request: Serialize + DeserializeOwned + JsonSchema;
     /// What it found.
-    type Report: Serialize;
+    type Report: Serialize + JsonSchema + 'static;
 
     /// What its progress counts, in the plural.
     const COUNTED: &'static str = "steps";
@@ -51,6 +52,8 @@ pub trait DatasetStudy {
     const COUNTED: &'static str;
     /// What it is asked for.
     type Request: Serialize + DeserializeOwned + JsonSchema;
+    /// What its dataset comes to.
+    type Report: Serialize + JsonSchema;
 
     /// What is to be computed of `case`.
     ///
@@ -58,17 +61,24 @@ pub trait DatasetStudy {
     /// When the request is not right, or what must be known beforehand cannot be found.
     fn recipe(case: &Case, request: &Self::Request, control: &Control<'_>)
     -> Result<Recipe, Error>;
+
+    /// What a finished dataset comes to.
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged.
+    fn report(store: &Store) -> Result<Self::Report, StoreError>;
 }
 
 /// A report with what it is of.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Document<'a, R: Serialize> {
     /// What was found.
     #[serde(flatten)]
     pub report: &'a R,
     /// The version of the program.
     pub version: &'static str,
-    /// The case that was studied.
+    /// The case that was studied, as a document of its own.
+    #[schemars(with = "Map<String, Value>")]
     pub case: CaseDocument,
 }
 
@@ -92,6 +102,8 @@ pub struct StudyEntry {
     pub about: &'static str,
     /// The JSON schema of its request.
     pub request: fn() -> Schema,
+    /// The JSON schema of its document, or of what its dataset comes to.
+    pub report: fn() -> Schema,
     /// What its progress counts.
     pub counted: &'static str,
     /// Whether it chooses the distance itself.
@@ -115,6 +127,7 @@ impl StudyEntry {
             name: S::NAME,
             about: S::ABOUT,
             request: schema::<S::Request>,
+            report: answer_schema::<Document<'static, S::Report>>,
             counted: S::COUNTED,
             any_distance: S::ANY_DISTANCE,
             run: Run::Document(|case, request, control| {
@@ -135,6 +148,7 @@ impl StudyEntry {
             name: S::NAME,
             about: S::ABOUT,
             request: schema::<S::Request>,
+            report: answer_schema::<S::Report>,
             counted: S::COUNTED,
             any_distance: false,
             run: Run::Dataset(|case, request, control| {

@@ -15,7 +15,13 @@ use serde_json::{Map, Value};
 use crate::Error;
 use crate::case::near_name::near_name;
 
-/// The JSON schema of a request or report, without references to definitions elsewhere.
+/// The JSON schema of what a study answers: what recurs stands under `$defs`.
+pub fn answer_schema<T: JsonSchema>() -> Schema {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    settings.into_generator().into_root_schema_for::<T>()
+}
+
+/// The JSON schema of a request, without references to definitions elsewhere.
 pub fn schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let mut schema = settings.into_generator().into_root_schema_for::<T>();

@@ -83,7 +83,7 @@ pub enum SimulateError {
 }
 
 /// What a motion was found to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Classification {
     /// It goes to a stable periodic orbit, closed by Newton.
@@ -112,7 +112,7 @@ impl Classification {
 }
 
 /// A finished run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Simulation {
     /// Drive periods recorded.
     pub periods: usize,
@@ -547,7 +547,7 @@ impl SimulateRequest {
 }
 
 /// What one run came to.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SimulateReport {
     /// By the exact flow.

@@ -5,11 +5,12 @@
 //! each named as in a [sweep](crate::study::sweep), whose datasets, chunks and resumption serve here
 //! too. What is found is certain, what is not found is only not found: more starts see more.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nanotap_dynamics::Control;
 use nanotap_figures::{CategoryMap, Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -95,8 +96,18 @@ impl Serialize for Condition {
     }
 }
 
+impl JsonSchema for Condition {
+    fn schema_name() -> Cow<'static, str> {
+        "Condition".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"enum": Self::ALL.map(Self::name)})
+    }
+}
+
 /// The operating window over two parameters.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Window {
     /// The parameters' keys, the first varies along a row.
     pub parameters: [String; 2],
@@ -333,9 +344,14 @@ impl DatasetStudy for WindowStudy {
                                  threaten";
     const COUNTED: &'static str = "values";
     type Request = WindowRequest;
+    type Report = Window;
 
     fn recipe(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
         Ok(Recipe::Sweep(Box::new(request.sweep(case)?)))
+    }
+
+    fn report(store: &Store) -> Result<Window, StoreError> {
+        Window::of(store)
     }
 }
 

@@ -27,6 +27,7 @@ mod standard_linear_solid;
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::model::cantilever::Cantilever;
@@ -35,7 +36,7 @@ use dual::Dual;
 use law::Law;
 
 /// How the sample answers the tip.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, JsonSchema, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ContactLaw {
     /// The paper's spring α4 and damper α6, in contact where V_T ≤ 0.

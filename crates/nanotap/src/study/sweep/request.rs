@@ -4,9 +4,10 @@ use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Follow, Over, Starts, Sweep, SweepOptions};
+use super::{Follow, Over, Starts, Summary, Sweep, SweepOptions};
 use crate::Error;
 use crate::case::Case;
+use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
 use crate::study::recipe::Recipe;
@@ -126,8 +127,13 @@ impl DatasetStudy for SweepStudy {
         "How the motion changes with one or two parameters, from any number of starts";
     const COUNTED: &'static str = "values";
     type Request = SweepRequest;
+    type Report = Summary;
 
     fn recipe(case: &Case, request: &SweepRequest, _: &Control<'_>) -> Result<Recipe, Error> {
         Ok(Recipe::Sweep(Box::new(request.sweep(case)?)))
+    }
+
+    fn report(store: &Store) -> Result<Summary, StoreError> {
+        super::summary(store)
     }
 }

@@ -15,6 +15,7 @@ mod case;
 mod dataset;
 mod failure;
 mod figure;
+mod map;
 mod motion;
 mod study;
 mod watch;
@@ -26,6 +27,8 @@ use pyo3::prelude::*;
 fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<case::CaseCore>()?;
+    module.add_class::<map::MapCore>()?;
+    module.add_class::<map::MotionCore>()?;
     module.add_class::<dataset::Recipe>()?;
     module.add_class::<dataset::Receiver>()?;
     for function in [

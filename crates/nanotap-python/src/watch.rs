@@ -2,7 +2,7 @@
 //! caught, and the interpreter is free meanwhile.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use nanotap::control::Control;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::Failure;
 
@@ -53,7 +54,9 @@ pub(crate) fn watched<R: Send + 'static>(
                 cancel: Some(&cancel),
                 progress: Some(&report),
             };
-            let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
+            let result = catch_unwind(AssertUnwindSafe(|| {
+                threads_of_this_process()?.install(|| work(&control))
+            }));
             // Nobody may be waiting any more.
             let _ = sender.send(result);
         })
@@ -128,4 +131,26 @@ fn ended<R>(done: Outcome<R>, stopped: Option<PyErr>) -> PyResult<Watched<R>> {
             )))
         }
     }
+}
+
+/// One thread a core. Threads do not survive a fork: a child of this process that waited for
+/// those of its parent would wait for ever, so it starts its own.
+fn threads_of_this_process() -> Result<Arc<ThreadPool>, Failure> {
+    static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if let Some((owner, threads)) = &*pool
+        && *owner == process
+    {
+        return Ok(Arc::clone(threads));
+    }
+    let threads = ThreadPoolBuilder::new().build().map_err(|error| {
+        Failure(nanotap::Error::numerics(format!(
+            "cannot start a thread a core: {error}"
+        )))
+    })?;
+    let threads = Arc::new(threads);
+    // The parent's can be neither used nor joined.
+    std::mem::forget(pool.replace((process, Arc::clone(&threads))));
+    Ok(threads)
 }

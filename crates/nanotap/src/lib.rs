@@ -3,16 +3,18 @@
 //!
 //! The rooms depend on each other in this order: a [`model`] holds the equations; a [`case`]
 //! states what is studied and maps to a model; [`observe`] reads off a motion what an
-//! experimenter would; a [`study`] runs and reports; a [`figure`] shows a report;
+//! experimenter would; a [`map`](mod@map) is for algorithms of one's own; a [`study`] runs and reports; a [`figure`] shows a report;
 //! a [`dataset`] keeps many motions on disk.
 
 pub mod case;
 pub mod dataset;
 pub mod error;
 pub mod figure;
+pub mod map;
 pub mod model;
 pub mod observe;
 pub mod study;
 
 pub use error::{Error, ErrorKind};
+pub use map::Map;
 pub use nanotap_dynamics::control;

@@ -41,6 +41,17 @@ pub enum Stability {
     Marginal,
 }
 
+impl Stability {
+    /// In a word: stable, unstable or marginal.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::Unstable { .. } => "unstable",
+            Self::Marginal => "marginal",
+        }
+    }
+}
+
 /// Eigenvalues of a product of matrices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipliers {

@@ -3,7 +3,8 @@
 A `Case` says which cantilever, sample and drive; a function for every command of the
 terminal says what it does: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`,
 `branch`, `approach`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`. Results carry the names that the
-terminal's JSON has, as xarray Datasets, objects and lists of objects.
+terminal's JSON has, as xarray Datasets, objects and lists of objects. A `Map` is the exact
+stroboscopic map itself, for algorithms of one's own.
 
 >>> import nanotap
 >>> case = nanotap.Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=3)
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING
 from ._case import Case, catalogue
 from ._datasets import merge, open
 from ._interrupt import Interrupted
+from ._map import Map, Motion, PeriodicOrbit
 from ._nanotap import __version__
 from ._results import (
     Attractor,
@@ -54,9 +56,12 @@ __all__ = [
     "Convergence",
     "Interrupted",
     "Lyapunov",
+    "Map",
     "Modes",
+    "Motion",
     "Orbit",
     "Paper",
+    "PeriodicOrbit",
     "Record",
     "__version__",
     "approach",

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use nanotap_dynamics::{
     Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
-    Stability, Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
+    Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
 };
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Trajectory};
@@ -280,11 +280,7 @@ pub fn report(
             .map(|m: &Complex<f64>| [m.re, m.im])
             .collect(),
         stable: orbit.is_stable(),
-        stability: match orbit.stability {
-            Stability::Stable => "stable",
-            Stability::Unstable { .. } => "unstable",
-            Stability::Marginal => "marginal",
-        },
+        stability: orbit.stability.name(),
         determinant_defect: determinant_defect(model, orbit, &trajectory),
         events: contacts.events(),
         spectrum: Spectrum::of(model, &trajectory, orbit.period, harmonics),

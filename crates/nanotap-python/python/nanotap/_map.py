@@ -1,0 +1,302 @@
+"""The stroboscopic map of a case, for algorithms of one's own."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _arguments, _nanotap
+from ._arguments import Floats
+from ._case import Case
+from ._results import Record
+
+
+class Map:
+    """The exact map of a case from the state at drive phase 0 to that one drive period later.
+
+    A state is (a₁ … a_N, ȧ₁ … ȧ_N) of a cantilever and (x, ẋ) of an oscillator, in the model's
+    units; `state_names` says which. Where a state is taken, an array of them will do: the last
+    axis is that of the state, the others stay. A map does not change: threads may share one,
+    and it can be pickled. While it works, other Python threads run.
+
+    >>> case = Case.paper(omega=3)
+    >>> map = Map(case)
+    >>> z = map([0.0] * map.dimension, periods=200)
+    >>> bool(abs(map(z) - z).max() < 1e-12)
+    True
+    >>> map.jacobian(z).shape, map.derivative(z, "alpha4").shape
+    ((6, 6), (6,))
+
+    Args:
+        case: Whose map. A distance that it leaves to a setpoint is solved for.
+        **keys: Keys of the case to change.
+    """
+
+    __slots__ = ("_core", "case")
+    case: Case
+
+    def __init__(self, case: Case, **keys: Any) -> None:
+        if not isinstance(case, Case):
+            message = f"case: a nanotap.Case is needed, not {type(case).__name__}"
+            raise TypeError(message)
+        self.case = case.with_(**keys)
+        self._core = _nanotap.MapCore(self.case._core)
+
+    @property
+    def dimension(self) -> int:
+        """How many numbers a state has."""
+        return self._core.dimension
+
+    @property
+    def period(self) -> float:
+        """The drive period, in the model's unit of time."""
+        return self._core.period
+
+    @property
+    def state_names(self) -> list[str]:
+        """The names of a state's entries."""
+        return self.case.state_names
+
+    def __call__(
+        self, z: npt.ArrayLike, periods: int = 1, *, threads: int | None = None
+    ) -> Floats:
+        """The states that come of `z` after so many drive periods.
+
+        Many states are spread over all cores, or `threads` threads; the same numbers come out
+        whatever their count.
+
+        Raises:
+            ValueError: `z` is no state and no array of them.
+            RuntimeError: a motion could not be followed; the words say which.
+        """
+        rows, shape = self._rows(z)
+        found = self._core.apply(
+            rows, _arguments.count("periods", periods), _threads(threads)
+        )
+        return found.reshape(shape)
+
+    def iterate(self, z: npt.ArrayLike, periods: int, *, every: int = 1) -> Floats:
+        """`z` and what comes of it at the end of `every` so many of the next drive periods.
+
+        Returns:
+            `periods // every + 1` rows, the first of them `z`.
+        """
+        every = _arguments.count("every", every, 1)
+        many = _arguments.count("periods", periods) // every + 1
+        return self._core.iterate(self._one(z, "z"), many, every)
+
+    def jacobian(
+        self, z: npt.ArrayLike, periods: int = 1, *, threads: int | None = None
+    ) -> Floats:
+        """The derivative ∂Pᵏ/∂z of the map over k = `periods` drive periods: `… × n × n`."""
+        rows, shape = self._rows(z)
+        k = _arguments.count("periods", periods)
+        _, jacobians, _ = self._core.linearised(rows, k, [], _threads(threads))
+        return jacobians.reshape((*shape, self.dimension))
+
+    def derivative(
+        self,
+        z: npt.ArrayLike,
+        key: str | Sequence[str],
+        periods: int = 1,
+        *,
+        threads: int | None = None,
+    ) -> Floats:
+        """The derivative ∂Pᵏ/∂key at constant `z`, exact through every switch.
+
+        Args:
+            z: States.
+            key: A key of the case, `"alpha4"`, `"sample.stiffness"`, or several. Of a physical
+                quantity the derivative is per SI unit; what else stays is what stays when that
+                quantity is varied in a sweep.
+            periods: k.
+            threads: Of many states: threads; without it, one a core.
+
+        Returns:
+            `… × n`; of several keys `… × n × keys`.
+        """
+        rows, shape = self._rows(z)
+        keys = [key] if isinstance(key, str) else list(key)
+        k = _arguments.count("periods", periods)
+        _, _, found = self._core.linearised(rows, k, keys, _threads(threads))
+        return found.reshape(shape if isinstance(key, str) else (*shape, len(keys)))
+
+    def orbit(self, z0: npt.ArrayLike, period: int = 1) -> "PeriodicOrbit":
+        """The periodic orbit that Newton finds near the motion from `z0`, stable or not.
+
+        `nanotap.orbit(case, state=…)` tells what would be observed of it.
+
+        Raises:
+            RuntimeError: there is none, or none that is isolated to rounding.
+        """
+        many = _arguments.count("period", period, 1)
+        states, multipliers, stability, residual, error = self._core.orbit(
+            self._one(z0, "z0"), many
+        )
+        return PeriodicOrbit(
+            len(states), states, multipliers, stability, residual, error
+        )
+
+    def flow(
+        self, z: npt.ArrayLike, tau: npt.ArrayLike, *, start: float = 0.0
+    ) -> "Motion":
+        """The motion from the state `z` at τ = `start` to the last of the times `tau`.
+
+        Args:
+            z: One state.
+            tau: When to look: a time or an array of them, in the model's unit; 0 is drive
+                phase 0.
+            start: When the motion begins, within the first drive period.
+
+        Returns:
+            The motion: at the times `tau` as its entries, at any other in between by calling
+            it.
+        """
+        return Motion(self, self._one(z, "z"), tau, _arguments.number("start", start))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Map, (self.case,)
+
+    def __repr__(self) -> str:
+        return f"Map({self.case!r})"
+
+    def _rows(self, z: npt.ArrayLike) -> tuple[Floats, tuple[int, ...]]:
+        array = _arguments.real(z, "z")
+        n = self.dimension
+        if array.ndim == 0 or array.shape[-1] != n:
+            message = f"z: the last axis of an array of states has {n} numbers, not {array.shape}"
+            raise ValueError(message)
+        return array.reshape(-1, n), array.shape
+
+    def _one(self, z: npt.ArrayLike, name: str) -> Floats:
+        array = _arguments.real(z, name)
+        if array.shape != (self.dimension,):
+            message = f"{name}: one state of {self.dimension} numbers is needed, not {array.shape}"
+            raise ValueError(message)
+        return array
+
+
+@dataclass(frozen=True)
+class PeriodicOrbit:
+    """A periodic orbit of a map, with its multipliers.
+
+    Attributes:
+        period: Minimal period in drive periods.
+        states: Its states at drive phase 0, `period × n`.
+        multipliers: Floquet multipliers, largest modulus first.
+        stability: stable, unstable or marginal.
+        residual: Largest entry of P(z_k) − z_{k+1}.
+        error: Estimated distance of the states from the true orbit.
+    """
+
+    period: int
+    states: Floats
+    multipliers: npt.NDArray[np.complex128]
+    stability: str
+    residual: float
+    error: float
+
+    @property
+    def state(self) -> Floats:
+        """Its first state."""
+        first: Floats = self.states[0]
+        return first
+
+    @property
+    def stable(self) -> bool:
+        """Whether every multiplier is inside the unit circle."""
+        return self.stability == "stable"
+
+
+class Motion:
+    """A motion between its strobes, known in closed form at every instant.
+
+    Its entries are those at the times that were asked for; calling it gives the same at
+    others. Numbers in the model's units.
+
+    Attributes:
+        tau: The times, 0 at drive phase 0.
+        state: States there, `… × n`.
+        tip: Tip deflection W, of an oscillator x.
+        tip_rate: Its rate.
+        gap: Height V_T of the tip over the undeformed surface.
+        force: Force of the sample on the tip.
+        guard: What ends the present regime by falling to zero: in flight the gap, in contact
+            what keeps the contact.
+        contact: Whether tip and sample touch.
+        events: Contacts begun and ended: `tau`, `kind`, `gap_rate`.
+    """
+
+    __slots__ = (
+        "_core",
+        "_made_of",
+        "contact",
+        "events",
+        "force",
+        "gap",
+        "guard",
+        "state",
+        "tau",
+        "tip",
+        "tip_rate",
+    )
+    tau: Floats
+    state: Floats
+    tip: Floats
+    tip_rate: Floats
+    gap: Floats
+    force: Floats
+    guard: Floats
+    contact: npt.NDArray[np.bool_]
+    events: list[Record]
+
+    def __init__(self, map: Map, z: Floats, tau: npt.ArrayLike, start: float) -> None:
+        times = _arguments.real(tau, "tau")
+        if times.size == 0:
+            message = "tau: at least one time is needed"
+            raise ValueError(message)
+        self._made_of = (map, z, times, start)
+        self._core = map._core.flow(z, start, float(times.max()) - start)
+        self.events = [Record(event) for event in json.loads(self._core.events)]
+        self._look(times)
+
+    def __call__(self, tau: npt.ArrayLike) -> "Motion":
+        """The same motion seen at other times."""
+        times = _arguments.real(tau, "tau")
+        seen = Motion.__new__(Motion)
+        seen._made_of, seen._core, seen.events = self._made_of, self._core, self.events
+        seen._look(times)
+        return seen
+
+    def _look(self, times: Floats) -> None:
+        _, _, known, start = self._made_of
+        end = float(known.max())
+        if times.size and not start <= times.min() <= times.max() <= end:
+            message = f"tau: the motion is known from τ = {start} to {end}"
+            raise ValueError(message)
+        rows = self._core.at(times.ravel())
+        self.tau = times
+        self.tip, self.tip_rate, self.gap, self.force, self.guard, contact = (
+            rows[:, k].reshape(times.shape) for k in range(6)
+        )
+        self.contact = contact > 0
+        self.state = rows[:, 6:].reshape((*times.shape, rows.shape[1] - 6))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        map, z, known, start = self._made_of
+        return _seen, (map, z, known, start, self.tau)
+
+    def __repr__(self) -> str:
+        _, _, known, start = self._made_of
+        return f"Motion(τ from {start:g} to {known.max():g}, {len(self.events)} events)"
+
+
+def _seen(map: Map, z: Floats, known: Floats, start: float, tau: Floats) -> Motion:
+    return Motion(map, z, known, start)(tau)
+
+
+def _threads(threads: int | None) -> int | None:
+    return None if threads is None else _arguments.count("threads", threads, 1)

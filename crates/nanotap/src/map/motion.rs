@@ -1,0 +1,146 @@
+//! A motion between its strobes: every instant of it in closed form.
+
+use std::sync::Arc;
+
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Flow, Output, Trajectory};
+
+use super::{MapError, of_state};
+use crate::model::Model;
+use crate::observe::{ContactEvent, Contacts};
+
+/// Most drive periods that a [`Motion`] keeps.
+pub const MOST_PERIODS: f64 = 100_000.0;
+
+/// A motion over a span of time.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    model: Arc<Model>,
+    tip_rate: Output,
+    trajectory: Trajectory,
+    events: Vec<ContactEvent>,
+    span: [f64; 2],
+    /// The only state of a span of no length.
+    start: (usize, Vec<f64>),
+}
+
+/// An instant of a motion; the model's units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// When, in the model's time, 0 at drive phase 0 of the first period.
+    pub tau: f64,
+    /// State, of length n.
+    pub state: Vec<f64>,
+    /// Tip deflection W, of an oscillator x.
+    pub tip: f64,
+    /// Its rate.
+    pub tip_rate: f64,
+    /// Height of the tip over the undeformed surface, V_T.
+    pub gap: f64,
+    /// Force of the sample on the tip.
+    pub force: f64,
+    /// What ends the present regime by falling to zero: in flight the gap, in contact what
+    /// keeps the contact. Not a number where nothing ends it.
+    pub guard: f64,
+    /// Whether tip and sample touch.
+    pub contact: bool,
+}
+
+impl Motion {
+    pub(super) fn follow(
+        model: &Arc<Model>,
+        state: &[f64],
+        from: f64,
+        length: f64,
+    ) -> Result<Self, MapError> {
+        let period = model.period();
+        let refused = |reason| MapError::Span {
+            from,
+            length,
+            reason,
+        };
+        if !(0.0..period).contains(&from) {
+            return Err(refused("it must begin within the first drive period"));
+        }
+        if length.is_nan() || length < 0.0 {
+            return Err(refused("its length must be a number and not negative"));
+        }
+        if length > MOST_PERIODS * period {
+            return Err(refused("more than 100000 drive periods are not kept"));
+        }
+        let mut flow = Flow::new(Arc::clone(&model.system));
+        flow.start(state, from).map_err(of_state(0))?;
+        let regime = flow.regime();
+        let (mut recorder, mut contacts) = (Recorder::default(), Contacts::of(model));
+        let end = from + length;
+        let whole = (end / period) as usize;
+        for _ in 0..whole {
+            flow.run_period(&mut (&mut recorder, &mut contacts))
+                .map_err(of_state(0))?;
+        }
+        let rest = end - whole as f64 * period;
+        if rest > 0.0 {
+            flow.run_until(rest, &mut (&mut recorder, &mut contacts))
+                .map_err(of_state(0))?;
+        }
+        Ok(Self {
+            tip_rate: model.tip_rate(),
+            trajectory: recorder.finish(Arc::clone(&model.system)),
+            events: contacts.events(),
+            span: [from, end],
+            start: (regime, state.to_vec()),
+            model: Arc::clone(model),
+        })
+    }
+
+    /// Where it begins and ends, in the model's time.
+    pub fn span(&self) -> [f64; 2] {
+        self.span
+    }
+
+    /// Contacts begun and ended, in order of time.
+    pub fn events(&self) -> &[ContactEvent] {
+        &self.events
+    }
+
+    /// The recording itself, for closed-form integrals, extrema and harmonics of any output.
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
+    /// The motion at time `tau`; outside its span, at the nearer end.
+    pub fn at(&self, tau: f64) -> Point {
+        let tau = tau.clamp(self.span[0], self.span[1]);
+        let (regime, start, mut state) = match self.trajectory.segment_at(tau) {
+            Some(segment) => (
+                segment.regime,
+                segment.start - segment.phase,
+                self.trajectory.state_at(tau).unwrap_or_default(),
+            ),
+            None => (self.start.0, 0.0, self.start.1.clone()),
+        };
+        let (model, phase) = (&self.model, tau - start);
+        let drive = model.system.drive();
+        let at = |output: &Output| output.at(drive, &state, phase);
+        let exits = &model.system.exits()[regime];
+        let contact = model.contact[regime];
+        let (tip, tip_rate, gap) = (at(&model.tip), at(&self.tip_rate), at(&model.height));
+        let force = at(&model.force[regime]);
+        let guard = exits.first().map_or(f64::NAN, |exit| at(&exit.guard));
+        // In contact the surface is where the tip holds it: see `time_series`.
+        if model.forgetting.is_some() && contact {
+            let memory = state.len() - model.memory;
+            state[memory] = gap;
+        }
+        Point {
+            tau,
+            state,
+            tip,
+            tip_rate,
+            gap,
+            force,
+            guard,
+            contact,
+        }
+    }
+}

@@ -37,4 +37,4 @@ def test_a_notebook_is_kept_without_its_outputs(path):
 
 
 def test_there_are_notebooks():
-    assert len(NOTEBOOKS) >= 5
+    assert len(NOTEBOOKS) >= 6

@@ -2,9 +2,9 @@
 
 A `Case` says which cantilever, sample and drive; a function for every command of the
 terminal says what it does: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`,
-`branch`, `approach`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`. Results carry the names that the
-terminal's JSON has, as xarray Datasets, objects and lists of objects. A `Map` is the exact
-stroboscopic map itself, for algorithms of one's own.
+`branch`, `approach`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`.
+Results carry the names that the terminal's JSON has, as xarray Datasets, objects and lists of
+objects. A `Map` is the exact stroboscopic map itself, for algorithms of one's own.
 
 >>> import nanotap
 >>> case = nanotap.Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=3)

@@ -8,6 +8,7 @@ mod facts;
 mod impact_oscillator;
 mod kelvin_voigt;
 mod located_runge_kutta;
+mod map;
 mod motions;
 mod observables;
 mod references;

@@ -1,0 +1,90 @@
+//! The map as a stranger uses it: one state and many, derivatives over several periods, the
+//! motion between strobes, refusals.
+
+use nanotap::case::{Case, Key};
+use nanotap::control::Control;
+use nanotap::map::{Map, MapError};
+use nanotap::model::cantilever::Cantilever;
+
+fn regular() -> Map {
+    let case = Cantilever {
+        omega: 3.0,
+        ..Cantilever::paper()
+    };
+    Map::new(&Case::from(case)).unwrap()
+}
+
+fn largest(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    apart.fold(0.0, f64::max)
+}
+
+#[test]
+fn many_states_go_as_each_alone_and_stop_when_told() {
+    let map = regular();
+    let mut states: Vec<f64> = (0..20 * 6)
+        .map(|k| 0.05 * (f64::from(k) * 1.7).sin())
+        .collect();
+    let alone: Vec<f64> = states
+        .chunks(6)
+        .flat_map(|state| map.apply(state, 1500).unwrap())
+        .collect();
+    let cancel = std::sync::atomic::AtomicBool::new(true);
+    let stopped = Control {
+        cancel: Some(&cancel),
+        ..Control::default()
+    };
+    let mut left = states.clone();
+    let refused = map.apply_all(&mut left, 1500, &stopped);
+    assert!(matches!(refused, Err(MapError::Stopped)));
+    map.apply_all(&mut states, 1500, &Control::default())
+        .unwrap();
+    assert_eq!(states, alone);
+}
+
+#[test]
+fn derivatives_over_several_periods() {
+    let map = regular();
+    let state = map.apply(&[0.0; 6], 40).unwrap();
+    let keys = [Key::Alpha4, Key::Omega];
+    let exact = map.linearised(&state, 3, &keys).unwrap();
+    assert!(largest(&exact.state, &map.apply(&state, 3).unwrap()) < 1e-13);
+    for (k, &key) in keys.iter().enumerate() {
+        let (value, h) = (map.case().get(key), 1e-5 * map.case().get(key));
+        let at = |h: f64| {
+            let moved = Map::new(&map.case().with(key, value + h)).unwrap();
+            moved.apply(&state, 3).unwrap()
+        };
+        let (a, b, c, d) = (at(-2.0 * h), at(-h), at(h), at(2.0 * h));
+        let slope: Vec<f64> = (0..6)
+            .map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h))
+            .collect();
+        let scale = slope.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        assert!(largest(exact.derivatives.column(k).as_slice(), &slope) < 1e-7 * scale);
+    }
+}
+
+#[test]
+fn a_motion_is_one_wherever_it_is_cut() {
+    let map = regular();
+    let start = map.apply(&[0.0; 6], 40).unwrap();
+    let period = map.period();
+    let whole = map.flow(&start, 0.0, 2.5 * period).unwrap();
+    assert!(!whole.events().is_empty());
+    let strobe = whole.at(period).state;
+    assert!(largest(&strobe, &map.apply(&start, 1).unwrap()) < 1e-13);
+    let rest = map.flow(&whole.at(0.3).state, 0.3, period).unwrap();
+    let (a, b) = (rest.at(0.3 + period), whole.at(0.3 + period));
+    assert!(largest(&a.state, &b.state) < 1e-12);
+    assert_eq!(a.contact, b.contact);
+    for event in whole.events() {
+        assert!(whole.at(event.tau).gap.abs() < 1e-12);
+    }
+    let nothing = map.flow(&start, 0.0, 0.0).unwrap();
+    assert_eq!(nothing.at(1.0).state, start);
+    for (from, length) in [(period, 1.0), (0.0, -1.0), (0.0, f64::NAN), (0.0, 1e9)] {
+        let refused = map.flow(&start, from, length);
+        assert!(matches!(refused, Err(MapError::Span { .. })));
+    }
+}

@@ -37,8 +37,8 @@ use nalgebra::DMatrix;
 use nanotap_dynamics::{
     Control, PeriodicOrbit, ShootingError, ShootingOptions, StroboscopicMap as _, close_orbit,
 };
+use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
-use nanotap_flow::{Ensemble, FlowError};
 use rayon::prelude::*;
 
 pub use motion::{Motion, Point};
@@ -52,9 +52,6 @@ pub const MOST_NUMBERS: usize = 200_000_000;
 
 /// Drive periods between two looks at whether the work is to stop.
 const UNINTERRUPTED: usize = 1024;
-
-/// States that are advanced side by side; see [`Ensemble`].
-const LANES: usize = 8;
 
 /// Why the map could not be made or applied.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -198,70 +195,17 @@ impl Map {
     ) -> Result<(), MapError> {
         let n = self.dimension();
         let rows = self.rows(states)?;
-        if rows == 1 {
-            return self.apply_alone(states, periods, control);
-        }
-        let side_by_side = |lanes: usize| {
-            move |(chunk, states): (usize, &mut [f64])| {
-                self.apply_side_by_side(states, periods, control)
-                    .map_err(|error| error.after(chunk * lanes))
-            }
+        let one = |strobe: &mut Strobe, (index, state): (usize, &mut [f64])| {
+            advance(strobe, state, periods, control).map_err(|error| error.after(index))
         };
-        if rows.saturating_mul(periods) <= UNINTERRUPTED {
-            let mut chunks = states.chunks_mut(LANES * n).enumerate();
-            return chunks.try_for_each(side_by_side(LANES));
+        let few = rows.saturating_mul(periods) <= UNINTERRUPTED;
+        if rows == 1 || few {
+            let mut strobe = self.strobe();
+            let mut states = states.chunks_mut(n).enumerate();
+            return states.try_for_each(|state| one(&mut strobe, state));
         }
-        // As many side by side as leave no thread idle.
-        let lanes = (rows / rayon::current_num_threads()).clamp(1, LANES);
-        let chunks = states.par_chunks_mut(lanes * n).enumerate();
-        chunks.try_for_each(side_by_side(lanes))
-    }
-
-    fn apply_alone(
-        &self,
-        state: &mut [f64],
-        periods: usize,
-        control: &Control<'_>,
-    ) -> Result<(), MapError> {
-        let mut strobe = self.strobe();
-        for periods in stretches(periods) {
-            strobe.advance_by(state, periods).map_err(of_state(0))?;
-            if control.is_cancelled() {
-                return Err(MapError::Stopped);
-            }
-        }
-        Ok(())
-    }
-
-    fn apply_side_by_side(
-        &self,
-        states: &mut [f64],
-        periods: usize,
-        control: &Control<'_>,
-    ) -> Result<(), MapError> {
-        let n = self.dimension();
-        if periods == 0 {
-            return Ok(());
-        }
-        if control.is_cancelled() {
-            return Err(MapError::Stopped);
-        }
-        let mut ensemble = Ensemble::new(&self.model.system, states.len() / n);
-        for (i, state) in states.chunks_exact(n).enumerate() {
-            ensemble.start(i, state).map_err(of_state(i))?;
-        }
-        for periods in stretches(periods) {
-            ensemble
-                .run_periods(periods)
-                .map_err(|(index, error)| MapError::Motion { index, error })?;
-            if control.is_cancelled() {
-                return Err(MapError::Stopped);
-            }
-        }
-        for (i, state) in states.chunks_exact_mut(n).enumerate() {
-            ensemble.flow(i).state(state);
-        }
-        Ok(())
+        let states = states.par_chunks_mut(n).enumerate();
+        states.try_for_each_init(|| self.strobe(), one)
     }
 
     /// The states `z, Pᵉ(z), P²ᵉ(z), …` for `e = every`, `count` of them, row by row
@@ -293,14 +237,7 @@ impl Map {
             if k + 1 == count {
                 break;
             }
-            for periods in stretches(every) {
-                strobe
-                    .advance_by(&mut state, periods)
-                    .map_err(of_state(0))?;
-                if control.is_cancelled() {
-                    return Err(MapError::Stopped);
-                }
-            }
+            advance(&mut strobe, &mut state, every, control)?;
         }
         Ok(all)
     }
@@ -317,7 +254,7 @@ impl Map {
         periods: usize,
         keys: &[Key],
     ) -> Result<Linearised, MapError> {
-        Ok(self.linearise(&self.tangents(keys)?, state, periods)?)
+        self.linearise(&self.tangents(keys)?, state, periods)
     }
 
     /// The same of every one of `states` (row by row), on the threads of the present pool.
@@ -418,10 +355,22 @@ impl Map {
     }
 }
 
-/// `periods` in parts after each of which the work may be stopped.
-fn stretches(periods: usize) -> impl Iterator<Item = usize> {
-    (0..periods.div_ceil(UNINTERRUPTED))
-        .map(move |k| (periods - k * UNINTERRUPTED).min(UNINTERRUPTED))
+/// Replaces `state` by what comes of it after `periods` drive periods; every so often looks
+/// whether the work is to stop.
+fn advance(
+    strobe: &mut Strobe,
+    state: &mut [f64],
+    periods: usize,
+    control: &Control<'_>,
+) -> Result<(), MapError> {
+    for done in (0..periods).step_by(UNINTERRUPTED) {
+        if control.is_cancelled() {
+            return Err(MapError::Stopped);
+        }
+        let now = (periods - done).min(UNINTERRUPTED);
+        strobe.advance_by(state, now).map_err(of_state(0))?;
+    }
+    Ok(())
 }
 
 fn of_state(index: usize) -> impl Fn(FlowError) -> MapError {

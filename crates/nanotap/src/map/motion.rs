@@ -122,11 +122,11 @@ impl Motion {
         let (model, phase) = (&self.model, tau - start);
         let drive = model.system.drive();
         let at = |output: &Output| output.at(drive, &state, phase);
-        let exits = &model.system.exits()[regime];
+        let out = &model.system.transitions()[regime];
         let contact = model.contact[regime];
         let (tip, tip_rate, gap) = (at(&model.tip), at(&self.tip_rate), at(&model.height));
         let force = at(&model.force[regime]);
-        let guard = exits.first().map_or(f64::NAN, |exit| at(&exit.guard));
+        let guard = out.first().map_or(f64::NAN, |out| at(&out.guard));
         // In contact the surface is where the tip holds it: see `time_series`.
         if model.forgetting.is_some() && contact {
             let memory = state.len() - model.memory;

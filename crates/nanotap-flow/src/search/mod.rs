@@ -24,9 +24,9 @@
 //! within rounding) from a near miss; it then decides by the value in twice double
 //! precision at the points it visits and reports the crossing as grazing.
 //!
-//! Modules call downwards only: a tabulated guard is searched on its table ([`on_table`]), by a
-//! [`walk`] along the points of a [`table`]; what that cannot decide is left to certified steps
-//! ([`steps`]). [`range`] and [`sign_changes()`] look for extrema with the same means.
+//! Modules call downwards only: a tabulated guard is searched on its table (`on_table`), by a
+//! `walk` along the points of a `table`; what that cannot decide is left to certified steps
+//! (`steps`). `range` and [`sign_changes()`] look for extrema with the same means.
 
 pub(crate) mod on_table;
 pub(crate) mod range;

@@ -195,3 +195,19 @@ def test_a_forked_child_has_threads_of_its_own(map_, regular, orbit):
     os.waitpid(child, 0)
     assert ready, "the child hangs"
     assert os.read(reader, 1) == b"\0"
+
+
+def test_derivatives_of_what_is_observed_of_an_orbit(regular):
+    orbit = nanotap.orbit(regular, derivatives=["alpha4", "omega"])
+
+    def amplitude(h):
+        return nanotap.orbit(regular, alpha4=20 + h, state=orbit.state, period=1)
+
+    by = orbit.derivatives["alpha4"]
+    for name in ("first_harmonic", "phase", "tip_max", "peak_force", "mean_deflection"):
+        slope = central(lambda h, name=name: getattr(amplitude(h), name), 0.02)
+        assert abs(by[name] - slope) < 1e-6 * abs(slope)
+    state = central(lambda h: amplitude(h).state, 0.02)
+    assert np.abs(np.array(by["state"]) - state).max() < 1e-6 * np.abs(state).max()
+    with pytest.raises(ValueError, match="alpha44"):
+        nanotap.orbit(regular, derivatives=["alpha44"])

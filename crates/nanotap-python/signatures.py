@@ -304,6 +304,8 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
         return "Box"
     elif option == "over":
         return "str | Sequence[str] | Mapping[str, Any]"
+    elif option == "derivatives":
+        return "Sequence[str] | None"
     elif option in {"x", "y"}:
         return "str | Mapping[str, Any]"
     elif option == "attractors":

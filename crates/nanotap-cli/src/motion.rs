@@ -7,7 +7,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Observables, Spectrum};
+use nanotap::observe::{Derivative, Observables, Spectrum};
 use nanotap::study::simulate::Classification;
 
 use crate::output::Output;
@@ -298,6 +298,32 @@ pub(crate) fn multipliers(multipliers: &[[f64; 2]]) -> String {
         let _ = writeln!(text, "  and {} smaller", multipliers.len() - SHOWN);
     }
     text
+}
+
+/// The derivatives of what is observed of an orbit with respect to a key: of a physical case in
+/// SI units.
+pub(crate) fn derivative(key: &str, derivative: &Derivative) -> String {
+    let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
+    let physical = derivative.physical.as_ref();
+    for (observable, change) in physical.unwrap_or(&derivative.observables) {
+        let Some(change) = change.number() else {
+            continue;
+        };
+        let (name, unit) = match physical {
+            Some(_) => (observable.si_name, observable.dimension.si_unit()),
+            None => (observable.name, observable.dimension.model_unit()),
+        };
+        let per = derivative
+            .unit
+            .map_or_else(String::new, |per| format!(" / ({per})"));
+        table.row([
+            name.to_owned(),
+            number::significant(change, 7),
+            format!("{unit}{per}"),
+        ]);
+    }
+    let heading = format!("derivatives by {key}");
+    format!("  {}\n{}", style::bold(&heading), table.render())
 }
 
 /// Lyapunov exponents in one line.

@@ -14,7 +14,7 @@
 //!   change of basis; [`flow`] runs it, [`trajectory`] records it;
 //! - [`accumulate`]: exact observables of a motion while it runs, at the price of the motion;
 //! - [`jacobian`] and [`sensitivity`]: derivatives with respect to the state and
-//!   to any parameter;
+//!   to any parameter; [`variation`]: of what is read off the motion;
 //! - [`fixed_step`]: the Runge–Kutta method that switches on its grid, kept to
 //!   show what it does wrong.
 //!
@@ -43,6 +43,7 @@ mod simd;
 pub mod spectral;
 pub mod system;
 pub mod trajectory;
+pub mod variation;
 
 /// The complex numbers used throughout.
 pub type Complex = nalgebra::Complex<f64>;

@@ -175,6 +175,37 @@ impl<'a> Sensitivity<'a> {
         }
     }
 
+    /// Begins with `∂x/∂θ_p = derivative` (length `n`) in `regime`, instead of with zero.
+    pub fn begin(&mut self, regime: &Regime, p: usize, derivative: &[f64]) {
+        let left = &regime.basis().left;
+        self.modal[p] = (0..left.nrows())
+            .map(|k| {
+                left.row(k)
+                    .iter()
+                    .zip(derivative)
+                    .map(|(l, d)| l * *d)
+                    .sum()
+            })
+            .collect();
+    }
+
+    /// `∂q/∂θ_p` in the present regime.
+    pub(crate) fn modal(&self, p: usize) -> &[Complex] {
+        &self.modal[p]
+    }
+
+    /// `∂q/∂θ_0` a time `s` into a stretch that was not passed yet.
+    pub(crate) fn after(&self, segment: &SegmentView<'_>, s: f64) -> Vec<Complex> {
+        let (regime, drive) = (segment.regime(), segment.system.drive());
+        Propagator::new(regime, drive, s).sensitivity(
+            self,
+            segment.regime,
+            segment.phase,
+            segment.modal,
+            &self.modal[0],
+        )
+    }
+
     /// `∂x/∂θ_p` (length `n`) of a flow that is in `regime` now.
     pub fn to_state(&self, regime: &Regime, p: usize, derivative: &mut [f64]) {
         derivative.fill(0.0);
@@ -260,6 +291,105 @@ impl Observer for Sensitivity<'_> {
     }
 }
 
+/// How modal coordinates and their sensitivity go on over one length of time in one regime,
+/// wherever they begin.
+pub(crate) struct Propagator<'a> {
+    regime: &'a Regime,
+    drive: &'a Drive,
+    length: f64,
+    /// `e^{λ_k · length}`.
+    factors: Vec<Complex>,
+    /// `∫₀^L e^{λ_k(L−τ)} e^{μτ} dτ` of μ = λ_j and its conjugate, of the tones and their
+    /// conjugates, and of zero; a row a mode. Empty where eigenvalues coincide.
+    responses: Vec<Vec<Complex>>,
+}
+
+impl<'a> Propagator<'a> {
+    pub(crate) fn new(regime: &'a Regime, drive: &'a Drive, length: f64) -> Self {
+        let lambdas = &regime.basis().eigenvalues;
+        let tones = drive.frequencies().iter().map(|&w| Complex::new(0.0, w));
+        let both = |z: Complex| [z, z.conj()];
+        let rates: Vec<Complex> = lambdas
+            .iter()
+            .copied()
+            .chain(tones)
+            .flat_map(both)
+            .chain([Complex::new(0.0, 0.0)])
+            .collect();
+        let row = |lambda: &Complex| -> Vec<Complex> {
+            rates
+                .iter()
+                .map(|mu| response(*lambda, *mu, length))
+                .collect()
+        };
+        let simple = regime.basis().clusters.is_empty();
+        Self {
+            factors: lambdas.iter().map(|l| (l * length).exp()).collect(),
+            responses: if simple {
+                lambdas.iter().map(row).collect()
+            } else {
+                Vec::new()
+            },
+            regime,
+            drive,
+            length,
+        }
+    }
+
+    /// Modal coordinates that were `q`.
+    pub(crate) fn modal(&self, q: &[Complex]) -> Vec<Complex> {
+        let mut later = q.to_vec();
+        self.regime
+            .basis()
+            .apply(&mut later, self.length, &self.factors);
+        later
+    }
+
+    /// The sensitivity to the first parameter, which was `s` beside `q` at `phase`; `number`
+    /// is the regime's.
+    pub(crate) fn sensitivity(
+        &self,
+        of: &Sensitivity<'_>,
+        number: usize,
+        phase: f64,
+        q: &[Complex],
+        s: &[Complex],
+    ) -> Vec<Complex> {
+        let source = &of.sources[0][number];
+        let mut later = s.to_vec();
+        if self.responses.is_empty() {
+            augmented_stretch(
+                &mut later,
+                source,
+                self.regime,
+                self.drive,
+                phase,
+                self.length,
+                q,
+            );
+            return later;
+        }
+        let tones = self.drive.frequencies().len();
+        let phasors: Vec<Complex> = (0..tones).map(|t| self.drive.phasor(t, phase)).collect();
+        for (k, sigma) in later.iter_mut().enumerate() {
+            let (modes, rest) = self.responses[k].split_at(2 * q.len());
+            let mut sum = *sigma * self.factors[k];
+            for (j, (q, [direct, mirrored])) in q.iter().zip(modes.as_chunks::<2>().0).enumerate() {
+                sum += source.direct[(k, j)] * q * direct;
+                sum += source.mirrored[(k, j)] * q.conj() * mirrored;
+            }
+            let (turning, constant) = rest.split_at(2 * tones);
+            let turning = turning.as_chunks::<2>().0.iter().zip(&phasors);
+            for ([a, b], ([direct, mirrored], phasor)) in source.tones.iter().zip(turning) {
+                sum += a[k] * phasor * direct;
+                sum += b[k] * phasor.conj() * mirrored;
+            }
+            *sigma = sum + source.constant[k] * constant[0];
+        }
+        later
+    }
+}
+
 /// Closed form, mode by mode.
 fn simple_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<'_>) {
     let lambdas = &segment.regime().basis().eigenvalues;
@@ -287,21 +417,33 @@ fn simple_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<
 /// The exponential of the state, its sensitivity and the drive as one linear system,
 /// for regimes whose eigenvalues coincide.
 fn augmented_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<'_>) {
-    let regime = segment.regime();
-    let drive = segment.system.drive();
-    let n = segment.system.dimension();
-    let (extended, start) = augmented(
-        regime.matrix(),
-        regime.forcing(),
+    augmented_stretch(
+        modal,
         source,
-        drive,
+        segment.regime(),
+        segment.system.drive(),
         segment.phase,
+        segment.length,
+        segment.modal,
     );
+}
+
+fn augmented_stretch(
+    modal: &mut [Complex],
+    source: &Source,
+    regime: &Regime,
+    drive: &Drive,
+    phase: f64,
+    length: f64,
+    q: &[Complex],
+) {
+    let n = regime.matrix().nrows();
+    let (extended, start) = augmented(regime.matrix(), regime.forcing(), source, drive, phase);
     let mut z = start;
     regime.to_state(
         drive,
-        segment.modal.iter().copied(),
-        segment.phase,
+        q.iter().copied(),
+        phase,
         &mut z.as_mut_slice()[n..2 * n],
     );
     for (k, q) in modal.iter().enumerate() {
@@ -309,7 +451,7 @@ fn augmented_segment(modal: &mut [Complex], source: &Source, segment: &SegmentVi
             z[i] += r.re * q.re - r.im * q.im;
         }
     }
-    let end = (extended * segment.length).exp() * z;
+    let end = (extended * length).exp() * z;
     for (k, sigma) in modal.iter_mut().enumerate() {
         *sigma = regime
             .basis()

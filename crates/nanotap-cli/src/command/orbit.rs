@@ -116,5 +116,9 @@ fn text(studied: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
     text.push_str(&motion::spectrum(&orbit.spectrum, orbit.period, &units));
     text.push('\n');
     text.push_str(&motion::multipliers(&orbit.multipliers));
+    for (key, derivative) in &orbit.derivatives {
+        text.push('\n');
+        text.push_str(&motion::derivative(key, derivative));
+    }
     text
 }

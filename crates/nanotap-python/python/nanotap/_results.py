@@ -212,6 +212,8 @@ class Orbit(Result):
     """Amplitude of the tip deflection at the drive's frequency."""
     physical: Record | None = None
     """The same in SI, if the case is physical."""
+    derivatives: Record | None = None
+    """Derivatives by the keys that were asked for: `state`, the observables, `physical`."""
     series: "xr.Dataset | None" = field(default=None, kw_only=True)
     """One repetition as a time series over `tau`; of an orbit found by `orbit`."""
 

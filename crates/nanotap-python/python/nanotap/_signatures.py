@@ -146,6 +146,7 @@ def orbit(  # type: ignore[overload-overlap]
     state: Any = None,
     harmonics: int = 20,
     resolution: int = 200,
+    derivatives: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress = None,
     **parameters: float | str,
@@ -158,6 +159,7 @@ def orbit(
     state: Any = None,
     harmonics: int = 20,
     resolution: int = 200,
+    derivatives: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
@@ -169,6 +171,7 @@ def orbit(
     state: Any = None,
     harmonics: int = 20,
     resolution: int = 200,
+    derivatives: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
@@ -188,6 +191,9 @@ def orbit(
         Harmonics of the drive frequency to report (0 to 100000).
     resolution : int
         Samples a drive period in the time series (1 to 1000000).
+    derivatives : Sequence[str] | None
+        Keys of the case by which to differentiate the orbit and all that is
+        observed of it.
     threads : int | None
         Of arrays: threads; without it, one a core.
     progress : Progress
@@ -213,6 +219,7 @@ def orbit(
         "state": state,
         "harmonics": harmonics,
         "resolution": resolution,
+        "derivatives": derivatives,
     }
     return _motions.orbit(case, options, threads, progress, parameters)
 

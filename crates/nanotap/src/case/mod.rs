@@ -47,14 +47,14 @@ pub use stated::{Value, ValueError};
 use file::{CaseFileError, Described, Source};
 use key::{ModelKind, Section};
 use near_name::near_name;
-use physical::{Catalogue, Kind, Physical, Reader, Remark};
+use physical::{Catalogue, Kind, Physical, Reader, Remark, Scales};
 use stated::Stated;
 use units::Units;
 
 use crate::model::cantilever::Cantilever;
-use crate::model::oscillator::{Oscillator, Stop};
+use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
-use crate::model::{Model, cantilever_tangent};
+use crate::model::{Model, ModelTangent, cantilever_model_tangent, cantilever_tangent};
 
 /// How many modes a case has that does not say.
 pub const DEFAULT_MODES: usize = 3;
@@ -357,26 +357,74 @@ impl Case {
     /// # Errors
     /// As [`model`](Self::model).
     pub fn tangent(&self, model: &Model, key: Key) -> Result<SystemTangent, CaseError> {
-        let quantities = match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
-                return Ok(oscillator.tangent(model, parameter)?);
-            }
-            (What::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
-                return Ok(cantilever_tangent(cantilever, model, parameter)?);
-            }
-            (What::Quantities(quantities), key::Means::Cantilever(parameter)) => {
-                let cantilever = &quantities.view()?.cantilever;
-                return Ok(cantilever_tangent(cantilever, model, parameter)?);
-            }
-            (What::Quantities(quantities), _) if key.is_physical() => quantities,
-            _ => return Ok(SystemTangent::zeros(&model.system)),
-        };
-        let cantilever = &quantities.view()?.cantilever;
+        if let Some((oscillator, parameter)) = self.oscillator_parameter(key) {
+            return Ok(oscillator.tangent(model, parameter)?);
+        }
         let mut sum = SystemTangent::zeros(&model.system);
-        for (parameter, slope) in quantities.derivatives(key)? {
+        let Some(cantilever) = self.cantilever() else {
+            return Ok(sum);
+        };
+        for (parameter, slope) in self.parameters_by(key)? {
             sum.add(slope, &cantilever_tangent(cantilever, model, parameter)?);
         }
         Ok(sum)
+    }
+
+    /// The derivative of its model with respect to the value of a key.
+    ///
+    /// # Errors
+    /// As [`model`](Self::model).
+    pub fn model_tangent(&self, model: &Model, key: Key) -> Result<ModelTangent, CaseError> {
+        if let Some((oscillator, parameter)) = self.oscillator_parameter(key) {
+            return Ok(oscillator.model_tangent(model, parameter)?);
+        }
+        let mut sum = ModelTangent::zeros(model);
+        let Some(cantilever) = self.cantilever() else {
+            return Ok(sum);
+        };
+        for (parameter, slope) in self.parameters_by(key)? {
+            let tangent = cantilever_model_tangent(cantilever, model, parameter)?;
+            sum.add(slope, &tangent);
+        }
+        Ok(sum)
+    }
+
+    fn oscillator_parameter(&self, key: Key) -> Option<(&Oscillator, OscillatorParameter)> {
+        match (&self.what, key.entry().means) {
+            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                Some((oscillator, parameter))
+            }
+            _ => None,
+        }
+    }
+
+    /// The numbers of a cantilever's equations that change with a key, each with its derivative.
+    fn parameters_by(&self, key: Key) -> Result<Vec<(Parameter, f64)>, CaseError> {
+        match (&self.what, key.entry().means) {
+            (What::Oscillator(_), _) => Ok(Vec::new()),
+            (_, key::Means::Cantilever(parameter)) => Ok(vec![(parameter, 1.0)]),
+            (What::Quantities(quantities), _) if key.is_physical() => {
+                quantities.view()?;
+                Ok(quantities.derivatives(key)?)
+            }
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// The units of the model beside a value of a key, below and above it, and how far apart
+    /// these values are; `None` where the units do not follow from the key.
+    pub(crate) fn scales_beside(
+        &self,
+        key: Key,
+    ) -> Result<Option<(Scales, Scales, f64)>, CaseError> {
+        let What::Quantities(quantities) = &self.what else {
+            return Ok(None);
+        };
+        if !key.is_physical() {
+            return Ok(None);
+        }
+        let (low, high, width) = quantities.beside(key)?;
+        Ok(Some((low.scales, high.scales, width)))
     }
 
     /// Its maps along one key.
@@ -576,6 +624,17 @@ impl Quantities {
     /// How the numbers of the equations change with a quantity: those that do, each with its
     /// derivative, by central differences of the mapping, which is a chain of closed forms.
     fn derivatives(&self, key: Key) -> Result<Vec<(Parameter, f64)>, Box<CaseFileError>> {
+        let (low, high, width) = self.beside(key)?;
+        let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
+        Ok(Parameter::every()
+            .map(|parameter| (parameter, slope(parameter)))
+            .filter(|(_, slope)| *slope != 0.0)
+            .collect())
+    }
+
+    /// What it comes to a little below and a little above the value of a key, and how far
+    /// apart these values are.
+    fn beside(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
         let here = self.view()?;
         let value = self.get(key).unwrap_or(f64::NAN);
         // Where the mapping is smooth its third derivative is of order 1/value³, so that
@@ -587,18 +646,13 @@ impl Quantities {
         };
         let step = 1e-5 * size;
         let (low, high) = (self.with(key, value - step), self.with(key, value + step));
-        let (low, high, width) = match (&low.view, &high.view) {
-            (Ok(low), Ok(high)) => (&**low, &**high, 2.0 * step),
+        match (low.view, high.view) {
+            (Ok(low), Ok(high)) => Ok((*low, *high, 2.0 * step)),
             // At the edge of what makes sense, on one side.
-            (Err(_), Ok(high)) => (here, &**high, step),
-            (Ok(low), Err(_)) => (&**low, here, step),
-            (Err(error), Err(_)) => return Err(error.clone()),
-        };
-        let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
-        Ok(Parameter::every()
-            .map(|parameter| (parameter, slope(parameter)))
-            .filter(|(_, slope)| *slope != 0.0)
-            .collect())
+            (Err(_), Ok(high)) => Ok((here.clone(), *high, step)),
+            (Ok(low), Err(_)) => Ok((*low, here.clone(), step)),
+            (Err(error), Err(_)) => Err(error),
+        }
     }
 }
 

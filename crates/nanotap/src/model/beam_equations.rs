@@ -471,6 +471,44 @@ impl BeamTangent {
             .plus(combination.rate.value, &self.height_rate)
     }
 
+    /// The derivative of V_T.
+    pub(crate) fn into_height(self) -> Output {
+        self.height
+    }
+
+    /// The derivative of the base's displacement, which the height of the tip has in it.
+    pub(crate) fn base(&self, beam: &Beam<'_>) -> Output {
+        let mut base = self.height.scaled(0.0);
+        if beam.galerkin.case.actuation == Actuation::Base {
+            base.tones.clone_from(&self.height.tones);
+        }
+        base
+    }
+
+    /// The derivatives of the factors of what the beam's damping takes, as they stand in
+    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ.
+    pub(crate) fn beam_power(&self, beam: &Beam<'_>, parameter: Parameter) -> Vec<[Output; 2]> {
+        let (layout, case) = (beam.layout, &beam.galerkin.case);
+        let by = f64::from(u8::from(parameter == Parameter::Alpha3));
+        let mut base_rate = self.base(beam);
+        let mut moving = base_rate.clone();
+        if case.actuation == Actuation::Base {
+            // Of the rates of V_T only the base's have tones.
+            moving.tones.clone_from(&beam.height_rate.tones);
+            base_rate.tones.clone_from(&self.height_rate.tones);
+        }
+        let unit = |j: usize| {
+            let mut unit = DVector::zeros(case.modes);
+            unit[j] = by;
+            layout.row(&unit, 1)
+        };
+        let zero = base_rate.scaled(0.0);
+        let mut factors: Vec<[Output; 2]> =
+            (0..case.modes).map(|j| [unit(j), zero.clone()]).collect();
+        factors.push([moving.scaled(by).plus(case.alpha3, &base_rate), base_rate]);
+        factors
+    }
+
     /// The derivative of a regime.
     pub(crate) fn regime(&self, beam: &Beam<'_>, answer: &Answer) -> RegimeTangent {
         let (mut matrix, mut forcing) = (self.matrix.clone(), self.forcing.clone());

@@ -17,12 +17,14 @@ pub mod oscillator;
 pub mod parameter;
 pub mod spectrum;
 pub mod strobe;
+mod tangent;
 
 use std::sync::{Arc, OnceLock};
 
 pub use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
+pub use tangent::ModelTangent;
 
 use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
@@ -295,6 +297,33 @@ pub fn cantilever_tangent(
         tangent.log_period = -1.0 / case.omega;
     }
     Ok(tangent)
+}
+
+/// The derivative of the cantilever's model with respect to one parameter.
+///
+/// # Errors
+/// As [`Model::cantilever`].
+pub(crate) fn cantilever_model_tangent(
+    case: &Cantilever,
+    model: &Model,
+    parameter: Parameter,
+) -> Result<ModelTangent, ModelError> {
+    let galerkin = Galerkin::new(case)?;
+    let law = ContactLaw::law(case, Some(parameter));
+    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let change = beam.derivative(parameter)?;
+    let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
+    Ok(ModelTangent {
+        system: cantilever_tangent(case, model, parameter)?,
+        base: change.base(&beam),
+        force: [&law.flight, &law.contact]
+            .map(|answer| change.combined(&beam, &answer.force))
+            .into(),
+        beam_power: change.beam_power(&beam, parameter),
+        height: change.into_height(),
+        second_phase: second_phase.to_radians(),
+        impact_loss: 0.0,
+    })
 }
 
 impl From<ModelError> for crate::Error {

@@ -10,7 +10,7 @@ use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, HarmonicVector, Output, Reset, Sticking, System, Transition};
 use serde::Serialize;
 
-use crate::model::{Model, ModelError, Powers, Product};
+use crate::model::{Model, ModelError, ModelTangent, Powers, Product};
 
 /// The stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -379,6 +379,41 @@ impl Oscillator {
         }
         if let (Stop::Rigid { .. }, true) = (self.stop, moving == 1) {
             self.release_tangent(&mut tangent, parameter);
+        }
+        Ok(tangent)
+    }
+
+    /// The derivative of the model with respect to one parameter.
+    ///
+    /// # Errors
+    /// As [`Oscillator::model`].
+    pub(crate) fn model_tangent(
+        &self,
+        model: &Model,
+        parameter: OscillatorParameter,
+    ) -> Result<ModelTangent, ModelError> {
+        use OscillatorParameter as P;
+        let is = |p: P| f64::from(u8::from(p == parameter));
+        let mut tangent = ModelTangent::zeros(model);
+        tangent.system = self.tangent(model, parameter)?;
+        let zero = model.tip.scaled(0.0);
+        tangent.height = zero.clone().with_constant(is(P::Gap));
+        let speed = Output::linear(RowDVector::from_row_slice(&[0.0, 1.0]), 1);
+        tangent.force[1] = match self.stop {
+            Stop::Soft { stiffness, .. } => model
+                .gap
+                .scaled(-is(P::ContactStiffness))
+                .plus(is(P::ContactDamping), &speed)
+                .plus(-stiffness, &tangent.height),
+            Stop::Rigid { .. } => zero
+                .clone()
+                .with_tone(0, 0.0, is(P::Forcing))
+                .plus(-is(P::Stiffness), &model.tip),
+        };
+        tangent.beam_power = vec![[speed.scaled(is(P::Damping)), zero]];
+        if let Stop::Rigid { restitution: r } = self.stop {
+            tangent.impact_loss =
+                0.5 * (1.0 - r * r) * is(P::Mass) - self.mass * r * is(P::Restitution);
         }
         Ok(tangent)
     }

@@ -27,10 +27,10 @@ use crate::model::{BeamOutputs, Model};
 
 /// Where a beam comes nearest to the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Clearance {
+pub struct Clearance<D = f64> {
     /// The least V(ξ, τ), in units of g₀; below zero the beam would pass through the
     /// sample.
-    pub height: f64,
+    pub height: D,
     /// Where along the beam, 0 (clamp) to 1 (tip).
     pub xi: f64,
     /// When, in drive periods from the start of the recording.

@@ -8,22 +8,23 @@ use nanotap_flow::{Complex, Output};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::model::{Model, Powers, Product};
+use super::number::Number;
+use crate::model::{Model, ModelTangent, Powers, Product};
 
 /// Energies over a recording, in the model's own units or in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct EnergyBalance {
+pub struct EnergyBalance<D = f64> {
     /// Work of the drive.
-    pub drive_work: f64,
+    pub drive_work: D,
     /// Taken by the beam's own damping.
-    pub beam_damping: f64,
+    pub beam_damping: D,
     /// Taken by the sample's damping, or by the impacts of a rigid stop; what the sample
     /// stores and gives back is not in it.
-    pub sample_damping: f64,
+    pub sample_damping: D,
     /// Gain of stored (kinetic and elastic) energy; zero over a period of an orbit.
-    pub stored: f64,
+    pub stored: D,
     /// What does not add up, as a part of the energy that was moved.
-    pub residual: f64,
+    pub residual: D,
 }
 
 impl EnergyBalance {
@@ -36,25 +37,6 @@ impl EnergyBalance {
         residual: f64::NAN,
     };
 
-    /// Of these energies, the last one the gain of stored energy.
-    pub(super) fn new(
-        drive_work: f64,
-        beam_damping: f64,
-        sample_damping: f64,
-        stored: f64,
-    ) -> Self {
-        // Signed works cancel; the damping and the stored energy say how much moved.
-        let moved = drive_work.abs() + beam_damping + sample_damping + stored.abs();
-        let rest = drive_work - beam_damping - sample_damping - stored;
-        Self {
-            drive_work,
-            beam_damping,
-            sample_damping,
-            stored,
-            residual: if moved > 0.0 { rest / moved } else { 0.0 },
-        }
-    }
-
     /// The same, told in a unit of which 1 is `unit`.
     pub(super) fn in_units(self, unit: f64) -> Self {
         Self {
@@ -64,6 +46,30 @@ impl EnergyBalance {
             stored: self.stored * unit,
             residual: self.residual,
         }
+    }
+}
+
+/// Of these energies, the last one the gain of stored energy.
+pub(super) fn balance<D: Number>(
+    drive_work: D,
+    beam_damping: D,
+    sample_damping: D,
+    stored: D,
+) -> EnergyBalance<D> {
+    // Signed works cancel; the damping and the stored energy say how much moved.
+    let (drive, gain) = (drive_work.plain().abs(), stored.plain().abs());
+    let moved = drive + beam_damping.plain() + sample_damping.plain() + gain;
+    let rest = drive_work - beam_damping - sample_damping - stored;
+    EnergyBalance {
+        drive_work,
+        beam_damping,
+        sample_damping,
+        stored,
+        residual: if moved > 0.0 {
+            rest / moved
+        } else {
+            D::default()
+        },
     }
 }
 
@@ -136,6 +142,16 @@ impl PowerTerm {
             Some(product) => product.a.scaled(product.weight),
         };
         model.power().iter().map(factor).collect()
+    }
+
+    /// The derivative of [`PowerTerm::outputs`] of what the beam's damping takes.
+    pub(super) fn changes(self, model: &Model, tangent: &ModelTangent) -> Vec<Output> {
+        let factors = tangent.beam_power.get(self.index);
+        let change = match factors.filter(|_| self.sum == Sum::Beam) {
+            None => model.tip.scaled(0.0),
+            Some(factors) => factors[usize::from(self.second)].clone(),
+        };
+        vec![change; model.system.regimes().len()]
     }
 }
 

@@ -9,13 +9,14 @@
 use std::sync::Arc;
 
 use nanotap_flow::accumulate::{
-    Accumulator, Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request, Switches,
+    Accumulator, Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request,
 };
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
 use nanotap_flow::{Complex, Flow, FlowError, Output};
 
 use super::clearance::{Clearance, ClearanceSearch};
-use super::energy::{Ends, EnergyBalance, PowerTerm};
+use super::energy::{Ends, EnergyBalance, PowerTerm, balance};
+use super::number::{Number, Phasor};
 use super::table::{Observables, Set};
 use super::{above_rounding, begins_contact};
 use crate::model::Model;
@@ -39,7 +40,7 @@ pub(super) enum Signal {
 
 impl Signal {
     /// What it is in `model`, an entry a regime.
-    fn outputs(self, model: &Model) -> Vec<Output> {
+    pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
         let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
         match self {
             Self::Tip => same(&model.tip),
@@ -73,7 +74,7 @@ pub(super) enum Tone {
 
 /// What is gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Need {
+pub(super) enum Need {
     Least(Signal),
     Greatest(Signal),
     Integral(Signal),
@@ -146,7 +147,7 @@ struct Needs {
 
 impl Needs {
     fn of(model: &Model, set: Set) -> Result<Self, FlowError> {
-        let mut measured = Measured::nothing(model);
+        let mut measured = Measured::<f64>::nothing(model);
         Observables::read(set, &mut measured);
         let mut request = Request::new();
         let mut channels: Vec<(Signal, Channel)> = Vec::new();
@@ -179,7 +180,7 @@ impl Needs {
     }
 }
 
-fn frequency(model: &Model, tone: Tone) -> f64 {
+pub(super) fn frequency(model: &Model, tone: Tone) -> f64 {
     match tone {
         Tone::First => model.frequency(),
         Tone::Second => {
@@ -323,25 +324,59 @@ impl<'a> Measurement<'a> {
             None => None,
         };
         let values = self.needs.keys.iter().map(|&(need, key)| {
-            let value = key.value(&self.accumulator);
+            let value = Phasor::from(key.value(&self.accumulator));
             // What was taken at the ends of periods belongs to the whole.
-            let taken = self.taken(need);
-            (
-                need,
-                taken.map_or(value, |taken| taken.together(value.re).into()),
-            )
+            let whole = self.taken(need).map(|taken| Phasor {
+                re: taken.together(value.re),
+                im: 0.0,
+            });
+            (need, whole.unwrap_or(value))
         });
+        let gathered = &self.accumulator;
         let mut measured = Measured {
             found: Some(Found {
                 values: values.collect(),
-                accumulator: &self.accumulator,
+                duration: gathered.duration(),
+                periods: gathered.periods(),
+                contact_time: contact_regimes(self.model)
+                    .map(|r| gathered.time_in(r))
+                    .sum(),
+                contacts: contacts(self.model, gathered),
                 stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(self.model)),
                 clearance,
+                impact_loss: self.model.impact_loss,
+                second_phase: self.model.second_phase,
             }),
             ..Measured::nothing(self.model)
         };
         Ok(Observables::read(self.set, &mut measured))
     }
+}
+
+/// The regimes that are contact.
+pub(super) fn contact_regimes(model: &Model) -> impl Iterator<Item = usize> + '_ {
+    (0..model.contact.len()).filter(|&regime| model.contact[regime])
+}
+
+/// Pairs of regimes between which a contact begins.
+pub(super) fn beginnings(model: &Model) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let regimes = model.contact.len();
+    (0..regimes)
+        .flat_map(move |from| (0..regimes).map(move |to| (from, to)))
+        .filter(|&(from, to)| begins_contact(model, from, to))
+}
+
+/// The contacts that began.
+fn contacts(model: &Model, gathered: &Accumulator) -> Beginnings<f64> {
+    let mut all = Beginnings::<f64>::default();
+    for (from, to) in beginnings(model) {
+        let some = gathered.switches(from, to);
+        all.count += some.count;
+        all.grazing += some.grazing;
+        all.greatest_speed = all.greatest_speed.max(some.greatest_speed);
+        all.squared_speeds += some.squared_speeds;
+    }
+    all
 }
 
 impl Observer for Measurement<'_> {
@@ -407,25 +442,43 @@ pub(super) fn measure_clearance(
 }
 
 /// What observables are read from. Before a run it is empty, and notes what they ask for.
-pub(super) struct Measured<'a> {
-    model: &'a Model,
-    asked: Vec<Need>,
+pub(super) struct Measured<'a, D = f64> {
+    pub(super) model: &'a Model,
+    pub(super) asked: Vec<Need>,
     asked_ends: bool,
     asked_clearance: bool,
-    found: Option<Found<'a>>,
+    pub(super) found: Option<Found<D>>,
 }
 
-struct Found<'a> {
-    values: Vec<(Need, Complex)>,
-    accumulator: &'a Accumulator,
+/// What was gathered of a motion.
+pub(super) struct Found<D> {
+    pub(super) values: Vec<(Need, Phasor<D>)>,
+    pub(super) duration: D,
+    /// Whole drive periods.
+    pub(super) periods: u64,
+    pub(super) contact_time: D,
+    pub(super) contacts: Beginnings<D>,
     /// Gain of stored energy.
-    stored: f64,
-    clearance: Option<Clearance>,
+    pub(super) stored: D,
+    pub(super) clearance: Option<Clearance<D>>,
+    /// What an impact takes, as a factor of the square of its speed.
+    pub(super) impact_loss: D,
+    /// Phase of the second tone in rad.
+    pub(super) second_phase: D,
 }
 
-impl<'a> Measured<'a> {
+/// The contacts that began.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Beginnings<D> {
+    pub(super) count: u64,
+    pub(super) grazing: u64,
+    pub(super) greatest_speed: D,
+    pub(super) squared_speeds: D,
+}
+
+impl<'a, D: Number> Measured<'a, D> {
     /// Before the run.
-    const fn nothing(model: &'a Model) -> Self {
+    pub(super) const fn nothing(model: &'a Model) -> Self {
         Self {
             model,
             asked: Vec::new(),
@@ -436,98 +489,93 @@ impl<'a> Measured<'a> {
     }
 
     /// What was gathered; 0 before the run.
-    fn value(&mut self, need: Need) -> Complex {
+    fn value(&mut self, need: Need) -> Phasor<D> {
         if let Some(found) = &self.found {
             let known = found.values.iter().find(|(known, _)| *known == need);
-            known.map_or(f64::NAN.into(), |(_, value)| *value)
+            let nothing = Phasor {
+                re: D::from(f64::NAN),
+                im: D::default(),
+            };
+            known.map_or(nothing, |(_, value)| *value)
         } else {
             if !self.asked.contains(&need) {
                 self.asked.push(need);
             }
-            0.0.into()
+            Phasor::default()
         }
     }
 
+    fn gathered(&self, read: impl Fn(&Found<D>) -> D) -> D {
+        self.found.as_ref().map_or_else(D::default, read)
+    }
+
     /// The least value of a signal.
-    pub(super) fn least(&mut self, signal: Signal) -> f64 {
+    pub(super) fn least(&mut self, signal: Signal) -> D {
         self.value(Need::Least(signal)).re
     }
 
     /// Its greatest value.
-    pub(super) fn greatest(&mut self, signal: Signal) -> f64 {
+    pub(super) fn greatest(&mut self, signal: Signal) -> D {
         self.value(Need::Greatest(signal)).re
     }
 
     /// Both.
-    pub(super) fn range(&mut self, signal: Signal) -> [f64; 2] {
+    pub(super) fn range(&mut self, signal: Signal) -> [D; 2] {
         [self.least(signal), self.greatest(signal)]
     }
 
     /// The time mean of a signal.
-    pub(super) fn mean(&mut self, signal: Signal) -> f64 {
+    pub(super) fn mean(&mut self, signal: Signal) -> D {
         self.value(Need::Integral(signal)).re / self.duration()
     }
 
     /// `∫ a b dt`.
-    fn product(&mut self, a: Signal, b: Signal) -> f64 {
+    fn product(&mut self, a: Signal, b: Signal) -> D {
         self.value(Need::Product(a, b)).re
     }
 
     /// The time mean of the product of two signals.
-    pub(super) fn mean_product(&mut self, a: Signal, b: Signal) -> f64 {
+    pub(super) fn mean_product(&mut self, a: Signal, b: Signal) -> D {
         self.product(a, b) / self.duration()
     }
 
     /// The component `Re(c e^{iωt})` of a signal at a frequency of the drive.
-    pub(super) fn component(&mut self, signal: Signal, tone: Tone) -> Complex {
-        self.value(Need::Fourier(signal, tone)) * 2.0 / self.duration()
+    pub(super) fn component(&mut self, signal: Signal, tone: Tone) -> Phasor<D> {
+        let c = self.value(Need::Fourier(signal, tone));
+        let duration = self.duration();
+        Phasor {
+            re: c.re * 2.0 / duration,
+            im: c.im * 2.0 / duration,
+        }
     }
 
     /// How long the motion ran.
-    pub(super) fn duration(&self) -> f64 {
-        let found = self.found.as_ref();
-        found.map_or(1.0, |found| found.accumulator.duration())
+    pub(super) fn duration(&self) -> D {
+        self.found
+            .as_ref()
+            .map_or(1.0.into(), |found| found.duration)
     }
 
     /// The same in drive periods.
     pub(super) fn periods(&self) -> f64 {
-        let whole = self
-            .found
-            .as_ref()
-            .map_or(0, |found| found.accumulator.periods());
+        let whole = self.found.as_ref().map_or(0, |found| found.periods);
         if whole > 0 {
             whole as f64
         } else {
-            self.duration() / self.model.period()
+            self.duration().plain() / self.model.period()
         }
     }
 
     /// Time in contact.
-    pub(super) fn contact_time(&self) -> f64 {
-        let contact = &self.model.contact;
-        self.found.as_ref().map_or(0.0, |found| {
-            (0..contact.len())
-                .filter(|&regime| contact[regime])
-                .map(|regime| found.accumulator.time_in(regime))
-                .sum()
-        })
+    pub(super) fn contact_time(&self) -> D {
+        self.gathered(|found| found.contact_time)
     }
 
     /// The contacts that began.
-    pub(super) fn contacts(&self) -> Switches {
-        let mut all = Switches::default();
-        let Some(found) = &self.found else { return all };
-        let regimes = self.model.contact.len();
-        for (from, to) in (0..regimes).flat_map(|from| (0..regimes).map(move |to| (from, to))) {
-            if begins_contact(self.model, from, to) {
-                let some = found.accumulator.switches(from, to);
-                all.count += some.count;
-                all.grazing += some.grazing;
-                all.greatest_speed = all.greatest_speed.max(some.greatest_speed);
-                all.squared_speeds += some.squared_speeds;
-            }
-        }
-        all
+    pub(super) fn contacts(&self) -> Beginnings<D> {
+        self.found
+            .as_ref()
+            .map_or_else(Beginnings::default, |found| found.contacts)
     }
 
     /// Whether the model is a beam.
@@ -543,78 +591,91 @@ impl<'a> Measured<'a> {
 
     /// Greatest force of the sample on the tip: 0 without contact; impacts of a rigid stop are
     /// impulses and do not count.
-    pub(super) fn peak_force(&mut self) -> f64 {
-        self.greatest(Signal::Force).max(0.0)
+    pub(super) fn peak_force(&mut self) -> D {
+        self.greatest(Signal::Force).at_least(0.0)
     }
 
     /// Least force of the sample on the tip: below zero where it pulls, as the paper's damper
     /// does on a tip that leaves. A force that vanishes where contact ends is 0.
-    pub(super) fn least_force(&mut self) -> f64 {
+    pub(super) fn least_force(&mut self) -> D {
         const ROUNDING: f64 = 1e-12;
         let (least, peak) = (self.least(Signal::Force), self.peak_force());
-        if least.abs() <= ROUNDING * peak {
-            0.0
+        if least.plain().abs() <= ROUNDING * peak.plain() {
+            0.0.into()
         } else {
             least
         }
     }
 
     /// Greatest depth of the tip below the resting surface, 0 if it never gets there.
-    pub(super) fn indentation(&mut self) -> f64 {
-        (-self.least(Signal::Height)).max(0.0)
+    pub(super) fn indentation(&mut self) -> D {
+        (-self.least(Signal::Height)).at_least(0.0)
     }
 
     /// Work of the tip on the sample a drive period, −∫ F V̇_T dt, and what impacts take: what
     /// the sample dissipates, whatever it is made of. 0 where it is the rounding of what the
     /// contact stores and gives back, force times indentation.
-    pub(super) fn dissipation(&mut self) -> f64 {
+    pub(super) fn dissipation(&mut self) -> D {
         let work = self.impacts() - self.product(Signal::Force, Signal::HeightRate);
-        above_rounding(work / self.periods(), self.peak_force(), self.indentation())
+        let (force, depth) = (self.peak_force(), self.indentation());
+        let work = work / self.periods();
+        if above_rounding(work.plain(), force.plain(), depth.plain()) == 0.0 {
+            0.0.into()
+        } else {
+            work
+        }
     }
 
     /// What impacts on a rigid stop take.
-    fn impacts(&self) -> f64 {
-        self.model.impact_loss * self.contacts().squared_speeds
+    fn impacts(&self) -> D {
+        self.gathered(|found| found.impact_loss * found.contacts.squared_speeds)
     }
 
     /// The component of the tip deflection at the second tone, if there is one, turned back by
     /// the tone's own phase.
-    pub(super) fn second_tone(&mut self) -> Option<Complex> {
+    pub(super) fn second_tone(&mut self) -> Option<Phasor<D>> {
         self.model.system.drive().frequencies().get(1)?;
-        let own = Complex::new(0.0, -self.model.second_phase).exp();
-        Some(self.component(Signal::Tip, Tone::Second) * own)
+        let own = self.gathered(|found| found.second_phase);
+        Some(self.component(Signal::Tip, Tone::Second).turned_back(own))
     }
 
     /// What an optical lever reads at the drive's frequency: the slope at the tip, taken for a
     /// deflection as if a static force at the tip had bent the beam. Such a beam has the slope
     /// 3W/2, so that W is taken to be ⅔ ∂W/∂ξ; the bare beam's first mode, whose slope is
     /// 1.3765 W, then reads 0.918 W.
-    pub(super) fn optical_lever(&mut self) -> Option<Complex> {
-        let reads = |m: &mut Self| m.component(Signal::Slope, Tone::First) * (2.0 / 3.0);
+    pub(super) fn optical_lever(&mut self) -> Option<Phasor<D>> {
+        let reads = |m: &mut Self| {
+            let slope = m.component(Signal::Slope, Tone::First);
+            slope.times((2.0 / 3.0).into())
+        };
         self.is_beam().then(|| reads(self))
     }
 
     /// What the drive feeds in, and what takes it.
-    pub(super) fn energy_balance(&mut self) -> EnergyBalance {
+    pub(super) fn energy_balance(&mut self) -> EnergyBalance<D> {
         self.asked_ends = true;
         let model = self.model;
-        let mut work = |terms: Vec<PowerTerm>| -> f64 {
-            terms
-                .into_iter()
-                .map(|a| self.product(Signal::Power(a), Signal::Power(a.other())))
-                .sum()
+        let mut work = |terms: Vec<PowerTerm>| -> D {
+            terms.into_iter().fold(D::default(), |sum, a| {
+                sum + self.product(Signal::Power(a), Signal::Power(a.other()))
+            })
         };
-        let (drive, beam, sample) = (
+        let beam = work(PowerTerm::of_beam(model));
+        if D::VARIES {
+            // Of a periodic orbit, along which nothing is stored.
+            let sample = self.dissipation() * self.periods();
+            return balance(beam + sample, beam, sample, D::default());
+        }
+        let (drive, sample) = (
             work(PowerTerm::of_drive(model)),
-            work(PowerTerm::of_beam(model)),
             work(PowerTerm::of_sample(model)),
         );
-        let stored = self.found.as_ref().map_or(0.0, |found| found.stored);
-        EnergyBalance::new(drive, beam, sample + self.impacts(), stored)
+        let stored = self.gathered(|found| found.stored);
+        balance(drive, beam, sample + self.impacts(), stored)
     }
 
     /// Where the beam comes nearest to the sample.
-    pub(super) fn clearance(&mut self) -> Option<Clearance> {
+    pub(super) fn clearance(&mut self) -> Option<Clearance<D>> {
         self.asked_clearance = true;
         // The beam's end stands a fixed height over the tip.
         self.least(Signal::Height);

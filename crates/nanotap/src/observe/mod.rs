@@ -5,12 +5,14 @@
 mod clearance;
 pub mod columns;
 mod contact_event;
+mod derivative;
 mod dimension;
 mod energy;
 pub mod glossary;
 mod harmonics;
 mod measure;
 pub mod mode_share;
+mod number;
 mod physical_motion;
 pub mod table;
 pub mod time_series;
@@ -18,6 +20,7 @@ mod value;
 
 pub use clearance::Clearance;
 pub use contact_event::{ContactEvent, ContactEventKind, Contacts};
+pub use derivative::{Derivative, DerivativeError};
 pub use dimension::Dimension;
 pub use energy::EnergyBalance;
 pub(crate) use harmonics::lag;

@@ -16,9 +16,11 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 use serde_json::Map;
 
 use super::measure::{Measured, Signal, Tone};
-use super::value::{Measurable, Value};
-use super::{Dimension, EnergyBalance, lag};
+use super::number::{Number as _, Phasor};
+use super::value::{Measurable, Value, Varying};
+use super::{Dimension, EnergyBalance};
 use crate::case::physical::Scales;
+use crate::model::contact::dual::Dual;
 
 use Signal::{Force, Height, Slope, Tip};
 
@@ -161,6 +163,26 @@ macro_rules! observables {
                 all
             }
 
+            /// How those of `set` change, as `measured` has them; what jumps, or where
+            /// nothing is measured, is left out.
+            pub(super) fn changes(
+                set: Set,
+                measured: &mut Measured<'_, Dual>,
+            ) -> Vec<(&'static Observable, Value)> {
+                let mut all = Vec::new();
+                $(
+                    let observable = &OBSERVABLES[Row::$name as usize];
+                    if set.contains(observable) {
+                        let read = $read as fn(&mut Measured<'_, Dual>) -> _;
+                        let change = change_of(measured, read);
+                        if change != Value::Absent {
+                            all.push((observable, change));
+                        }
+                    }
+                )*
+                all
+            }
+
             /// The same in SI.
             #[must_use]
             pub fn in_si(&self, scales: &Scales) -> Self {
@@ -209,7 +231,7 @@ observables! {
     phase: f64, Angle, common,
         "phase behind the drive (°)",
         "lag of the tip deflection at the drive frequency behind the drive",
-        |m| lag(m.component(Tip, Tone::First));
+        |m| m.component(Tip, Tone::First).lag();
     indentation: f64, Length, common,
         "indentation", "greatest depth of the tip below the resting surface",
         |m| m.indentation();
@@ -240,15 +262,18 @@ observables! {
     tone2_response: Option<f64>, Length, rare,
         "amplitude at the second tone",
         "amplitude of the tip deflection at the frequency of the second tone",
-        |m| m.second_tone().map(nalgebra::Complex::norm);
+        |m| m.second_tone().map(Phasor::norm);
     tone2_lag: Option<f64>, Angle, rare,
         "phase behind the second tone (°)",
         "lag of the tip deflection behind the second tone",
-        |m| m.second_tone().map(lag);
+        |m| m.second_tone().map(Phasor::lag);
     rms_deflection: f64, Length, rare,
         "root mean square of the tip deflection",
         "root mean square of the tip deflection about its mean",
-        |m| (m.mean_product(Tip, Tip) - m.mean(Tip).powi(2)).max(0.0).sqrt();
+        |m| {
+            let mean = m.mean(Tip);
+            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).sqrt()
+        };
     gap_range: [f64; 2], Length, rare,
         "gap", "least and greatest height of the tip over the undeformed surface",
         |m| m.range(Height);
@@ -260,7 +285,7 @@ observables! {
         |m| {
             let impulse = m.mean(Force) * m.duration();
             let time = m.contact_time();
-            (time > 0.0).then(|| impulse / time)
+            (time.plain() > 0.0).then(|| impulse / time)
         };
     drive_power: f64, Power, rare,
         "power of the drive", "mean power of the drive",
@@ -274,10 +299,10 @@ observables! {
     optical_amplitude: Option<f64>, Length, rare,
         "amplitude read by an optical lever",
         "amplitude that an optical lever, calibrated by a static force, reads at the drive frequency",
-        |m| m.optical_lever().map(nalgebra::Complex::norm);
+        |m| m.optical_lever().map(Phasor::norm);
     optical_phase: Option<f64>, Angle, rare,
         "phase read by an optical lever (°)", "lag that an optical lever reads behind the drive",
-        |m| m.optical_lever().map(lag);
+        |m| m.optical_lever().map(Phasor::lag);
     energy_balance: EnergyBalance, Energy, rare,
         "energy", "energies over the recording; the residual as a part of what was moved",
         |m| m.energy_balance();
@@ -293,6 +318,13 @@ observables! {
     grazing_contacts: Option<usize>, Count, rare,
         "grazing contacts", "contacts that only graze, within rounding",
         |m| Some(m.contacts().grazing as usize);
+}
+
+fn change_of<R: Varying>(
+    measured: &mut Measured<'_, Dual>,
+    read: impl FnOnce(&mut Measured<'_, Dual>) -> R,
+) -> Value {
+    read(measured).change()
 }
 
 impl Serialize for Observables {

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::EnergyBalance;
+use crate::model::contact::dual::Dual;
 
 /// The value of an observable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -18,6 +19,29 @@ pub enum Value {
     Range([f64; 2]),
     /// Energies.
     Energies(EnergyBalance),
+}
+
+impl Value {
+    /// `factor · self + other · by`: an observable's derivative in another unit, which itself
+    /// changes. Both are of one kind.
+    pub(super) fn in_unit(self, factor: f64, value: Self, by: f64) -> Self {
+        match (self, value) {
+            (Self::Number(change), Self::Number(value)) => {
+                Self::Number(change * factor + value * by)
+            }
+            (Self::Range(change), Self::Range(value)) => {
+                Self::Range([0, 1].map(|k| change[k] * factor + value[k] * by))
+            }
+            (Self::Energies(change), Self::Energies(value)) => Self::Energies(EnergyBalance {
+                drive_work: change.drive_work * factor + value.drive_work * by,
+                beam_damping: change.beam_damping * factor + value.beam_damping * by,
+                sample_damping: change.sample_damping * factor + value.sample_damping * by,
+                stored: change.stored * factor + value.stored * by,
+                residual: 0.0,
+            }),
+            _ => Self::Absent,
+        }
+    }
 }
 
 impl Value {
@@ -115,5 +139,68 @@ impl<T: Measurable> Measurable for Option<T> {
 
     fn scaled(self, unit: Option<f64>) -> Self {
         self.map(|value| value.scaled(unit))
+    }
+}
+
+/// What an observable is while its derivative goes along.
+pub(super) trait Varying {
+    /// The derivative.
+    fn change(self) -> Value;
+}
+
+impl Varying for Dual {
+    fn change(self) -> Value {
+        if self.derivative.is_finite() {
+            Value::Number(self.derivative)
+        } else {
+            Value::Absent
+        }
+    }
+}
+
+impl Varying for [Dual; 2] {
+    fn change(self) -> Value {
+        let ends = self.map(|end| end.derivative);
+        if ends.iter().all(|end| end.is_finite()) {
+            Value::Range(ends)
+        } else {
+            Value::Absent
+        }
+    }
+}
+
+impl Varying for EnergyBalance<Dual> {
+    fn change(self) -> Value {
+        let energies = EnergyBalance {
+            drive_work: self.drive_work.derivative,
+            beam_damping: self.beam_damping.derivative,
+            sample_damping: self.sample_damping.derivative,
+            stored: self.stored.derivative,
+            residual: 0.0,
+        };
+        if energies.drive_work.is_finite() {
+            Value::Energies(energies)
+        } else {
+            Value::Absent
+        }
+    }
+}
+
+/// Numbers that jump, or of which no derivative is known.
+impl Varying for f64 {
+    fn change(self) -> Value {
+        Value::Absent
+    }
+}
+
+impl Varying for usize {
+    fn change(self) -> Value {
+        Value::Absent
+    }
+}
+
+impl<T: Varying> Varying for Option<T> {
+    fn change(self) -> Value {
+        self.map_or(Value::Absent, T::change)
     }
 }

@@ -1,5 +1,6 @@
 //! A periodic orbit by Newton, with its stability and what can be read off it.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::DVector;
@@ -17,7 +18,7 @@ use crate::case::Case;
 use crate::model::strobe::Strobe;
 use crate::model::{Forgetting, Model};
 use crate::observe::PhysicalMotion;
-use crate::observe::{ContactEvent, Contacts, Measurement, Observables, Set, Spectrum};
+use crate::observe::{ContactEvent, Contacts, Derivative, Measurement, Observables, Set, Spectrum};
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
 use crate::study::registry::Study;
@@ -120,6 +121,9 @@ pub struct OrbitReport {
     /// Harmonics, distortion and phase.
     #[serde(flatten)]
     pub spectrum: Spectrum,
+    /// Derivatives by the keys that were asked for.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derivatives: BTreeMap<&'static str, Derivative>,
     /// Its full length, for figures.
     #[serde(skip)]
     pub trajectory: Trajectory,
@@ -285,6 +289,7 @@ pub fn report(
         events: contacts.events(),
         spectrum: Spectrum::of(model, &trajectory, orbit.period, harmonics),
         observables,
+        derivatives: BTreeMap::new(),
         trajectory,
     })
 }
@@ -399,6 +404,9 @@ pub struct OrbitRequest {
     /// Samples a drive period in the time series
     #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
     pub resolution: usize,
+    /// Keys of the case by which to differentiate the orbit and all that is observed of it
+    #[schemars(extend("x-value" = "KEY,…"))]
+    pub derivatives: Vec<String>,
 }
 
 impl Default for OrbitRequest {
@@ -409,6 +417,7 @@ impl Default for OrbitRequest {
             state: options.state,
             harmonics: options.harmonics,
             resolution: 200,
+            derivatives: Vec::new(),
         }
     }
 }
@@ -440,7 +449,17 @@ impl Study for OrbitStudy {
         request: &OrbitRequest,
         _: &Control<'_>,
     ) -> Result<InSi<OrbitReport>, Error> {
-        let found = orbit(&case.model()?, &request.options())?;
+        let keys = request.derivatives.iter();
+        let keys = keys
+            .map(|name| case.key(name))
+            .collect::<Result<Vec<_>, _>>()?;
+        let model = case.model()?;
+        let mut found = orbit(&model, &request.options())?;
+        for key in keys {
+            let at = (found.state.as_slice(), found.period);
+            let derivative = Derivative::of(case, &model, key, at, &found.observables, Set::ALL)?;
+            found.derivatives.insert(key.path(), derivative);
+        }
         let physical = case.physical().map(|resolved| {
             PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved)
         });

@@ -11,6 +11,7 @@ mod located_runge_kutta;
 mod map;
 mod motions;
 mod observables;
+mod orbit_derivatives;
 mod references;
 mod short_contacts;
 mod standard_linear_solid;

@@ -70,6 +70,41 @@ impl Div for Dual {
     }
 }
 
+impl From<f64> for Dual {
+    fn from(value: f64) -> Self {
+        Self::constant(value)
+    }
+}
+
+impl Mul<f64> for Dual {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        Self::new(self.value * factor, self.derivative * factor)
+    }
+}
+
+impl Mul<Dual> for f64 {
+    type Output = Dual;
+    fn mul(self, other: Dual) -> Dual {
+        other * self
+    }
+}
+
+impl Div<f64> for Dual {
+    type Output = Self;
+    fn div(self, by: f64) -> Self {
+        Self::new(self.value / by, self.derivative / by)
+    }
+}
+
+impl Dual {
+    /// The square root; zero of zero has no derivative.
+    pub(crate) fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        Self::new(root, 0.5 * self.derivative / root)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,0 +1,65 @@
+//! The derivative of a model with respect to one parameter.
+
+use nanotap_flow::Output;
+use nanotap_flow::sensitivity::SystemTangent;
+
+use crate::model::Model;
+
+/// The derivative of a [`Model`]: of its system and of what it shows, at constant state and
+/// drive phase. Tip and slope are the same for every value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelTangent {
+    /// Of the system.
+    pub system: SystemTangent,
+    /// Of the tip's height.
+    pub height: Output,
+    /// Of the displacement of the base, of a beam.
+    pub base: Output,
+    /// Of the force; an entry a regime.
+    pub force: Vec<Output>,
+    /// Of the factors of what the beam's own damping takes.
+    pub(crate) beam_power: Vec<[Output; 2]>,
+    /// Of the second tone's phase in rad.
+    pub second_phase: f64,
+    /// Of what an impact takes.
+    pub impact_loss: f64,
+}
+
+impl ModelTangent {
+    /// The derivative of nothing.
+    pub fn zeros(model: &Model) -> Self {
+        let zero = model.tip.scaled(0.0);
+        let products = model.power().first().map_or(0, |power| power.beam.len());
+        Self {
+            system: SystemTangent::zeros(&model.system),
+            height: zero.clone(),
+            base: zero.clone(),
+            force: vec![zero.clone(); model.force.len()],
+            beam_power: vec![[zero.clone(), zero]; products],
+            second_phase: 0.0,
+            impact_loss: 0.0,
+        }
+    }
+
+    /// Adds `factor · other`: what a parameter does through several others.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        self.system.add(factor, &other.system);
+        let outputs = |of: &Self| -> Vec<Output> {
+            let single = [&of.height, &of.base].into_iter().chain(&of.force);
+            single
+                .chain(of.beam_power.iter().flatten())
+                .cloned()
+                .collect()
+        };
+        let mine = [&mut self.height, &mut self.base].into_iter();
+        let mine = mine.chain(&mut self.force);
+        for (mine, more) in mine
+            .chain(self.beam_power.iter_mut().flatten())
+            .zip(outputs(other))
+        {
+            *mine = mine.plus(factor, &more);
+        }
+        self.second_phase += factor * other.second_phase;
+        self.impact_loss += factor * other.impact_loss;
+    }
+}

@@ -1,0 +1,416 @@
+//! Derivatives of what is observed of a periodic orbit with respect to a key of the case.
+//!
+//! An orbit x of period n is a zero of Pⁿ(x; θ) − x, so that by the implicit function theorem
+//! dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ. With this start the sensitivity of the flow is the orbit's own,
+//! and a [`Variation`] has of every integral, Fourier coefficient and extremum that observables
+//! are read from its derivative; the observables are then read once more, each number with its
+//! derivative beside it. Where the period varies, derivatives are at constant drive phase.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
+use nanotap_flow::variation::{Variation, Varied, VariedOutput, Wanted};
+use nanotap_flow::{Flow, FlowError, Output};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::{Map, Value as Json, json};
+
+use super::clearance::Clearance;
+use super::measure::{
+    Beginnings, Found, Measured, Need, Signal, beginnings, contact_regimes, frequency,
+};
+use super::number::Phasor;
+use super::table::{OBSERVABLES, Observable, Observables, Set};
+use super::value::Value;
+use crate::case::{Case, CaseError, Key};
+use crate::model::contact::dual::Dual;
+use crate::model::strobe::Strobe;
+use crate::model::{Model, ModelTangent};
+
+/// Why an orbit has no derivative.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum DerivativeError {
+    /// The case makes no sense beside this value of the key.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The flow failed.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// A multiplier is 1: at a fold the orbit has no derivative.
+    #[error("the orbit has no derivative: a multiplier is 1 within rounding")]
+    NotIsolated,
+}
+
+/// The derivative of a periodic orbit and of what is observed of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Derivative {
+    /// The unit of the key in SI; none of a number of the equations.
+    pub unit: Option<&'static str>,
+    /// Of the state at drive phase 0, of length n.
+    pub state: Vec<f64>,
+    /// Of observables in the model's units; those that jump are left out.
+    pub observables: Vec<(&'static Observable, Value)>,
+    /// The same in SI, of a physical case.
+    pub physical: Option<Vec<(&'static Observable, Value)>>,
+}
+
+impl Derivative {
+    /// Of the orbit of `period` drive periods from `state`, of the observables `set`, with
+    /// respect to `key`; `observed` is what is observed of it, all of `set` and the beam's
+    /// clearance if its derivative is wanted.
+    ///
+    /// # Errors
+    /// When the case makes no sense beside the value, or the orbit is not isolated.
+    pub fn of(
+        case: &Case,
+        model: &Model,
+        key: Key,
+        (state, period): (&[f64], usize),
+        observed: &Observables,
+        set: Set,
+    ) -> Result<Self, DerivativeError> {
+        let tangent = case.model_tangent(model, key)?;
+        let start = orbit_derivative(model, &tangent, state, period)?;
+        let clearance = observed.beam_clearance_xi;
+        let mut followed = Followed::new(model, &tangent, set, clearance);
+        followed.run(state, &start, period)?;
+        let observables = followed.changes(set);
+        let physical = case
+            .physical()
+            .map(|view| {
+                let scales = case.scales_beside(key)?;
+                let in_si = |(observable, change): &(&'static Observable, Value)| {
+                    let unit = |scales| observable.dimension.si(scales);
+                    let by = match &scales {
+                        None => 0.0,
+                        Some((low, high, width)) => (unit(high)? - unit(low)?) / width,
+                    };
+                    let value = (observable.of)(observed);
+                    let change = change.in_unit(unit(&view.scales)?, value, by);
+                    Some((*observable, change))
+                };
+                Ok::<_, CaseError>(observables.iter().filter_map(in_si).collect())
+            })
+            .transpose()?;
+        Ok(Self {
+            unit: key.is_physical().then(|| key.kind().si_unit()),
+            state: start,
+            observables,
+            physical,
+        })
+    }
+
+    /// The derivative of an observable that is one number, in the model's units.
+    pub fn number(&self, observable: &Observable) -> Option<f64> {
+        let known = self.observables.iter().find(|(o, _)| *o == observable);
+        known.and_then(|(_, change)| change.number())
+    }
+
+    /// The same in SI.
+    pub fn number_in_si(&self, observable: &Observable) -> Option<f64> {
+        let all = self.physical.as_ref()?;
+        let known = all.iter().find(|(o, _)| *o == observable);
+        known.and_then(|(_, change)| change.number())
+    }
+}
+
+impl Serialize for Derivative {
+    /// A map: `unit`, `state`, the observables by name, and `physical` by their names in SI.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        if let Some(unit) = self.unit {
+            map.serialize_entry("unit", unit)?;
+        }
+        map.serialize_entry("state", &self.state)?;
+        for (observable, change) in &self.observables {
+            map.serialize_entry(observable.name, change)?;
+        }
+        if let Some(physical) = &self.physical {
+            let by_name = physical.iter().map(|(o, change)| (o.si_name, change));
+            let by_name: std::collections::BTreeMap<_, _> = by_name.collect();
+            map.serialize_entry("physical", &by_name)?;
+        }
+        map.end()
+    }
+}
+
+impl JsonSchema for Derivative {
+    fn schema_name() -> Cow<'static, str> {
+        "Derivative".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut named = |name: fn(&Observable) -> &'static str| -> Map<String, Json> {
+            let entry = |o: &Observable| {
+                let schema = (o.schema)(generator).to_value();
+                (name(o).to_owned(), schema)
+            };
+            OBSERVABLES.iter().map(entry).collect()
+        };
+        let (mut properties, physical) = (named(|o| o.name), named(|o| o.si_name));
+        let unit = json!({"type": "string", "description": "The key's unit in SI"});
+        let state = json!({
+            "type": "array",
+            "items": {"type": "number"},
+            "description": "Of the state at drive phase 0",
+        });
+        let physical = json!({
+            "type": "object",
+            "description": "Of the observables in SI",
+            "properties": physical,
+        });
+        for (name, schema) in [("unit", unit), ("state", state), ("physical", physical)] {
+            properties.insert(name.to_owned(), schema);
+        }
+        json_schema!({
+            "type": "object",
+            "description": "Derivatives of a periodic orbit and of what is observed of it",
+            "properties": properties,
+        })
+    }
+}
+
+/// dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ.
+fn orbit_derivative(
+    model: &Model,
+    tangent: &ModelTangent,
+    state: &[f64],
+    period: usize,
+) -> Result<Vec<f64>, DerivativeError> {
+    let n = state.len();
+    let mut map = Strobe::with_tangents(model, vec![tangent.system.clone()]);
+    let mut x = state.to_vec();
+    let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
+    let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));
+    for _ in 0..period {
+        map.advance_with_derivatives(&mut x, &mut one, &mut by)?;
+        change = &one * change + &by;
+        all = &one * all;
+    }
+    let solved = (DMatrix::identity(n, n) - all).lu().solve(&change);
+    let solved: Option<DVector<f64>> = solved.map(|s| s.column(0).into_owned());
+    solved
+        .filter(|s| s.iter().all(|v| v.is_finite()))
+        .map(|s| s.as_slice().to_vec())
+        .ok_or(DerivativeError::NotIsolated)
+}
+
+/// An orbit on its way, and what is gathered of it.
+struct Followed<'a> {
+    model: &'a Model,
+    tangent: &'a ModelTangent,
+    needs: Vec<(Need, Place)>,
+    outputs: Vec<VariedOutput>,
+    wanted: Wanted,
+    clearance: Option<f64>,
+    /// What was found, once it ran.
+    found: Option<Found<Dual>>,
+}
+
+/// Where a need stands among what is wanted.
+#[derive(Clone, Copy)]
+enum Place {
+    Extremum(usize),
+    Integral(usize),
+    Product(usize),
+    Fourier(usize),
+}
+
+impl<'a> Followed<'a> {
+    fn new(model: &'a Model, tangent: &'a ModelTangent, set: Set, clearance: Option<f64>) -> Self {
+        let mut asked = Measured::<Dual>::nothing(model);
+        Observables::changes(set, &mut asked);
+        let mut followed = Self {
+            model,
+            tangent,
+            needs: Vec::new(),
+            outputs: Vec::new(),
+            wanted: Wanted::default(),
+            clearance,
+            found: None,
+        };
+        let mut signals: Vec<Signal> = Vec::new();
+        for need in asked.asked {
+            let place = followed.want(need, &mut signals);
+            followed.needs.push((need, place));
+        }
+        followed
+    }
+
+    fn want(&mut self, need: Need, signals: &mut Vec<Signal>) -> Place {
+        let mut channel = |of: &mut Self, signal: Signal| {
+            if let Some(known) = signals.iter().position(|known| *known == signal) {
+                return known;
+            }
+            signals.push(signal);
+            let output = varied(signal, of.model, of.tangent);
+            of.outputs.push(output);
+            signals.len() - 1
+        };
+        match need {
+            Need::Least(signal) | Need::Greatest(signal) => {
+                let sign = if matches!(need, Need::Least(_)) {
+                    -1.0
+                } else {
+                    1.0
+                };
+                let output = channel(self, signal);
+                self.wanted.extrema.push((output, sign));
+                Place::Extremum(self.wanted.extrema.len() - 1)
+            }
+            Need::Integral(signal) => {
+                let output = channel(self, signal);
+                self.wanted.integrals.push(output);
+                Place::Integral(self.wanted.integrals.len() - 1)
+            }
+            Need::Product(a, b) => {
+                let (a, b) = (channel(self, a), channel(self, b));
+                self.wanted.products.push((a, b));
+                Place::Product(self.wanted.products.len() - 1)
+            }
+            Need::Fourier(signal, tone) => {
+                let output = channel(self, signal);
+                self.wanted
+                    .fouriers
+                    .push((output, frequency(self.model, tone)));
+                Place::Fourier(self.wanted.fouriers.len() - 1)
+            }
+        }
+    }
+
+    /// Follows the orbit, which changes by `start` at its beginning.
+    fn run(&mut self, state: &[f64], start: &[f64], period: usize) -> Result<(), FlowError> {
+        let model = self.model;
+        let (mut outputs, mut wanted) = (self.outputs.clone(), self.wanted.clone());
+        // Beside what observables read: time in contact, speeds, the beam's least height.
+        let zero = model.tip.scaled(0.0);
+        let regimes = 0..model.contact.len();
+        let touching = |r| {
+            zero.clone()
+                .with_constant(f64::from(u8::from(model.contact[r])))
+        };
+        outputs.push(VariedOutput {
+            value: regimes.map(touching).collect(),
+            change: vec![zero.clone(); model.contact.len()],
+        });
+        wanted.integrals.push(outputs.len() - 1);
+        wanted.speeds = beginnings(model).collect();
+        if let (Some(xi), Some(beam)) = (self.clearance, &model.beam) {
+            // The base moves as the tip's height does beside the beam's shape.
+            let change = zero.plus(1.0, &tones_of(&self.tangent.base));
+            outputs.push(VariedOutput::same(&model.system, &beam.height(xi), &change));
+            wanted.extrema.push((outputs.len() - 1, -1.0));
+        }
+        let mut flow = Flow::new(std::sync::Arc::clone(&model.system));
+        flow.start(state, 0.0)?;
+        let mut variation = Variation::new(
+            &model.system,
+            &self.tangent.system,
+            flow.regime(),
+            start,
+            outputs,
+            wanted,
+        );
+        for _ in 0..period {
+            flow.run_period(&mut variation)?;
+        }
+        variation.finish();
+        self.found = Some(self.read(&variation, period));
+        Ok(())
+    }
+
+    fn read(&self, variation: &Variation<'_>, period: usize) -> Found<Dual> {
+        let real = |number: Varied<f64>| Phasor {
+            re: dual(number),
+            im: Dual::default(),
+        };
+        let value = |place| match place {
+            Place::Extremum(at) => real(variation.extrema[at]),
+            Place::Integral(at) => real(variation.integrals[at]),
+            Place::Product(at) => real(variation.products[at]),
+            Place::Fourier(at) => {
+                let c = variation.fouriers[at];
+                Phasor {
+                    re: Dual::new(c.value.re, c.change.re),
+                    im: Dual::new(c.value.im, c.change.im),
+                }
+            }
+        };
+        let touching = self.wanted.integrals.len();
+        let mut contacts = Beginnings::<Dual>::default();
+        for (speed, squares) in variation.speeds.iter().zip(&variation.squared_speeds) {
+            if speed.value > contacts.greatest_speed.value {
+                contacts.greatest_speed = dual(*speed);
+            }
+            contacts.squared_speeds = contacts.squared_speeds + dual(*squares);
+        }
+        let heights = variation.extrema.get(self.wanted.extrema.len());
+        let values = self.needs.iter();
+        Found {
+            values: values.map(|&(need, place)| (need, value(place))).collect(),
+            duration: dual(variation.duration),
+            periods: period as u64,
+            contact_time: contact_regimes(self.model)
+                .next()
+                .map_or_else(Dual::default, |_| dual(variation.integrals[touching])),
+            contacts,
+            stored: Dual::default(),
+            clearance: self.clearance.zip(heights).map(|(xi, height)| Clearance {
+                height: dual(*height),
+                xi,
+                period: 0.0,
+            }),
+            impact_loss: Dual::new(self.model.impact_loss, self.tangent.impact_loss),
+            second_phase: Dual::new(self.model.second_phase, self.tangent.second_phase),
+        }
+    }
+
+    fn changes(&mut self, set: Set) -> Vec<(&'static Observable, Value)> {
+        let mut measured = Measured::nothing(self.model);
+        measured.found = self.found.take();
+        Observables::changes(set, &mut measured)
+    }
+}
+
+const fn dual(number: Varied<f64>) -> Dual {
+    Dual::new(number.value, number.change)
+}
+
+/// The tones of an output alone.
+fn tones_of(output: &Output) -> Output {
+    let mut tones = output.scaled(0.0);
+    tones.tones.clone_from(&output.tones);
+    tones
+}
+
+/// A signal with its derivative.
+fn varied(signal: Signal, model: &Model, tangent: &ModelTangent) -> VariedOutput {
+    let system = &*model.system;
+    let zero = model.tip.scaled(0.0);
+    let height = || VariedOutput::same(system, &model.height, &tangent.height);
+    match signal {
+        Signal::Height => height(),
+        Signal::HeightRate => height().rate(system, &tangent.system),
+        Signal::Force => VariedOutput {
+            value: model.force.clone(),
+            change: tangent.force.clone(),
+        },
+        Signal::Power(term) => VariedOutput {
+            value: term.outputs(model),
+            change: term.changes(model, tangent),
+        },
+        Signal::Tip | Signal::Slope => VariedOutput {
+            value: signal.outputs(model),
+            change: vec![zero; system.regimes().len()],
+        },
+    }
+}
+
+impl From<DerivativeError> for crate::Error {
+    fn from(error: DerivativeError) -> Self {
+        match error {
+            DerivativeError::Case(error) => error.into(),
+            other => Self::numerics(other.to_string()),
+        }
+    }
+}

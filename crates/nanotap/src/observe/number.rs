@@ -1,0 +1,136 @@
+//! The numbers that observables are made of: plain, or with a derivative beside them.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use nanotap_flow::Complex;
+
+use crate::model::contact::dual::Dual;
+
+/// A real number, with or without a derivative.
+pub(super) trait Number:
+    Copy
+    + Default
+    + From<f64>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<f64, Output = Self>
+{
+    /// Whether it has a derivative.
+    const VARIES: bool;
+    /// The number alone.
+    fn plain(self) -> f64;
+    /// At least `low`.
+    fn at_least(self, low: f64) -> Self;
+    /// √(x² + y²).
+    fn hypotenuse(self, y: Self) -> Self;
+    /// The angle of (x, y) = (`x`, self) in degrees.
+    fn degrees(self, x: Self) -> Self;
+    /// Sine and cosine.
+    fn turn(self) -> (Self, Self);
+}
+
+impl Number for f64 {
+    const VARIES: bool = false;
+
+    fn plain(self) -> f64 {
+        self
+    }
+
+    fn at_least(self, low: f64) -> Self {
+        self.max(low)
+    }
+
+    fn hypotenuse(self, y: Self) -> Self {
+        self.hypot(y)
+    }
+
+    fn degrees(self, x: Self) -> Self {
+        self.atan2(x).to_degrees()
+    }
+
+    fn turn(self) -> (Self, Self) {
+        self.sin_cos()
+    }
+}
+
+impl Number for Dual {
+    const VARIES: bool = true;
+
+    fn plain(self) -> f64 {
+        self.value
+    }
+
+    fn at_least(self, low: f64) -> Self {
+        if self.value >= low { self } else { low.into() }
+    }
+
+    fn hypotenuse(self, y: Self) -> Self {
+        let value = self.value.hypot(y.value);
+        let change = self.value * self.derivative + y.value * y.derivative;
+        Self::new(value, change / value)
+    }
+
+    fn degrees(self, x: Self) -> Self {
+        let size = self.value * self.value + x.value * x.value;
+        let change = (x.value * self.derivative - self.value * x.derivative) / size;
+        let value = self.value.atan2(x.value);
+        Self::new(value.to_degrees(), change.to_degrees())
+    }
+
+    fn turn(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        let by = self.derivative;
+        (Self::new(sin, cos * by), Self::new(cos, -sin * by))
+    }
+}
+
+/// The component `Re(c e^{iωt})` of a signal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Phasor<D> {
+    pub(super) re: D,
+    pub(super) im: D,
+}
+
+impl From<Complex> for Phasor<f64> {
+    fn from(c: Complex) -> Self {
+        Self { re: c.re, im: c.im }
+    }
+}
+
+impl<D: Number> Phasor<D> {
+    /// Its amplitude.
+    pub(super) fn norm(self) -> D {
+        self.re.hypotenuse(self.im)
+    }
+
+    /// Its lag φ: `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
+    pub(super) fn lag(self) -> D {
+        let degrees = -self.re.degrees(D::from(0.0) - self.im);
+        if degrees.plain() <= -180.0 {
+            degrees + 360.0.into()
+        } else {
+            degrees
+        }
+    }
+
+    /// In other units.
+    pub(super) fn times(self, factor: D) -> Self {
+        Self {
+            re: self.re * factor,
+            im: self.im * factor,
+        }
+    }
+
+    /// Turned back by an angle in rad.
+    pub(super) fn turned_back(self, angle: D) -> Self {
+        let (sin, cos) = angle.turn();
+        Self {
+            re: self.re * cos + self.im * sin,
+            im: self.im * cos - self.re * sin,
+        }
+    }
+}

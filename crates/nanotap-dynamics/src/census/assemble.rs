@@ -20,7 +20,7 @@ pub(crate) fn assemble(
     outcomes: &[Outcome],
     starts: &StartSet,
     orbits: Vec<PeriodicOrbit>,
-    relaxation: f64,
+    after: f64,
     transient_spectrum: Option<LyapunovSpectrum>,
     row: usize,
     control: &Control<'_>,
@@ -34,7 +34,7 @@ pub(crate) fn assemble(
             members: Vec::new(),
         })
         .collect();
-    let escapes = Escapes::count(outcomes, relaxation);
+    let escapes = Escapes::count(outcomes, after);
     let chaos_lasts = escapes.chaos_lasts();
     let mut undecided = Vec::new();
     let mut unbounded = Vec::new();

@@ -14,8 +14,14 @@ pub(crate) struct Escapes {
 }
 
 impl Escapes {
-    pub(crate) fn count(outcomes: &[Outcome], relaxation: f64) -> Self {
-        let after = (3.0 * relaxation).max(64.0);
+    /// Periods after which a start that is in no neighbourhood has outlived every linear
+    /// transient.
+    pub(crate) fn after(relaxation: f64) -> f64 {
+        (3.0 * relaxation).max(64.0)
+    }
+
+    /// Counts the escapes that came `after` so many periods.
+    pub(crate) fn count(outcomes: &[Outcome], after: f64) -> Self {
         let mut escaped = Vec::new();
         let mut wandering = Vec::new();
         for (k, outcome) in outcomes.iter().enumerate() {
@@ -34,9 +40,11 @@ impl Escapes {
         }
     }
 
-    /// End of the first quarter of the time for which all wanderers were watched.
+    /// End of the first quarter of the time for which all wanderers were watched that
+    /// were watched for long enough to count.
     fn early(&self) -> f64 {
-        let end = self.wandering.iter().copied().min().unwrap_or(0) as f64;
+        let watched = self.wandering.iter().map(|&t| t as f64);
+        let end = watched.filter(|&t| t > self.after).fold(f64::NAN, f64::min);
         self.after + 0.25 * (end - self.after).max(0.0)
     }
 
@@ -53,9 +61,13 @@ impl Escapes {
         )
     }
 
-    /// True if the wanderers are on an attractor: none escaped, or escapes stopped
-    /// early in a way that a constant rate would show with probability below 1 %.
+    /// True if the wanderers are on an attractor: one at least was watched for long
+    /// enough to count, and none escaped, or escapes stopped early in a way that a
+    /// constant rate would show with probability below 1 %.
     pub(crate) fn chaos_lasts(&self) -> bool {
+        if !self.wandering.iter().any(|&t| t as f64 > self.after) {
+            return false;
+        }
         if self.escaped.is_empty() {
             return true;
         }

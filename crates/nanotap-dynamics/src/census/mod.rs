@@ -38,8 +38,9 @@ use std::sync::atomic::AtomicUsize;
 
 use rayon::prelude::*;
 
+use crate::census::escapes::Escapes;
 use crate::classify::{
-    Arrival, Chaos, Known, SettleOptions, Settled, Torus, UndecidedReason, Verdict, arrive,
+    Arrival, Chaos, Known, SettleOptions, Settled, Torus, UndecidedReason, Verdict, arrive, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -58,6 +59,8 @@ const BATCH: usize = 128;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
 const LEAST_PATIENCE: usize = 64;
+/// Chaos is watched for so many times the periods after which escapes are counted.
+const WATCHED_TRANSIENTS: f64 = 8.0;
 
 /// How a census is taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -249,12 +252,13 @@ pub fn census_of<M: StroboscopicMap>(
         work.batch(size);
         size = BATCH;
     }
-    let relaxation = work.relaxation();
+    let mut after = Escapes::after(work.relaxation());
+    work.watch_chaos(&mut after);
     assemble::assemble(
         &work.outcomes,
         starts,
         work.orbits,
-        relaxation,
+        after,
         work.transient_spectrum,
         work.row,
         control,
@@ -341,12 +345,13 @@ impl<M: StroboscopicMap> Work<'_, M> {
         sides(&(0..self.outcomes.len()).filter_map(|k| self.starts.start(k)))
     }
 
+    fn balls(&self) -> Vec<Neighbourhood> {
+        let balls = self.neighbourhoods.iter();
+        balls.map(|(_, ball)| ball.clone()).collect()
+    }
+
     fn run(&self, indices: &[usize], count: bool) -> Vec<Option<Arrival>> {
-        let balls: Vec<Neighbourhood> = self
-            .neighbourhoods
-            .iter()
-            .map(|(_, ball)| ball.clone())
-            .collect();
+        let balls = self.balls();
         let known = Known {
             balls: &balls,
             chaos: &self.chaos,
@@ -482,6 +487,61 @@ impl<M: StroboscopicMap> Work<'_, M> {
             position += 1;
             !discarded.contains(&(position - 1))
         });
+    }
+
+    /// Follows chaotic starts for several times the periods `after` which escapes are
+    /// counted: beside a weakly stable orbit, chaos that was watched for less than a
+    /// linear transient takes is no evidence of an attractor. Where one of them escapes,
+    /// escapes count from when it was known to be chaotic.
+    fn watch_chaos(&mut self, after: &mut f64) {
+        let enough = (WATCHED_TRANSIENTS * *after) as usize;
+        let mut budget = self.options.max_periods;
+        let watched: Vec<usize> = (0..self.outcomes.len())
+            .filter(|&k| match &self.outcomes[k] {
+                Outcome::Chaos(chaos, _) if chaos.observed < enough => {
+                    let left = budget.checked_sub(enough - chaos.observed);
+                    budget = left.unwrap_or(budget);
+                    left.is_some()
+                }
+                _ => false,
+            })
+            .collect();
+        let balls = self.balls();
+        let ends: Vec<Result<Vec<f64>, Arrival>> = watched
+            .par_iter()
+            .map_init(
+                || self.map.clone(),
+                |map, &k| match &self.outcomes[k] {
+                    Outcome::Chaos(chaos, state) => {
+                        let periods = enough - chaos.observed;
+                        watch(map, state, &balls, periods, &self.options.settle)
+                    }
+                    _ => Ok(Vec::new()),
+                },
+            )
+            .collect();
+        let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
+        for (k, end) in watched.into_iter().zip(ends) {
+            let Outcome::Chaos(chaos, at) = &mut self.outcomes[k] else {
+                continue;
+            };
+            match end {
+                Ok(state) => {
+                    chaos.observed = enough;
+                    *at = state;
+                }
+                Err(arrival) => {
+                    let (spectrum, observed) = (chaos.spectrum.clone(), chaos.observed);
+                    let mut outcome = self.outcome(Some(arrival), &known);
+                    if let Outcome::Orbit { periods, .. } = &mut outcome {
+                        *periods += observed;
+                        self.transient_spectrum.get_or_insert(spectrum);
+                        *after = after.min(observed as f64);
+                    }
+                    self.outcomes[k] = outcome;
+                }
+            }
+        }
     }
 
     /// The natural length of a transient that is no chaos.

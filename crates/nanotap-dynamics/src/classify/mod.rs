@@ -37,7 +37,7 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
-pub(crate) use run::{Arrival, Known, arrive};
+pub(crate) use run::{Arrival, Known, arrive, watch};
 pub use undecided::UndecidedReason;
 
 /// Budgets of [`settle`].

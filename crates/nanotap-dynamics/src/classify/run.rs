@@ -72,29 +72,31 @@ pub(crate) fn arrive<M: StroboscopicMap>(
         }));
     }
     let mut run = Run::new(start, known, options);
-    let verdict = match run.follow(map) {
-        Ok(verdict) => verdict,
-        Err(Stop::Entered(index)) => {
-            return Arrival::Entered {
-                index,
-                periods: run.periods,
-            };
-        }
-        Err(Stop::Unbounded) => Verdict::Unbounded,
-        Err(Stop::Failed(failure)) => undecided(
-            UndecidedReason::Map {
-                periods: run.periods,
-                failure,
-            },
-            None,
-        ),
+    match run.follow(map) {
+        Ok(verdict) => run.settled(verdict),
+        Err(stop) => run.stopped(stop),
+    }
+}
+
+/// Follows a motion for so many periods more: its state then, or where it went instead.
+pub(crate) fn watch<M: StroboscopicMap>(
+    map: &mut M,
+    state: &[f64],
+    balls: &[Neighbourhood],
+    periods: usize,
+    options: &SettleOptions,
+) -> Result<Vec<f64>, Arrival> {
+    let known = Known {
+        balls,
+        ..Known::default()
     };
-    Arrival::Settled(Box::new(Settled {
-        verdict,
-        periods: run.periods,
-        state: run.state,
-        met: run.met,
-    }))
+    let mut run = Run::new(state, known, options);
+    while run.periods < periods {
+        if let Err(stop) = run.step(map) {
+            return Err(run.stopped(stop));
+        }
+    }
+    Ok(run.state)
 }
 
 fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Verdict {
@@ -146,6 +148,27 @@ impl<'a> Run<'a> {
                 ..options.shooting.clone()
             },
             met: Vec::new(),
+        }
+    }
+
+    fn settled(self, verdict: Verdict) -> Arrival {
+        Arrival::Settled(Box::new(Settled {
+            verdict,
+            periods: self.periods,
+            state: self.state,
+            met: self.met,
+        }))
+    }
+
+    fn stopped(self, stop: Stop) -> Arrival {
+        let periods = self.periods;
+        match stop {
+            Stop::Entered(index) => Arrival::Entered { index, periods },
+            Stop::Unbounded => self.settled(Verdict::Unbounded),
+            Stop::Failed(failure) => {
+                let reason = UndecidedReason::Map { periods, failure };
+                self.settled(undecided(reason, None))
+            }
         }
     }
 
@@ -379,6 +402,17 @@ impl<'a> Run<'a> {
                 UndecidedReason::NotIsolated {
                     period: c.period,
                     closure: c.closure,
+                },
+                Some(spectrum),
+            ));
+        }
+        if self.d == 1 {
+            return Ok(undecided(
+                UndecidedReason::NoTorusOnALine {
+                    exponent,
+                    error,
+                    max_period: longest_period,
+                    observed: self.periods,
                 },
                 Some(spectrum),
             ));

@@ -61,6 +61,20 @@ pub enum UndecidedReason {
         /// Periods run.
         observed: usize,
     },
+    /// The exponent is zero within errors, but a line holds no closed curve.
+    #[error(
+        "the largest exponent is zero within errors ({exponent:.3e} ± {error:.1e} per period) and no orbit of period up to {max_period} closed in {observed} periods; it is no torus, for the map has one variable only"
+    )]
+    NoTorusOnALine {
+        /// Largest exponent.
+        exponent: f64,
+        /// Its standard error.
+        error: f64,
+        /// Longest period tried.
+        max_period: usize,
+        /// Periods run.
+        observed: usize,
+    },
     /// The exponent is zero within errors, but averages do not converge as on a torus.
     #[error(
         "the largest exponent is zero within errors ({exponent:.3e} ± {error:.1e} per period), but Birkhoff averages agree to {digits:.1} digits only"

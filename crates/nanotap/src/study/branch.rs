@@ -2,10 +2,11 @@
 //! bifurcations, and the loci of these in two parameters.
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions, Complex,
-    ContinuationError, ContinuationOptions, Control, Diagram, DiagramBranch, DiagramOptions,
-    Direction, LocusOptions, PeriodicOrbit, SettleOptions, StartBoxError, assemble_diagram, census,
-    continue_orbit, trace_locus,
+    AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions,
+    Complex, ContinuationError, ContinuationOptions, Control, Diagram, DiagramBranch,
+    DiagramOptions, Direction, GlobalOptions, LocusOptions, LyapunovOptions, PeriodicOrbit,
+    SettleOptions, StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit,
+    trace_locus,
 };
 use nanotap_flow::FlowError;
 use schemars::JsonSchema;
@@ -19,7 +20,7 @@ use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
 use crate::study::registry::Study;
-use crate::study::start_box::default_box;
+use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, key_and_ends};
 
 /// How to follow.
@@ -56,7 +57,7 @@ pub struct BranchOptions {
 pub struct SeedOptions {
     /// Parameter values, evenly spaced over the range, its ends included.
     pub values: usize,
-    /// Starts at each.
+    /// Starts drawn at each, besides rest and the linear responses.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
@@ -67,8 +68,8 @@ pub struct SeedOptions {
 impl Default for SeedOptions {
     fn default() -> Self {
         Self {
-            values: 5,
-            starts: 48,
+            values: 65,
+            starts: 16,
             seed: 1,
             max_period: 16,
         }
@@ -465,41 +466,55 @@ fn first_orbit(case: &Case, options: &BranchOptions) -> Result<PeriodicOrbit, Br
     .map_err(|error| failed(error.into()))
 }
 
-/// Stable orbits at several values of the parameter.
+/// Stable orbits at several values of the parameter: those of a census at each, and those
+/// that the ones of the neighbouring values lead to, until no value gains another.
 fn census_seeds(
     case: &Case,
     options: &BranchOptions,
     seeds: &SeedOptions,
     control: &Control<'_>,
 ) -> Result<Vec<(f64, PeriodicOrbit)>, BranchError> {
-    let values = seeds.values.max(2);
-    let mut found = Vec::new();
-    for k in 0..values {
-        if control.is_cancelled() {
-            break;
-        }
-        let t = k as f64 / (values - 1) as f64;
-        let value = options.from + t * (options.to - options.from);
-        let model = model_at(case, options.key, value)?;
-        let starts = default_box(&model)?.starts(seeds.seed, seeds.starts);
-        let census_options = CensusOptions {
+    let steps = seeds.values.max(2) - 1;
+    let values: Vec<f64> = (0..=steps)
+        .map(|k| k as f64 / steps as f64)
+        .map(|t| options.from * (1.0 - t) + options.to * t)
+        .collect();
+    // Where there is no model there is no map, and nobody asks for starts.
+    let starts = |k: usize, _: &Strobe| {
+        let model = model_at(case, options.key, values[k]).ok();
+        let drawn = model.and_then(|model| default_starts(&model, seeds.seed).ok());
+        drawn.unwrap_or_else(|| StartSet::given(Vec::new()))
+    };
+    let settle = SettleOptions::default();
+    let how = GlobalOptions {
+        census: CensusOptions {
+            pilots: seeds.starts,
+            max_starts: seeds.starts,
             settle: SettleOptions {
                 max_period: seeds.max_period,
-                ..SettleOptions::default()
+                lyapunov: LyapunovOptions {
+                    max_periods: SEED_PERIODS,
+                    ..settle.lyapunov
+                },
+                ..settle
             },
             ..CensusOptions::default()
-        };
-        let taken = census(&Strobe::new(&model), &starts, &census_options, control);
-        for attractor in taken.attractors {
-            if let nanotap_dynamics::AttractorKind::Periodic(orbit) = attractor.kind {
-                found.push((value, orbit));
+        },
+    };
+    let family = case.family(options.key);
+    let known = attractors_along(&family, &values, starts, &how, control);
+    let mut found = Vec::new();
+    for (value, at) in values.iter().zip(known) {
+        for each in at.attractors {
+            if let AttractorKind::Periodic(orbit) = each.attractor.kind {
+                found.push((*value, orbit));
             }
         }
     }
     if found.is_empty() && !control.is_cancelled() {
         return Err(BranchError::NoSeeds {
             name: options.key.path(),
-            values,
+            values: values.len(),
         });
     }
     Ok(found)
@@ -671,6 +686,9 @@ fn bifurcation(
     })
 }
 
+/// Periods over which Lyapunov exponents are measured at most where seeds are looked for:
+/// only what closes is followed.
+const SEED_PERIODS: usize = 1000;
 /// Points of each half of a locus at most.
 const LOCUS_POINTS: usize = 6000;
 

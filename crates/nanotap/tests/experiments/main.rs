@@ -1,6 +1,7 @@
 //! Experiments against closed forms, invariants and independent methods.
 
 mod approach;
+mod branches;
 mod identities;
 mod modes_that_matter;
 mod physical_quantities;

@@ -490,6 +490,7 @@ fn census_seeds(
         census: CensusOptions {
             pilots: seeds.starts,
             max_starts: seeds.starts,
+            max_periods: SEED_PERIODS * seeds.starts,
             settle: SettleOptions {
                 max_period: seeds.max_period,
                 lyapunov: LyapunovOptions {

@@ -48,7 +48,9 @@ pub use continuation::{
 pub use control::Control;
 pub use curve::{CurveEnd, Locus, LocusOptions, LocusPoint, trace_locus};
 pub use failure::MapFailure;
-pub use global::{GlobalAttractor, GlobalOptions, GlobalValue, attractors_along, attractors_over};
+pub use global::{
+    GlobalAttractor, GlobalOptions, GlobalValue, attractors_along, attractors_over, orbits_shared,
+};
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
 pub use map::{MapFamily, StroboscopicMap, Tangency, TwoParameterFamily};
 pub use nalgebra::{Complex, DMatrix};

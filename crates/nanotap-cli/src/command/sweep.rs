@@ -153,5 +153,13 @@ fn counts(summary: &Summary) -> String {
             }
         }
     }
-    table.render()
+    match summary.from_neighbours.len() {
+        0 => table.render(),
+        more => format!(
+            "{}\n  {} more that no start met, but that {} of neighbouring values to\n",
+            table.render(),
+            number::counted(more, "motion", "motions"),
+            if more == 1 { "one leads" } else { "those lead" }
+        ),
+    }
 }

@@ -138,7 +138,7 @@ fn over_graph<M: StroboscopicMap>(
         progress: None,
     };
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let mut values: Vec<GlobalValue> = (0..count)
+    let values: Vec<GlobalValue> = (0..count)
         .into_par_iter()
         .map(|k| {
             let value = match at(k) {
@@ -153,6 +153,48 @@ fn over_graph<M: StroboscopicMap>(
             value
         })
         .collect();
+    shared(values, at, neighbours, &options.census.settle, control)
+}
+
+/// Orbits that are known at some values, tried at the neighbouring ones in turn until no
+/// value gains one: the last step of [`attractors_along`] where runs were made already.
+/// `known` has the stable orbits at each value, `at` is the map there, `neighbours` are the
+/// values beside it.
+pub fn orbits_shared<M: StroboscopicMap>(
+    known: Vec<Vec<PeriodicOrbit>>,
+    at: impl Fn(usize) -> Result<M, String> + Sync,
+    neighbours: impl Fn(usize) -> Vec<usize>,
+    settle: &SettleOptions,
+    control: &Control<'_>,
+) -> Vec<GlobalValue> {
+    let values = known.into_iter().map(|orbits| GlobalValue {
+        attractors: orbits
+            .into_iter()
+            .map(|orbit| GlobalAttractor {
+                attractor: Attractor {
+                    state: orbit.states[0].clone(),
+                    kind: AttractorKind::Periodic(orbit),
+                    fraction: Fraction::new(0, 0),
+                    first_start: None,
+                },
+                shown_by: None,
+                branch: 0,
+            })
+            .collect(),
+        census: None,
+        failure: None,
+    });
+    shared(values.collect(), at, neighbours, settle, control)
+}
+
+/// Tries what is known at each value at its neighbours until none gains anything.
+fn shared<M: StroboscopicMap>(
+    mut values: Vec<GlobalValue>,
+    at: impl Fn(usize) -> Result<M, String> + Sync,
+    neighbours: impl Fn(usize) -> Vec<usize>,
+    settle: &SettleOptions,
+    control: &Control<'_>,
+) -> Vec<GlobalValue> {
     let mut links: Vec<(Place, Place)> = Vec::new();
     let mut fresh: Vec<Place> = places(&values);
     while !fresh.is_empty() && !control.is_cancelled() {
@@ -169,7 +211,7 @@ fn over_graph<M: StroboscopicMap>(
                 }
                 let attractor = &values[from.0].attractors[from.1].attractor;
                 let mut map = at(k).ok()?;
-                let (kind, state, continued) = tried(&mut map, attractor, &options.census.settle)?;
+                let (kind, state, continued) = tried(&mut map, attractor, settle)?;
                 Some(Trial {
                     from,
                     at: k,

@@ -268,6 +268,27 @@ impl Store {
         }
     }
 
+    /// Writes a document beside the arrays, whole or not at all.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn write_beside(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        write_if_other(&self.path.join(name), bytes)
+    }
+
+    /// A document beside the arrays; `None` if it is not there.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn read_beside(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        let path = self.path.join(name);
+        match fs::read(&path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(StoreError::io("read", &path)(error)),
+        }
+    }
+
     /// Once every chunk is finished: removes what killed runs left half-written. Returns
     /// whether every chunk is.
     ///

@@ -12,7 +12,7 @@ use crate::case::physical::Kind;
 use crate::case::units::prefixed;
 use crate::dataset::{Coordinate, Store, StoreError, Values};
 use crate::study::simulate::Classification;
-use crate::study::sweep::{Motions, class_of};
+use crate::study::sweep::{FromNeighbour, Motions, class_of, from_neighbours};
 
 /// Categories of a map, and periods of a diagram, that get a colour of their own.
 const MOST_CATEGORIES: usize = 12;
@@ -56,6 +56,9 @@ pub struct SweepTable {
     /// sweep over two parameters.
     #[serde(default)]
     pub period_max: Vec<f64>,
+    /// Orbits that no start met, but that those of neighbouring values lead to.
+    #[serde(default)]
+    pub neighbours: Vec<FromNeighbour>,
 }
 
 /// Direction and motion of a cloud of points; no motion: one too rare to be named.
@@ -89,6 +92,7 @@ impl SweepTable {
             classification: vec![0; cells],
             period: vec![0; cells],
             period_max: vec![f64::NAN; cells * stride],
+            neighbours: from_neighbours(store)?,
         };
         for chunk in 0..store.chunks() {
             let block = schema.grid.block(chunk);
@@ -170,6 +174,15 @@ impl SweepTable {
                 .or_default();
             cloud.extend(row.iter().filter(|y| y.is_finite()).map(|y| (at, *y)));
         }
+        // Where motions are followed, hysteresis is what is to be seen.
+        let drawn = self.directions.iter().all(String::is_empty);
+        for orbit in self.neighbours.iter().filter(|_| drawn) {
+            let (Some(&at), Some(motion)) = (x.values.get(orbit.at[0]), orbit.motion()) else {
+                continue;
+            };
+            let key = ("", frequent.contains(&motion).then_some(motion));
+            clouds.entry(key).or_default().push((at, orbit.tip_max));
+        }
         let (factor, unit) = deflection(&self.units, clouds.values().flatten().map(|p| p.1));
         let shown: BTreeSet<&str> = self.directions.iter().map(String::as_str).collect();
         let mut figure = Figure::new(shown.len(), 1).width(DOUBLE_COLUMN).share_x();
@@ -214,13 +227,19 @@ impl SweepTable {
     /// What motions there are over two parameters.
     fn map(&self, x: &GridScale, y: &GridScale) -> Figure {
         let starts = self.directions.len();
-        let found: Vec<BTreeSet<Option<Motion>>> = (0..x.values.len() * y.values.len())
+        let mut found: Vec<BTreeSet<Option<Motion>>> = (0..x.values.len() * y.values.len())
             .map(|place| {
                 (0..starts)
                     .map(|k| self.motion(place * starts + k))
                     .collect()
             })
             .collect();
+        for orbit in &self.neighbours {
+            let place = orbit.at[1] * x.values.len() + orbit.at[0];
+            if let (Some(motions), Some(motion)) = (found.get_mut(place), orbit.motion()) {
+                motions.insert(Some(motion));
+            }
+        }
         let mut counts: BTreeMap<&BTreeSet<Option<Motion>>, usize> = BTreeMap::new();
         for motions in &found {
             *counts.entry(motions).or_default() += 1;
@@ -274,6 +293,13 @@ impl SweepTable {
             .with(layer)
             .legend(Legend::Right);
         Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS)
+    }
+}
+
+impl FromNeighbour {
+    /// What it is, as far as its colour goes; none of what does not repeat.
+    fn motion(&self) -> Option<Motion> {
+        (self.period > 0).then_some(Motion::Periodic(self.period))
     }
 }
 

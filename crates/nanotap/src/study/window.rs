@@ -1,9 +1,11 @@
 //! The operating window: where, over two parameters, the lever taps with one motion and no
 //! other, and where a second state, subharmonics or chaos threaten.
 //!
-//! Every point is a census of its own: motions from seeded starts all over the box of states,
-//! each named as in a [sweep](crate::study::sweep), whose datasets, chunks and resumption serve here
-//! too. What is found is certain, what is not found is only not found: more starts see more.
+//! Every point is a census of its own: motions from rest, from the linear responses and from
+//! seeded starts of every size, each named as in a [sweep](crate::study::sweep), whose datasets,
+//! chunks and resumption serve here too; then the orbits of each point are tried at its
+//! neighbours, until none gains one. What is found is certain, what is not found is only not
+//! found: more starts see more.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -22,8 +24,7 @@ use crate::study::limits::MOST_PERIOD;
 use crate::study::recipe::Recipe;
 use crate::study::registry::DatasetStudy;
 use crate::study::simulate::Classification;
-use crate::study::sweep::class_of;
-use crate::study::sweep::{Sweep, SweepRequest};
+use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepRequest, class_of, from_neighbours};
 use crate::study::value::Axes;
 
 /// What there is at one point, from the safest to the least.
@@ -130,6 +131,24 @@ struct Seen {
     contact: f64,
 }
 
+impl From<&FromNeighbour> for Seen {
+    fn from(motion: &FromNeighbour) -> Self {
+        let repeats = motion.period > 0;
+        Self {
+            // What does not repeat is chaos or a torus: one condition.
+            class: Some(if repeats {
+                Classification::Periodic
+            } else {
+                Classification::Chaotic
+            }),
+            period: i32::try_from(motion.period).unwrap_or(i32::MAX),
+            amplitude: motion.first_harmonic,
+            maximum: motion.tip_max,
+            contact: motion.contact_fraction,
+        }
+    }
+}
+
 impl Window {
     /// Of the finished dataset of a sweep over two parameters.
     ///
@@ -176,6 +195,12 @@ impl Window {
                     maximum: maxima[flat],
                     contact: contacts[flat],
                 });
+            }
+        }
+        for motion in from_neighbours(store)? {
+            let point = motion.at[1] * columns + motion.at[0];
+            if let Some(seen) = seen.get_mut(point) {
+                seen.push(Seen::from(&motion));
             }
         }
         let conditions: Vec<Vec<Condition>> = seen
@@ -285,7 +310,7 @@ pub struct WindowRequest {
     /// omega=2:4:81; twice, the first is the horizontal axis
     #[schemars(extend("x-value" = "KEY=FROM:TO:COUNT", "x-required" = true))]
     pub over: Axes,
-    /// Quasi-random starts of the census at each point
+    /// Starts of the census at each point: rest, the linear responses, and draws of every size
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: usize,
     /// Seed of the starts
@@ -329,7 +354,8 @@ impl WindowRequest {
             max_period: self.max_period,
             ..SweepRequest::default()
         };
-        request.sweep(case)
+        let (count, seed) = (self.starts, self.seed);
+        Ok(request.sweep(case)?.from(Starts::Spread { count, seed })?)
     }
 }
 

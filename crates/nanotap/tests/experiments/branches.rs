@@ -46,10 +46,7 @@ fn a_smooth_branch_is_followed_to_its_end() {
     assert!(report.failures.is_empty(), "{:?}", report.failures);
     assert_eq!(report.branches[0].range, [2.1, 6.0]);
     let flips = of_kind(&report, "flip");
-    assert!(
-        flips.iter().any(|f| (f - 5.1385).abs() < 5e-5),
-        "{flips:?}"
-    );
+    assert!(flips.iter().any(|f| (f - 5.1385).abs() < 5e-5), "{flips:?}");
 }
 
 /// With the drive's amplitude all motion ends: the orbit shrinks with α2, to nothing.

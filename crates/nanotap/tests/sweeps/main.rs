@@ -3,4 +3,5 @@
 mod basins;
 mod datasets;
 mod folder;
+mod neighbours;
 mod physics;

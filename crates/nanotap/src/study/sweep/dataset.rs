@@ -42,7 +42,7 @@ fn code(classification: Classification) -> u8 {
 /// Names of what the recordings are over.
 pub(super) const PERIODS: &str = "drive_period";
 const STROBE: &str = "strobe_period";
-const STATE: &str = "state";
+pub(super) const STATE: &str = "state";
 /// Name of the last axis of the grid.
 pub(super) const START: &str = "start";
 
@@ -250,6 +250,10 @@ fn attributes(case: &Case, options: &SweepOptions) -> crate::dataset::schema::At
         Starts::Seeded { count, seed, sides } => {
             all.insert("seed".into(), json!(seed));
             json!({ "count": count, "seed": seed, "box": sides })
+        }
+        Starts::Spread { count, seed } => {
+            all.insert("seed".into(), json!(seed));
+            json!({ "count": count, "seed": seed, "sizes": "spread" })
         }
     };
     let recipe: Value = json!({

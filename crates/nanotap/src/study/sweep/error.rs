@@ -159,6 +159,7 @@ fn starts(case: &Case, options: &SweepOptions) -> Result<(), SweepError> {
             Starts::Rest => {}
             Starts::Given(state) => drop(starting_state(&model, Some(state))?),
             Starts::Seeded { sides, .. } => drop(box_with(&model, sides)?),
+            Starts::Spread { .. } => drop(box_with(&model, &[])?),
         }
     }
     Ok(())

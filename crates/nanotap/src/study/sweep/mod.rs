@@ -27,6 +27,7 @@
 mod dataset;
 mod error;
 mod follow;
+mod neighbours;
 mod over;
 mod request;
 mod run;
@@ -34,6 +35,7 @@ mod summary;
 
 pub use error::SweepError;
 pub use follow::Follow;
+pub use neighbours::{FromNeighbour, from_neighbours};
 pub use over::{Over, OverError, Spacing};
 pub use request::{SweepRequest, SweepStudy};
 pub use run::Starts;
@@ -131,6 +133,18 @@ impl Sweep {
         })
     }
 
+    /// The same sweep from other starts.
+    ///
+    /// # Errors
+    /// As [`Sweep::new`].
+    pub fn from(self, starts: Starts) -> Result<Self, SweepError> {
+        let options = SweepOptions {
+            starts,
+            ..self.options
+        };
+        Self::new(self.case, options)
+    }
+
     /// What its dataset holds.
     pub fn schema(&self) -> &Schema {
         &self.schema
@@ -146,7 +160,9 @@ impl Sweep {
         self.schema.grid.entries()
     }
 
-    /// Computes the chunks that `store`, made for [`schema`](Self::schema), still lacks.
+    /// Computes the chunks that `store`, made for [`schema`](Self::schema), still lacks; once
+    /// all are there, the orbits found are tried at the neighbouring values
+    /// ([`from_neighbours`]).
     ///
     /// # Errors
     /// When the work was stopped (what is finished stays), or the store refuses.
@@ -158,7 +174,11 @@ impl Sweep {
             |block| self.items(block),
             |block, item| self.item(block, item, &cancelled),
             |_, items| self.columns(&items),
-        )
+        )?;
+        if store.missing() > 0 {
+            return Ok(());
+        }
+        self.share(store, &how.control)
     }
 
     /// The files of one chunk, computed on this thread: the same bytes wherever that is.

@@ -12,7 +12,7 @@ use crate::model::strobe::Strobe;
 use crate::observe::time_series::with_modes;
 use crate::observe::{Measurement, Observables, Set};
 use crate::study::simulate::{Classification, Named};
-use crate::study::start_box::box_with;
+use crate::study::start_box::{box_with, default_starts};
 
 /// Where motions start.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +31,14 @@ pub enum Starts {
         /// [fit the case](crate::study::start_box) at each value.
         sides: Vec<(String, f64, f64)>,
     },
+    /// Rest, the linear responses, and draws of every size
+    /// ([`default_starts`](crate::study::start_box::default_starts)).
+    Spread {
+        /// How many.
+        count: usize,
+        /// Seed of the draws.
+        seed: u64,
+    },
 }
 
 impl Starts {
@@ -38,7 +46,7 @@ impl Starts {
     pub fn count(&self) -> usize {
         match self {
             Self::Rest | Self::Given(_) => 1,
-            Self::Seeded { count, .. } => *count,
+            Self::Seeded { count, .. } | Self::Spread { count, .. } => *count,
         }
     }
 
@@ -52,6 +60,10 @@ impl Starts {
                 |_| vec![0.0; model.dimension()],
                 |sides| sides.start(*seed, index as u64),
             ),
+            Self::Spread { seed, .. } => default_starts(model, *seed)
+                .ok()
+                .and_then(|starts| starts.start(index))
+                .unwrap_or_else(|| vec![0.0; model.dimension()]),
         }
     }
 }
@@ -324,7 +336,7 @@ struct Watched {
 const ARRIVED: f64 = 1e-10;
 
 /// Whether a motion that goes to an orbit has come to it.
-fn is_on(orbit: &PeriodicOrbit, state: &[f64]) -> bool {
+pub(super) fn is_on(orbit: &PeriodicOrbit, state: &[f64]) -> bool {
     let apart = nearest(orbit, state).iter().zip(state);
     let distance = apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     distance <= (ARRIVED * orbit.scale()).max(10.0 * orbit.error)

@@ -6,10 +6,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::dataset::CLASSES;
+use super::{FromNeighbour, from_neighbours};
 use crate::dataset::{Store, StoreError, Values};
 
 /// How many runs came to what.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// All of them.
     pub runs: usize,
@@ -17,13 +18,19 @@ pub struct Summary {
     pub counts: BTreeMap<&'static str, usize>,
     /// Periodic ones by period.
     pub periods: BTreeMap<i32, usize>,
+    /// Motions that no run met, but that those of neighbouring values lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub from_neighbours: Vec<FromNeighbour>,
 }
 
 impl Summary {
     /// Counts the runs of a finished dataset.
     pub(super) fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
-        let mut summary = Self::default();
+        let mut summary = Self {
+            from_neighbours: from_neighbours(store)?,
+            ..Self::default()
+        };
         summary.counts.extend(CLASSES.iter().map(|c| (c.name(), 0)));
         for chunk in 0..store.chunks() {
             let Motions { codes, periods } = Motions::read(store, chunk)?;

@@ -1,0 +1,217 @@
+//! Motions that no start of a sweep met at a value, but that those of the neighbouring
+//! values lead to.
+//!
+//! Starts are drawn; an attractor whose basin is small is met at some values and missed at
+//! others. So each stable orbit that the runs ended on is tried at the neighbouring values,
+//! both ways along every parameter, and what is new there at its neighbours in turn
+//! ([`nanotap_dynamics::orbits_shared`]). What that finds is kept beside the dataset, in
+//! `neighbours.json`: the runs stay what they are.
+//!
+//! Fails: where the number of modes varies, or no strobe states were kept, nothing is tried;
+//! an orbit that no run at any value ended on is not found.
+
+use nanotap_dynamics::{
+    AttractorKind, Control, PeriodicOrbit, ShootingOptions, close_orbit, orbits_shared,
+};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::run::is_on;
+use super::{Motions, Sweep};
+use crate::case::{Case, CaseError, Key};
+use crate::dataset::{Store, StoreError, Values, WorkError};
+use crate::model::strobe::Strobe;
+use crate::observe::{Set, measure};
+
+/// The file of a sweep's dataset that keeps them.
+const FILE: &str = "neighbours.json";
+
+/// A stable orbit that no start met at a value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FromNeighbour {
+    /// Index of the value of each parameter, in the order in which they were given.
+    pub at: Vec<usize>,
+    /// The values.
+    pub values: Vec<f64>,
+    /// Period; 0 of a motion that does not repeat.
+    pub period: usize,
+    /// A state on it, at drive phase 0.
+    pub state: Vec<f64>,
+    /// Amplitude at the drive's frequency, in the dataset's unit of length.
+    pub first_harmonic: f64,
+    /// Greatest tip deflection.
+    pub tip_max: f64,
+    /// Part of the time in contact.
+    pub contact_fraction: f64,
+}
+
+impl Sweep {
+    /// Tries the orbits of a finished dataset of this sweep at the neighbouring values, and
+    /// keeps beside it what no start had met there; nothing if that was done.
+    pub(super) fn share(&self, store: &Store, control: &Control<'_>) -> Result<(), WorkError> {
+        if store.read_beside(FILE)?.is_some() {
+            return Ok(());
+        }
+        let found = match store.schema().index_of("strobe") {
+            Some(strobe) if self.options.over.iter().all(|o| o.key != Key::Modes) => {
+                self.gained(store, strobe, control)?
+            }
+            _ => Vec::new(),
+        };
+        if control.is_cancelled() {
+            let (finished, total) = (store.chunks(), store.chunks());
+            return Err(WorkError::Cancelled { finished, total });
+        }
+        let text = serde_json::to_string(&found).unwrap_or_default();
+        Ok(store.write_beside(FILE, text.as_bytes())?)
+    }
+
+    fn gained(
+        &self,
+        store: &Store,
+        strobe: usize,
+        control: &Control<'_>,
+    ) -> Result<Vec<FromNeighbour>, StoreError> {
+        let shape: Vec<usize> = self.options.over.iter().map(|over| over.count).collect();
+        let count: usize = shape.iter().product();
+        let place = |k: usize| [k % shape[0], k / shape[0]];
+        let case_at = |k: usize| -> Case {
+            let steps = self.options.over.iter().zip(place(k));
+            steps.fold(self.case.clone(), |case, (over, index)| {
+                over.apply(&case, index)
+            })
+        };
+        let model_at = |k: usize| case_at(k).model();
+        let map_at = |k: usize| model_at(k).map(|m| Strobe::new(&m));
+        let neighbours = |k: usize| {
+            let [x, y] = place(k);
+            let rows = shape.get(1).copied().unwrap_or(1);
+            [
+                (x > 0).then(|| k - 1),
+                (x + 1 < shape[0]).then_some(k + 1),
+                (y > 0).then(|| k - shape[0]),
+                (y + 1 < rows).then_some(k + shape[0]),
+            ]
+            .into_iter()
+            .flatten()
+            .collect()
+        };
+        let states = self.orbit_states(store, strobe, count)?;
+        let known: Vec<Vec<PeriodicOrbit>> = states
+            .par_iter()
+            .enumerate()
+            .map(|(k, states)| map_at(k).map_or_else(|_| Vec::new(), |map| closed(map, states)))
+            .collect();
+        let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
+        let settle = self.options.settle();
+        let values = orbits_shared(known, at, neighbours, &settle, control);
+        let mut found = Vec::new();
+        for (k, value) in values.into_iter().enumerate() {
+            let gained = value
+                .attractors
+                .into_iter()
+                .filter(|a| a.shown_by.is_some());
+            for attractor in gained.map(|a| a.attractor) {
+                let period = match &attractor.kind {
+                    AttractorKind::Periodic(orbit) => orbit.period,
+                    _ => 0,
+                };
+                let case = case_at(k);
+                let turn = if period == 0 { UNREPEATED } else { period };
+                let Ok(model) = case.model() else { continue };
+                let Ok(seen) = measure(&model, &attractor.state, turn, Set::COMMON) else {
+                    continue;
+                };
+                let seen = case
+                    .physical()
+                    .map_or(seen.clone(), |view| seen.in_si(&view.scales));
+                let at = &place(k)[..shape.len()];
+                found.push(FromNeighbour {
+                    at: at.to_vec(),
+                    values: at
+                        .iter()
+                        .zip(&self.options.over)
+                        .map(|(&index, over)| over.value(index))
+                        .collect(),
+                    period,
+                    state: attractor.state,
+                    first_harmonic: seen.first_harmonic,
+                    tip_max: seen.tip_max,
+                    contact_fraction: seen.contact_fraction,
+                });
+            }
+        }
+        Ok(found)
+    }
+
+    /// Period and state of every run that ended on an orbit, value by value, the first
+    /// parameter fastest.
+    fn orbit_states(
+        &self,
+        store: &Store,
+        strobe: usize,
+        count: usize,
+    ) -> Result<Vec<Vec<(usize, Vec<f64>)>>, StoreError> {
+        let schema = store.schema();
+        let stride = schema.variables[strobe].stride();
+        let columns = schema.coordinate(super::dataset::STATE);
+        let columns = columns.map_or(stride, |c| c.values.len());
+        let mut states = vec![Vec::new(); count];
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            let periods = Motions::read(store, chunk)?.periods;
+            let Values::Real(rows) = store.read_chunk(&block, strobe)? else {
+                continue;
+            };
+            for (flat, entry) in block.entries().enumerate() {
+                let period = usize::try_from(periods[flat]).unwrap_or(0);
+                let end = (flat + 1) * stride;
+                let state = rows.get(end - columns..end).unwrap_or_default();
+                if period > 0 && state.iter().all(|v| v.is_finite()) {
+                    let axis = self.axis();
+                    let first = entry[axis];
+                    let second = if axis > 0 { entry[0] } else { 0 };
+                    let width = self.options.over[0].count;
+                    states[second * width + first].push((period, state.to_vec()));
+                }
+            }
+        }
+        Ok(states)
+    }
+}
+
+/// Drive periods over which a motion that does not repeat is measured.
+const UNREPEATED: usize = 64;
+
+/// The stable orbits among the states that runs ended in, each once.
+fn closed(mut map: Strobe, states: &[(usize, Vec<f64>)]) -> Vec<PeriodicOrbit> {
+    let mut orbits: Vec<PeriodicOrbit> = Vec::new();
+    for (period, state) in states {
+        let known = orbits.iter().filter(|o| o.period == *period);
+        if known.into_iter().any(|orbit| is_on(orbit, state)) {
+            continue;
+        }
+        let Ok(orbit) = close_orbit(&mut map, state, *period, &ShootingOptions::default()) else {
+            continue;
+        };
+        if orbit.is_stable() && !orbits.iter().any(|o| o.is_same_as(&orbit)) {
+            orbits.push(orbit);
+        }
+    }
+    orbits
+}
+
+/// What was kept beside a dataset; nothing where nothing was tried.
+///
+/// # Errors
+/// When the file cannot be read or is damaged.
+pub fn from_neighbours(store: &Store) -> Result<Vec<FromNeighbour>, StoreError> {
+    let Some(bytes) = store.read_beside(FILE)? else {
+        return Ok(Vec::new());
+    };
+    serde_json::from_slice(&bytes).map_err(|error| StoreError::NotAStore {
+        path: store.path().into(),
+        what: format!("its {FILE} is damaged: {error}"),
+    })
+}

@@ -1,0 +1,99 @@
+//! What one value of a sweep shows, its neighbours know.
+
+use nanotap::case::Case;
+use nanotap::case::file::Source;
+use nanotap::dataset::{Share, Store, Work};
+use nanotap::study::FreeMotion;
+use nanotap::study::sweep::{SweepRequest, from_neighbours};
+use nanotap::study::value::Axes;
+use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap_dynamics::Control;
+
+use crate::folder::Folder;
+
+fn case(text: &str) -> Case {
+    let source = Source {
+        name: "case.toml".into(),
+        text: text.into(),
+    };
+    Case::parse(Some(source), &[]).unwrap()
+}
+
+fn how() -> Work<'static> {
+    Work {
+        share: Share::WHOLE,
+        threads: 2,
+        control: Control::default(),
+    }
+}
+
+/// A lever of 42 N/m, 330 kHz and Q = 400 on polystyrene, 325 … 335 kHz, gaps of
+/// 2 … 25 nm. Where the free motion does not reach the sample it exists and is stable, so no
+/// such point may be called one motion that taps.
+#[test]
+fn no_window_calls_a_bistable_point_safe() {
+    let lever = case(
+        "[model]\nmodes = 2\n[cantilever]\nlever = \"PPP-NCHR\"\nQ = 400\n\
+         [tip]\nradius = \"10 nm\"\n\
+         [sample]\nmaterial = \"polystyrene\"\nloss_tangent = 0.1\n\
+         [drive]\nfrequency_ratio = 1.001\nfree_amplitude = \"20 nm\"\n[gap]\ntip = \"15 nm\"\n",
+    );
+    let request = WindowRequest {
+        over: Axes(vec![
+            "drive.frequency=325kHz:335kHz:7".to_owned(),
+            "gap.tip=2nm:25nm:12".to_owned(),
+        ]),
+        ..WindowRequest::default()
+    };
+    let sweep = request.sweep(&lever).unwrap();
+    let folder = Folder::new();
+    let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
+    sweep.compute(&store, &how()).unwrap();
+    let window = Window::of(&store).unwrap();
+    let [frequency, gap] = [0, 1].map(|k| sweep.options().over[k].key);
+    let mut safe = 0;
+    for (row, &y) in window.conditions.iter().zip(&window.y) {
+        for (condition, &x) in row.iter().zip(&window.x) {
+            let here = lever.with(frequency, x).with(gap, y);
+            let free = FreeMotion::of(&here.model().unwrap());
+            let distance = y / here.physical().unwrap().scales.length;
+            if *condition == Condition::OnePeriod1 {
+                safe += 1;
+                assert!(free.reach >= distance, "{x} Hz, {y} m");
+            }
+        }
+    }
+    assert!(safe > 10, "{safe} points are safe");
+}
+
+/// Stable orbits of period 3 lie between Ω = 3.109 and 3.180 beside chaos and period 1; of
+/// two starts a value few meet them, and yet every value in between has one.
+#[test]
+fn a_sweep_hands_on_what_one_value_found() {
+    let paper = case(
+        "[model]\nmodes = 3\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\nalpha4 = 20.0\n\
+         alpha5 = 0.0\nalpha6 = 0.2\nomega = 3.0\n",
+    );
+    let request = SweepRequest {
+        over: Axes(vec!["omega=3.115:3.175:13".to_owned()]),
+        starts: Some(12),
+        periods: 3,
+        ..SweepRequest::default()
+    };
+    let sweep = request.sweep(&paper).unwrap();
+    let folder = Folder::new();
+    let store = Store::create_or_resume(&folder.join("sweep"), sweep.schema().clone()).unwrap();
+    sweep.compute(&store, &how()).unwrap();
+    let table = nanotap::figure::sweep::SweepTable::of(&store).unwrap();
+    let met: Vec<bool> = table
+        .period
+        .chunks(12)
+        .map(|runs| runs.contains(&3))
+        .collect();
+    let more = from_neighbours(&store).unwrap();
+    let known = |k: usize| met[k] || more.iter().any(|m| m.at == [k] && m.period == 3);
+    assert!(met.contains(&true) && met.contains(&false), "{met:?}");
+    assert!((0..13).all(known), "{met:?}");
+    // A motion that a start met is not listed again.
+    assert!(more.iter().all(|m| m.period != 3 || !met[m.at[0]]));
+}

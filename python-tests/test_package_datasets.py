@@ -77,6 +77,8 @@ def test_shares_merge_to_the_same_bytes(regular, tmp_path):
     part = nanotap.merge(shares[:2], tmp_path / "merged.zarr")
     assert part.copied == 6 and part.missing == [2, 5, 8]
     assert nanotap.merge(shares, tmp_path / "merged.zarr").missing == []
+    # Nothing is left to compute but what the values show their neighbours.
+    nanotap.sweep(regular, **call, out=tmp_path / "merged.zarr")
     assert_same(tmp_path / "whole.zarr", tmp_path / "merged.zarr")
     with pytest.raises(ValueError, match="made otherwise: .*omega"):
         nanotap.sweep(regular, over={"omega": (2, 3, 9)}, periods=4, out=shares[0])

@@ -6,6 +6,7 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
 use nanotap::study::basin;
@@ -114,6 +115,7 @@ impl Recipe {
     fn receiver(&self, path: PathBuf) -> PyResult<Receiver> {
         Ok(Receiver {
             store: self.store(&path)?,
+            recipe: Arc::clone(&self.recipe),
         })
     }
 }
@@ -128,6 +130,7 @@ impl Recipe {
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct Receiver {
     store: Store,
+    recipe: Arc<study::recipe::Recipe>,
 }
 
 #[pymethods]
@@ -148,9 +151,21 @@ impl Receiver {
             .map_err(Failure::from)?)
     }
 
-    /// Removes what killed work left half-written, once every chunk is there.
-    fn tidy(&self) -> PyResult<bool> {
-        Ok(self.store.tidy().map_err(Failure::from)?)
+    /// Once every chunk is there: does what needs them all, and removes what killed work left
+    /// half-written.
+    fn finish(&self) -> PyResult<()> {
+        if self.store.missing() > 0 {
+            return Ok(());
+        }
+        let work = Work {
+            share: Share::WHOLE,
+            threads: 0,
+            control: Control::default(),
+        };
+        match self.recipe.compute(&self.store, &work) {
+            Ok(()) | Err(WorkError::Cancelled { .. }) => Ok(()),
+            Err(WorkError::Store(error)) => Err(Failure::from(error).into()),
+        }
     }
 }
 

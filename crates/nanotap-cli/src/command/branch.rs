@@ -92,7 +92,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         )
         .write(path)?;
     }
-    output.study(&studied, &report, |report| text(&studied, report))
+    output.study(&studied, &report, |report| text(&studied, report))?;
+    let cut = report.branches.iter().filter(|b| !b.complete).count();
+    if cut > 0 && !report.cancelled {
+        let what = number::counted(cut, "branch was", "branches were");
+        return Err(Failure::numerics(format!("{what} cut before the end")));
+    }
+    Ok(())
 }
 
 /// What is shown if nobody says: the greatest displacement of an oscillator with a wall is

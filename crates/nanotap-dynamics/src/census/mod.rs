@@ -166,6 +166,21 @@ pub enum AttractorKind {
     },
 }
 
+impl AttractorKind {
+    /// Whether both are the same motion: orbits up to a cyclic shift within their error
+    /// estimates; chaos and tori by exponents and means that agree.
+    pub fn is_same_as(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Periodic(a), Self::Periodic(b)) => a.is_same_as(b),
+            (Self::QuasiPeriodic(a), Self::QuasiPeriodic(b)) => a.spectrum.agrees_with(&b.spectrum),
+            (Self::Chaotic { spectrum: a, .. }, Self::Chaotic { spectrum: b, .. }) => {
+                a.agrees_with(b)
+            }
+            _ => false,
+        }
+    }
+}
+
 /// Chaos that ends.
 #[derive(Clone, Debug)]
 pub struct TransientChaos {

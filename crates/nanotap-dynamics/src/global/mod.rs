@@ -226,7 +226,7 @@ fn shared<M: StroboscopicMap>(
             let known = &mut values[trial.at].attractors;
             let index = known
                 .iter()
-                .position(|a| is_same(&a.attractor.kind, &trial.kind));
+                .position(|a| a.attractor.kind.is_same_as(&trial.kind));
             let index = index.unwrap_or_else(|| {
                 known.push(GlobalAttractor {
                     attractor: Attractor {
@@ -316,20 +316,6 @@ fn tried<M: StroboscopicMap>(
 fn is_continuation(orbit: &PeriodicOrbit, closed: &PeriodicOrbit) -> bool {
     let size = orbit.scale().max(closed.scale());
     orbit.distance_to(closed).1 <= CONTINUITY * size
-}
-
-fn is_same(a: &AttractorKind, b: &AttractorKind) -> bool {
-    match (a, b) {
-        (AttractorKind::Periodic(a), AttractorKind::Periodic(b)) => a.is_same_as(b),
-        (AttractorKind::QuasiPeriodic(a), AttractorKind::QuasiPeriodic(b)) => {
-            a.spectrum.agrees_with(&b.spectrum)
-        }
-        (
-            AttractorKind::Chaotic { spectrum: a, .. },
-            AttractorKind::Chaotic { spectrum: b, .. },
-        ) => a.agrees_with(b),
-        _ => false,
-    }
 }
 
 /// Gives linked attractors one number, in the order of the grid.

@@ -83,7 +83,7 @@ def compute(
     except BaseException:
         client.cancel(list(running), force=True)
         raise
-    receiver.tidy()
+    receiver.finish()
     return False
 
 

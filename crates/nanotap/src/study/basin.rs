@@ -5,14 +5,16 @@
 //! a neighbourhood that contracts to one of them ([`nanotap_dynamics::basin`], which says
 //! what that proves and what is evidence only).
 //!
-//! An attractor that is met by fewer than about one start in the number of the census is
-//! missed; its basin shows as "unsettled".
+//! The census is of starts in the slice; then a grid of 64 × 64 points of it is followed, and
+//! where one comes to no motion of the census, what it comes to is added, until no point of the
+//! grid is left. Motions whose basin in the slice is smaller still show as "unsettled".
 
 use nanotap_dynamics::{
     Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, Control, Label,
     LyapunovOptions, SettleOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
 };
 use nanotap_figures::Figure;
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -40,6 +42,10 @@ const MOST_POINTS: usize = 4_000_000_000;
 /// Points that a chunk should not exceed, and chunks that a large slice is cut into.
 const CHUNK_POINTS: usize = 1 << 20;
 const CHUNKS: usize = 64;
+/// Points along each axis of the grid on which motions that the census missed are looked
+/// for, and how many of its points are classified at a time.
+const COARSE: usize = 64;
+const STRANGERS: usize = 64;
 /// Strobe points by which an attractor is shown.
 const SHOWN: usize = 512;
 /// Labels of points that go to no attractor.
@@ -330,16 +336,35 @@ impl Basin {
             );
             return Err(BasinError::NoAttractor { why });
         }
-        let known: Vec<Known> = found
-            .attractors
-            .iter()
-            .map(|a| Known::of(a, &mut map.clone()))
-            .collect();
         let budget = Budget {
             max_periods: options.periods,
             ..Budget::default()
         };
-        let basins = Basins::new(&map, slice, &found.attractors, budget)?;
+        let given = options.attractors.is_some();
+        let mut attractors = found.attractors;
+        let mut basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
+        // States that somebody gave are what points are to be told apart by.
+        while !given && !control.is_cancelled() {
+            let strangers = strangers(&map, &slice, &basins);
+            let taken = census(&map, &strangers, &how, control).attractors;
+            let before = attractors.len();
+            for attractor in taken {
+                if !attractors.iter().any(|a| a.kind.is_same_as(&attractor.kind)) {
+                    attractors.push(attractor);
+                }
+            }
+            if attractors.len() == before {
+                break;
+            }
+            basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
+        }
+        if control.is_cancelled() {
+            return Err(BasinError::Cancelled);
+        }
+        let known: Vec<Known> = attractors
+            .iter()
+            .map(|a| Known::of(a, &mut map.clone()))
+            .collect();
         let schema = schema(case, options, &names, &basins, &known);
         Ok(Self {
             map,
@@ -407,6 +432,36 @@ fn columns(rows: &[Vec<Label>]) -> Vec<Values> {
     vec![Values::Whole(
         rows.iter().flatten().copied().map(number).collect(),
     )]
+}
+
+/// States among a coarse grid of the slice that come to none of the attractors.
+fn strangers(map: &Strobe, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
+    let (x, y) = slice.axes();
+    let some = |count: usize| {
+        let many = COARSE.min(count);
+        (0..many).map(move |k| (2 * k + 1) * count / (2 * many))
+    };
+    let points: Vec<usize> = some(y.count)
+        .flat_map(|row| some(x.count).map(move |column| row * x.count + column))
+        .collect();
+    let lost: Vec<bool> = points
+        .par_iter()
+        .map_init(
+            || map.clone(),
+            |map, &index| basins.chunk(map, index..index + 1) == [Label::Unsettled],
+        )
+        .collect();
+    points
+        .into_iter()
+        .zip(lost)
+        .filter(|(_, lost)| *lost)
+        .take(STRANGERS)
+        .map(|(index, _)| {
+            let mut state = vec![0.0; map.dimension()];
+            slice.state(index, &mut state);
+            state
+        })
+        .collect()
 }
 
 /// Quasi-random starts in the slice.

@@ -228,6 +228,9 @@ pub struct BranchSummary {
     pub range: [f64; 2],
     /// Why it ends.
     pub end: String,
+    /// Whether it was followed to its end: out of the range, into another branch, or to
+    /// where the motion ceases to be.
+    pub complete: bool,
 }
 
 /// One orbit of a branch.
@@ -613,6 +616,7 @@ fn summary(branch: &Branch, parent: Option<usize>, depth: usize) -> BranchSummar
             parameters().fold(f64::NEG_INFINITY, f64::max),
         ],
         end: branch.end.to_string(),
+        complete: !branch.end.is_failure(),
     }
 }
 

@@ -3,9 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::RowDVector;
-use nanotap_dynamics::{
-    LyapunovSpectrum, SettleOptions, StroboscopicMap, lyapunov_spectrum, settle,
-};
+use nanotap_dynamics::{SettleOptions, StroboscopicMap, lyapunov_spectrum, settle};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Output, Trajectory};
 use schemars::JsonSchema;
@@ -97,7 +95,8 @@ pub struct LyapunovReport {
     pub errors: Vec<f64>,
     /// Their sum: how fast volumes of states shrink.
     pub sum: f64,
-    /// The same from the trace of the equations and the time in contact: the check.
+    /// The same from the trace of the equations and the time in each regime, with twice the
+    /// logarithm of the restitution at every impact, over the same periods: the check.
     pub sum_by_trace: f64,
     /// Kaplan–Yorke dimension of the strobe points.
     pub kaplan_yorke_dimension: f64,
@@ -120,14 +119,21 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
         return Err(SimulateError::NoPeriods);
     }
     let mut map = Strobe::new(model);
-    for _ in 0..options.transient {
+    let defaults = SpectrumOptions::default();
+    // The tangent vectors align themselves during the last periods of the transient.
+    let alignment = defaults.alignment.min(options.transient);
+    for _ in 0..options.transient - alignment {
         map.advance(&mut state)?;
     }
-    let start = state.clone();
+    let mut start = state.clone();
+    for _ in 0..alignment {
+        map.advance(&mut start)?;
+    }
     let fixed = SpectrumOptions {
+        alignment,
         min_periods: options.periods,
         max_periods: options.periods,
-        ..SpectrumOptions::default()
+        ..defaults
     };
     let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
         SimulateError::Flow(FlowError::NotFinite {
@@ -142,7 +148,7 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
         transient: options.transient,
         periods: spectrum.periods,
         sum: spectrum.exponents.iter().sum(),
-        sum_by_trace: sum_by_trace(model, &start, &spectrum)?,
+        sum_by_trace: spectrum.log_determinant,
         kaplan_yorke_dimension: spectrum.kaplan_yorke_dimension(),
         exponents: spectrum.exponents,
         errors: spectrum.errors,
@@ -150,45 +156,6 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
         section: section(model, &start, options.section, options.points)?,
         section_at: options.section,
     })
-}
-
-/// Σλ = ⟨tr A_free t_free + tr A_contact t_contact⟩ and, of a rigid stop, 2 log r an
-/// impact, over as many periods from the same start.
-fn sum_by_trace(
-    model: &Model,
-    start: &[f64],
-    spectrum: &LyapunovSpectrum,
-) -> Result<f64, FlowError> {
-    let traces: Vec<f64> = model
-        .system
-        .regimes()
-        .iter()
-        .map(|r| r.matrix().trace())
-        .collect();
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(start, 0.0)?;
-    let mut sum = 0.0;
-    for _ in 0..spectrum.periods {
-        let mut recorder = Recorder::default();
-        flow.run_period(&mut recorder)?;
-        let trajectory = recorder.finish(Arc::clone(&model.system));
-        sum += trajectory
-            .segments()
-            .iter()
-            .map(|s| traces[s.regime] * s.length)
-            .sum::<f64>();
-        sum += trajectory
-            .events()
-            .iter()
-            .filter_map(|e| {
-                let transition = model.system.transitions()[e.from]
-                    .iter()
-                    .find(|x| x.target == e.to)?;
-                Some(2.0 * transition.reset.as_ref()?.matrix.determinant().abs().ln())
-            })
-            .sum::<f64>();
-    }
-    Ok(sum / spectrum.periods as f64)
 }
 
 /// `points` points of the section of the motion from `start`, and fewer where contacts

@@ -349,7 +349,10 @@ impl Basin {
             let taken = census(&map, &strangers, &how, control).attractors;
             let before = attractors.len();
             for attractor in taken {
-                if !attractors.iter().any(|a| a.kind.is_same_as(&attractor.kind)) {
+                if !attractors
+                    .iter()
+                    .any(|a| a.kind.is_same_as(&attractor.kind))
+                {
                     attractors.push(attractor);
                 }
             }

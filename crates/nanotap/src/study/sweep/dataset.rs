@@ -253,7 +253,7 @@ fn attributes(case: &Case, options: &SweepOptions) -> crate::dataset::schema::At
         }
         Starts::Spread { count, seed } => {
             all.insert("seed".into(), json!(seed));
-            json!({ "count": count, "seed": seed, "sizes": "spread" })
+            json!({ "count": count, "seed": seed, "box": [], "sizes": "spread" })
         }
     };
     let recipe: Value = json!({

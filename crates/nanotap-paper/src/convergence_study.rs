@@ -174,7 +174,7 @@ fn off_circle(orbit: &OrbitReport) -> f64 {
 }
 
 fn tip_series(model: &Model, orbit: &OrbitReport) -> Vec<f64> {
-    let tip = orbit.trajectory.signal(&model.tip);
+    let tip = orbit.trajectory.curve(&model.tip);
     let end = orbit.trajectory.end();
     (0..INSTANTS)
         .filter_map(|k| tip.at(end * k as f64 / INSTANTS as f64))

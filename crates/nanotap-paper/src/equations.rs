@@ -412,7 +412,7 @@ pub(super) fn scaling(_: &Laboratory<'_>, section: Section) -> Result<Section, P
             &nanotap::model::Model::cantilever(&case)?,
         ))
     };
-    let failed = |error: nanotap_flow::FlowError| PaperError::Failed {
+    let failed = |error: nanotap::model::MotionError| PaperError::Failed {
         what: "a run".into(),
         why: error.to_string(),
     };

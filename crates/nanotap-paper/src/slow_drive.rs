@@ -425,7 +425,7 @@ struct Returns {
 
 impl Returns {
     fn of(model: &Model, state: &[f64], watched: usize) -> Result<Self, PaperError> {
-        let failed = |error: nanotap_flow::FlowError| PaperError::Failed {
+        let failed = |error: nanotap::model::MotionError| PaperError::Failed {
             what: "a run on the chaotic attractor".into(),
             why: error.to_string(),
         };

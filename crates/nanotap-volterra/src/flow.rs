@@ -370,6 +370,8 @@ impl Flow {
         };
         // A singular exit is passed: the step means nothing beyond, but says about when.
         let mut passed: Option<(usize, f64)> = None;
+        // No exit is reached before the last node that is inside of it.
+        let mut inside = 0.0;
         let n = self.step.forces.len();
         for (number, exit) in system.exits(self.branch).iter().enumerate() {
             self.guard_values(system, exit, n);
@@ -380,18 +382,23 @@ impl Flow {
                 let time = self.step.map.time(self.step.length, u);
                 if passed.is_none_or(|(_, t)| time < t) {
                     passed = Some((number, time));
+                    inside = nodes[i - 1];
                 }
             }
         }
         if let Some((number, time)) = passed
             && system.exits(self.branch)[number].before != Approach::Analytic
         {
-            // The series says better when than the chord between two nodes.
+            // The series says better when than the chord between two nodes. Just after a switch
+            // it begins at zero, where rounding may let it fall at once.
             let exit = system.exits(self.branch)[number];
             self.guard_values(system, &exit, n);
             self.guard_series(system);
+            if self.onset.is_some() {
+                self.deflate(system);
+            }
             let time = match first_fall(&self.work.series, &mut self.work.scratch) {
-                Fall::At(u) if u > 0.0 => self.step.map.time(self.step.length, u),
+                Fall::At(u) if u > inside => self.step.map.time(self.step.length, u),
                 _ => time,
             };
             return Attempt::Ends(number, time);

@@ -132,6 +132,16 @@ pub trait ForceLaw: Debug + Send + Sync {
         None
     }
 
+    /// Whether tip and sample touch on a branch: of most laws all but the first.
+    fn touches(&self, branch: usize) -> bool {
+        branch > 0
+    }
+
+    /// Whether gap and rate do not tell the branch: the law remembers.
+    fn remembers(&self) -> bool {
+        false
+    }
+
     /// Whether the force on a branch is zero whatever the gap does.
     fn vanishes(&self, branch: usize) -> bool {
         let _ = branch;

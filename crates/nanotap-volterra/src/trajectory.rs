@@ -3,7 +3,7 @@
 use crate::flow::{Flow, Observer, Switch};
 use crate::kernel::TimeMap;
 use crate::law::Exit;
-use crate::quadrature::gauss_legendre;
+use crate::quadrature::{derivative, gauss_legendre, series};
 use crate::step::{Solver, Step};
 use crate::system::System;
 use crate::{Complex, VolterraError};
@@ -17,7 +17,7 @@ const REACH: f64 = 6.0;
 /// The largest number of steps a trajectory keeps.
 pub const MAX_RECORDED_STEPS: usize = 4_000_000;
 
-/// A scalar read from the state: `row · x + offset + Re Σ tones e^{iωt}`.
+/// A scalar read from the motion: `row · x + offset + Re Σ tones e^{iωt} + force F`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
     /// Of the length of the state.
@@ -26,6 +26,8 @@ pub struct Output {
     pub offset: f64,
     /// One complex amplitude a tone of the drive (empty: none).
     pub tones: Vec<Complex>,
+    /// How much of the law's force is added.
+    pub force: f64,
 }
 
 impl Output {
@@ -37,6 +39,7 @@ impl Output {
             row,
             offset: 0.0,
             tones: Vec::new(),
+            force: 0.0,
         }
     }
 }
@@ -54,7 +57,20 @@ pub struct Sample {
     pub rate: f64,
     /// The force of the law.
     pub force: f64,
+    /// How fast it changes; infinite where it sets in or ends like a root of time.
+    pub force_rate: f64,
     /// The branch of the law.
+    pub branch: usize,
+}
+
+/// A stretch of a trajectory on one branch of the law, one step long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// When it begins.
+    pub start: f64,
+    /// How long it lasts.
+    pub length: f64,
+    /// The branch.
     pub branch: usize,
 }
 
@@ -130,6 +146,13 @@ impl Piece {
         self.start + self.map.time(self.length, self.end)
     }
 
+    /// The derivative of the force's series by `u`.
+    fn force_slope(&self) -> Vec<f64> {
+        let mut slope = vec![0.0; self.coefficients.len()];
+        derivative(&self.coefficients, &mut slope);
+        slope
+    }
+
     fn sample(&self, system: &System, u: f64) -> Sample {
         let time = self.start + self.map.time(self.length, u);
         let mut modal = vec![0.0; system.dimension()];
@@ -149,7 +172,15 @@ impl Piece {
             state,
             gap,
             rate,
-            force: crate::quadrature::series(&self.coefficients, u),
+            force: series(&self.coefficients, u),
+            force_rate: {
+                let slope = series(&self.force_slope(), u);
+                if slope == 0.0 {
+                    0.0
+                } else {
+                    slope / self.map.rate(self.length, u)
+                }
+            },
             branch: self.branch,
         }
     }
@@ -167,6 +198,15 @@ impl Trajectory {
             (Some(first), Some(last)) => (first.start, last.end_time()),
             _ => (0.0, 0.0),
         }
+    }
+
+    /// Its stretches, in order.
+    pub fn stretches(&self) -> impl Iterator<Item = Stretch> + '_ {
+        self.pieces.iter().map(|p| Stretch {
+            start: p.start,
+            length: p.end_time() - p.start,
+            branch: p.branch,
+        })
     }
 
     /// The number of steps.
@@ -192,6 +232,22 @@ impl Trajectory {
         Some(piece.sample(&self.system, u))
     }
 
+    /// The motion on stretch number `index`, `after` its beginning; at its very ends too, where
+    /// the force of the next stretch may be another.
+    pub fn on_stretch(&self, index: usize, after: f64) -> Option<Sample> {
+        let piece = self.pieces.get(index)?;
+        let u = piece.map.variable(piece.length, after).min(piece.end);
+        Some(piece.sample(&self.system, u))
+    }
+
+    /// The fastest rate of modes and drive.
+    pub fn fastest(&self) -> f64 {
+        let blocks = self.system.kernel().modes().blocks();
+        let modes = blocks.iter().map(crate::modes::Block::rate);
+        let tones = self.system.drive().tones.iter().map(|t| t.frequency);
+        modes.chain(tones).fold(0.0, f64::max)
+    }
+
     /// The value of an output and its rate at a sample.
     pub fn read(&self, output: &Output, sample: &Sample) -> (f64, f64) {
         let mut field = vec![0.0; self.system.dimension()];
@@ -203,6 +259,10 @@ impl Trajectory {
         );
         let mut value = output.offset + (&output.row * &sample.state)[0];
         let mut rate: f64 = output.row.iter().zip(&field).map(|(r, f)| r * f).sum();
+        if output.force != 0.0 {
+            value += output.force * sample.force;
+            rate += output.force * sample.force_rate;
+        }
         for (tone, z) in self.system.drive().tones.iter().zip(&output.tones) {
             let (sin, cos) = (tone.frequency * sample.time).sin_cos();
             value += z.re * cos - z.im * sin;
@@ -217,9 +277,21 @@ impl Trajectory {
         count: usize,
         mut integrand: impl FnMut(&Sample, &mut [f64]),
     ) -> Vec<f64> {
-        let (nodes, weights) = gauss_legendre(POINTS);
         let mut sums = vec![0.0; count];
         let mut values = vec![0.0; count];
+        self.quadrature(|weight, sample| {
+            integrand(&sample, &mut values);
+            for (sum, value) in sums.iter_mut().zip(&values) {
+                *sum += weight * value;
+            }
+        });
+        sums
+    }
+
+    /// Hands the samples of a quadrature of the whole motion to `take`, each with its weight,
+    /// in order of time.
+    pub fn quadrature(&self, mut take: impl FnMut(f64, Sample)) {
+        let (nodes, weights) = gauss_legendre(POINTS);
         for piece in &self.pieces {
             let panels = self.panels(piece);
             let width = piece.end / panels as f64;
@@ -227,14 +299,10 @@ impl Trajectory {
                 for (x, w) in nodes.iter().zip(&weights) {
                     let u = width * (panel as f64 + x);
                     let weight = w * width * piece.map.rate(piece.length, u);
-                    integrand(&piece.sample(&self.system, u), &mut values);
-                    for (sum, value) in sums.iter_mut().zip(&values) {
-                        *sum += weight * value;
-                    }
+                    take(weight, piece.sample(&self.system, u));
                 }
             }
         }
-        sums
     }
 
     /// The time mean of an output.
@@ -297,17 +365,31 @@ impl Trajectory {
 
     /// The least and the largest value of an output over the span, ends included.
     pub fn range(&self, output: &Output) -> (f64, f64) {
-        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut take = |value: f64| range = (range.0.min(value), range.1.max(value));
+        let [least, largest] = self.ends_of_range(output);
+        (least.1, largest.1)
+    }
+
+    /// When an output is least and when it is largest, each with its value.
+    pub fn ends_of_range(&self, output: &Output) -> [(f64, f64); 2] {
+        let mut ends = [(0.0, f64::INFINITY), (0.0, f64::NEG_INFINITY)];
+        let mut take = |time: f64, value: f64| {
+            if value < ends[0].1 {
+                ends[0] = (time, value);
+            }
+            if value > ends[1].1 {
+                ends[1] = (time, value);
+            }
+        };
         for piece in &self.pieces {
             for u in [0.0, piece.end] {
-                take(self.read(output, &piece.sample(&self.system, u)).0);
+                let sample = piece.sample(&self.system, u);
+                take(sample.time, self.read(output, &sample).0);
             }
         }
-        for (_, value) in self.extrema(output) {
-            take(value);
+        for (time, value) in self.extrema(output) {
+            take(time, value);
         }
-        range
+        ends
     }
 
     /// The gap as an output.
@@ -317,19 +399,12 @@ impl Trajectory {
             row: self.system.kernel().row().clone(),
             offset: drive.offset,
             tones: drive.tones.iter().map(|t| t.gap).collect(),
+            force: 0.0,
         }
     }
 
     fn panels(&self, piece: &Piece) -> usize {
-        let fastest = self
-            .system
-            .kernel()
-            .modes()
-            .blocks()
-            .iter()
-            .map(crate::modes::Block::rate)
-            .chain(self.system.drive().tones.iter().map(|t| t.frequency))
-            .fold(0.0, f64::max);
+        let fastest = self.fastest();
         let steepest = piece
             .map
             .rate(piece.length, 0.0)

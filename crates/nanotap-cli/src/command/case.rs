@@ -2,12 +2,14 @@
 
 use clap::Args;
 use nanotap::ErrorKind;
-use nanotap::case::document::CaseDocument;
+use nanotap::case::document::{CaseDocument, equilibria};
 use nanotap::case::file as case_file;
+use nanotap::case::physical::force::SampleForce;
 use nanotap::case::physical::{Kind, Physical, Severity};
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
+use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::table::shown_phase;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase};
@@ -67,7 +69,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             |view| {
                 let solved = &document.setpoint_solved;
                 let solved = solved.as_ref().map_or_else(String::new, setpoint);
-                format!("{}{solved}", physical(case.title(), view))
+                let rest = equilibria_table(&equilibria(&case), view);
+                format!("{}{rest}{solved}", physical(case.title(), view))
             },
         )
     })
@@ -77,6 +80,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
     let Some(path) = &out.out else { return Ok(()) };
     file::ending(path, &["toml"])?;
+    if case.law.is_some() {
+        return Err(Failure::input(
+            format!(
+                "--out {}: a nonlinear force law has no dimensionless case file",
+                path.display()
+            ),
+            "leave --out away, or take --json, which has the law in the model's units",
+        ));
+    }
     file::write(path, case_file::to_toml(case).as_bytes())
 }
 
@@ -190,7 +202,12 @@ fn physical(title: &str, view: &Physical) -> String {
         given.row(["A02", &Kind::Length.format(free), &what]);
     }
     given.row(["", case.actuation.name(), case.actuation.meaning()]);
-    given.row(["", case.contact.name(), case.contact.meaning()]);
+    match &view.sample.force {
+        None => {
+            given.row(["", case.contact.name(), case.contact.meaning()]);
+        }
+        Some(force) => force_rows(&mut given, force),
+    }
     let mut mapping = Table::new([
         ("", Align::Left),
         ("key", Align::Left),
@@ -219,6 +236,55 @@ fn physical(title: &str, view: &Physical) -> String {
         given.render(),
         mapping.render()
     )
+}
+
+/// Where the undriven lever can rest.
+fn equilibria_table(all: &[Equilibrium], view: &Physical) -> String {
+    if all.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new([
+        ("gap", Align::Right),
+        ("deflection", Align::Right),
+        ("force", Align::Right),
+        ("", Align::Left),
+    ]);
+    for e in all {
+        let stability = if e.stable { "stable" } else { "unstable" };
+        let contact = if e.contact { ", in contact" } else { "" };
+        table.row([
+            Kind::Length.format(e.gap * view.scales.length),
+            Kind::Length.format(e.deflection * view.scales.length),
+            Kind::Force.format(e.force * view.scales.force),
+            format!("{stability}{contact}"),
+        ]);
+    }
+    format!(
+        "\n  {}\n{}",
+        style::bold("where the lever rests without a drive"),
+        table.render()
+    )
+}
+
+/// The force laws with their quantities.
+fn force_rows(table: &mut Table, force: &SampleForce) {
+    for term in &force.terms {
+        table.row(["", term.entry.name, term.entry.words]);
+        table.row(["", "", &format!("F = {}", term.entry.formula)]);
+    }
+    let mut told = Vec::new();
+    for (parameter, key, value) in force.parameters() {
+        if told.contains(&key) {
+            continue;
+        }
+        told.push(key);
+        let value = if value.is_infinite() {
+            "rigid".to_owned()
+        } else {
+            key.kind().format(value)
+        };
+        table.row(["", &value, parameter.words]);
+    }
 }
 
 /// Every distance at which an orbit has the setpoint amplitude.

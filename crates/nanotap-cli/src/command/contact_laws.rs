@@ -79,7 +79,7 @@ fn text(studied: &GivenCase, result: &Comparison) -> String {
         ("contact (%)", Align::Point),
     ]);
     for sample in &result.samples {
-        let mut cells = vec![sample.contact.to_string(), from_rest(sample)];
+        let mut cells = vec![sample.contact.clone(), from_rest(sample)];
         if let Some(orbit) = &sample.orbit {
             let o = &orbit.observables;
             // What is not above rounding is no force.
@@ -103,7 +103,8 @@ fn text(studied: &GivenCase, result: &Comparison) -> String {
         table.row(cells);
     }
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
-    if let Some(solid) = result.samples.last() {
+    let linear = result.samples.iter().all(|s| s.case.law.is_none());
+    if let Some(solid) = result.samples.last().filter(|_| linear) {
         text.push_str(&motion::paragraph(&format!(
             "all have the spring α₄ = {} and the damper of the case; the solid has it in series with an arm of \
              stiffness {}, so that its force relaxes in {}. E_dis is the energy that the sample takes in one \

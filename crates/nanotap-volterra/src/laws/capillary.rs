@@ -112,6 +112,15 @@ impl Formula for Capillary {
         }
     }
 
+    /// Across the bridge of branch 1 they do not touch.
+    fn touches(&self, branch: usize) -> bool {
+        branch == 2
+    }
+
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
         branch == 0
     }

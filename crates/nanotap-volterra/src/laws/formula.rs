@@ -92,6 +92,14 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
         let _ = (c, branch, gap);
         None
     }
+    /// See [`ForceLaw::touches`].
+    fn touches(&self, branch: usize) -> bool {
+        branch > 0
+    }
+    /// See [`ForceLaw::remembers`].
+    fn remembers(&self) -> bool {
+        false
+    }
     /// See [`ForceLaw::vanishes`].
     fn vanishes(&self, branch: usize) -> bool {
         let _ = branch;
@@ -272,6 +280,14 @@ impl<F: Formula> ForceLaw for Law<F> {
 
     fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
         self.formula.energy(&self.constants, branch, gap)
+    }
+
+    fn touches(&self, branch: usize) -> bool {
+        self.formula.touches(branch)
+    }
+
+    fn remembers(&self) -> bool {
+        self.formula.remembers()
     }
 
     fn vanishes(&self, branch: usize) -> bool {

@@ -81,6 +81,10 @@ impl Formula for AdhesionHysteresis {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
         branch == 0
     }

@@ -77,6 +77,10 @@ impl Formula for Jkr {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
         branch == 0
     }

@@ -164,6 +164,11 @@ impl Formula for KelvinVoigt {
         if index == 0 { sum } else { -sum }
     }
 
+    /// Where the surface has let go the tip is free.
+    fn touches(&self, branch: usize) -> bool {
+        branch == 1
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
         branch != 1
     }

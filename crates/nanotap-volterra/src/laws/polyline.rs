@@ -125,6 +125,11 @@ impl ForceLaw for Polyline {
         )
     }
 
+    /// Where the whole piece lies below the surface, `d ≤ 0`.
+    fn touches(&self, branch: usize) -> bool {
+        self.gaps.get(branch + 1).is_some_and(|gap| *gap <= 0.0)
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
         branch + 1 == self.gaps.len() && self.forces[branch] == 0.0
     }

@@ -181,6 +181,14 @@ impl ForceLaw for Sum {
             .sum()
     }
 
+    fn touches(&self, branch: usize) -> bool {
+        self.split(branch).any(|(_, term, own)| term.touches(own))
+    }
+
+    fn remembers(&self) -> bool {
+        self.terms.iter().any(|t| t.remembers())
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
         self.split(branch).all(|(_, term, own)| term.vanishes(own))
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::case::Case;
 use crate::case::physical::{MappingRow, Physical};
 use crate::model::cantilever::Cantilever;
+use crate::model::nonlinear::Equilibrium;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 
 /// A case, checked and view.
@@ -30,6 +31,9 @@ pub struct CantileverDocument {
     pub case: Cantilever,
     /// Drive period 2π/Ω.
     pub period: f64,
+    /// Where the undriven lever can rest under a nonlinear force law.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub equilibria: Vec<Equilibrium>,
     /// What is known of it in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalSummary>,
@@ -78,6 +82,9 @@ pub struct PhysicalSummary {
     pub relaxation_stiffness: f64,
     /// Its relaxation time, s.
     pub relaxation_time: f64,
+    /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub force_law: Vec<LawParameterDocument>,
     /// Gap of the tip, m.
     pub tip_gap: f64,
     /// Gap of the beam, m.
@@ -90,6 +97,19 @@ pub struct PhysicalSummary {
     pub force_unit: f64,
     /// The model's unit of energy, J.
     pub energy_unit: f64,
+}
+
+/// A parameter of a nonlinear force law.
+#[derive(Clone, Debug, Serialize)]
+pub struct LawParameterDocument {
+    /// The key of the case.
+    pub key: &'static str,
+    /// What it is.
+    pub what: &'static str,
+    /// Its value in SI; `null` of the modulus of a rigid tip.
+    pub value: Option<f64>,
+    /// Its SI unit.
+    pub unit: &'static str,
 }
 
 impl PhysicalSummary {
@@ -121,6 +141,16 @@ impl PhysicalSummary {
             contact_damping: parameters.contact_damping,
             relaxation_stiffness: parameters.relaxation_stiffness,
             relaxation_time: parameters.relaxation_time,
+            force_law: view.sample.force.as_ref().map_or_else(Vec::new, |force| {
+                let rows = force.parameters();
+                rows.map(|(parameter, key, value)| LawParameterDocument {
+                    key: key.path(),
+                    what: parameter.words,
+                    value: value.is_finite().then_some(value),
+                    unit: key.kind().si_unit(),
+                })
+                .collect()
+            }),
             tip_gap: parameters.tip_gap,
             beam_gap: scales.length,
             length_unit: scales.length,
@@ -177,10 +207,21 @@ impl CantileverDocument {
         Self {
             kind: "cantilever",
             period: cantilever.period(),
+            equilibria: equilibria(case),
             case: cantilever,
             physical: case.physical().map(PhysicalSummary::of),
         }
     }
+}
+
+/// The equilibria of a case with a nonlinear force law.
+pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
+    let law = case
+        .cantilever()
+        .and_then(|cantilever| cantilever.law.as_ref());
+    let model = law.and_then(|_| case.model().ok());
+    let nonlinear = model.and_then(|model| model.nonlinear);
+    nonlinear.map_or_else(Vec::new, |nonlinear| nonlinear.equilibria())
 }
 
 /// One parameter between the two worlds, as a document.

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 use nanotap_dynamics::{MapFamily, StroboscopicMap, TwoParameterFamily};
-use nanotap_flow::FlowError;
 
 use super::error::CaseError;
 use super::{Case, Key};
+use crate::model::MotionError;
 use crate::model::strobe::Strobe;
 
 /// A case with one free parameter.
@@ -64,7 +64,7 @@ impl TwoParameterFamily for PlaneFamily {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
         derivatives: [&mut [f64]; 2],
-    ) -> Result<(), FlowError> {
+    ) -> Result<(), MotionError> {
         let mut columns = DMatrix::zeros(state.len(), 2);
         map.advance_with_derivatives(state, jacobian, &mut columns)?;
         for (derivative, column) in derivatives.into_iter().zip(columns.column_iter()) {

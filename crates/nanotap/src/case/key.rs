@@ -157,6 +157,8 @@ pub enum Takes {
     Count(usize),
     /// One of these words.
     Word(&'static [&'static str]),
+    /// A contact law, or nonlinear force laws joined by `+`.
+    Law,
     /// The name of a lever of the catalogue.
     LeverName,
     /// The name of a material of the catalogue.
@@ -394,7 +396,7 @@ impl Key {
             ),
             Takes::Count(_) => Some("it is a whole number"),
             Takes::FrequencyRatio => Some("it is a ratio of whole numbers"),
-            Takes::Word(_) | Takes::LeverName | Takes::MaterialName => {
+            Takes::Word(_) | Takes::Law | Takes::LeverName | Takes::MaterialName => {
                 Some("it is a name, not a quantity")
             }
         }

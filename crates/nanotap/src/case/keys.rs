@@ -188,7 +188,8 @@ macro_rules! keys {
 }
 
 use Kind::{
-    Angle, Damping, Density, Force, Frequency, Length, Mass, Number, Pressure, Stiffness, Time,
+    Angle, ChargeDensity, Damping, Density, Energy, Force, Frequency, Length, Mass, Number,
+    Pressure, Repulsion, Stiffness, Time, Viscosity, Voltage,
 };
 use Range as R;
 use Section::{Cantilever, Drive, Gap, Sample, Tip};
@@ -280,7 +281,12 @@ keys! {
     TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip");
     TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip");
 
-    SampleLaw = other(Sample, "law", Takes::Word(words!(ContactLaw)), "how the sample answers the tip");
+    TipCharge = quantity(Tip, "charge", ChargeDensity, R::ANY, "surface charge density of the tip (dlvo)");
+
+    SampleLaw = other(
+        Sample, "law", Takes::Law,
+        "how the sample answers the tip: a linear contact, or nonlinear force laws, one or a sum with +",
+    );
     SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue");
     SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
         .feeds(Parameter::Alpha4);
@@ -301,6 +307,27 @@ keys! {
     SampleIndentation = quantity(
         Sample, "indentation", Length, R::POSITIVE, "indentation at which Hertz's stiffness is taken",
     ).feeds(Parameter::Alpha4);
+
+    SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample");
+    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area");
+    SampleWorkOfRetraction = quantity(
+        Sample, "work_of_retraction", Stiffness, R::NOT_NEGATIVE, "work of adhesion on retraction (adhesion-hysteresis)",
+    );
+    SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off");
+    SampleIntermolecularDistance = quantity(
+        Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
+    );
+    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample");
+    SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support");
+    SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays");
+    SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)");
+    SampleFilmThickness = quantity(Sample, "film_thickness", Length, R::POSITIVE, "thickness of the adsorbed film (capillary)");
+    SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)");
+    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "voltage between tip and sample (electrostatic)");
+    SamplePermittivity = quantity(Sample, "permittivity", Number, R::POSITIVE, "permittivity of the medium over that of free space");
+    SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)");
+    SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)");
+    SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)");
 
     DriveFrequency = quantity(Drive, "frequency", Frequency, R::POSITIVE, "frequency of the drive")
         .feeds(Parameter::Omega);
@@ -383,6 +410,14 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
             ],
         ],
         reason: "the stiffness is either given or Hertz's",
+    },
+    Alternatives {
+        ways: &[
+            &[Key::SampleHamaker],
+            &[Key::SampleWorkOfAdhesion],
+            &[Key::SampleAdhesionForce],
+        ],
+        reason: "each gives the adhesion, which would be counted twice or contradict itself",
     },
     Alternatives {
         ways: &[&[Key::GapTip], &[Key::DriveSetpoint]],

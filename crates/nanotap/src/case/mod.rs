@@ -35,7 +35,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use nanotap_flow::sensitivity::SystemTangent;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
@@ -54,7 +53,7 @@ use units::Units;
 use crate::model::cantilever::Cantilever;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
-use crate::model::{Model, ModelTangent, cantilever_model_tangent, cantilever_tangent};
+use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 
 /// How many modes a case has that does not say.
 pub const DEFAULT_MODES: usize = 3;
@@ -352,22 +351,19 @@ impl Case {
         })
     }
 
-    /// The derivative of its system with respect to the value of a key.
+    /// How its map changes with the value of a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
-    pub fn tangent(&self, model: &Model, key: Key) -> Result<SystemTangent, CaseError> {
+    pub fn tangent(&self, model: &Model, key: Key) -> Result<Tangent, CaseError> {
         if let Some((oscillator, parameter)) = self.oscillator_parameter(key) {
-            return Ok(oscillator.tangent(model, parameter)?);
+            return Ok(oscillator.tangent(model, parameter)?.into());
         }
-        let mut sum = SystemTangent::zeros(&model.system);
         let Some(cantilever) = self.cantilever() else {
-            return Ok(sum);
+            return Ok(Tangent::zeros(model));
         };
-        for (parameter, slope) in self.parameters_by(key)? {
-            sum.add(slope, &cantilever_tangent(cantilever, model, parameter)?);
-        }
-        Ok(sum)
+        let (slopes, law) = self.parameters_by(key)?;
+        Ok(Tangent::along(cantilever, model, &slopes, &law)?)
     }
 
     /// The derivative of its model with respect to the value of a key.
@@ -382,7 +378,7 @@ impl Case {
         let Some(cantilever) = self.cantilever() else {
             return Ok(sum);
         };
-        for (parameter, slope) in self.parameters_by(key)? {
+        for (parameter, slope) in self.parameters_by(key)?.0 {
             let tangent = cantilever_model_tangent(cantilever, model, parameter)?;
             sum.add(slope, &tangent);
         }
@@ -399,15 +395,15 @@ impl Case {
     }
 
     /// The numbers of a cantilever's equations that change with a key, each with its derivative.
-    fn parameters_by(&self, key: Key) -> Result<Vec<(Parameter, f64)>, CaseError> {
+    fn parameters_by(&self, key: Key) -> Result<Slopes, CaseError> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(_), _) => Ok(Vec::new()),
-            (_, key::Means::Cantilever(parameter)) => Ok(vec![(parameter, 1.0)]),
+            (What::Oscillator(_), _) => Ok(Slopes::default()),
+            (_, key::Means::Cantilever(parameter)) => Ok((vec![(parameter, 1.0)], Vec::new())),
             (What::Quantities(quantities), _) if key.is_physical() => {
                 quantities.view()?;
                 Ok(quantities.derivatives(key)?)
             }
-            _ => Ok(Vec::new()),
+            _ => Ok(Slopes::default()),
         }
     }
 
@@ -622,14 +618,32 @@ impl Quantities {
     }
 
     /// How the numbers of the equations change with a quantity: those that do, each with its
-    /// derivative, by central differences of the mapping, which is a chain of closed forms.
-    fn derivatives(&self, key: Key) -> Result<Vec<(Parameter, f64)>, Box<CaseFileError>> {
+    /// derivative, and those of the parameters of a nonlinear law, by central differences of the
+    /// mapping, which is a chain of closed forms.
+    fn derivatives(&self, key: Key) -> Result<Slopes, Box<CaseFileError>> {
         let (low, high, width) = self.beside(key)?;
         let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
-        Ok(Parameter::every()
+        let numbers = Parameter::every()
             .map(|parameter| (parameter, slope(parameter)))
             .filter(|(_, slope)| *slope != 0.0)
-            .collect())
+            .collect();
+        let values = |view: &Physical| {
+            let law = view.cantilever.law.as_ref();
+            law.map_or_else(Vec::new, |law| law.values().to_vec())
+        };
+        let law = values(&high)
+            .iter()
+            .zip(values(&low))
+            // A rigid tip stays rigid.
+            .map(|(high, low)| {
+                if *high == low {
+                    0.0
+                } else {
+                    (high - low) / width
+                }
+            })
+            .collect();
+        Ok((numbers, law))
     }
 
     /// What it comes to a little below and a little above the value of a key, and how far
@@ -655,6 +669,9 @@ impl Quantities {
         }
     }
 }
+
+/// Derivatives of the numbers that change, and of a nonlinear law's parameters in order.
+type Slopes = (Vec<(Parameter, f64)>, Vec<f64>);
 
 /// A size of a quantity that is zero.
 fn scale_of(view: &Physical, kind: Kind) -> f64 {

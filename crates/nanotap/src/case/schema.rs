@@ -89,6 +89,11 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             say("enum", words.into());
             return schema;
         }
+        Takes::Law => {
+            say("type", "string".into());
+            say("examples", super::stated::laws().into());
+            return schema;
+        }
         Takes::LeverName | Takes::MaterialName => {
             say("type", "string".into());
             return schema;

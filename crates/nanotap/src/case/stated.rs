@@ -5,7 +5,11 @@ use std::sync::Arc;
 use super::file::{CaseFileError, Header, Place, Problem, Source};
 use super::key::{Key, Takes};
 use super::quantity::{Kind, Quantity, QuantityError};
+use nanotap_volterra::VolterraError;
+
+use crate::model::contact::ContactLaw;
 use crate::model::drive_form::{FrequencyRatio, RatioError};
+use crate::model::sample_law::SampleLaw;
 
 /// A value of a key.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +18,7 @@ pub enum Value {
     Number(f64, Kind),
     /// One of a key's words.
     Word(&'static str),
-    /// A name of the catalogue.
+    /// A name of the catalogue, or of nonlinear laws.
     Name(Arc<str>),
     /// A ratio of frequencies.
     Ratio(FrequencyRatio),
@@ -49,6 +53,34 @@ pub enum ValueError {
     /// No ratio of frequencies.
     #[error(transparent)]
     Ratio(#[from] RatioError),
+    /// No contact law.
+    #[error("there is no law \"{given}\"; there are {}", laws().join(", "))]
+    Law {
+        /// The name that is none.
+        given: String,
+    },
+}
+
+/// The names of all laws: of linear contacts, then of nonlinear forces.
+pub(crate) fn laws() -> Vec<&'static str> {
+    let linear = ContactLaw::ALL.map(ContactLaw::name);
+    let further = SampleLaw::all().filter(|name| !linear.contains(name));
+    linear.into_iter().chain(further).collect()
+}
+
+/// A linear contact as one of its words; nonlinear laws as their names.
+fn law(text: &str) -> Result<Value, ValueError> {
+    if let Ok(law) = text.parse::<ContactLaw>() {
+        return Ok(Value::Word(law.name()));
+    }
+    let terms = SampleLaw::terms(text).map_err(|error| ValueError::Law {
+        given: match error {
+            VolterraError::UnknownLaw { name } => name,
+            _ => text.to_owned(),
+        },
+    })?;
+    let names: Vec<&str> = terms.iter().map(|term| term.entry.name).collect();
+    Ok(Value::Name(names.join(" + ").into()))
 }
 
 /// Words in quotes, in a row.
@@ -81,6 +113,7 @@ impl Key {
                     words,
                 })?)
             }
+            Takes::Law => law(text)?,
             Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
         })

@@ -1,13 +1,13 @@
 //! Figures of all attractors together, and of a Poincaré section.
 
 use nanotap_figures::Figure;
-use nanotap_flow::Trajectory;
 
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::figure::motion::portrait;
 use crate::figure::panels::{AttractorCurve, AttractorCurves, MotionAxes, SectionCurves};
 use crate::model::Model;
+use crate::model::recording::Recording;
 use crate::study::attractors::{AttractorReport, Attractors};
 use crate::study::lyapunov::{LyapunovReport, Section};
 
@@ -102,7 +102,7 @@ impl Curve {
             });
         }
         let start = &attractor.wandering.as_ref()?.state;
-        let trajectory = Trajectory::record(&model.system, start, WANDERING_PERIODS).ok()?;
+        let trajectory = Recording::of(model, start, WANDERING_PERIODS).ok()?;
         let section =
             crate::study::lyapunov::section(model, start, Section::Phase(0.0), STROBE_POINTS)
                 .ok()?;

@@ -12,7 +12,12 @@ use crate::study::contact_laws::{Comparison, SampleMotion};
 /// Loops of force and indentation on each sample; where the orbits were followed, energy
 /// and amplitude against the drive frequency too, unstable dashed.
 pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
-    let loops = loops_panel(comparison, units);
+    let nonlinear = comparison.samples.iter().any(|s| !s.force_curve.is_empty());
+    let loops = if nonlinear {
+        force_panel(comparison, units)
+    } else {
+        loops_panel(comparison, units)
+    };
     if comparison.samples.iter().all(|s| s.branch.is_none()) {
         return Figure::single(loops).width(110.0).height(80.0);
     }
@@ -27,6 +32,28 @@ pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
 /// The largest size of some numbers.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |m, v| m.max(v.abs()))
+}
+
+/// Force against gap of nonlinear laws, on a slow approach and back.
+fn force_panel(comparison: &Comparison, units: &Units) -> Panel {
+    let curves = || comparison.samples.iter().flat_map(|s| &s.force_curve);
+    let (length, length_unit) = units.axis(Kind::Length, largest(curves().map(|p| p[0])));
+    let (force, force_unit) = units.axis(Kind::Force, largest(curves().map(|p| p[1])));
+    let mut panel = Panel::new(
+        Axis::linear(format!("gap $d${length_unit}")).tight(),
+        Axis::linear(format!("force on the tip{force_unit}")),
+    )
+    .legend(Legend::Above)
+    .with(Rule::horizontal(0.0));
+    for (k, sample) in comparison.samples.iter().enumerate() {
+        let points = sample.force_curve.iter();
+        let line = Line::new(points.map(|[gap, f]| (length * gap, force * f)));
+        panel = panel.with(
+            line.colour(LINES[k % LINES.len()])
+                .label(sample.contact.clone()),
+        );
+    }
+    panel
 }
 
 fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
@@ -56,7 +83,7 @@ fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
         panel = panel.with(
             Line::new(seen)
                 .colour(LINES[k % LINES.len()])
-                .label(sample.contact.name()),
+                .label(sample.contact.clone()),
         );
     }
     panel

@@ -5,13 +5,13 @@ use nanotap_figures::{
     Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Note, Panel, Place, Points,
     Rule,
 };
-use nanotap_flow::trajectory::{Piece, PiecewiseSignal};
-use nanotap_flow::{Output, Trajectory};
+use nanotap_flow::Output;
 
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::figure::panels::{MotionAxes, MotionCurves, OrbitCurves, time_axis};
 use crate::model::Model;
+use crate::model::recording::{Curve, CurvePiece, Recording};
 use crate::study::convergence::Convergence;
 use crate::study::fixed_step::FixedStepRun;
 use crate::study::orbit::OrbitReport;
@@ -31,18 +31,18 @@ const PORTRAIT_PERIODS: f64 = 64.0;
 /// A curve of a motion ready to draw, in shown units.
 struct View<'a> {
     model: &'a Model,
-    trajectory: &'a Trajectory,
+    recording: &'a Recording,
     length: (f64, String),
     velocity: (f64, String),
-    tip: PiecewiseSignal,
-    rate: PiecewiseSignal,
+    tip: Curve,
+    rate: Curve,
 }
 
 impl<'a> View<'a> {
-    fn new(model: &'a Model, trajectory: &'a Trajectory, units: &Units) -> Self {
-        let tip = trajectory.signal(&model.tip);
-        let rate = trajectory.signal(&model.tip_rate());
-        let size = |s: &PiecewiseSignal| {
+    fn new(model: &'a Model, recording: &'a Recording, units: &Units) -> Self {
+        let tip = recording.curve(&model.tip);
+        let rate = recording.curve(&model.tip_rate());
+        let size = |s: &Curve| {
             s.range()
                 .map_or(0.0, |(low, high)| low.value.abs().max(high.value.abs()))
         };
@@ -50,7 +50,7 @@ impl<'a> View<'a> {
             length: units.axis(Kind::Length, size(&tip)),
             velocity: units.axis(Kind::Velocity, size(&rate)),
             model,
-            trajectory,
+            recording,
             tip,
             rate,
         }
@@ -62,7 +62,7 @@ impl<'a> View<'a> {
     }
 
     fn over_time(&self, output: &Output, periods: f64) -> Vec<(f64, f64)> {
-        let signal = self.trajectory.signal(output);
+        let signal = self.recording.curve(output);
         self.instants(periods)
             .into_iter()
             .filter_map(|t| Some((t / self.model.period(), self.length.0 * signal.at(t)?)))
@@ -73,16 +73,16 @@ impl<'a> View<'a> {
     fn portrait(&self, periods: f64) -> Vec<(f64, f64)> {
         let end = periods * self.model.period();
         let mut points = Vec::new();
-        for (tip, rate) in self.tip.pieces.iter().zip(&self.rate.pieces) {
-            if tip.start >= end {
+        for piece in self.tip.pieces() {
+            if piece.start >= end {
                 break;
             }
-            let count = points_on(tip, self.model.period());
+            let count = points_on(&self.tip, &piece, self.model.period());
             points.extend((0..=count).map(|k| {
-                let s = tip.length * k as f64 / count as f64;
+                let s = piece.length * k as f64 / count as f64;
                 (
-                    self.length.0 * tip.signal.at(s),
-                    self.velocity.0 * rate.signal.at(s),
+                    self.length.0 * self.tip.on(&piece, s),
+                    self.velocity.0 * self.rate.on(&piece, s),
                 )
             }));
         }
@@ -116,7 +116,7 @@ impl<'a> View<'a> {
         MotionCurves {
             axes: self.axes(),
             title,
-            contacts: contact_intervals(self.model, self.trajectory, shown),
+            contacts: contact_intervals(self.model, self.recording, shown),
             surface: self.over_time(&self.model.surface(), shown),
             tip: self.over_time(&self.model.tip, shown),
             portrait: self.portrait(portrait),
@@ -127,34 +127,35 @@ impl<'a> View<'a> {
 }
 
 /// Points that show every turn of every mode on a piece.
-fn points_on(piece: &Piece, period: f64) -> usize {
-    let turns = piece.length * piece.signal.fastest() / std::f64::consts::TAU;
+fn points_on(curve: &Curve, piece: &CurvePiece, period: f64) -> usize {
+    let turns = piece.length * curve.fastest(piece) / std::f64::consts::TAU;
     let share = piece.length / period;
     let wanted = (POINTS_PER_TURN * turns).max(FEWEST_POINTS * share);
     wanted.min(POINTS_PER_PERIOD * share).max(6.0).ceil() as usize
 }
 
-fn instants(signal: &PiecewiseSignal, period: f64, periods: f64) -> Vec<f64> {
+fn instants(curve: &Curve, period: f64, periods: f64) -> Vec<f64> {
     let end = periods * period;
+    let pieces = curve.pieces();
     let mut times = Vec::new();
-    for piece in signal.pieces.iter().take_while(|p| p.start < end) {
-        let count = points_on(piece, period);
+    for piece in pieces.iter().take_while(|p| p.start < end) {
+        let count = points_on(curve, piece, period);
         times.extend((0..count).map(|k| piece.start + piece.length * k as f64 / count as f64));
     }
-    let last = signal.pieces.last().map_or(0.0, |p| p.start + p.length);
+    let last = pieces.last().map_or(0.0, |p| p.start + p.length);
     times.retain(|t| *t < end);
     times.push(end.min(last));
     times
 }
 
 /// When the tip is in contact, in drive periods.
-fn contact_intervals(model: &Model, trajectory: &Trajectory, periods: f64) -> Vec<(f64, f64)> {
+fn contact_intervals(model: &Model, recording: &Recording, periods: f64) -> Vec<(f64, f64)> {
     let period = model.period();
     let mut intervals: Vec<(f64, f64)> = Vec::new();
-    for s in trajectory
-        .segments()
+    for s in recording
+        .stretches(model)
         .iter()
-        .filter(|s| model.contact[s.regime] && s.start < periods * period)
+        .filter(|s| s.contact && s.start < periods * period)
     {
         let (from, to) = (
             s.start / period,
@@ -170,8 +171,8 @@ fn contact_intervals(model: &Model, trajectory: &Trajectory, periods: f64) -> Ve
 }
 
 /// A motion in the plane of tip displacement and rate, in the model's own units.
-pub fn portrait(model: &Model, trajectory: &Trajectory) -> Vec<(f64, f64)> {
-    View::new(model, trajectory, &Units::Model).portrait(trajectory.end() / model.period())
+pub fn portrait(model: &Model, recording: &Recording) -> Vec<(f64, f64)> {
+    View::new(model, recording, &Units::Model).portrait(recording.end() / model.period())
 }
 
 /// What a motion is, in few words: "period 4", "chaotic".
@@ -252,7 +253,7 @@ pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
     .legend(Legend::Above);
     for (i, view) in &drawn {
         let signal = &view.tip;
-        let periods = view.trajectory.end() / view.model.period();
+        let periods = view.recording.end() / view.model.period();
         let curve = view
             .instants(periods)
             .into_iter()

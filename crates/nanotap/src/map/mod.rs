@@ -38,14 +38,14 @@ use nanotap_dynamics::{
     Control, PeriodicOrbit, ShootingError, ShootingOptions, StroboscopicMap as _, close_orbit,
 };
 use nanotap_flow::FlowError;
-use nanotap_flow::sensitivity::SystemTangent;
+use nanotap_volterra::VolterraError;
 use rayon::prelude::*;
 
 pub use motion::{Motion, Point};
 
 use crate::case::{Case, CaseError, Key};
-use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::model::{Model, MotionError, Tangent};
 
 /// Most numbers that [`Map::iterate`] returns.
 pub const MOST_NUMBERS: usize = 200_000_000;
@@ -94,7 +94,7 @@ pub enum MapError {
         /// Which of the states, from 0.
         index: usize,
         /// Why.
-        error: FlowError,
+        error: MotionError,
     },
     /// Newton found no orbit.
     #[error(transparent)]
@@ -283,14 +283,14 @@ impl Map {
         states.par_chunks(n).enumerate().map(one).collect()
     }
 
-    fn tangents(&self, keys: &[Key]) -> Result<Vec<SystemTangent>, MapError> {
+    fn tangents(&self, keys: &[Key]) -> Result<Vec<Tangent>, MapError> {
         let tangent = |key: &Key| Ok(self.case.tangent(&self.model, *key)?);
         keys.iter().map(tangent).collect()
     }
 
     fn linearise(
         &self,
-        tangents: &[SystemTangent],
+        tangents: &[Tangent],
         state: &[f64],
         periods: usize,
     ) -> Result<Linearised, MapError> {
@@ -373,7 +373,7 @@ fn advance(
     Ok(())
 }
 
-fn of_state(index: usize) -> impl Fn(FlowError) -> MapError {
+fn of_state(index: usize) -> impl Fn(MotionError) -> MapError {
     move |error| MapError::Motion { index, error }
 }
 
@@ -399,7 +399,9 @@ impl From<MapError> for crate::Error {
                 "solve for the distance first, or give gap.tip",
             ),
             MapError::Motion {
-                error: FlowError::NotFinite { .. } | FlowError::Shape { .. },
+                error:
+                    MotionError::Flow(FlowError::NotFinite { .. } | FlowError::Shape { .. })
+                    | MotionError::Nonlinear(VolterraError::Value { .. } | VolterraError::Shape { .. }),
                 ..
             }
             | MapError::Shape { .. }

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, Output, Trajectory};
+use nanotap_flow::{Flow, FlowError, Output};
 
 use super::{MapError, of_state};
-use crate::model::Model;
-use crate::observe::{ContactEvent, Contacts};
+use crate::model::nonlinear::Nonlinear;
+use crate::model::recording::Recording;
+use crate::model::{Model, MotionError};
+use crate::observe::{ContactEvent, Contacts, Kept, Set, watch};
 
 /// Most drive periods that a [`Motion`] keeps.
 pub const MOST_PERIODS: f64 = 100_000.0;
@@ -17,7 +19,7 @@ pub const MOST_PERIODS: f64 = 100_000.0;
 pub struct Motion {
     model: Arc<Model>,
     tip_rate: Output,
-    trajectory: Trajectory,
+    recording: Recording,
     events: Vec<ContactEvent>,
     span: [f64; 2],
     /// The only state of a span of no length.
@@ -68,27 +70,64 @@ impl Motion {
         if length > MOST_PERIODS * period {
             return Err(refused("more than 100000 drive periods are not kept"));
         }
+        if let Some(nonlinear) = &model.nonlinear {
+            if from != 0.0 {
+                return Err(refused(
+                    "under a nonlinear force law it must begin at drive phase 0",
+                ));
+            }
+            return Self::under(model, nonlinear, state, length).map_err(of_state(0));
+        }
+        let failed = |error: FlowError| of_state(0)(error.into());
         let mut flow = Flow::new(Arc::clone(&model.system));
-        flow.start(state, from).map_err(of_state(0))?;
+        flow.start(state, from).map_err(failed)?;
         let regime = flow.regime();
         let (mut recorder, mut contacts) = (Recorder::default(), Contacts::of(model));
         let end = from + length;
         let whole = (end / period) as usize;
         for _ in 0..whole {
             flow.run_period(&mut (&mut recorder, &mut contacts))
-                .map_err(of_state(0))?;
+                .map_err(failed)?;
         }
         let rest = end - whole as f64 * period;
         if rest > 0.0 {
             flow.run_until(rest, &mut (&mut recorder, &mut contacts))
-                .map_err(of_state(0))?;
+                .map_err(failed)?;
         }
         Ok(Self {
             tip_rate: model.tip_rate(),
-            trajectory: recorder.finish(Arc::clone(&model.system)),
+            recording: Recording::Exact(recorder.finish(Arc::clone(&model.system))),
             events: contacts.events(),
             span: [from, end],
             start: (regime, state.to_vec()),
+            model: Arc::clone(model),
+        })
+    }
+
+    /// A motion under a nonlinear force, of whole periods that are read up to its end.
+    fn under(
+        model: &Arc<Model>,
+        nonlinear: &Nonlinear,
+        state: &[f64],
+        length: f64,
+    ) -> Result<Self, MotionError> {
+        let periods = (length / model.period()).ceil() as usize;
+        let kept = Kept {
+            recorded: periods,
+            events: true,
+            ..Kept::default()
+        };
+        let seen = watch(model, state, periods, Set::NONE, kept)?;
+        let mut events = seen.events;
+        events.retain(|event| event.tau <= length);
+        let n = nonlinear.system.dimension();
+        let (gap, rate) = nonlinear.system.gap(0.0, &state[..n]);
+        Ok(Self {
+            tip_rate: model.tip_rate(),
+            recording: seen.recording,
+            events,
+            span: [0.0, length],
+            start: (nonlinear.system.law().branch_at(gap, rate), state.to_vec()),
             model: Arc::clone(model),
         })
     }
@@ -104,18 +143,22 @@ impl Motion {
     }
 
     /// The recording itself, for closed-form integrals, extrema and harmonics of any output.
-    pub fn trajectory(&self) -> &Trajectory {
-        &self.trajectory
+    pub fn recording(&self) -> &Recording {
+        &self.recording
     }
 
     /// The motion at time `tau`; outside its span, at the nearer end.
     pub fn at(&self, tau: f64) -> Point {
         let tau = tau.clamp(self.span[0], self.span[1]);
-        let (regime, start, mut state) = match self.trajectory.segment_at(tau) {
+        let trajectory = match &self.recording {
+            Recording::Exact(trajectory) => trajectory,
+            Recording::Nonlinear(_) => return self.nonlinear_at(tau),
+        };
+        let (regime, start, mut state) = match trajectory.segment_at(tau) {
             Some(segment) => (
                 segment.regime,
                 segment.start - segment.phase,
-                self.trajectory.state_at(tau).unwrap_or_default(),
+                trajectory.state_at(tau).unwrap_or_default(),
             ),
             None => (self.start.0, 0.0, self.start.1.clone()),
         };
@@ -141,6 +184,33 @@ impl Motion {
             force,
             guard,
             contact,
+        }
+    }
+
+    /// The same under a nonlinear force, whose law may keep its own guards.
+    fn nonlinear_at(&self, tau: f64) -> Point {
+        let model = &self.model;
+        let phase = tau.rem_euclid(model.period());
+        let state = self.recording.state_at(tau);
+        let state = state.unwrap_or_else(|| self.start.1.clone());
+        let at = |output: &Output| output.at(model.system.drive(), &state, phase);
+        let force = self.recording.force(model).at(tau);
+        let stretches = self.recording.stretches(model);
+        let inside = |s: &&crate::model::recording::Stretch| s.start <= tau;
+        let contact = stretches
+            .iter()
+            .rev()
+            .find(inside)
+            .is_some_and(|s| s.contact);
+        Point {
+            tau,
+            tip: at(&model.tip),
+            tip_rate: at(&self.tip_rate),
+            gap: at(&model.height),
+            force: force.unwrap_or(f64::NAN),
+            guard: f64::NAN,
+            contact,
+            state,
         }
     }
 }

@@ -174,6 +174,29 @@ impl<'a> Beam<'a> {
         })
     }
 
+    /// V_T.
+    pub(crate) const fn height(&self) -> &Output {
+        &self.height
+    }
+
+    /// What a force at the tip adds to ẋ.
+    pub(crate) const fn kick(&self) -> &DVector<f64> {
+        &self.kick
+    }
+
+    /// How much of the sample's force is in the force with which a moving clamp pushes, see
+    /// [`Beam::powers_in`].
+    pub(crate) fn clamp_force(&self) -> f64 {
+        if self.galerkin.case.actuation != Actuation::Base {
+            return 0.0;
+        }
+        let modes = &self.galerkin.modes;
+        let momentum = self.layout.row(&modes.integral, 1);
+        let tip_speed = self.layout.row(&modes.tip, 1);
+        let momentum = momentum.plus(self.galerkin.case.alpha1, &tip_speed);
+        (&momentum.row * &self.kick)[0] - 1.0
+    }
+
     /// A combination as an output.
     fn combined(&self, combination: &Combination) -> Output {
         self.with_numbers(combination, |dual| dual.value)
@@ -321,7 +344,7 @@ impl<'a> Beam<'a> {
     /// through the medium, takes α3 ∫(Ẇ + ẏ)² dξ; the sample takes and stores what its law
     /// says. The printed Eq. (14) is a further force on the modes, whose work counts as the
     /// drive's.
-    fn powers_in(&self, flow: &nanotap_flow::Regime, answer: &Answer) -> Powers {
+    pub(crate) fn powers_in(&self, flow: &nanotap_flow::Regime, answer: &Answer) -> Powers {
         let (case, modes) = (&self.galerkin.case, &self.galerkin.modes);
         let (base, force) = (self.base(), self.combined(&answer.force));
         let rate = |o: &Output| o.rate(flow.matrix(), flow.forcing(), self.drive);
@@ -464,6 +487,16 @@ pub(crate) struct BeamTangent {
 }
 
 impl BeamTangent {
+    /// ∂f in flight.
+    pub(crate) const fn forcing(&self) -> &HarmonicVector {
+        &self.forcing
+    }
+
+    /// ∂V_T.
+    pub(crate) const fn height(&self) -> &Output {
+        &self.height
+    }
+
     /// The derivative of a combination.
     pub(crate) fn combined(&self, beam: &Beam<'_>, combination: &Combination) -> Output {
         beam.with_numbers(combination, |dual| dual.derivative)

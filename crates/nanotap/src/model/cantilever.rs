@@ -8,6 +8,7 @@ use crate::model::beam::{MAX_MODES, ModeCountError};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::parameter::Parameter;
+use crate::model::sample_law::SampleLaw;
 
 /// Which cosine term the drive has in Eq. (14) of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
@@ -58,6 +59,9 @@ pub struct Cantilever {
     pub cosine_term: CosineTerm,
     /// How the sample answers the tip.
     pub contact: ContactLaw,
+    /// A nonlinear force law in place of spring and damper, in the model's units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<SampleLaw>,
     /// Stiffness of the standard linear solid's relaxing arm over bending stiffness, ≥ 0;
     /// 0 with every other law.
     pub relaxation_stiffness: f64,
@@ -94,6 +98,7 @@ impl Cantilever {
             omega: 2.6,
             cosine_term: CosineTerm::Corrected,
             contact: ContactLaw::SpringDamper,
+            law: None,
             relaxation_stiffness: 0.0,
             relaxation_time: 0.0,
             actuation: Actuation::Base,
@@ -116,6 +121,7 @@ impl Cantilever {
             omega: 4.1,
             cosine_term: CosineTerm::Corrected,
             contact: ContactLaw::SpringDamper,
+            law: None,
             relaxation_stiffness: 0.0,
             relaxation_time: 0.0,
             actuation: Actuation::Base,
@@ -172,8 +178,10 @@ impl Cantilever {
     /// relaxing arm's) and those of its contact law and its second tone.
     pub fn parameters(&self) -> Vec<Parameter> {
         let of_solid = self.contact == ContactLaw::StandardLinearSolid;
+        let of_law = self.law.is_some();
         Parameter::every()
             .filter(|parameter| match parameter {
+                Parameter::Alpha4 | Parameter::Alpha6 if of_law => false,
                 Parameter::Alpha6 => !of_solid,
                 Parameter::RelaxationStiffness | Parameter::RelaxationTime => of_solid,
                 Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
@@ -195,6 +203,7 @@ impl Cantilever {
             return None;
         }
         Some(match parameter {
+            Parameter::Alpha4 | Parameter::Alpha6 if self.law.is_some() => Reason::SpringOfLaw,
             Parameter::Alpha6 => Reason::DamperOfSolid,
             Parameter::Tone2Amplitude | Parameter::Tone2Phase => Reason::NoSecondTone,
             _ => Reason::NoSolid,
@@ -308,6 +317,8 @@ pub enum Reason {
     FrequencyOutOfRange,
     /// A damper beside a standard linear solid.
     DamperOfSolid,
+    /// A spring or a damper beside a nonlinear law.
+    SpringOfLaw,
     /// A relaxing arm of another law.
     NoSolid,
     /// A second tone without a frequency.
@@ -343,6 +354,8 @@ impl fmt::Display for Reason {
                 "must be 0 with contact = \"standard-linear-solid\", whose damper is its arm's: \
                  relaxation_stiffness times relaxation_time",
             ),
+            Self::SpringOfLaw => formatter
+                .write_str("must be 0 beside a nonlinear force law, which is all of the sample"),
             Self::NoSecondTone => formatter.write_str(
                 "there is no second tone: give tone2_ratio, as in \"25/4\", or leave this out",
             ),

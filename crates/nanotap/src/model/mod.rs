@@ -5,6 +5,9 @@
 //! sample that recovers (see [`contact`]), zero at rest; `(x, ẋ)` for an
 //! oscillator. Regime 0 is free flight. Everything that analyses or shows a motion works on a
 //! [`Model`] and asks no more where it came from.
+//!
+//! A sample with a [nonlinear] force law is no regime: such a model has free flight
+//! alone as a linear system, and the flow under the force beside it.
 
 pub mod beam;
 mod beam_equations;
@@ -13,14 +16,19 @@ pub mod contact;
 pub mod drive_form;
 pub mod exact_beam;
 pub mod galerkin;
+mod motion_error;
+pub mod nonlinear;
 pub mod oscillator;
 pub mod parameter;
+pub mod recording;
+pub mod sample_law;
 pub mod spectrum;
 pub mod strobe;
 mod tangent;
 
 use std::sync::{Arc, OnceLock};
 
+pub use motion_error::MotionError;
 pub use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
@@ -31,7 +39,9 @@ use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::contact::ContactLaw;
 use crate::model::galerkin::{Galerkin, Regime};
+use crate::model::nonlinear::{Nonlinear, Variation};
 use crate::model::parameter::Parameter;
+use crate::model::sample_law::SampleLaw;
 
 /// Why a cantilever or an oscillator has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -45,6 +55,9 @@ pub enum ModelError {
     /// Its equations cannot be solved in closed form.
     #[error(transparent)]
     Flow(#[from] FlowError),
+    /// Its force law makes no sense, or its modes cannot be had.
+    #[error(transparent)]
+    Nonlinear(#[from] nanotap_volterra::VolterraError),
 }
 
 /// A piecewise-linear system with names for what it shows.
@@ -78,6 +91,8 @@ pub struct Model {
     /// What a sample's memory that is overwritten at the end of each contact does to
     /// volumes of states.
     pub forgetting: Option<Forgetting>,
+    /// The flow under a nonlinear force law; the system is then free flight alone.
+    pub nonlinear: Option<Arc<Nonlinear>>,
 }
 
 /// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
@@ -183,6 +198,9 @@ impl Model {
     pub fn cantilever(case: &Cantilever) -> Result<Self, ModelError> {
         let galerkin = Galerkin::new(case)?;
         let drive = drive_of(case)?;
+        if let Some(law) = &case.law {
+            return Self::under(law, galerkin, &drive);
+        }
         let law = ContactLaw::law(case, None);
         let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
         let regimes = vec![
@@ -203,7 +221,39 @@ impl Model {
             memory: usize::from(law.has_memory),
             forgetting: outputs.forgetting,
             second_phase: case.tone2_phase.to_radians(),
+            nonlinear: None,
             system,
+        })
+    }
+
+    /// The beam under a nonlinear force law.
+    fn under(law: &SampleLaw, galerkin: Galerkin, drive: &Drive) -> Result<Self, ModelError> {
+        let free = |beam: &Beam<'_>, memory| {
+            let flight = contact::no_sample(memory).flight;
+            beam.regime(Regime::Free, &flight, true)
+        };
+        let bare = Beam::new(&galerkin, drive, false)?;
+        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, false)?, drive)?;
+        let memory = nonlinear.remembers;
+        let beam = Beam::new(&galerkin, drive, memory)?;
+        let regime = free(&beam, memory)?;
+        let outputs = beam.outputs(&contact::no_sample(memory));
+        let system = System::new(drive.clone(), vec![regime], vec![Vec::new()])?;
+        let second_phase = galerkin.case.tone2_phase.to_radians();
+        Ok(Self {
+            contact: vec![false],
+            tip: outputs.tip,
+            gap: outputs.height.clone(),
+            force: vec![outputs.height.scaled(0.0)],
+            height: outputs.height,
+            beam: Some(outputs.beam),
+            power: PowersOnDemand::of(galerkin),
+            impact_loss: 0.0,
+            memory: usize::from(memory),
+            forgetting: None,
+            second_phase,
+            nonlinear: Some(Arc::new(nonlinear)),
+            system: Arc::new(system),
         })
     }
 
@@ -213,8 +263,16 @@ impl Model {
             let Some(galerkin) = &self.power.equations else {
                 return Vec::new();
             };
+            let drive = self.system.drive();
+            if self.nonlinear.is_some() {
+                let flight = contact::no_sample(self.memory > 0).flight;
+                let free = &self.system.regimes()[0];
+                return Beam::new(galerkin, drive, self.memory > 0)
+                    .map(|beam| vec![beam.powers_in(free, &flight)])
+                    .unwrap_or_default();
+            }
             let law = ContactLaw::law(&galerkin.case, None);
-            Beam::new(galerkin, self.system.drive(), law.has_memory)
+            Beam::new(galerkin, drive, law.has_memory)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
@@ -268,7 +326,55 @@ fn drive_of(case: &Cantilever) -> Result<Drive, FlowError> {
     }
 }
 
-/// The derivative of the cantilever's system with respect to one parameter.
+/// How the map of a model changes with a number.
+#[derive(Clone, Debug)]
+pub struct Tangent(pub(crate) TangentKind);
+
+/// The engines' own terms.
+#[derive(Clone, Debug)]
+pub(crate) enum TangentKind {
+    Exact(SystemTangent),
+    Nonlinear(Variation),
+}
+
+impl Tangent {
+    /// Of a model that does not change.
+    pub(crate) fn zeros(model: &Model) -> Self {
+        Self(match &model.nonlinear {
+            None => TangentKind::Exact(SystemTangent::zeros(&model.system)),
+            Some(_) => TangentKind::Nonlinear(Variation::none()),
+        })
+    }
+
+    /// Along `slopes` of a cantilever's numbers and `law` of its force law's parameters.
+    ///
+    /// # Errors
+    /// As [`Model::cantilever`].
+    pub(crate) fn along(
+        case: &Cantilever,
+        model: &Model,
+        slopes: &[(Parameter, f64)],
+        law: &[f64],
+    ) -> Result<Self, ModelError> {
+        if let Some(nonlinear) = &model.nonlinear {
+            let variation = Variation::along(case, model, nonlinear, slopes, law)?;
+            return Ok(Self(TangentKind::Nonlinear(variation)));
+        }
+        let mut sum = SystemTangent::zeros(&model.system);
+        for &(parameter, slope) in slopes {
+            sum.add(slope, &cantilever_tangent(case, model, parameter)?);
+        }
+        Ok(Self(TangentKind::Exact(sum)))
+    }
+}
+
+impl From<SystemTangent> for Tangent {
+    fn from(tangent: SystemTangent) -> Self {
+        Self(TangentKind::Exact(tangent))
+    }
+}
+
+/// The derivative of the cantilever's piecewise-linear system with respect to one parameter.
 ///
 /// # Errors
 /// As [`Model::cantilever`].
@@ -333,6 +439,10 @@ impl From<ModelError> for crate::Error {
             ModelError::Oscillator(_) | ModelError::Flow(FlowError::Resonance { .. }) => {
                 Self::input(error.to_string(), "change it in the case")
             }
+            ModelError::Nonlinear(error) => Self::input(
+                error.to_string(),
+                "change the law of the sample in the case",
+            ),
             ModelError::Flow(error) => error.into(),
         }
     }

@@ -308,6 +308,7 @@ impl Oscillator {
             beam: None,
             memory: 0,
             forgetting: None,
+            nonlinear: None,
             second_phase: 0.0,
             height: gap.clone(),
             gap,

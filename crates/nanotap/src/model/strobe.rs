@@ -1,5 +1,5 @@
-//! The stroboscopic map of a model: the joint between the exact flow and the
-//! analysis of its motions.
+//! The stroboscopic map of a model: the joint between the engines, the exact flow and that
+//! under a nonlinear force, and the analysis of motions.
 
 use std::sync::Arc;
 
@@ -12,17 +12,21 @@ use nanotap_flow::signal::Signal;
 use nanotap_flow::system::Transition;
 use nanotap_flow::{Flow, FlowError, Output, System};
 
-use crate::model::Model;
+use crate::model::nonlinear::NonlinearStrobe;
+use crate::model::{Model, MotionError, Tangent, TangentKind};
 
 /// The map from the state at drive phase 0 to the state one drive period later.
 #[derive(Clone, Debug)]
-pub struct Strobe {
-    flow: Flow,
-    /// The state that the flow was last left in: whoever goes on from it need not start anew.
-    last: Vec<f64>,
-    gap: Arc<Output>,
-    /// Derivatives of the system with respect to the parameters of a family.
-    tangents: Arc<[SystemTangent]>,
+pub struct Strobe(Engine);
+
+#[expect(
+    clippy::large_enum_variant,
+    reason = "the exact map is the one whose period takes no more time than following a pointer"
+)]
+#[derive(Clone, Debug)]
+enum Engine {
+    Exact(ExactStrobe),
+    Nonlinear(Box<NonlinearStrobe>),
 }
 
 impl Strobe {
@@ -31,14 +35,32 @@ impl Strobe {
         Self::with_tangents(model, Vec::new())
     }
 
-    /// The map of `model`, which also knows the derivatives of its system with respect to
-    /// some parameters.
-    pub fn with_tangents(model: &Model, tangents: Vec<SystemTangent>) -> Self {
-        Self {
-            flow: Flow::new(Arc::clone(&model.system)),
-            last: Vec::new(),
-            gap: Arc::new(model.gap.clone()),
-            tangents: tangents.into(),
+    /// The map of `model`, which also knows how it changes with some parameters.
+    pub fn with_tangents(model: &Model, tangents: Vec<Tangent>) -> Self {
+        Self(match &model.nonlinear {
+            None => {
+                let exact = tangents.into_iter().filter_map(|tangent| match tangent.0 {
+                    TangentKind::Exact(tangent) => Some(tangent),
+                    TangentKind::Nonlinear(_) => None,
+                });
+                Engine::Exact(ExactStrobe::new(model, exact.collect()))
+            }
+            Some(nonlinear) => {
+                let variations = tangents.into_iter().filter_map(|tangent| match tangent.0 {
+                    TangentKind::Nonlinear(variation) => Some(variation),
+                    TangentKind::Exact(_) => None,
+                });
+                let map = NonlinearStrobe::new(nonlinear, variations.collect());
+                Engine::Nonlinear(Box::new(map))
+            }
+        })
+    }
+
+    /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
+    pub fn evaluations(&self) -> u64 {
+        match &self.0 {
+            Engine::Exact(map) => map.flow.statistics().evaluations,
+            Engine::Nonlinear(map) => map.evaluations(),
         }
     }
 
@@ -48,6 +70,120 @@ impl Strobe {
     /// # Errors
     /// When the flow fails.
     pub fn advance_with_derivatives(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => Ok(map.advance_with_derivatives(state, jacobian, derivatives)?),
+            Engine::Nonlinear(map) => {
+                map.advance_with_derivatives(state, jacobian, Some(derivatives))
+            }
+        }
+    }
+}
+
+impl StroboscopicMap for Strobe {
+    type Error = MotionError;
+
+    fn dimension(&self) -> usize {
+        match &self.0 {
+            Engine::Exact(map) => map.flow.system().dimension(),
+            Engine::Nonlinear(map) => map.dimension(),
+        }
+    }
+
+    fn period(&self) -> f64 {
+        match &self.0 {
+            Engine::Exact(map) => map.flow.system().drive().period(),
+            Engine::Nonlinear(map) => map.period(),
+        }
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => Ok(map.advance(state)?),
+            Engine::Nonlinear(map) => map.advance(state),
+        }
+    }
+
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => Ok(map.advance_by(state, periods)?),
+            Engine::Nonlinear(map) => (0..periods).try_for_each(|_| map.advance(state)),
+        }
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => Ok(map.advance_with_jacobian(state, jacobian)?),
+            Engine::Nonlinear(map) => map.advance_with_derivatives(state, jacobian, None),
+        }
+    }
+
+    /// From the trace of the equations and the time in each regime, and of a rigid stop
+    /// from its impacts.
+    fn log_determinant(&mut self, state: &[f64]) -> Result<Option<f64>, MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => Ok(Some(map.log_determinant(state)?)),
+            Engine::Nonlinear(map) => Ok(map.log_determinant()),
+        }
+    }
+
+    fn log_determinant_bound(&self) -> f64 {
+        match &self.0 {
+            Engine::Exact(map) => map.log_determinant_bound(),
+            Engine::Nonlinear(map) => map.log_determinant().unwrap_or(f64::INFINITY),
+        }
+    }
+
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => Ok(map.advance_with_tangencies(state, tangencies)?),
+            Engine::Nonlinear(map) => {
+                let period = map.period();
+                let extrema = map.advance_with_extrema(state)?.into_iter();
+                tangencies.extend(extrema.map(|(time, value)| Tangency {
+                    phase: time / period,
+                    value,
+                }));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The exact map of a piecewise-linear model.
+#[derive(Clone, Debug)]
+struct ExactStrobe {
+    flow: Flow,
+    /// The state that the flow was last left in: whoever goes on from it need not start anew.
+    last: Vec<f64>,
+    gap: Arc<Output>,
+    /// Derivatives of the system with respect to the parameters of a family.
+    tangents: Arc<[SystemTangent]>,
+}
+
+impl ExactStrobe {
+    fn new(model: &Model, tangents: Vec<SystemTangent>) -> Self {
+        Self {
+            flow: Flow::new(Arc::clone(&model.system)),
+            last: Vec::new(),
+            gap: Arc::new(model.gap.clone()),
+            tangents: tangents.into(),
+        }
+    }
+
+    fn advance_with_derivatives(
         &mut self,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
@@ -78,23 +214,6 @@ impl Strobe {
         self.last.extend_from_slice(state);
     }
 
-    /// The flow it runs.
-    pub fn flow(&self) -> &Flow {
-        &self.flow
-    }
-}
-
-impl StroboscopicMap for Strobe {
-    type Error = FlowError;
-
-    fn dimension(&self) -> usize {
-        self.flow.system().dimension()
-    }
-
-    fn period(&self) -> f64 {
-        self.flow.system().drive().period()
-    }
-
     fn advance(&mut self, state: &mut [f64]) -> Result<(), FlowError> {
         self.begin(state)?;
         self.flow.run_period(&mut ())?;
@@ -120,13 +239,11 @@ impl StroboscopicMap for Strobe {
         Ok(())
     }
 
-    /// From the trace of the equations and the time in each regime, and of a rigid stop
-    /// from its impacts.
-    fn log_determinant(&mut self, state: &[f64]) -> Result<Option<f64>, FlowError> {
+    fn log_determinant(&mut self, state: &[f64]) -> Result<f64, FlowError> {
         self.begin(state)?;
         let mut sum = LogDeterminant(0.0);
         self.flow.run_period(&mut sum)?;
-        Ok(Some(sum.0))
+        Ok(sum.0)
     }
 
     fn log_determinant_bound(&self) -> f64 {

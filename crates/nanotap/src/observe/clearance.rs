@@ -23,7 +23,9 @@ use serde::Serialize;
 
 use super::measure::measure_clearance;
 use crate::model::beam::Modes;
-use crate::model::{BeamOutputs, Model};
+use crate::model::nonlinear::Nonlinear;
+use crate::model::recording::{Recording, read};
+use crate::model::{BeamOutputs, Model, MotionError};
 
 /// Where a beam comes nearest to the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -48,7 +50,7 @@ impl Clearance {
     ///
     /// # Errors
     /// When the flow fails.
-    pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, FlowError> {
+    pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, MotionError> {
         measure_clearance(model, state, periods)
     }
 
@@ -62,7 +64,7 @@ impl Clearance {
 struct RecordedBeam<'a> {
     model: &'a Model,
     beam: &'a BeamOutputs,
-    trajectory: &'a Trajectory,
+    recording: &'a Recording,
 }
 
 impl RecordedBeam<'_> {
@@ -124,7 +126,7 @@ impl RecordedBeam<'_> {
 
     /// The least height of one place.
     fn least_height(&self, xi: f64) -> Option<Clearance> {
-        let least = self.trajectory.signal(&self.beam.height(xi)).range()?.0;
+        let least = self.recording.curve(&self.beam.height(xi)).range()?.0;
         Some(Clearance {
             height: least.value,
             xi,
@@ -135,7 +137,7 @@ impl RecordedBeam<'_> {
     /// The slope of the beam where and when it is `lowest`.
     fn slope(&self, lowest: &Clearance) -> Option<f64> {
         let time = lowest.period * self.model.period();
-        let state = self.trajectory.state_at(time)?;
+        let state = self.recording.state_at(time)?;
         let slopes = self.beam.modes.iter().map(|mode| mode.slope(lowest.xi));
         Some(slopes.zip(&state).map(|(slope, a)| slope * a).sum())
     }
@@ -322,7 +324,7 @@ impl ClearanceSearch {
             let beam = RecordedBeam {
                 model,
                 beam,
-                trajectory: &period,
+                recording: &Recording::Exact(period),
             };
             let first = beam.beam.modes.iter().next();
             let bound = |xi: f64| {
@@ -340,6 +342,102 @@ impl ClearanceSearch {
             }
         }
         Ok(least)
+    }
+}
+
+/// Looks for the clearance of motions under a nonlinear force: the places of the beam are
+/// sampled with the quadrature of the motion, and the period in which one is lowest is searched
+/// exactly at the places that came near.
+pub(super) struct SampledClearance {
+    heights: Vec<nanotap_volterra::Output>,
+    lowest: Option<LowestPeriod>,
+}
+
+/// The period in which the beam was lowest so far.
+struct LowestPeriod {
+    number: usize,
+    period: nanotap_volterra::Trajectory,
+    /// Least sampled height of each place.
+    places: Vec<f64>,
+    /// How far the lowest place swings.
+    swing: f64,
+}
+
+impl LowestPeriod {
+    fn least(&self) -> f64 {
+        self.places.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Heights that samples leave open, as a part of the swing.
+const BETWEEN_SAMPLES: f64 = 0.01;
+
+impl SampledClearance {
+    /// In a motion of `model`; `None` if it is no beam.
+    pub(super) fn new(model: &Model, nonlinear: &Nonlinear) -> Option<Self> {
+        let beam = model.beam.as_ref()?;
+        let count = PLACES_PER_MODE * beam.modes.count();
+        let height = |i: usize| nonlinear.output(&beam.height(i as f64 / count as f64), 0.0);
+        Some(Self {
+            heights: (0..=count).map(height).collect(),
+            lowest: None,
+        })
+    }
+
+    /// Takes period `number`, with the samples of its quadrature.
+    pub(super) fn period(
+        &mut self,
+        nonlinear: &Nonlinear,
+        number: usize,
+        period: &nanotap_volterra::Trajectory,
+        samples: &[(f64, nanotap_volterra::Sample)],
+    ) {
+        let range = |height: &nanotap_volterra::Output| {
+            let values = samples.iter().map(|(_, s)| read(nonlinear, height, s));
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(v), high.max(v))
+            })
+        };
+        let ranges: Vec<(f64, f64)> = self.heights.iter().map(range).collect();
+        let found = LowestPeriod {
+            number,
+            period: period.clone(),
+            places: ranges.iter().map(|r| r.0).collect(),
+            swing: ranges.iter().map(|r| r.1 - r.0).fold(0.0, f64::max),
+        };
+        if self
+            .lowest
+            .as_ref()
+            .is_none_or(|known| found.least() < known.least())
+        {
+            self.lowest = Some(found);
+        }
+    }
+
+    /// The clearance of the periods taken.
+    pub(super) fn found(self, model: &Model, nonlinear: &Arc<Nonlinear>) -> Option<Clearance> {
+        let lowest = self.lowest?;
+        let near = lowest.least() + BETWEEN_SAMPLES * lowest.swing;
+        let last = lowest.places.len() - 1;
+        let recording = Recording::of_periods(nonlinear, vec![lowest.period]);
+        let beam = RecordedBeam {
+            model,
+            beam: model.beam.as_ref()?,
+            recording: &recording,
+        };
+        let bound = |xi: f64| {
+            let place = (xi * last as f64).round() as usize;
+            if lowest.places[place.min(last)] > near {
+                f64::INFINITY
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
+        let found = beam.lowest(bound)?;
+        Some(Clearance {
+            period: found.period + lowest.number as f64,
+            ..found
+        })
     }
 }
 

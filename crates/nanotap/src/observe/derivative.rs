@@ -25,7 +25,7 @@ use super::value::Value;
 use crate::case::{Case, CaseError, Key};
 use crate::model::contact::dual::Dual;
 use crate::model::strobe::Strobe;
-use crate::model::{Model, ModelTangent};
+use crate::model::{Model, ModelTangent, MotionError};
 
 /// Why an orbit has no derivative.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -35,7 +35,10 @@ pub enum DerivativeError {
     Case(#[from] CaseError),
     /// The flow failed.
     #[error(transparent)]
-    Flow(#[from] FlowError),
+    Flow(#[from] MotionError),
+    /// The force law is nonlinear.
+    #[error("derivatives of observables are known of piecewise-linear contacts only")]
+    Nonlinear,
     /// A multiplier is 1: at a fold the orbit has no derivative.
     #[error("the orbit has no derivative: a multiplier is 1 within rounding")]
     NotIsolated,
@@ -69,11 +72,16 @@ impl Derivative {
         observed: &Observables,
         set: Set,
     ) -> Result<Self, DerivativeError> {
+        if model.nonlinear.is_some() {
+            return Err(DerivativeError::Nonlinear);
+        }
         let tangent = case.model_tangent(model, key)?;
         let start = orbit_derivative(model, &tangent, state, period)?;
         let clearance = observed.beam_clearance_xi;
         let mut followed = Followed::new(model, &tangent, set, clearance);
-        followed.run(state, &start, period)?;
+        followed
+            .run(state, &start, period)
+            .map_err(MotionError::from)?;
         let observables = followed.changes(set);
         let physical = case
             .physical()
@@ -178,7 +186,7 @@ fn orbit_derivative(
     period: usize,
 ) -> Result<Vec<f64>, DerivativeError> {
     let n = state.len();
-    let mut map = Strobe::with_tangents(model, vec![tangent.system.clone()]);
+    let mut map = Strobe::with_tangents(model, vec![tangent.system.clone().into()]);
     let mut x = state.to_vec();
     let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
     let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));
@@ -355,6 +363,7 @@ impl<'a> Followed<'a> {
                 .map_or_else(Dual::default, |_| dual(variation.integrals[touching])),
             contacts,
             stored: Dual::default(),
+            stored_by_sample: Dual::default(),
             clearance: self.clearance.zip(heights).map(|(xi, height)| Clearance {
                 height: dual(*height),
                 xi,

@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::number::Number;
+use crate::model::nonlinear::Nonlinear;
 use crate::model::{Model, ModelTangent, Powers, Product};
 
 /// Energies over a recording, in the model's own units or in SI.
@@ -153,6 +154,31 @@ impl PowerTerm {
         };
         vec![change; model.system.regimes().len()]
     }
+
+    /// How much of a nonlinear law's force is added to the factor: the clamp, whose force is the
+    /// first factor of the drive's first product, feels the sample's.
+    pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
+        let clamp = Self {
+            sum: Sum::Drive,
+            index: 0,
+            second: false,
+        };
+        if self == clamp {
+            nonlinear.clamp_force
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Energy stored in the lever in a state at drive phase 0.
+pub(super) fn stored_by_lever(model: &Model, state: &[f64]) -> f64 {
+    let at = |output: &Output| output.at(model.system.drive(), state, 0.0);
+    let stored = model
+        .power()
+        .first()
+        .map_or(&[][..], |powers| &powers.stored);
+    stored.iter().map(|p| p.weight * at(&p.a) * at(&p.b)).sum()
 }
 
 /// Where a motion began and where it is: the stretch it began with, and the last one.

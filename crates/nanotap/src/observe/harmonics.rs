@@ -1,10 +1,11 @@
-//! Harmonics of tip deflection, slope and force, in closed form.
+//! Harmonics of tip deflection, slope and force.
 
-use nanotap_flow::{Complex, Trajectory};
+use nanotap_flow::Complex;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Model;
+use crate::model::recording::Recording;
 
 /// One component of a periodic motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -43,15 +44,12 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// The spectrum up to `orders` times the drive's frequency, of a trajectory that
+    /// The spectrum up to `orders` times the drive's frequency, of a recording that
     /// holds exactly one repetition: `period` drive periods.
-    pub fn of(model: &Model, trajectory: &Trajectory, period: usize, orders: usize) -> Self {
-        let tip = trajectory.signal(&model.tip);
-        let force = trajectory.signal_by_regime(&model.force);
-        let slope = model
-            .beam
-            .as_ref()
-            .map(|beam| trajectory.signal(&beam.slope));
+    pub fn of(model: &Model, recording: &Recording, period: usize, orders: usize) -> Self {
+        let tip = recording.curve(&model.tip);
+        let force = recording.force(model);
+        let slope = model.beam.as_ref().map(|beam| recording.curve(&beam.slope));
         // Both tones are whole multiples of the whole motion's own frequency.
         let repetition = model.repetition() * period;
         let base = model.frequency() / repetition as f64;

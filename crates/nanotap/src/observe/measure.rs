@@ -12,14 +12,15 @@ use nanotap_flow::accumulate::{
     Accumulator, Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request,
 };
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
-use nanotap_flow::{Complex, Flow, FlowError, Output};
+use nanotap_flow::{Complex, FlowError, Output};
 
 use super::clearance::{Clearance, ClearanceSearch};
 use super::energy::{Ends, EnergyBalance, PowerTerm, balance};
 use super::number::{Number, Phasor};
 use super::table::{Observables, Set};
 use super::{above_rounding, begins_contact};
-use crate::model::Model;
+use crate::model::nonlinear::Nonlinear;
+use crate::model::{Model, MotionError};
 
 /// A scalar along a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,16 @@ pub(super) enum Signal {
 }
 
 impl Signal {
+    /// What it is in a model with a nonlinear law.
+    pub(super) fn reading(self, model: &Model, nonlinear: &Nonlinear) -> nanotap_volterra::Output {
+        let force = match self {
+            Self::Force => 1.0,
+            Self::Power(term) => term.force_part(nonlinear),
+            _ => 0.0,
+        };
+        nonlinear.output(&self.outputs(model)[0], force)
+    }
+
     /// What it is in `model`, an entry a regime.
     pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
         let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
@@ -92,6 +103,29 @@ enum Key {
 }
 
 impl Need {
+    /// The signals that it is made of.
+    pub(super) const fn signals(&self) -> (Signal, Option<Signal>) {
+        match *self {
+            Self::Least(signal)
+            | Self::Greatest(signal)
+            | Self::Integral(signal)
+            | Self::Fourier(signal, _) => (signal, None),
+            Self::Product(a, b) => (a, Some(b)),
+        }
+    }
+
+    /// What it is of no time.
+    pub(super) const fn nothing(&self) -> Complex {
+        Complex::new(
+            match self {
+                Self::Least(_) => f64::INFINITY,
+                Self::Greatest(_) => f64::NEG_INFINITY,
+                _ => 0.0,
+            },
+            0.0,
+        )
+    }
+
     /// Adds it to `request`; `channel` says where its signals are there.
     fn key(
         self,
@@ -145,10 +179,29 @@ struct Needs {
     clearance: bool,
 }
 
-impl Needs {
-    fn of(model: &Model, set: Set) -> Result<Self, FlowError> {
+/// What a choice of observables asks for.
+pub(super) struct Asked {
+    pub(super) needs: Vec<Need>,
+    /// Whether the beam's least height is wanted.
+    pub(super) clearance: bool,
+    ends: bool,
+}
+
+impl Asked {
+    pub(super) fn of(model: &Model, set: Set) -> Self {
         let mut measured = Measured::<f64>::nothing(model);
         Observables::read(set, &mut measured);
+        Self {
+            needs: measured.asked,
+            clearance: measured.asked_clearance,
+            ends: measured.asked_ends,
+        }
+    }
+}
+
+impl Needs {
+    fn of(model: &Model, set: Set) -> Result<Self, FlowError> {
+        let asked = Asked::of(model, set);
         let mut request = Request::new();
         let mut channels: Vec<(Signal, Channel)> = Vec::new();
         let mut channel = |request: &mut Request, signal: Signal| {
@@ -159,16 +212,16 @@ impl Needs {
             channels.push((signal, new));
             new
         };
-        let asked = std::mem::take(&mut measured.asked);
         let keys = asked
+            .needs
             .into_iter()
             .map(|need| (need, need.key(&mut request, &mut channel, model)))
             .collect();
         Ok(Self {
             plan: request.plan(&model.system)?,
             keys,
-            ends: measured.asked_ends,
-            clearance: measured.asked_clearance,
+            ends: asked.ends,
+            clearance: asked.clearance,
         })
     }
 
@@ -333,23 +386,21 @@ impl<'a> Measurement<'a> {
             (need, whole.unwrap_or(value))
         });
         let gathered = &self.accumulator;
-        let mut measured = Measured {
-            found: Some(Found {
-                values: values.collect(),
-                duration: gathered.duration(),
-                periods: gathered.periods(),
-                contact_time: contact_regimes(self.model)
-                    .map(|r| gathered.time_in(r))
-                    .sum(),
-                contacts: contacts(self.model, gathered),
-                stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(self.model)),
-                clearance,
-                impact_loss: self.model.impact_loss,
-                second_phase: self.model.second_phase,
-            }),
-            ..Measured::nothing(self.model)
+        let found = Found {
+            values: values.collect(),
+            duration: gathered.duration(),
+            periods: gathered.periods(),
+            contact_time: contact_regimes(self.model)
+                .map(|r| gathered.time_in(r))
+                .sum(),
+            contacts: contacts(self.model, gathered),
+            stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(self.model)),
+            stored_by_sample: 0.0,
+            clearance,
+            impact_loss: self.model.impact_loss,
+            second_phase: self.model.second_phase,
         };
-        Ok(Observables::read(self.set, &mut measured))
+        Ok(found.observables(self.model, self.set))
     }
 }
 
@@ -408,32 +459,13 @@ impl Observer for Measurement<'_> {
     }
 }
 
-/// Measures `periods` drive periods of `model` from `state` at drive phase 0.
-///
-/// # Errors
-/// When the flow fails.
-pub fn measure(
-    model: &Model,
-    state: &[f64],
-    periods: usize,
-    set: Set,
-) -> Result<Observables, FlowError> {
-    let mut measurement = Measurement::new(model, set)?;
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(state, 0.0)?;
-    for _ in 0..periods {
-        flow.run_period(&mut measurement)?;
-    }
-    measurement.observables()
-}
-
 /// Where the beam comes nearest to the sample over `periods` drive periods from `state`.
 pub(super) fn measure_clearance(
     model: &Model,
     state: &[f64],
     periods: usize,
-) -> Result<Option<Clearance>, FlowError> {
-    let seen = measure(model, state, periods, Set::CLEARANCE)?;
+) -> Result<Option<Clearance>, MotionError> {
+    let seen = super::measure(model, state, periods, Set::CLEARANCE)?;
     let (height, xi) = (seen.beam_clearance, seen.beam_clearance_xi);
     Ok(height
         .zip(xi)
@@ -460,11 +492,24 @@ pub(super) struct Found<D> {
     pub(super) contacts: Beginnings<D>,
     /// Gain of stored energy.
     pub(super) stored: D,
+    /// The part of it that a nonlinear law stores.
+    pub(super) stored_by_sample: D,
     pub(super) clearance: Option<Clearance<D>>,
     /// What an impact takes, as a factor of the square of its speed.
     pub(super) impact_loss: D,
     /// Phase of the second tone in rad.
     pub(super) second_phase: D,
+}
+
+impl Found<f64> {
+    /// The observables.
+    pub(super) fn observables(self, model: &Model, set: Set) -> Observables {
+        let mut measured = Measured {
+            found: Some(self),
+            ..Measured::nothing(model)
+        };
+        Observables::read(set, &mut measured)
+    }
 }
 
 /// The contacts that began.
@@ -607,8 +652,15 @@ impl<'a, D: Number> Measured<'a, D> {
         }
     }
 
-    /// Greatest depth of the tip below the resting surface, 0 if it never gets there.
+    /// Greatest depth of the tip below the resting surface, 0 if it never gets there. Under a
+    /// nonlinear law contact begins at its intermolecular distance a0: δ = a0 − d.
     pub(super) fn indentation(&mut self) -> D {
+        if let Some(nonlinear) = &self.model.nonlinear {
+            let Some(surface) = nonlinear.contact_gap() else {
+                return D::default();
+            };
+            return (-self.least(Signal::Height) + D::from(surface)).at_least(0.0);
+        }
         (-self.least(Signal::Height)).at_least(0.0)
     }
 
@@ -616,14 +668,30 @@ impl<'a, D: Number> Measured<'a, D> {
     /// the sample dissipates, whatever it is made of. 0 where it is the rounding of what the
     /// contact stores and gives back, force times indentation.
     pub(super) fn dissipation(&mut self) -> D {
-        let work = self.impacts() - self.product(Signal::Force, Signal::HeightRate);
-        let (force, depth) = (self.peak_force(), self.indentation());
+        let work = self.impacts() + self.work_on_sample();
         let work = work / self.periods();
-        if above_rounding(work.plain(), force.plain(), depth.plain()) == 0.0 {
+        let (force, depth) = if self.model.nonlinear.is_some() {
+            // An attraction stores without contact.
+            let [near, far] = self.range(Signal::Height);
+            let pull = -self.least(Signal::Force).plain();
+            (
+                self.peak_force().plain().max(pull),
+                (far.plain() - near.plain()),
+            )
+        } else {
+            (self.peak_force().plain(), self.indentation().plain())
+        };
+        if above_rounding(work.plain(), force, depth) == 0.0 {
             0.0.into()
         } else {
             work
         }
+    }
+
+    /// What the tip gives the sample and does not get back.
+    fn work_on_sample(&mut self) -> D {
+        let stored = self.gathered(|found| found.stored_by_sample);
+        -self.product(Signal::Force, Signal::HeightRate) - stored
     }
 
     /// What impacts on a rigid stop take.
@@ -666,10 +734,12 @@ impl<'a, D: Number> Measured<'a, D> {
             let sample = self.dissipation() * self.periods();
             return balance(beam + sample, beam, sample, D::default());
         }
-        let (drive, sample) = (
-            work(PowerTerm::of_drive(model)),
-            work(PowerTerm::of_sample(model)),
-        );
+        let drive = work(PowerTerm::of_drive(model));
+        let sample = if model.nonlinear.is_some() {
+            self.work_on_sample()
+        } else {
+            work(PowerTerm::of_sample(model))
+        };
         let stored = self.gathered(|found| found.stored);
         balance(drive, beam, sample + self.impacts(), stored)
     }

@@ -8,6 +8,7 @@ mod contact_event;
 mod derivative;
 mod dimension;
 mod energy;
+mod gather;
 pub mod glossary;
 mod harmonics;
 mod measure;
@@ -16,7 +17,9 @@ mod number;
 mod physical_motion;
 pub mod table;
 pub mod time_series;
+mod validity;
 mod value;
+mod watch;
 
 pub use clearance::Clearance;
 pub use contact_event::{ContactEvent, ContactEventKind, Contacts};
@@ -25,10 +28,12 @@ pub use dimension::Dimension;
 pub use energy::EnergyBalance;
 pub(crate) use harmonics::lag;
 pub use harmonics::{Harmonic, Spectrum};
-pub use measure::{Measurement, measure};
+pub use measure::Measurement;
 pub use physical_motion::{PhysicalHarmonic, PhysicalMotion, Setting};
 pub use table::{OBSERVABLES, Observable, Observables, Set};
+pub use validity::OutOfRange;
 pub use value::Value;
+pub use watch::{Kept, Watched, measure, watch};
 
 use crate::model::Model;
 

@@ -1,11 +1,12 @@
 //! Which modes matter: what an experimenter reads with N = 1 … K modes, and the part that
 //! each mode has in a motion's energy, in its tip signal and in the work of the contact.
 
-use nanotap_flow::{Output, Trajectory};
+use nanotap_flow::Output;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Model;
+use crate::model::recording::Recording;
 use crate::study::orbit::OrbitReport;
 
 /// What an experimenter reads off an orbit, in the model's units.
@@ -160,19 +161,19 @@ impl EnoughReadings {
 }
 
 /// The part of each mode in an orbit.
-fn shares(model: &Model, trajectory: &Trajectory) -> Vec<ModeShare> {
+fn shares(model: &Model, recording: &Recording) -> Vec<ModeShare> {
     let Some(beam) = &model.beam else {
         return Vec::new();
     };
-    let duration = trajectory.end();
+    let duration = recording.end();
     let (dimension, tones) = (model.dimension(), model.tip.tones.len());
     let entry = |k: usize, weight: f64| {
         let mut row = nalgebra::RowDVector::zeros(dimension);
         row[k] = weight;
-        trajectory.signal(&Output::linear(row, tones))
+        recording.curve(&Output::linear(row, tones))
     };
-    let tip = trajectory.signal(&model.tip);
-    let force = trajectory.signal_by_regime(&model.force);
+    let tip = recording.curve(&model.tip);
+    let force = recording.force(model);
     let (tip_mean, force_mean) = (tip.mean(), force.mean());
     let n = beam.modes.count();
     let parts: Vec<[f64; 3]> = (0..n)

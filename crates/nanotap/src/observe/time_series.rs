@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, FlowError, Output};
+use nanotap_flow::{Flow, Output};
 
-use crate::model::Model;
+use crate::model::recording::each_period;
+use crate::model::{Model, MotionError};
 
 /// The columns before the state.
 const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];
@@ -57,8 +58,30 @@ pub fn sample(
     periods: usize,
     resolution: usize,
     mut row: impl FnMut(&[f64]),
-) -> Result<(), FlowError> {
+) -> Result<(), MotionError> {
     let outputs = Outputs::new(model);
+    let instants = |period: usize| {
+        let last = usize::from(period + 1 == periods);
+        (0..resolution + last).map(|k| model.period() * k as f64 / resolution as f64)
+    };
+    if let Some(nonlinear) = &model.nonlinear {
+        let (mut end, mut count) = (start.to_vec(), 0);
+        return each_period(nonlinear, &mut end, periods, |_, period| {
+            let tau = count as f64 * model.period();
+            for phase in instants(count) {
+                let Some(sample) = period.at(phase.min(period.span().1)) else {
+                    continue;
+                };
+                let mut state = sample.state.as_slice().to_vec();
+                if nonlinear.remembers {
+                    state.push(sample.branch as f64);
+                }
+                let contact = nonlinear.contact[sample.branch];
+                row(&outputs.row(model, contact, sample.force, &state, phase, tau + phase));
+            }
+            count += 1;
+        });
+    }
     let mut flow = Flow::new(Arc::clone(&model.system));
     flow.start(start, 0.0)?;
     let mut state = vec![0.0; model.dimension()];
@@ -66,9 +89,7 @@ pub fn sample(
         let mut recorder = Recorder::default();
         flow.run_period(&mut recorder)?;
         let trajectory = recorder.finish(Arc::clone(&model.system));
-        let last = usize::from(period + 1 == periods);
-        for k in 0..resolution + last {
-            let phase = model.period() * k as f64 / resolution as f64;
+        for phase in instants(period) {
             let Some(segment) = trajectory.segment_at(phase) else {
                 continue;
             };
@@ -77,7 +98,9 @@ pub fn sample(
             };
             state.copy_from_slice(&at);
             let tau = period as f64 * model.period() + phase;
-            row(&outputs.row(model, segment.regime, &state, phase, tau));
+            let contact = model.contact[segment.regime];
+            let force = model.force[segment.regime].at(model.system.drive(), &state, phase);
+            row(&outputs.row(model, contact, force, &state, phase, tau));
         }
     }
     Ok(())
@@ -94,21 +117,28 @@ impl Outputs {
         }
     }
 
-    fn row(&self, model: &Model, regime: usize, state: &[f64], phase: f64, tau: f64) -> Vec<f64> {
+    fn row(
+        &self,
+        model: &Model,
+        contact: bool,
+        force: f64,
+        state: &[f64],
+        phase: f64,
+        tau: f64,
+    ) -> Vec<f64> {
         let at = |output: &Output| output.at(model.system.drive(), state, phase);
-        let contact = if model.contact[regime] { 1.0 } else { 0.0 };
         let mut row = vec![
             tau,
             at(&model.tip),
             at(&self.tip_rate),
             at(&model.height),
-            at(&model.force[regime]),
-            contact,
+            force,
+            f64::from(u8::from(contact)),
         ];
         row.extend_from_slice(state);
         // In contact the surface is where the tip holds it. A memory that the end of the contact
         // sets anew knows nothing of that.
-        if model.forgetting.is_some() && model.contact[regime] {
+        if model.forgetting.is_some() && contact {
             row[COLUMNS.len() + model.dimension() - model.memory] = at(&model.height);
         }
         row

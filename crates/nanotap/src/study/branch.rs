@@ -8,14 +8,13 @@ use nanotap_dynamics::{
     SettleOptions, StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit,
     trace_locus,
 };
-use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::{Case, CaseError, Key, ParameterUnit, PlaneFamily};
-use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::model::{Model, MotionError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
@@ -180,7 +179,7 @@ pub enum BranchError {
     Continuation(#[from] ContinuationError),
     /// A point could not be followed once more.
     #[error(transparent)]
-    Flow(#[from] FlowError),
+    Flow(#[from] MotionError),
 }
 
 /// Branches with their points and bifurcations.

@@ -6,17 +6,20 @@
 //! not, and how it goes on with the drive frequency.
 
 use nanotap_dynamics::{Control, SettleOptions, ShootingOptions, close_orbit, settle};
-use nanotap_flow::trajectory::PiecewiseSignal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::physical::Physical;
+use crate::case::physical::force::SampleForce;
 use crate::case::{CaseError, Key};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
+use crate::model::recording::Curve;
+use crate::model::sample_law::SampleLaw;
 use crate::model::strobe::Strobe;
 use crate::observe::Observables;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
@@ -71,7 +74,7 @@ pub enum ComparisonError {
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SampleMotion {
     /// The law.
-    pub contact: ContactLaw,
+    pub contact: String,
     /// The case with this law.
     #[schemars(with = "Map<String, Value>")]
     pub case: Cantilever,
@@ -88,6 +91,10 @@ pub struct SampleMotion {
     /// The branch through it in the drive frequency, if it was followed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub branch: Option<BranchReport>,
+    /// Gap and force of a nonlinear law on a slow approach and back, over the gaps of the
+    /// orbits.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub force_curve: Vec<[f64; 2]>,
 }
 
 /// What an orbit looks like.
@@ -175,6 +182,62 @@ pub fn compare(
     })
 }
 
+/// Compares the motions under the nonlinear law of `case` and under the others that its
+/// quantities say.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_forces(
+    view: &Physical,
+    force: &SampleForce,
+    options: &ComparisonOptions,
+    control: &Control<'_>,
+) -> Result<Comparison, ComparisonError> {
+    if options.period == 0 {
+        return Err(OrbitError::NoPeriod.into());
+    }
+    let mut samples = Vec::new();
+    for force in force.others() {
+        let Ok(law) = force.in_model(&view.scales) else {
+            continue;
+        };
+        let case = Cantilever {
+            law: Some(law),
+            ..view.cantilever.clone()
+        };
+        samples.push(motion(case, options, control)?);
+    }
+    let least = samples
+        .iter()
+        .filter_map(|s| s.orbit.as_ref())
+        .map(|orbit| orbit.observables.gap_range[0])
+        .fold(f64::INFINITY, f64::min);
+    for sample in &mut samples {
+        let model = Model::cantilever(&sample.case).map_err(CaseError::from)?;
+        let Some(nonlinear) = &model.nonlinear else {
+            continue;
+        };
+        let surface = nonlinear.contact_gap().unwrap_or(0.0);
+        let depth = (surface - least).max(surface.abs());
+        let far = surface + CURVE_REACH * depth;
+        let near = surface - depth;
+        let step = (far - near) / f64::from(CURVE_POINTS);
+        let down = (0..=CURVE_POINTS).map(|k| far - step * f64::from(k));
+        let up = (0..=CURVE_POINTS).map(|k| near + step * f64::from(k));
+        sample.force_curve = nonlinear.force_curve(down.chain(up));
+    }
+    Ok(Comparison {
+        omega: view.cantilever.omega,
+        period: options.period,
+        samples,
+    })
+}
+
+/// Points of a force curve each way.
+const CURVE_POINTS: u32 = 400;
+/// How far it reaches outwards, in greatest indentations.
+const CURVE_REACH: f64 = 2.0;
+
 fn motion(
     case: Cantilever,
     options: &ComparisonOptions,
@@ -198,7 +261,11 @@ fn motion(
         _ => None,
     };
     Ok(SampleMotion {
-        contact: case.contact,
+        contact: case
+            .law
+            .as_ref()
+            .map_or_else(|| case.contact.to_string(), SampleLaw::name),
+        force_curve: Vec::new(),
         case,
         from_rest: named.classification,
         from_rest_period: named.orbit.map(|o| o.period),
@@ -231,8 +298,8 @@ fn followed(
 }
 
 fn look(model: &Model, found: OrbitReport) -> OrbitLook {
-    let height = found.trajectory.signal(&model.height);
-    let force = found.trajectory.signal_by_regime(&model.force);
+    let height = found.trajectory.curve(&model.height);
+    let force = found.trajectory.force(model);
     OrbitLook {
         period: found.period,
         spectral_radius: found
@@ -250,18 +317,15 @@ fn look(model: &Model, found: OrbitReport) -> OrbitLook {
 const LOOP_POINTS: u32 = 160;
 
 /// Indentation and force, piece by piece up to its very ends, where the force may jump.
-fn force_loop(height: &PiecewiseSignal, force: &PiecewiseSignal) -> Vec<[f64; 2]> {
-    height
-        .pieces
-        .iter()
-        .zip(&force.pieces)
-        .flat_map(|(h, f)| {
-            (0..=LOOP_POINTS).map(|k| {
-                let s = h.length * f64::from(k) / f64::from(LOOP_POINTS);
-                [-h.signal.at(s), f.signal.at(s)]
-            })
+fn force_loop(height: &Curve, force: &Curve) -> Vec<[f64; 2]> {
+    let pieces = height.pieces();
+    let points = pieces.iter().flat_map(|piece| {
+        (0..=LOOP_POINTS).map(|k| {
+            let s = piece.length * f64::from(k) / f64::from(LOOP_POINTS);
+            [-height.on(piece, s), force.on(piece, s)]
         })
-        .collect()
+    });
+    points.collect()
 }
 
 /// What the comparison of contact laws is asked for.
@@ -339,6 +403,16 @@ impl Study for ContactLawsStudy {
         request: &ContactLawsRequest,
         control: &Control<'_>,
     ) -> Result<Comparison, Error> {
+        if let Some(view) = case.physical()
+            && let Some(force) = &view.sample.force
+        {
+            return Ok(compare_forces(
+                view,
+                force,
+                &request.options(case)?,
+                control,
+            )?);
+        }
         let lever = cantilever(case, Self::NAME)?;
         Ok(compare(lever, &request.options(case)?, control)?)
     }

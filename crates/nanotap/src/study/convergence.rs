@@ -154,7 +154,7 @@ fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
 }
 
 fn tip_series(report: &OrbitReport, model: &Model) -> Option<Vec<f64>> {
-    let tip = report.trajectory.signal(&model.tip);
+    let tip = report.trajectory.curve(&model.tip);
     let length = report.trajectory.end();
     (0..COMPARED_POINTS)
         .map(|i| tip.at(length * i as f64 / COMPARED_POINTS as f64))

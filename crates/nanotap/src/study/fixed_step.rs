@@ -15,8 +15,8 @@ pub use nanotap_flow::fixed_step::Switching;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::model::{FlowError, Model, MotionError};
 use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
 
 /// How to run.
@@ -64,6 +64,11 @@ pub enum FixedStepError {
          left without force, can be run this way"
     )]
     Rigid,
+    /// A nonlinear law has no regimes.
+    #[error(
+        "under a nonlinear force law there are no linear regimes for the fixed-step method to run"
+    )]
+    Nonlinear,
     /// The numbers overflowed.
     #[error(
         "the fixed-step run grew beyond the range of double precision in period {period}: take more steps"
@@ -159,6 +164,9 @@ pub fn fixed_step_run(
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods.into());
     }
+    if model.nonlinear.is_some() {
+        return Err(FixedStepError::Nonlinear);
+    }
     if model
         .system
         .transitions()
@@ -169,7 +177,7 @@ pub fn fixed_step_run(
         return Err(FixedStepError::Rigid);
     }
     let mut run = FixedStep::new(&model.system, &state, &options.steps, options.switching)
-        .map_err(SimulateError::from)?;
+        .map_err(|error| SimulateError::Flow(error.into()))?;
     let clock = Instant::now();
     for period in 0..options.transient {
         run.run_period(|_, _| {});
@@ -319,11 +327,11 @@ fn apparent_period(strobes: &[Vec<f64>]) -> (Option<usize>, f64) {
 impl From<FixedStepError> for crate::Error {
     fn from(error: FixedStepError) -> Self {
         match error {
-            FixedStepError::Simulate(SimulateError::Flow(nanotap_flow::FlowError::Shape {
-                ..
-            })) => Self::input(error.to_string(), "give 1 or more {steps}"),
+            FixedStepError::Simulate(SimulateError::Flow(MotionError::Flow(
+                FlowError::Shape { .. },
+            ))) => Self::input(error.to_string(), "give 1 or more {steps}"),
             FixedStepError::Simulate(error) => error.into(),
-            FixedStepError::Rigid => Self::input(
+            FixedStepError::Rigid | FixedStepError::Nonlinear => Self::input(
                 error.to_string(),
                 "leave {method} out: the exact flow runs it",
             ),

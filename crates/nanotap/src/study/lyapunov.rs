@@ -14,8 +14,9 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::model::Model;
+use crate::model::recording::each_period;
 use crate::model::strobe::Strobe;
+use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::limits::MOST_PERIODS;
 use crate::study::registry::Study;
@@ -136,9 +137,9 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
         ..defaults
     };
     let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
-        SimulateError::Flow(FlowError::NotFinite {
+        SimulateError::Flow(MotionError::Flow(FlowError::NotFinite {
             what: "the tangent vectors of the motion",
-        })
+        }))
     })?;
     let named = Named::of(&settle(&mut map, &start, &options.settle).verdict);
     Ok(LyapunovReport {
@@ -168,7 +169,7 @@ pub fn section(
     start: &[f64],
     at: Section,
     points: usize,
-) -> Result<Vec<SectionPoint>, FlowError> {
+) -> Result<Vec<SectionPoint>, MotionError> {
     /// Periods watched for each point.
     const RAREST: usize = 8;
     let tip_rate = model.tip_rate();
@@ -185,9 +186,36 @@ pub fn section(
         gap_rate: gap_rate.at(drive, &state, time),
         state,
     };
+    let mut found = Vec::with_capacity(points);
+    if let Some(nonlinear) = &model.nonlinear {
+        let mut state = start.to_vec();
+        for _ in 0..points.saturating_mul(RAREST) {
+            if found.len() >= points {
+                break;
+            }
+            each_period(nonlinear, &mut state, 1, |_, recorded| {
+                let times: Vec<f64> = match at {
+                    Section::Phase(phase) => vec![phase.rem_euclid(1.0) * period],
+                    Section::Contact => recorded
+                        .switches()
+                        .iter()
+                        .filter(|s| !nonlinear.contact[s.from] && nonlinear.contact[s.to])
+                        .map(|s| s.time)
+                        .collect(),
+                };
+                found.extend(times.into_iter().filter_map(|time| {
+                    let sample = recorded.at(time)?;
+                    let mut state = sample.state.as_slice().to_vec();
+                    state.resize(model.dimension(), sample.branch as f64);
+                    Some(point(state, time))
+                }));
+            })?;
+        }
+        found.truncate(points);
+        return Ok(found);
+    }
     let mut flow = Flow::new(Arc::clone(&model.system));
     flow.start(start, 0.0)?;
-    let mut found = Vec::with_capacity(points);
     for _ in 0..points.saturating_mul(RAREST) {
         if found.len() >= points {
             break;

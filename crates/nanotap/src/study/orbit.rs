@@ -1,24 +1,25 @@
 //! A periodic orbit by Newton, with its stability and what can be read off it.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use nalgebra::DVector;
 use nanotap_dynamics::{
     Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
     Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
 };
-use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, FlowError, Trajectory};
+use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
+use crate::model::recording::{NonlinearRecording, Recording};
 use crate::model::strobe::Strobe;
-use crate::model::{Forgetting, Model};
+use crate::model::{Forgetting, Model, MotionError};
 use crate::observe::PhysicalMotion;
-use crate::observe::{ContactEvent, Contacts, Derivative, Measurement, Observables, Set, Spectrum};
+use crate::observe::{
+    ContactEvent, Derivative, Kept, Observables, OutOfRange, Set, Spectrum, watch,
+};
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
 use crate::study::registry::Study;
@@ -69,7 +70,7 @@ pub enum OrbitError {
     Start(#[from] SimulateError),
     /// The flow failed.
     #[error(transparent)]
-    Flow(#[from] FlowError),
+    Flow(#[from] MotionError),
     /// Newton found nothing.
     #[error(transparent)]
     Newton(#[from] ShootingError),
@@ -124,9 +125,12 @@ pub struct OrbitReport {
     /// Derivatives by the keys that were asked for.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<&'static str, Derivative>,
+    /// What of the range of a nonlinear force law it leaves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub out_of_range: Vec<OutOfRange>,
     /// Its full length, for figures.
     #[serde(skip)]
-    pub trajectory: Trajectory,
+    pub trajectory: Recording,
 }
 
 /// Most harmonics of the drive frequency that are reported.
@@ -262,16 +266,12 @@ pub fn report(
     harmonics: usize,
 ) -> Result<OrbitReport, OrbitError> {
     let start = orbit.states.first().cloned().unwrap_or_default();
-    let mut measurement = Measurement::new(model, Set::ALL)?;
-    let mut contacts = Contacts::of(model);
-    let mut recorder = Recorder::default();
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(&start, 0.0)?;
-    for _ in 0..orbit.period {
-        flow.run_period(&mut (&mut measurement, &mut (&mut contacts, &mut recorder)))?;
-    }
-    let trajectory = recorder.finish(Arc::clone(&model.system));
-    let observables = measurement.observables()?;
+    let kept = Kept {
+        recorded: orbit.period,
+        events: true,
+        ..Kept::default()
+    };
+    let seen = watch(model, &start, orbit.period, Set::ALL, kept)?;
     Ok(OrbitReport {
         period: orbit.period,
         state: start,
@@ -285,13 +285,34 @@ pub fn report(
             .collect(),
         stable: orbit.is_stable(),
         stability: orbit.stability.name(),
-        determinant_defect: determinant_defect(model, orbit, &trajectory),
-        events: contacts.events(),
-        spectrum: Spectrum::of(model, &trajectory, orbit.period, harmonics),
-        observables,
+        determinant_defect: match &seen.recording {
+            Recording::Exact(trajectory) => determinant_defect(model, orbit, trajectory),
+            Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
+        },
+        events: seen.events,
+        spectrum: Spectrum::of(model, &seen.recording, orbit.period, harmonics),
+        out_of_range: OutOfRange::of(model, &seen.observables),
+        observables: seen.observables,
         derivatives: BTreeMap::new(),
-        trajectory,
+        trajectory: seen.recording,
     })
+}
+
+/// How far the multipliers of an orbit under a nonlinear force are from Liouville's formula; a
+/// law's memory has the multiplier zero.
+fn nonlinear_defect(orbit: &PeriodicOrbit, recording: &NonlinearRecording) -> f64 {
+    let nonlinear = recording.nonlinear();
+    let periods = recording.periods().iter();
+    let expected: f64 = periods
+        .map(|period| nonlinear.log_determinant(period))
+        .sum();
+    let found = if nonlinear.remembers {
+        let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
+        kept.iter().map(|m| m.norm().ln()).sum()
+    } else {
+        orbit.log_determinant
+    };
+    (found - expected).abs()
 }
 
 /// How far the multipliers are from Liouville's formula.

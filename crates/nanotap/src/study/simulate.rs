@@ -1,22 +1,20 @@
 //! One run: the transient thrown away, the motion recorded, observed and named.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 pub use nanotap_dynamics::SettleOptions;
 use nanotap_dynamics::{LyapunovSpectrum, PeriodicOrbit, StroboscopicMap, Verdict, settle};
-use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, FlowError, Trajectory};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::model::Model;
+use crate::model::recording::Recording;
 use crate::model::strobe::Strobe;
+use crate::model::{Model, MotionError};
 use crate::observe::PhysicalMotion;
-use crate::observe::{ContactEvent, Contacts, Measurement, Observables, Set};
+use crate::observe::{ContactEvent, Kept, Observables, OutOfRange, Set, watch};
 use crate::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES};
@@ -79,7 +77,7 @@ pub enum SimulateError {
     NoPeriods,
     /// The flow failed.
     #[error(transparent)]
-    Flow(#[from] FlowError),
+    Flow(#[from] MotionError),
 }
 
 /// What a motion was found to be.
@@ -140,16 +138,19 @@ pub struct Simulation {
     /// What can be read off the recorded stretch.
     #[serde(flatten)]
     pub observables: Observables,
+    /// What of the range of a nonlinear force law it leaves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub out_of_range: Vec<OutOfRange>,
     /// Speed of the propagation alone, drive periods a second.
     pub periods_per_second: f64,
-    /// Evaluations of the gap a drive period.
+    /// Evaluations of the gap a drive period; of the force under a nonlinear law.
     pub evaluations_per_period: f64,
     /// The stable orbit it goes to, if periodic.
     #[serde(skip)]
     pub orbit: Option<PeriodicOrbit>,
     /// The first recorded periods, for figures and time series.
     #[serde(skip)]
-    pub trajectory: Trajectory,
+    pub trajectory: Recording,
 }
 
 /// Periods recorded for figures; bounds the memory of long runs.
@@ -173,7 +174,14 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     } else {
         measured_transient(&mut map, &mut state, &options.settle)
     };
-    let record = record(model, &state, options)?;
+    let (periods_per_second, evaluations_per_period) = speed(model, &state, options.periods)?;
+    let kept = Kept {
+        recorded: SHOWN,
+        states: options.strobe,
+        events: true,
+        each_period: false,
+    };
+    let record = watch(model, &state, options.periods, options.observables, kept)?;
     let named = Named::of(&settle(&mut map, &state, &options.settle).verdict);
     Ok(Simulation {
         periods: options.periods,
@@ -187,13 +195,14 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
             .orbit
             .as_ref()
             .map(|orbit| nearest_phase(orbit, &record.end).1 / orbit.scale()),
-        strobe: record.strobe,
+        strobe: record.states,
         events: record.events,
+        out_of_range: OutOfRange::of(model, &record.observables),
         observables: record.observables,
-        periods_per_second: record.periods_per_second,
-        evaluations_per_period: record.evaluations_per_period,
+        periods_per_second,
+        evaluations_per_period,
         orbit: named.orbit,
-        trajectory: record.trajectory,
+        trajectory: record.recording,
     })
 }
 
@@ -270,65 +279,16 @@ fn nearest_phase<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> (&'a [f64], f64
         .unwrap_or((&[], f64::NAN))
 }
 
-struct Record {
-    /// The state at the end.
-    end: Vec<f64>,
-    strobe: Vec<Vec<f64>>,
-    events: Vec<ContactEvent>,
-    observables: Observables,
-    periods_per_second: f64,
-    evaluations_per_period: f64,
-    trajectory: Trajectory,
-}
-
-fn record(
-    model: &Model,
-    state: &[f64],
-    options: &SimulateOptions,
-) -> Result<Record, SimulateError> {
-    let (periods_per_second, evaluations_per_period) = speed(model, state, options.periods)?;
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(state, 0.0)?;
-    let mut measurement = Measurement::new(model, options.observables)?;
-    let mut contacts = Contacts::of(model);
-    let mut recorder = Recorder::default();
-    let mut strobe = Vec::new();
-    for k in 0..options.periods {
-        let mut both = (&mut measurement, &mut contacts);
-        if k < SHOWN {
-            flow.run_period(&mut (&mut both, &mut recorder))?;
-        } else {
-            flow.run_period(&mut both)?;
-        }
-        if k + 1 + options.strobe > options.periods {
-            let mut x = vec![0.0; model.dimension()];
-            flow.state(&mut x);
-            strobe.push(x);
-        }
-    }
-    let mut end = vec![0.0; model.dimension()];
-    flow.state(&mut end);
-    Ok(Record {
-        end,
-        strobe,
-        events: contacts.events(),
-        observables: measurement.observables()?,
-        periods_per_second,
-        evaluations_per_period,
-        trajectory: recorder.finish(Arc::clone(&model.system)),
-    })
-}
-
-/// Speed of the bare propagation and gap evaluations a period.
-fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), SimulateError> {
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(state, 0.0)?;
+/// Speed of the bare propagation and evaluations of gap or force a period.
+fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), MotionError> {
+    let mut map = Strobe::new(model);
+    let mut state = state.to_vec();
     let clock = Instant::now();
     for _ in 0..periods {
-        flow.run_period(&mut ())?;
+        map.advance(&mut state)?;
     }
     let seconds = clock.elapsed().as_secs_f64().max(1e-9);
-    let evaluations = flow.statistics().evaluations as f64;
+    let evaluations = map.evaluations() as f64;
     Ok((periods as f64 / seconds, evaluations / periods as f64))
 }
 

@@ -8,7 +8,6 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
-use nanotap_flow::Flow;
 
 pub(crate) fn advance(subject: &Case, state: &[f64]) -> Vec<f64> {
     let mut x = state.to_vec();
@@ -29,9 +28,8 @@ pub(crate) fn worst(subject: &Case, state: &[f64]) -> f64 {
         .collect();
     let n = state.len();
     let (mut jacobian, mut derivatives) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
-    let mut flow = Flow::new(model.system.clone());
-    flow.start(state, 0.0).unwrap();
-    flow.run_period_with_sensitivities(&tangents, &mut jacobian, &mut derivatives)
+    Strobe::with_tangents(&model, tangents)
+        .advance_with_derivatives(&mut state.to_vec(), &mut jacobian, &mut derivatives)
         .unwrap();
     let difference = |f: &dyn Fn(f64) -> Vec<f64>, h: f64| -> Vec<f64> {
         let (a, b, c, d) = (f(-2.0 * h), f(-h), f(h), f(2.0 * h));

@@ -84,7 +84,7 @@ fn period_one_at_omega_20() {
     // Extrema come from roots of the rate: no dense sample exceeds them, and the densest
     // comes as near as its spacing allows.
     let model = Model::cantilever(&at(20.0)).unwrap();
-    let tip = report.trajectory.signal(&model.tip);
+    let tip = report.trajectory.curve(&model.tip);
     let samples = 20_000;
     let highest = (0..samples)
         .map(|i| {

@@ -90,7 +90,7 @@ fn virial_and_dissipation_of_a_permanent_contact() {
     let o = &found.observables;
     assert_eq!(o.contact_fraction, 1.0);
     near(o.contact_time, TAU / case.omega, 1e-12);
-    let tip = found.trajectory.signal(&model.tip).fourier(case.omega);
+    let tip = found.trajectory.curve(&model.tip).fourier(case.omega);
     // α2 sin Ωτ = Re(−iα2 e^{iΩτ})
     let gap = tip + Complex::new(0.0, -case.alpha2);
     let force = -gap * Complex::new(case.alpha4, case.alpha6 * case.omega);

@@ -86,8 +86,8 @@ fn harmonic_indentation_loses_what_the_loss_modulus_says() {
         };
         let found = orbit(&model, &options).unwrap();
         assert!(found.events.is_empty(), "the tip stays in contact");
-        let height = found.trajectory.signal(&model.height);
-        let force = found.trajectory.signal_by_regime(&model.force);
+        let height = found.trajectory.curve(&model.height);
+        let force = found.trajectory.force(&model);
         let (indented, pushed) = (-height.fourier(omega), force.fourier(omega));
         let turn = omega * time;
         let arm = case.relaxation_stiffness;

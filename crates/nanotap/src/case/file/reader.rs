@@ -214,6 +214,9 @@ fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
         match error {
             ValueError::Quantity(error) => at(format!("{key}: {error}")),
             ValueError::Ratio(error) => at(format!("{key} = {text}: {error}")),
+            ValueError::Law { given } => {
+                refusal::not_among(entry, &given, &crate::case::stated::laws())
+            }
             ValueError::Word { words, .. } => Problem {
                 message: format!(
                     "{key} = \"{text}\" is not one of {}",

@@ -46,7 +46,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn name(self, key: Key) -> Option<&'a str> {
+    pub(crate) fn name(self, key: Key) -> Option<&'a str> {
         match self.stated.get(key)? {
             Value::Name(name) => Some(name),
             _ => None,

@@ -1,9 +1,11 @@
-//! The sample under the tip: a spring and a damper, given or from Hertz's contact.
+//! The sample under the tip: a spring and a damper, given or from Hertz's contact, or a
+//! nonlinear force law.
 
 use serde::Serialize;
 
 use super::catalogue::Material;
 use super::error::PhysicalError;
+use super::force::SampleForce;
 use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::Tip;
@@ -112,11 +114,25 @@ pub struct Sample {
     pub relaxation_time: f64,
     /// Its elastic constants, where they are known.
     pub elastic: Option<Elastic>,
+    /// A nonlinear force law in place of all these.
+    pub force: Option<SampleForce>,
 }
 
 impl Sample {
     /// What `[sample]` says.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Self, PhysicalError> {
+        if let Some(force) = SampleForce::read(reader, tip)? {
+            return Ok(Self {
+                stiffness: 0.0,
+                hertz: None,
+                damping: None,
+                law: ContactLaw::default(),
+                relaxation_stiffness: 0.0,
+                relaxation_time: 0.0,
+                elastic: None,
+                force: Some(force),
+            });
+        }
         let given = reader.number(Key::SampleStiffness)?;
         let (stiffness, hertz, elastic) = if let Some(stiffness) = given {
             (stiffness, None, None)
@@ -139,11 +155,15 @@ impl Sample {
             relaxation_stiffness,
             relaxation_time,
             elastic,
+            force: None,
         })
     }
 
     /// What had to be assumed of the sample, and what puts it in doubt.
     pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
+        if let Some(force) = &self.force {
+            return force.remarks(reader, tip);
+        }
         let mut remarks = Vec::new();
         if let Some(hertz) = self.hertz {
             if let Ok(Some(material)) = reader.material(Key::SampleMaterial) {

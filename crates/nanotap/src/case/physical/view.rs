@@ -113,6 +113,11 @@ impl Physical {
     pub(crate) fn value(&self, key: Key) -> Option<f64> {
         let (parameters, second) = (&self.parameters, self.cantilever.tone2_ratio);
         let damping = parameters.contact_damping;
+        if let Some(force) = &self.sample.force
+            && let Some(value) = force.get(key)
+        {
+            return Some(value);
+        }
         Some(match key {
             Key::LeverK => self.lever.k,
             Key::LeverF0 => self.lever.f0,
@@ -126,6 +131,15 @@ impl Physical {
             Key::TipHeight => self.tip_height,
             Key::TipModulus => self.tip.elastic?.modulus,
             Key::TipPoisson => self.tip.elastic?.poisson,
+            Key::SampleStiffness
+            | Key::SampleDamping
+            | Key::SampleLossTangent
+            | Key::SampleRelaxationStiffness
+            | Key::SampleRelaxationTime
+                if self.sample.force.is_some() =>
+            {
+                return None;
+            }
             Key::SampleStiffness => parameters.contact_stiffness,
             Key::SampleDamping => damping,
             Key::SampleLossTangent => {
@@ -271,8 +285,11 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         tone2_amplitude: second.map_or(0.0, |(_, (applied, _))| applied),
         tone2_phase: second.map_or(0.0, |(phase, _)| phase),
     };
-    let cantilever = parameters.to_case(&scales, &like);
+    let mut cantilever = parameters.to_case(&scales, &like);
     cantilever.validate()?;
+    if let Some(force) = &sample.force {
+        cantilever.law = Some(force.in_model(&scales)?);
+    }
     Ok(Physical {
         cantilever,
         scales,

@@ -25,7 +25,7 @@ use parser::read;
 /// Elementary charge in coulomb, hence joules in one electronvolt; exact in the SI of 2019.
 pub const JOULES_PER_ELECTRONVOLT: f64 = 1.602_176_634e-19;
 
-/// Exponents of the base units kilogram, metre, second and radian.
+/// Exponents of the base units kilogram, metre, second, radian and coulomb.
 ///
 /// The radian counts as a unit of its own here, so that an angular frequency in rad/s cannot
 /// be taken for a frequency in Hz, a factor 2π apart.
@@ -39,10 +39,13 @@ pub struct Dimension {
     pub time: i32,
     /// Exponent of the radian.
     pub angle: i32,
+    /// Exponent of the coulomb.
+    pub charge: i32,
 }
 
 impl Dimension {
     const NONE: Self = Self::new(0, 0, 0, 0);
+    const CHARGE: Self = Self::NONE.charged(1);
 
     const fn new(mass: i32, length: i32, time: i32, angle: i32) -> Self {
         Self {
@@ -50,7 +53,12 @@ impl Dimension {
             length,
             time,
             angle,
+            charge: 0,
         }
+    }
+
+    const fn charged(self, charge: i32) -> Self {
+        Self { charge, ..self }
     }
 
     fn times(self, other: Self, power: i32) -> Self {
@@ -59,6 +67,7 @@ impl Dimension {
             length: self.length + power * other.length,
             time: self.time + power * other.time,
             angle: self.angle + power * other.angle,
+            charge: self.charge + power * other.charge,
         }
     }
 
@@ -79,6 +88,7 @@ impl fmt::Display for Dimension {
             ("m", self.length),
             ("s", self.time),
             ("rad", self.angle),
+            ("C", self.charge),
         ];
         let mut separator = "";
         for (unit, exponent) in exponents.into_iter().filter(|&(_, e)| e != 0) {
@@ -126,11 +136,19 @@ pub enum Kind {
     Velocity,
     /// Radian; shown in degrees.
     Angle,
+    /// Pascal second.
+    Viscosity,
+    /// Volt.
+    Voltage,
+    /// Coulomb per square metre.
+    ChargeDensity,
+    /// Joule times metre to the sixth: what repels in a Lennard-Jones law.
+    Repulsion,
 }
 
 impl Kind {
     /// Every kind, in the order in which a dimension is named.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 19] = [
         Self::Number,
         Self::Length,
         Self::Mass,
@@ -146,6 +164,10 @@ impl Kind {
         Self::Power,
         Self::Velocity,
         Self::Angle,
+        Self::Viscosity,
+        Self::Voltage,
+        Self::ChargeDensity,
+        Self::Repulsion,
     ];
 
     /// Its exponents of kg, m, s and rad.
@@ -166,6 +188,10 @@ impl Kind {
             Self::Power => Dimension::new(1, 2, -3, 0),
             Self::Velocity => Dimension::new(0, 1, -1, 0),
             Self::Angle => Dimension::new(0, 0, 0, 1),
+            Self::Viscosity => Dimension::new(1, -1, -1, 0),
+            Self::Voltage => Dimension::new(1, 2, -2, 0).charged(-1),
+            Self::ChargeDensity => Dimension::new(0, -2, 0, 0).charged(1),
+            Self::Repulsion => Dimension::new(1, 8, -2, 0),
         }
     }
 
@@ -187,6 +213,10 @@ impl Kind {
             Self::Power => "a power",
             Self::Velocity => "a velocity",
             Self::Angle => "an angle",
+            Self::Viscosity => "a viscosity",
+            Self::Voltage => "a voltage",
+            Self::ChargeDensity => "a charge per area",
+            Self::Repulsion => "an energy times a length to the sixth",
         }
     }
 
@@ -208,6 +238,10 @@ impl Kind {
             Self::Power => "1 pW",
             Self::Velocity => "2 mm/s",
             Self::Angle => "25 deg",
+            Self::Viscosity => "2 Pa s",
+            Self::Voltage => "0.5 V",
+            Self::ChargeDensity => "-2.5 mC/m^2",
+            Self::Repulsion => "1e-76 J m^6",
         }
     }
 
@@ -239,6 +273,10 @@ impl Kind {
             Self::Power => ("W", 0, true),
             Self::Velocity => ("m/s", 0, true),
             Self::Angle => ("rad", 0, false),
+            Self::Viscosity => ("Pa s", 0, true),
+            Self::Voltage => ("V", 0, true),
+            Self::ChargeDensity => ("C/m^2", 0, true),
+            Self::Repulsion => ("J m^6", 0, false),
         }
     }
 

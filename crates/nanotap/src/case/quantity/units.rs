@@ -46,6 +46,8 @@ const UNITS: &[Unit] = &[
         Kind::Energy.dimension(),
         true,
     ),
+    unit("V", 0, 1.0, Kind::Voltage.dimension(), true),
+    unit("C", 0, 1.0, Dimension::CHARGE, true),
     unit("rad", 0, 1.0, Kind::Angle.dimension(), true),
     unit("deg", 0, DEGREE, Kind::Angle.dimension(), false),
     unit("°", 0, DEGREE, Kind::Angle.dimension(), false),

@@ -13,10 +13,7 @@
 //! - `standard_linear_solid`: a spring beside a spring and damper in series.
 //!
 //! A law that is not linear (Hertz, DMT, JKR) has no place here, since its flow has no closed
-//! form. Its place is one floor up: whatever analyses motions asks for a
-//! [`StroboscopicMap`](nanotap_dynamics::StroboscopicMap) only, of which
-//! [`Strobe`](crate::model::strobe::Strobe) is the exact one. An integrator of such a law that gives
-//! that map, with its Jacobian, has orbits, attractors, basins and branches at once.
+//! form: see [`nonlinear`](crate::model::nonlinear).
 
 pub(crate) mod dual;
 mod kelvin_voigt;
@@ -88,6 +85,16 @@ impl ContactLaw {
                 dual(Parameter::RelaxationTime),
             ),
         }
+    }
+}
+
+/// No sample at all, beside a memory that nothing depends on or none.
+pub(crate) fn no_sample(has_memory: bool) -> Law {
+    let none = Dual::constant(0.0);
+    if has_memory {
+        spring_damper::without_memory(none, none)
+    } else {
+        spring_damper::law(none, none)
     }
 }
 

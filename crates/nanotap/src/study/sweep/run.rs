@@ -1,16 +1,15 @@
 //! One run of a sweep, and the runs of one piece of work.
 
 use nanotap_dynamics::{PeriodicOrbit, SettleOptions, StroboscopicMap, settle};
-use nanotap_flow::{Flow, FlowError};
 
 use super::{Sweep, SweepOptions};
 use crate::case::Case;
 use crate::case::physical::Scales;
 use crate::dataset::Block;
-use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
-use crate::observe::{Measurement, Observables, Set};
+use crate::observe::{Kept, Observables, Set, Watched, watch};
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::{box_with, default_starts};
 
@@ -280,12 +279,18 @@ impl<'a> Runner<'a> {
     ) -> (Outcome, Option<Vec<f64>>) {
         let periods = self.options.periods;
         let turn = period.unwrap_or(periods);
+        let kept = Kept {
+            states: turn,
+            each_period: true,
+            ..Kept::default()
+        };
         let Watched {
             observables,
             states,
             lows,
             highs,
-        } = match self.watch(from, turn) {
+            ..
+        } = match watch(self.model, from, turn, Set::COMMON, kept) {
             Ok(watched) => watched,
             Err(error) => return (Outcome::unknown(class_of(&error), outcome.transient), None),
         };
@@ -299,36 +304,6 @@ impl<'a> Runner<'a> {
         let end = states[(periods - 1) % turn].clone();
         (outcome, Some(end))
     }
-
-    /// Runs `periods` periods and measures them.
-    fn watch(&self, from: &[f64], periods: usize) -> Result<Watched, FlowError> {
-        let mut measurement = Measurement::new(self.model, Set::COMMON)?.of_each_period();
-        let mut flow = Flow::new(std::sync::Arc::clone(&self.model.system));
-        flow.start(from, 0.0)?;
-        let mut states = Vec::with_capacity(periods);
-        for _ in 0..periods {
-            flow.run_period(&mut measurement)?;
-            let mut state = vec![0.0; from.len()];
-            flow.state(&mut state);
-            states.push(state);
-        }
-        Ok(Watched {
-            lows: measurement.lows().to_vec(),
-            highs: measurement.highs().to_vec(),
-            observables: measurement.observables()?,
-            states,
-        })
-    }
-}
-
-/// What was seen of some periods.
-struct Watched {
-    observables: Observables,
-    /// States at their ends.
-    states: Vec<Vec<f64>>,
-    /// Least and greatest tip deflection of each.
-    lows: Vec<f64>,
-    highs: Vec<f64>,
 }
 
 /// Distance from an orbit, as a part of its size, at which a motion has come to it: what is
@@ -358,9 +333,10 @@ pub(crate) fn nearest<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> &'a [f64] 
 }
 
 /// What a motion is that the flow could not follow.
-fn class_of(error: &FlowError) -> Classification {
-    match error {
-        FlowError::Diverged { .. } | FlowError::NotFinite { .. } => Classification::Unbounded,
-        _ => Classification::Undecided,
+fn class_of(error: &MotionError) -> Classification {
+    if error.is_unbounded() {
+        Classification::Unbounded
+    } else {
+        Classification::Undecided
     }
 }

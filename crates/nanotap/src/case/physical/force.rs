@@ -1,0 +1,402 @@
+//! A nonlinear force law of the sample, from the quantities that a case states.
+
+use std::f64::consts::PI;
+
+use nanotap_volterra::laws::TableLaw;
+use nanotap_volterra::laws::entry::{Dimension, ParameterEntry};
+
+use super::error::PhysicalError;
+use super::mapping::Scales;
+use super::reader::Reader;
+use super::remark::Remark;
+use super::tip::Tip;
+use crate::case::key::Key;
+use crate::case::quantity::Kind;
+use crate::model::sample_law::SampleLaw;
+
+/// Permittivity of free space, F/m.
+const VACUUM: f64 = 8.854_187_812_8e-12;
+
+/// The keys that only nonlinear laws take.
+const OF_LAWS: [Key; 17] = [
+    Key::SampleHamaker,
+    Key::SampleWorkOfAdhesion,
+    Key::SampleWorkOfRetraction,
+    Key::SampleAdhesionForce,
+    Key::SampleIntermolecularDistance,
+    Key::SampleViscosity,
+    Key::SampleThickness,
+    Key::SampleDecayLength,
+    Key::SampleSurfaceTension,
+    Key::SampleFilmThickness,
+    Key::SampleSurfaceEnergy,
+    Key::SampleVoltage,
+    Key::SamplePermittivity,
+    Key::SampleDebyeLength,
+    Key::SampleCharge,
+    Key::TipCharge,
+    Key::SampleRepulsion,
+];
+
+/// Keys of a linear sample that a nonlinear law may take too, or not.
+const OF_SAMPLES: [Key; 9] = [
+    Key::SampleMaterial,
+    Key::SampleModulus,
+    Key::SamplePoisson,
+    Key::SampleStiffness,
+    Key::SampleDamping,
+    Key::SampleLossTangent,
+    Key::SampleIndentation,
+    Key::SampleRelaxationStiffness,
+    Key::SampleRelaxationTime,
+];
+
+/// A law, or a sum of laws, with its parameters in SI.
+#[derive(Debug, Clone)]
+pub struct SampleForce {
+    /// The laws.
+    pub terms: Vec<&'static TableLaw>,
+    /// Their parameters, one term after the other.
+    pub values: Vec<f64>,
+}
+
+impl PartialEq for SampleForce {
+    fn eq(&self, other: &Self) -> bool {
+        self.values == other.values && self.names() == other.names()
+    }
+}
+
+/// The key that states a parameter of a law.
+fn key_of(parameter: &ParameterEntry) -> Key {
+    match parameter.name {
+        "modulus" => Key::SampleModulus,
+        "poisson" => Key::SamplePoisson,
+        "tip_modulus" => Key::TipModulus,
+        "tip_poisson" => Key::TipPoisson,
+        "radius" => Key::TipRadius,
+        "half_angle" => Key::TipHalfAngle,
+        "contact_distance" => Key::SampleIntermolecularDistance,
+        "work_of_adhesion" => Key::SampleWorkOfAdhesion,
+        "work_of_retraction" => Key::SampleWorkOfRetraction,
+        "viscosity" => Key::SampleViscosity,
+        "thickness" => Key::SampleThickness,
+        "damping" => Key::SampleDamping,
+        "stiffness" => Key::SampleStiffness,
+        "decay_length" => Key::SampleDecayLength,
+        "surface_tension" => Key::SampleSurfaceTension,
+        "film_thickness" => Key::SampleFilmThickness,
+        "surface_energy" => Key::SampleSurfaceEnergy,
+        "voltage" => Key::SampleVoltage,
+        "permittivity" => Key::SamplePermittivity,
+        "debye_length" => Key::SampleDebyeLength,
+        "sample_charge" => Key::SampleCharge,
+        "tip_charge" => Key::TipCharge,
+        "repulsion" => Key::SampleRepulsion,
+        // A test sees that there is no other.
+        _ => Key::SampleHamaker,
+    }
+}
+
+/// The factor from SI to the key's own unit.
+fn unit(key: Key) -> f64 {
+    match key {
+        Key::SamplePermittivity => VACUUM,
+        _ => 1.0,
+    }
+}
+
+impl SampleForce {
+    /// What `[sample]` says, if its law is nonlinear.
+    pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Option<Self>, PhysicalError> {
+        let Some(name) = reader.name(Key::SampleLaw) else {
+            let stated = OF_LAWS.into_iter().find(|key| reader.has(*key));
+            return stated.map_or(Ok(None), |key| {
+                let reason = "it belongs to a nonlinear force law, as in sample.law = \"dmt\"";
+                Err(reader.impossible(key, reason))
+            });
+        };
+        let refused = |reason: String| PhysicalError::impossible(Key::SampleLaw, name, reason);
+        let terms = SampleLaw::terms(name).map_err(|error| refused(error.to_string()))?;
+        let parameters = || terms.iter().flat_map(|term| term.entry.parameters);
+        let takes = |key: Key| {
+            parameters().any(|p| key_of(p) == key)
+                || key == Key::SampleMaterial && parameters().any(|p| p.name == "modulus")
+                || ADHESION.contains(&key) && adhesion_of(&terms).is_some()
+        };
+        let strange = OF_LAWS.into_iter().chain(OF_SAMPLES);
+        if let Some(key) = strange
+            .into_iter()
+            .find(|key| reader.has(*key) && !takes(*key))
+        {
+            let mut keys: Vec<&str> = Vec::new();
+            for key in parameters().map(|p| key_of(p).path()) {
+                if !keys.contains(&key) {
+                    keys.push(key);
+                }
+            }
+            let reason = format!(
+                "it is no part of sample.law = \"{name}\", which takes {}",
+                keys.join(", ")
+            );
+            return Err(reader.impossible(key, reason));
+        }
+        let mut force = Self {
+            values: Vec::new(),
+            terms: terms.clone(),
+        };
+        for parameter in parameters() {
+            let value = force.value(reader, tip, parameter)?;
+            if !parameter.range.holds(value) {
+                let reason = format!("it must be {}", parameter.range.words());
+                return Err(reader.impossible(key_of(parameter), reason));
+            }
+            force.values.push(value);
+        }
+        SampleLaw::new(terms, force.values.clone()).map_err(|error| refused(error.to_string()))?;
+        Ok(Some(force))
+    }
+
+    /// The value of a parameter: stated, following from another, or the law's default.
+    fn value(
+        &self,
+        reader: Reader<'_>,
+        tip: &Tip,
+        parameter: &ParameterEntry,
+    ) -> Result<f64, PhysicalError> {
+        let key = key_of(parameter);
+        if let Some(stated) = reader.number(key)? {
+            return Ok(stated * unit(key));
+        }
+        let material = || reader.material(Key::SampleMaterial);
+        let known = match key {
+            Key::SampleModulus => material()?.map(|m| m.elastic.modulus),
+            Key::SamplePoisson => material()?.map(|m| m.elastic.poisson),
+            Key::TipModulus => tip.elastic.map(|e| e.modulus),
+            Key::TipPoisson => tip.elastic.map(|e| e.poisson),
+            Key::TipRadius => tip.radius,
+            Key::SampleHamaker | Key::SampleWorkOfAdhesion => self.adhesion(reader, tip, key)?,
+            _ => None,
+        };
+        known.or(parameter.default).ok_or_else(|| {
+            let ways = match key {
+                Key::SampleHamaker | Key::SampleWorkOfAdhesion
+                    if adhesion_of(&self.terms).is_some() =>
+                {
+                    " (or another of sample.hamaker, sample.work_of_adhesion and \
+                     sample.adhesion_force)"
+                }
+                Key::SampleModulus => " (or sample.material)",
+                _ => "",
+            };
+            let reason = format!(
+                "sample.law = \"{}\" needs the {}{ways}",
+                self.names().join(" + "),
+                parameter.words
+            );
+            PhysicalError::missing(key, reason)
+        })
+    }
+
+    /// Hamaker constant or work of adhesion from whichever of the three was stated.
+    fn adhesion(
+        &self,
+        reader: Reader<'_>,
+        tip: &Tip,
+        wanted: Key,
+    ) -> Result<Option<f64>, PhysicalError> {
+        let Some(pull_off) = adhesion_of(&self.terms) else {
+            return Ok(None);
+        };
+        let distance = reader
+            .number(Key::SampleIntermolecularDistance)?
+            .unwrap_or(DISTANCE);
+        // w = 2γ with γ = H/(24π a0²).
+        let square = 12.0 * PI * distance * distance;
+        let work = if let Some(hamaker) = reader.number(Key::SampleHamaker)? {
+            Some(hamaker / square)
+        } else if let Some(work) = reader.number(Key::SampleWorkOfAdhesion)? {
+            Some(work)
+        } else if let (Some(force), Some(radius)) =
+            (reader.number(Key::SampleAdhesionForce)?, tip.radius)
+        {
+            Some(force / (pull_off * PI * radius))
+        } else {
+            None
+        };
+        Ok(work.map(|work| match wanted {
+            Key::SampleHamaker => work * square,
+            _ => work,
+        }))
+    }
+
+    /// The same contact under other laws, as far as what is known of it says their parameters:
+    /// these laws first.
+    pub fn others(&self) -> Vec<Self> {
+        let known = |key: Key| self.get(key).map(|value| value * unit(key));
+        let distance = known(Key::SampleIntermolecularDistance).unwrap_or(DISTANCE);
+        let square = 12.0 * PI * distance * distance;
+        let work = known(Key::SampleWorkOfAdhesion)
+            .or_else(|| known(Key::SampleHamaker).map(|hamaker| hamaker / square));
+        let value = |parameter: &ParameterEntry| {
+            let key = key_of(parameter);
+            let adhesion = match key {
+                Key::SampleHamaker => work.map(|work| work * square),
+                Key::SampleWorkOfAdhesion => work,
+                _ => None,
+            };
+            known(key).or(adhesion).or(parameter.default)
+        };
+        let mut all = vec![self.clone()];
+        for name in COMPARED {
+            let Ok(terms) = SampleLaw::terms(name) else {
+                continue;
+            };
+            let parameters = terms.iter().flat_map(|term| term.entry.parameters);
+            let Some(values) = parameters.map(value).collect::<Option<Vec<f64>>>() else {
+                continue;
+            };
+            let other = Self { terms, values };
+            if other.names() != self.names() {
+                all.push(other);
+            }
+        }
+        all
+    }
+
+    /// The laws' names.
+    pub fn name(&self) -> String {
+        self.names().join(" + ")
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        self.terms.iter().map(|term| term.entry.name).collect()
+    }
+
+    /// The parameters with their keys and values in the keys' own units, term by term.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static ParameterEntry, Key, f64)> {
+        let entries = self.terms.iter().flat_map(|term| term.entry.parameters);
+        entries.zip(&self.values).map(|(parameter, value)| {
+            let key = key_of(parameter);
+            (parameter, key, value / unit(key))
+        })
+    }
+
+    /// The value of a key, if the law has it.
+    pub(crate) fn get(&self, key: Key) -> Option<f64> {
+        let found = self.parameters().find(|(_, other, _)| *other == key);
+        found.map(|(_, _, value)| value)
+    }
+
+    /// The law in the model's units.
+    pub(crate) fn in_model(&self, scales: &Scales) -> Result<SampleLaw, PhysicalError> {
+        let entries = self.terms.iter().flat_map(|term| term.entry.parameters);
+        let values = entries.zip(&self.values);
+        let values = values.map(|(p, value)| value / size(p.dimension, scales));
+        SampleLaw::new(self.terms.clone(), values.collect()).map_err(|error| {
+            PhysicalError::impossible(Key::SampleLaw, self.names().join(" + "), error.to_string())
+        })
+    }
+
+    /// What had to be assumed of the law, and what puts it in doubt.
+    pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        let has = |name: &str| self.parameters().any(|(p, _, _)| p.name == name);
+        if has("modulus")
+            && let Ok(Some(material)) = reader.material(Key::SampleMaterial)
+        {
+            remarks.push(Remark::note(format!(
+                "sample \"{}\" from the catalogue: {}",
+                material.name, material.source
+            )));
+        }
+        let assumed = [
+            Key::SamplePoisson,
+            Key::SampleIntermolecularDistance,
+            Key::SampleSurfaceTension,
+            Key::SamplePermittivity,
+        ];
+        for key in assumed {
+            let Some(value) = self.get(key).filter(|_| !reader.has(key)) else {
+                continue;
+            };
+            if key == Key::SamplePoisson && reader.has(Key::SampleMaterial) {
+                continue;
+            }
+            remarks.push(Remark::note(format!(
+                "{key} is not given: taken as {}",
+                key.kind().format(value)
+            )));
+        }
+        if has("tip_modulus") && tip.elastic.is_none() {
+            remarks.push(Remark::note(
+                "the tip counts as rigid: give tip.material, or tip.modulus and tip.poisson, \
+                 to include its own compliance",
+            ));
+        }
+        if let (Some(radius), Some(distance)) = (
+            self.get(Key::TipRadius),
+            self.get(Key::SampleIntermolecularDistance),
+        ) && radius <= distance
+        {
+            remarks.push(Remark::warning(format!(
+                "the tip's radius of {} is not above the intermolecular distance of {}: no law \
+                 of continuous bodies holds",
+                Kind::Length.format(radius),
+                Kind::Length.format(distance)
+            )));
+        }
+        remarks
+    }
+}
+
+/// The ways to say how strongly tip and sample attract.
+const ADHESION: [Key; 3] = [
+    Key::SampleHamaker,
+    Key::SampleWorkOfAdhesion,
+    Key::SampleAdhesionForce,
+];
+/// The laws of a sphere that are compared with each other.
+const COMPARED: [&str; 6] = [
+    "hertz",
+    "dmt",
+    "jkr",
+    "voigt-sphere",
+    "voigt-sphere-pulling",
+    "thin-sphere",
+];
+/// Intermolecular distance where none is given.
+const DISTANCE: f64 = 0.165e-9;
+
+/// The pull-off force over πRw of a law with such an adhesion: 2 in Derjaguin, Muller and
+/// Toporov's limit of stiff contacts, as of any rigid sphere, 3/2 in Johnson, Kendall and
+/// Roberts' of soft ones.
+fn adhesion_of(terms: &[&'static TableLaw]) -> Option<f64> {
+    terms.iter().find_map(|term| match term.entry.name {
+        "dmt" | "van-der-waals" => Some(2.0),
+        "jkr" => Some(1.5),
+        _ => None,
+    })
+}
+
+/// The model's unit of a dimension, in SI; that of charge is 1 C.
+fn size(dimension: Dimension, scales: &Scales) -> f64 {
+    scales.mass.powi(i32::from(dimension.mass))
+        * scales.length.powi(i32::from(dimension.length))
+        * scales.time.powi(i32::from(dimension.time))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nanotap_volterra::laws::TABLE;
+
+    #[test]
+    fn every_parameter_of_every_law_has_its_key() {
+        for law in TABLE {
+            for p in law.entry.parameters {
+                let hamaker = ["hamaker", "attraction"].contains(&p.name);
+                assert_eq!(key_of(p) == Key::SampleHamaker, hamaker, "{}", p.name);
+            }
+        }
+    }
+}

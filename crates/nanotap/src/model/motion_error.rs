@@ -1,0 +1,35 @@
+//! Why a motion could not be followed.
+
+use nanotap_flow::FlowError;
+use nanotap_volterra::VolterraError;
+
+/// Why a motion could not be followed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The exact flow failed.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// The flow under a nonlinear force failed.
+    #[error(transparent)]
+    Nonlinear(#[from] VolterraError),
+}
+
+impl MotionError {
+    /// Whether the motion left every bound.
+    pub const fn is_unbounded(&self) -> bool {
+        matches!(
+            self,
+            Self::Flow(FlowError::Diverged { .. } | FlowError::NotFinite { .. })
+                | Self::Nonlinear(VolterraError::Diverged { .. })
+        )
+    }
+}
+
+impl From<MotionError> for crate::Error {
+    fn from(error: MotionError) -> Self {
+        match error {
+            MotionError::Flow(error) => error.into(),
+            MotionError::Nonlinear(error) => Self::numerics(error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,675 @@
+//! The lever over a sample with a nonlinear force law: the same beam, the force at its tip from
+//! [`nanotap_volterra`].
+//!
+//! The state is that of the free beam, `(a_1 … a_N, ȧ_1 … ȧ_N)`, and where the law remembers
+//! (whether the tip is attached, say) one more number: the branch of the law at drive phase 0.
+//! A whole number does not vary, so that its row and column of the Jacobian are zero and one
+//! multiplier is.
+
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::{Output, Regime};
+use nanotap_volterra::{
+    Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
+    ToneChange, Trajectory, VolterraError,
+};
+use serde::Serialize;
+
+use crate::model::beam_equations::{Beam, BeamTangent};
+use crate::model::cantilever::Cantilever;
+use crate::model::galerkin::Galerkin;
+use crate::model::parameter::Parameter;
+use crate::model::sample_law::SampleLaw;
+use crate::model::{Model, ModelError, MotionError};
+
+/// Forces a step.
+const NODES: usize = 20;
+/// How much the error of a step may move the gap, as a part of what the tip swings and stands
+/// away: a few units of rounding.
+const TOLERANCE: f64 = 3e-15;
+
+/// The lever under a nonlinear force.
+#[derive(Clone, Debug)]
+pub struct Nonlinear {
+    /// Modes, drive and law.
+    pub system: Arc<System>,
+    /// On which branches of the law tip and sample touch.
+    pub contact: Vec<bool>,
+    /// The drive period.
+    pub period: f64,
+    /// How much of the sample's force is in the force of the clamp.
+    pub(crate) clamp_force: f64,
+    /// Whether the law remembers its branch.
+    pub remembers: bool,
+}
+
+impl PartialEq for Nonlinear {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.system, &other.system)
+    }
+}
+
+impl Nonlinear {
+    /// The beam in flight, `free`, under `law`; `height` is the gap, `kick` what a unit of force
+    /// adds to ẋ.
+    pub(crate) fn new(
+        law: &SampleLaw,
+        beam: &Beam<'_>,
+        free: &Regime,
+        drive: &nanotap_flow::Drive,
+    ) -> Result<Self, ModelError> {
+        let height = beam.height();
+        let law = law.build()?;
+        let kernel = kernel(free, &height.row, beam.kick())?;
+        let tones: Vec<Tone> = drive
+            .frequencies()
+            .iter()
+            .enumerate()
+            .map(|(k, &frequency)| Tone {
+                frequency,
+                forcing: free.forcing().tones[k].clone(),
+                gap: height.tones[k],
+            })
+            .collect();
+        let response = free.project(height);
+        let swing: f64 = response.tones.iter().map(|z| z.norm()).sum();
+        let size = swing.max(height.constant.abs());
+        let tolerance = TOLERANCE * if size > 0.0 { size } else { 1.0 };
+        let forcing = Drive {
+            constant: free.forcing().constant.clone(),
+            offset: height.constant,
+            tones,
+        };
+        let system = System::new(kernel, Arc::clone(&law), forcing, Options::new(tolerance))?;
+        Ok(Self {
+            system: Arc::new(system),
+            contact: (0..law.branches()).map(|b| law.touches(b)).collect(),
+            period: drive.period(),
+            clamp_force: beam.clamp_force(),
+            remembers: law.remembers(),
+        })
+    }
+
+    /// Whether the law is known to feed and take nothing.
+    pub fn is_conservative(&self) -> bool {
+        self.system.law().conservative()
+    }
+
+    /// The branch of the law in a state of the model at drive phase 0: the one that it
+    /// remembers, if that can be.
+    fn branch(&self, state: &[f64]) -> usize {
+        let n = self.system.dimension();
+        let law = self.system.law();
+        let (gap, rate) = self.system.gap(0.0, &state[..n]);
+        let known = state.get(n).map(|s| s.round().max(0.0) as usize);
+        let possible = |branch: &usize| {
+            *branch < law.branches()
+                && self.system.exits(*branch).iter().all(|exit| {
+                    let guard = match exit.guard {
+                        Guard::Falls(level) => gap - level,
+                        Guard::Rises(level) => level - gap,
+                        Guard::Turns => -rate,
+                        Guard::Own(index) => law.guard(index, gap, rate).value,
+                    };
+                    guard >= 0.0
+                })
+        };
+        known
+            .filter(possible)
+            .unwrap_or_else(|| law.branch_at(gap, rate))
+    }
+
+    /// Puts `flow` at a state of the model at drive phase 0.
+    pub(crate) fn start(&self, flow: &mut Flow, state: &[f64]) -> Result<(), MotionError> {
+        let n = self.system.dimension();
+        let expected = n + usize::from(self.remembers);
+        if state.len() != expected {
+            return Err(MotionError::Nonlinear(VolterraError::Shape {
+                what: "the state",
+                found: state.len(),
+                expected,
+            }));
+        }
+        if state.iter().all(|v| v.is_finite()) {
+            flow.start_on(&state[..n], 0.0, self.branch(state))?;
+        } else {
+            // Refused with the value that is none.
+            flow.start(&state[..n], 0.0)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the state of the model off `flow`.
+    pub(crate) fn end(&self, flow: &Flow, state: &mut [f64]) {
+        let n = self.system.dimension();
+        flow.state(&mut state[..n]);
+        if let Some(memory) = state.get_mut(n) {
+            *memory = flow.branch() as f64;
+        }
+    }
+
+    /// The gap at which contact begins from outside, if there is one.
+    pub(crate) fn contact_gap(&self) -> Option<f64> {
+        let mut outside = self.system.exits(0).iter();
+        outside.find_map(|exit| match exit.guard {
+            Guard::Falls(level) => Some(level),
+            _ => None,
+        })
+    }
+
+    /// What a motion that came as close as `least_gap` violates.
+    pub fn remarks(&self, least_gap: f64) -> Vec<Remark> {
+        self.system.law().remarks(least_gap)
+    }
+
+    /// An output of the model, with so much of the sample's force added.
+    pub(crate) fn output(&self, output: &Output, force: f64) -> nanotap_volterra::Output {
+        let n = self.system.dimension();
+        nanotap_volterra::Output {
+            row: output.row.columns(0, n).into_owned(),
+            offset: output.constant,
+            tones: output.tones.clone(),
+            force,
+        }
+    }
+}
+
+/// Where the lever can rest without a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Equilibrium {
+    /// Gap between tip and sample, in units of g₀.
+    pub gap: f64,
+    /// Tip deflection, in units of g₀.
+    pub deflection: f64,
+    /// Force of the sample on the tip, in the model's unit.
+    pub force: f64,
+    /// Whether tip and sample touch.
+    pub contact: bool,
+    /// Whether it is stable: the lever is stiffer than the attraction.
+    pub stable: bool,
+}
+
+/// Points at which a force is looked at, on each branch of the law.
+const EQUILIBRIUM_POINTS: i32 = 600;
+
+impl Nonlinear {
+    /// The equilibria of the undriven lever, those with the tip farthest away first: zeros of
+    /// `d − d₀ − c F(d)`, with the lever's static compliance `c`.
+    pub fn equilibria(&self) -> Vec<Equilibrium> {
+        let law = self.system.law();
+        let (rest, compliance) = (self.system.drive().offset, self.compliance());
+        let tip = rest.abs();
+        let mut found: Vec<Equilibrium> = Vec::new();
+        for branch in 0..law.branches() {
+            let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+            for exit in self.system.exits(branch) {
+                match exit.guard {
+                    Guard::Falls(level) => low = low.max(level),
+                    Guard::Rises(level) => high = high.min(level),
+                    Guard::Turns | Guard::Own(_) => {}
+                }
+            }
+            let excess = |gap: f64| gap - rest - compliance * law.force(branch, gap, 0.0).value;
+            // From where contact begins outwards and inwards, ever farther.
+            let contact = self.contact_gap().unwrap_or(0.0);
+            let reach = 10.0 * (tip + contact.abs());
+            let ladder =
+                |k: i32| reach * 1e-9_f64.powf(f64::from(k) / f64::from(EQUILIBRIUM_POINTS));
+            let outwards = (0..=EQUILIBRIUM_POINTS).map(|k| contact + ladder(k));
+            let inwards = (0..=EQUILIBRIUM_POINTS).rev().map(|k| contact - ladder(k));
+            let mut gaps: Vec<f64> = outwards
+                .chain(inwards)
+                .filter(|gap| *gap >= low && *gap <= high)
+                .chain([low, high].into_iter().filter(|end| end.is_finite()))
+                .collect();
+            gaps.sort_by(|a, b| b.total_cmp(a));
+            for pair in gaps.windows(2) {
+                let (mut a, mut b) = (pair[0], pair[1]);
+                let (fa, fb) = (excess(a), excess(b));
+                if !(fa * fb < 0.0 || fb == 0.0 && fa != 0.0) {
+                    continue;
+                }
+                for _ in 0..200 {
+                    let middle = 0.5 * (a + b);
+                    if middle >= a.max(b) || middle <= a.min(b) {
+                        break;
+                    }
+                    if excess(middle) * fa > 0.0 {
+                        a = middle;
+                    } else {
+                        b = middle;
+                    }
+                }
+                let force = law.force(branch, b, 0.0);
+                found.push(Equilibrium {
+                    gap: b,
+                    deflection: b - rest,
+                    force: force.value,
+                    contact: self.contact[branch],
+                    stable: compliance * force.by_gap < 1.0,
+                });
+            }
+        }
+        found.sort_by(|a, b| b.gap.total_cmp(&a.gap));
+        found.dedup_by(|a, b| (a.gap - b.gap).abs() <= 1e-12 * tip && a.contact == b.contact);
+        found
+    }
+
+    /// How far a unit of force at the tip bends the lever.
+    fn compliance(&self) -> f64 {
+        let kernel = self.system.kernel();
+        let modes = kernel.modes();
+        let source = modes.left() * kernel.column();
+        let readout = kernel.row() * modes.right();
+        let blocks = modes.blocks().iter();
+        blocks
+            .map(|block| {
+                let s = block.start;
+                if block.size == 1 {
+                    return -readout[s] * source[s] / block.matrix[0][0];
+                }
+                let [[a, b], [c, d]] = block.matrix;
+                let determinant = a * d - b * c;
+                let x = (d * source[s] - b * source[s + 1]) / determinant;
+                let y = (a * source[s + 1] - c * source[s]) / determinant;
+                -(readout[s] * x + readout[s + 1] * y)
+            })
+            .sum()
+    }
+
+    /// The force at these gaps, met one after the other without haste.
+    pub fn force_curve(&self, gaps: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
+        let law = self.system.law();
+        let mut last: Option<(f64, usize)> = None;
+        let mut curve = Vec::new();
+        for gap in gaps {
+            let mut branch = match last {
+                None => law.branch_at(gap, -1.0),
+                Some((_, branch)) => branch,
+            };
+            // At most every branch is passed on the way.
+            for _ in 0..law.branches() {
+                let rises = last.is_some_and(|(before, _)| gap > before);
+                let exit = self
+                    .system
+                    .exits(branch)
+                    .iter()
+                    .find(|exit| match exit.guard {
+                        Guard::Falls(level) => gap < level,
+                        Guard::Rises(level) => gap > level,
+                        Guard::Turns => rises,
+                        Guard::Own(index) => law.guard(index, gap, 0.0).value < 0.0,
+                    });
+                let Some(exit) = exit else { break };
+                branch = exit.target;
+            }
+            curve.push([gap, law.force(branch, gap, 0.0).value]);
+            last = Some((gap, branch));
+        }
+        curve
+    }
+}
+
+/// Kernels kept: a study builds many models on the same lever.
+const KEPT: usize = 16;
+
+/// What a kernel is made of, as bits.
+type KernelKey = Vec<u64>;
+
+/// The kernel of the beam's modes, of the last ones made if it is among them: it depends on
+/// neither drive nor law.
+fn kernel(
+    free: &Regime,
+    row: &RowDVector<f64>,
+    kick: &DVector<f64>,
+) -> Result<Arc<Kernel>, VolterraError> {
+    static KNOWN: Mutex<VecDeque<(KernelKey, Arc<Kernel>)>> = Mutex::new(VecDeque::new());
+    let values = free.matrix().iter().chain(row.iter()).chain(kick.iter());
+    let key: KernelKey = values.map(|v| v.to_bits()).collect();
+    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, kernel)) = known().iter().find(|(other, _)| *other == key) {
+        return Ok(Arc::clone(kernel));
+    }
+    let basis = free.basis();
+    let modes = if basis.clusters.is_empty() {
+        Modes::from_eigenpairs(&basis.eigenvalues, &basis.right, &basis.left)?
+    } else {
+        Modes::from_matrix(free.matrix())?
+    };
+    let slowest = modes
+        .blocks()
+        .iter()
+        .map(nanotap_volterra::modes::Block::rate)
+        .filter(|rate| *rate > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let longest = if slowest.is_finite() {
+        0.25 * TAU / slowest
+    } else {
+        1.0
+    };
+    let kernel = Kernel::new(modes, row.clone(), kick.clone(), longest, NODES)?;
+    let mut known = known();
+    if known.len() >= KEPT {
+        known.pop_front();
+    }
+    known.push_back((key, Arc::clone(&kernel)));
+    Ok(kernel)
+}
+
+/// How the map changes with a number.
+#[derive(Clone, Debug)]
+pub(crate) enum Variation {
+    /// Through drive, distance and law: from the equations, linearised.
+    Linearised {
+        change: Change,
+        /// Of ln T.
+        log_period: f64,
+    },
+    /// Through the modes: from the maps on both sides.
+    Differences {
+        low: Arc<Nonlinear>,
+        high: Arc<Nonlinear>,
+        width: f64,
+    },
+}
+
+/// A step between maps on both sides, as a part of the number: the difference is good to its
+/// square.
+const STEP: f64 = 1e-5;
+
+impl Variation {
+    /// Along `slopes` of the case's numbers and `law` of its law's parameters (empty: none).
+    pub(crate) fn along(
+        case: &Cantilever,
+        model: &Model,
+        nonlinear: &Nonlinear,
+        slopes: &[(Parameter, f64)],
+        law: &[f64],
+    ) -> Result<Self, ModelError> {
+        let of_modes = |p: Parameter| matches!(p, Parameter::Alpha1 | Parameter::Alpha3);
+        if slopes
+            .iter()
+            .any(|(p, slope)| of_modes(*p) && *slope != 0.0)
+        {
+            return Self::between(case, slopes, law);
+        }
+        let galerkin = Galerkin::new(case)?;
+        let drive = model.system.drive();
+        let beam = Beam::new(&galerkin, drive, false)?;
+        let n = nonlinear.system.dimension();
+        let mut change = Change {
+            law: law.to_vec(),
+            constant: vec![0.0; n],
+            tones: drive
+                .frequencies()
+                .iter()
+                .map(|_| ToneChange {
+                    forcing: vec![nanotap_flow::Complex::new(0.0, 0.0); n],
+                    ..ToneChange::default()
+                })
+                .collect(),
+            ..Change::default()
+        };
+        let mut log_period = 0.0;
+        for &(parameter, slope) in slopes {
+            add(&mut change, &beam.derivative(parameter)?, slope);
+            if parameter == Parameter::Omega {
+                log_period -= slope / case.omega;
+                for (tone, frequency) in change.tones.iter_mut().zip(drive.frequencies()) {
+                    tone.frequency += slope * frequency / case.omega;
+                }
+            }
+        }
+        Ok(Self::Linearised { change, log_period })
+    }
+
+    fn between(
+        case: &Cantilever,
+        slopes: &[(Parameter, f64)],
+        law: &[f64],
+    ) -> Result<Self, ModelError> {
+        // No number moves by more than a small part of itself.
+        let parts = slopes.iter().map(|(p, slope)| (case.get(*p), *slope));
+        let values = case.law.iter().flat_map(|law| law.values().iter().copied());
+        let parts = parts.chain(values.zip(law.iter().copied()));
+        let step = parts
+            .filter(|(_, slope)| *slope != 0.0)
+            .map(|(value, slope)| STEP * value.abs().max(1e-3) / slope.abs())
+            .filter(|step| step.is_finite())
+            .fold(f64::INFINITY, f64::min);
+        let at = |side: f64| {
+            let mut moved = case.clone();
+            for &(parameter, slope) in slopes {
+                moved = moved
+                    .clone()
+                    .with(parameter, case.get(parameter) + side * step * slope);
+            }
+            if !law.is_empty() {
+                moved.law = moved.law.map(|own| own.moved(law, side * step));
+            }
+            Model::cantilever(&moved)
+        };
+        let (low, high, width) = match (at(-1.0), at(1.0)) {
+            (Ok(low), Ok(high)) => (low, high, 2.0 * step),
+            (Err(_), Ok(high)) => (at(0.0)?, high, step),
+            (Ok(low), Err(_)) => (low, at(0.0)?, step),
+            (Err(error), Err(_)) => return Err(error),
+        };
+        match (low.nonlinear, high.nonlinear) {
+            (Some(low), Some(high)) => Ok(Self::Differences { low, high, width }),
+            // A case without a law has no such map.
+            _ => Ok(Self::none()),
+        }
+    }
+
+    /// No change.
+    pub(crate) fn none() -> Self {
+        Self::Linearised {
+            change: Change::default(),
+            log_period: 0.0,
+        }
+    }
+}
+
+/// Adds `slope` times the derivative of the beam's forcing and gap.
+fn add(change: &mut Change, of: &BeamTangent, slope: f64) {
+    let (forcing, height) = (of.forcing(), of.height());
+    change.offset += slope * height.constant;
+    for (sum, value) in change.constant.iter_mut().zip(forcing.constant.iter()) {
+        *sum += slope * value;
+    }
+    for (k, tone) in change.tones.iter_mut().enumerate() {
+        tone.gap += height.tones[k] * slope;
+        for (sum, value) in tone.forcing.iter_mut().zip(forcing.tones[k].iter()) {
+            *sum += value * slope;
+        }
+    }
+}
+
+/// The map of a lever under a nonlinear force.
+#[derive(Clone, Debug)]
+pub(crate) struct NonlinearStrobe {
+    nonlinear: Arc<Nonlinear>,
+    flow: Flow,
+    variations: Arc<[Variation]>,
+}
+
+impl NonlinearStrobe {
+    pub(crate) fn new(nonlinear: &Arc<Nonlinear>, variations: Vec<Variation>) -> Self {
+        Self {
+            nonlinear: Arc::clone(nonlinear),
+            flow: Flow::new(Arc::clone(&nonlinear.system)),
+            variations: variations.into(),
+        }
+    }
+
+    pub(crate) fn dimension(&self) -> usize {
+        self.nonlinear.system.dimension() + usize::from(self.nonlinear.remembers)
+    }
+
+    pub(crate) fn period(&self) -> f64 {
+        self.nonlinear.period
+    }
+
+    pub(crate) fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
+        self.nonlinear.start(&mut self.flow, state)?;
+        self.flow.run_until(self.nonlinear.period)?;
+        self.nonlinear.end(&self.flow, state);
+        Ok(())
+    }
+
+    pub(crate) fn advance_with_derivatives(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), MotionError> {
+        let (n, whole) = (self.nonlinear.system.dimension(), self.dimension());
+        let start = state.to_vec();
+        let varied = derivatives.is_some();
+        let changes: Vec<Change> = self
+            .variations
+            .iter()
+            .filter(|_| varied)
+            .map(|variation| match variation {
+                Variation::Linearised { change, .. } => change.clone(),
+                Variation::Differences { .. } => Change::default(),
+            })
+            .collect();
+        let period = self.nonlinear.period;
+        let (mut own, mut columns) = (DMatrix::zeros(n, n), DMatrix::zeros(n, changes.len()));
+        self.nonlinear.start(&mut self.flow, state)?;
+        self.flow
+            .run_with_derivatives(period, &changes, &mut own, &mut columns)?;
+        self.nonlinear.end(&self.flow, state);
+        *jacobian = own.resize(whole, whole, 0.0);
+        let Some(derivatives) = derivatives else {
+            return Ok(());
+        };
+        let mut field = vec![0.0; n];
+        let branch = self.flow.branch();
+        self.nonlinear
+            .system
+            .field(period, &state[..n], branch, &mut field);
+        for (k, variation) in self.variations.iter().enumerate() {
+            let mut column = columns.column_mut(k);
+            match variation {
+                // The end of the period moves too.
+                Variation::Linearised { log_period, .. } => {
+                    column.axpy(period * log_period, &DVector::from_vec(field.clone()), 1.0);
+                }
+                Variation::Differences { low, high, width } => {
+                    let end = |side: &Arc<Nonlinear>| {
+                        let mut state = start.clone();
+                        Self::new(side, Vec::new()).advance(&mut state)?;
+                        Ok::<_, MotionError>(state)
+                    };
+                    let (low, high) = (end(low)?, end(high)?);
+                    for i in 0..n {
+                        column[i] = (high[i] - low[i]) / width;
+                    }
+                }
+            }
+        }
+        *derivatives = columns.resize(whole, self.variations.len(), 0.0);
+        Ok(())
+    }
+
+    /// Evaluations of the law so far.
+    pub(crate) fn evaluations(&self) -> u64 {
+        self.flow.statistics().evaluations
+    }
+
+    /// log|det DP| where it is the same everywhere; a law that remembers loses a direction.
+    pub(crate) fn log_determinant(&self) -> Option<f64> {
+        let known = self.nonlinear.constant_log_determinant();
+        known.filter(|_| !self.nonlinear.remembers)
+    }
+
+    /// The extrema of the gap over a period, as times and values over the contact.
+    pub(crate) fn advance_with_extrema(
+        &mut self,
+        state: &mut [f64],
+    ) -> Result<Vec<(f64, f64)>, MotionError> {
+        self.nonlinear.start(&mut self.flow, state)?;
+        let period = self.flow.record_until(self.nonlinear.period)?;
+        self.nonlinear.end(&self.flow, state);
+        let Some(contact) = self.nonlinear.contact_gap() else {
+            return Ok(Vec::new());
+        };
+        let extrema = period.extrema(&period.gap_output()).into_iter();
+        Ok(extrema.map(|(time, gap)| (time, gap - contact)).collect())
+    }
+}
+
+impl Nonlinear {
+    /// log|det DP| of the lever's state where every motion has the same: a force that depends
+    /// on the gap alone has no part in the trace, nor in the determinant of a switch at a gap.
+    pub(crate) fn constant_log_determinant(&self) -> Option<f64> {
+        let law = self.system.law();
+        let turns = (0..law.branches())
+            .flat_map(|branch| self.system.exits(branch))
+            .any(|exit| exit.guard == Guard::Turns);
+        let varies = law.depends_on_rate() || turns;
+        (!varies).then(|| self.free_log_determinant())
+    }
+
+    /// log|det DP| of the lever's state over a recorded period, from the trace of the equations
+    /// and what the force jumps at turning points add.
+    pub(crate) fn log_determinant(&self, period: &Trajectory) -> f64 {
+        if let Some(known) = self.constant_log_determinant() {
+            return known;
+        }
+        let law = self.system.law();
+        let (row, column) = (self.system.kernel().row(), self.system.kernel().column());
+        let n = self.system.dimension() / 2;
+        let onto_rate: f64 = (0..n).map(|j| row[j] * column[n + j]).sum();
+        let by_rate = period.integrate(1, |s, out| {
+            out[0] = law.force(s.branch, s.gap, s.rate).by_rate;
+        });
+        let turns = period
+            .switches()
+            .iter()
+            .filter(|switch| self.system.exits(switch.from)[switch.exit].guard == Guard::Turns);
+        // The saltation matrix there has the ratio of the gap's accelerations as determinant.
+        let jumps = turns.filter_map(|switch| {
+            let sample = period.at(switch.time)?;
+            let acceleration = |branch: usize| {
+                let mut field = vec![0.0; 2 * n];
+                let state = sample.state.as_slice();
+                self.system.field(switch.time, state, branch, &mut field);
+                let own: f64 = (0..n).map(|j| row[j] * field[n + j]).sum();
+                let tones = self.system.drive().tones.iter();
+                let forced = tones.map(|tone| {
+                    let (sin, cos) = (tone.frequency * switch.time).sin_cos();
+                    -tone.frequency.powi(2) * (tone.gap.re * cos - tone.gap.im * sin)
+                });
+                own + forced.sum::<f64>()
+            };
+            Some(
+                (acceleration(switch.to) / acceleration(switch.from))
+                    .abs()
+                    .ln(),
+            )
+        });
+        self.free_log_determinant() + onto_rate * by_rate[0] + jumps.sum::<f64>()
+    }
+
+    /// log|det DP| of the lever without a sample.
+    fn free_log_determinant(&self) -> f64 {
+        let blocks = self.system.kernel().modes().blocks().iter();
+        let trace: f64 = blocks
+            .map(|block| {
+                if block.size == 1 {
+                    block.matrix[0][0]
+                } else {
+                    block.matrix[0][0] + block.matrix[1][1]
+                }
+            })
+            .sum();
+        trace * self.period
+    }
+}

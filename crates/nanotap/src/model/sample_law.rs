@@ -1,0 +1,125 @@
+//! The nonlinear force laws of a sample: names and numbers of laws of
+//! [`nanotap_volterra::laws`], in the model's units.
+
+use std::sync::Arc;
+
+use nanotap_volterra::laws::entry::{Entry, ParameterEntry};
+use nanotap_volterra::laws::{TABLE, TableLaw, build_sum, law};
+use nanotap_volterra::{ForceLaw, VolterraError};
+use serde::ser::SerializeSeq;
+use serde::{Serialize, Serializer};
+
+/// A law, or a sum of laws, with its parameters.
+#[derive(Clone, Debug)]
+pub struct SampleLaw {
+    terms: Vec<&'static TableLaw>,
+    /// The parameters of the terms, one after the other.
+    values: Vec<f64>,
+}
+
+impl PartialEq for SampleLaw {
+    fn eq(&self, other: &Self) -> bool {
+        self.values == other.values && self.names().eq(other.names())
+    }
+}
+
+impl SampleLaw {
+    /// The names of all laws.
+    pub fn all() -> impl Iterator<Item = &'static str> {
+        TABLE.iter().map(|law| law.entry.name)
+    }
+
+    /// The laws that `text` names, `hertz` or `hertz + exponential-damping`.
+    ///
+    /// # Errors
+    /// [`VolterraError::UnknownLaw`] for the first name that is none.
+    pub fn terms(text: &str) -> Result<Vec<&'static TableLaw>, VolterraError> {
+        text.split('+')
+            .map(|name| law(&name.trim().to_lowercase().replace(['_', ' '], "-")))
+            .collect()
+    }
+
+    /// These laws with `values`, the parameters of all terms one after the other, in the model's
+    /// units.
+    ///
+    /// # Errors
+    /// When a value makes no sense, or two of the laws cannot be added.
+    pub fn new(terms: Vec<&'static TableLaw>, values: Vec<f64>) -> Result<Self, VolterraError> {
+        let law = Self { terms, values };
+        law.build()?;
+        Ok(law)
+    }
+
+    fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.entries().map(|entry| entry.name)
+    }
+
+    /// What is said of each term.
+    pub fn entries(&self) -> impl Iterator<Item = &'static Entry> {
+        self.terms.iter().map(|term| term.entry)
+    }
+
+    /// The laws' names.
+    pub fn name(&self) -> String {
+        self.names().collect::<Vec<_>>().join(" + ")
+    }
+
+    /// The parameters of all terms with their values, term by term.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static ParameterEntry, f64)> {
+        let entries = self.entries().flat_map(|entry| entry.parameters);
+        entries.zip(self.values.iter().copied())
+    }
+
+    /// Their values alone.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The same with each value changed by `step` times its entry of `slopes`.
+    #[must_use]
+    pub(crate) fn moved(&self, slopes: &[f64], step: f64) -> Self {
+        let values = self.values.iter().zip(slopes);
+        Self {
+            terms: self.terms.clone(),
+            values: values.map(|(value, slope)| value + step * slope).collect(),
+        }
+    }
+
+    /// The force law.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn build(&self) -> Result<Arc<dyn ForceLaw>, VolterraError> {
+        let mut rest = self.values.as_slice();
+        let mut built = Vec::with_capacity(self.terms.len());
+        for term in &self.terms {
+            let count = term.entry.parameters.len().min(rest.len());
+            let (own, others) = rest.split_at(count);
+            built.push((term.entry, term.with(own)?));
+            rest = others;
+        }
+        build_sum(&built)
+    }
+}
+
+impl Serialize for SampleLaw {
+    /// As the list of its laws, each a map from names to values in the model's units.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Term {
+            law: &'static str,
+            #[serde(flatten)]
+            parameters: std::collections::BTreeMap<&'static str, f64>,
+        }
+        let mut values = self.values.iter().copied();
+        let mut terms = serializer.serialize_seq(Some(self.terms.len()))?;
+        for entry in self.entries() {
+            let parameters = entry.parameters.iter().map(|p| p.name);
+            terms.serialize_element(&Term {
+                law: entry.name,
+                parameters: parameters.zip(values.by_ref()).collect(),
+            })?;
+        }
+        terms.end()
+    }
+}

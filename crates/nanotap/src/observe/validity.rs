@@ -1,0 +1,46 @@
+//! Where a motion leaves the range for which the sample's force law was derived.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::table::Observables;
+use crate::model::Model;
+
+/// A ratio that a force law takes to be small, and that a motion makes large.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct OutOfRange {
+    /// The ratio, as a formula: `δ/R`.
+    pub ratio: &'static str,
+    /// Its largest value.
+    pub value: f64,
+    /// The value up to which the law holds.
+    pub limit: f64,
+}
+
+impl OutOfRange {
+    /// What the motion with these observables violates; their gap must have been measured.
+    pub fn of(model: &Model, seen: &Observables) -> Vec<Self> {
+        let Some(nonlinear) = &model.nonlinear else {
+            return Vec::new();
+        };
+        let remarks = nonlinear.remarks(seen.gap_range[0]).into_iter();
+        let report = |remark: nanotap_volterra::Remark| Self {
+            ratio: remark.ratio,
+            value: remark.value,
+            limit: remark.limit,
+        };
+        remarks.map(report).collect()
+    }
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            formatter,
+            "{} reaches {:.3}, and the force law was derived for values up to {}",
+            self.ratio, self.value, self.limit
+        )
+    }
+}

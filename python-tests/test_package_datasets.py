@@ -64,8 +64,18 @@ def test_a_logarithmic_array_is_a_logarithmic_axis(regular):
     ds = nanotap.sweep(regular, over={"alpha4": given}, periods=3)
     np.testing.assert_allclose(ds.alpha4, given, rtol=1e-14)
     assert ds.alpha4.attrs["spacing"] == "log"
-    with pytest.raises(ValueError, match="neither in equal steps nor in equal ratios"):
-        nanotap.sweep(regular, over={"alpha4": [1, 2, 4, 9]})
+
+
+def test_any_values_that_ascend_are_an_axis(regular, tmp_path):
+    given = np.array([5.0, 20.0, 21.5, 50.0])
+    ds = nanotap.sweep(regular, over={"alpha4": given}, periods=3)
+    np.testing.assert_array_equal(ds.alpha4, given)
+    assert ds.alpha4.attrs["spacing"] == "listed"
+    # A value has the motion that it has alone.
+    alone = nanotap.sweep(regular.with_(alpha4=21.5), over="omega=3:3:1", periods=3)
+    np.testing.assert_allclose(ds.tip_max[2], alone.tip_max[0], rtol=1e-9)
+    with pytest.raises(ValueError, match="greater than the one before"):
+        nanotap.sweep(regular, over={"alpha4": [1, 9, 4]})
 
 
 def test_shares_merge_to_the_same_bytes(regular, tmp_path):

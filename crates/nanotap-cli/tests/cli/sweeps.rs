@@ -295,6 +295,8 @@ fn bad_requests_of_a_sweep_are_refused() {
         ("alpha5=-1:1:9:log", "above 0"),
         ("modes=1:5:4", "whole"),
         ("modes=0:5:6", "whole"),
+        ("omega=2,3,3", "3 before 3"),
+        ("omega=2,x", "the value `x`"),
         ("temperature=1:2:3", "no parameter"),
     ] {
         refused(&["--over", over], &[word]);

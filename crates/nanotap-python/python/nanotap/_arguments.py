@@ -132,7 +132,7 @@ def quantity(name: str, value: Any) -> str:
 
 
 def axis(name: str, values: Any) -> str:
-    """An axis as the terminal writes it: `omega=2:4:400` or `alpha4=1:1000:50:log`."""
+    """An axis as the terminal writes it: `omega=2:4:400`, `alpha4=1:1000:50:log`, `omega=2,2.5,4`."""
     if isinstance(values, tuple):
         if len(values) not in (3, 4):
             message = f"{name}: first, last and how many are needed, as in (2, 4, 400)"
@@ -140,6 +140,8 @@ def axis(name: str, values: Any) -> str:
         first, last, many, *spacing = values
         words = [quantity(name, first), quantity(name, last), str(count(name, many))]
         return f"{name}={':'.join([*words, *map(str, spacing)])}"
+    if isinstance(values, list) and values and all(isinstance(v, str) for v in values):
+        return f"{name}={','.join(values)}"
     array = real(values, name)
     if array.ndim != 1 or array.size == 0:
         message = f"{name}: a row of values is needed, as in numpy.linspace(2, 4, 400)"
@@ -153,11 +155,7 @@ def axis(name: str, values: Any) -> str:
         and np.allclose(array, np.geomspace(first, last, many), rtol=1e-12, atol=0)
     ):
         return f"{name}={first!r}:{last!r}:{many}:log"
-    message = (
-        f"{name}: the values go neither in equal steps nor in equal ratios; simulate and orbit "
-        "take any values"
-    )
-    raise ValueError(message)
+    return f"{name}={','.join(map(repr, array.tolist()))}"
 
 
 def axes(over: str | Sequence[str] | Mapping[str, Any]) -> list[str]:
@@ -224,7 +222,7 @@ def _plain(name: str, value: Any, schema: Mapping[str, Any]) -> Any:
     if "boolean" in kinds:
         return bool(value)
     if "object" in kinds:
-        if isinstance(value, str) and "string" in kinds:
+        if isinstance(value, str | list) and "string" in kinds:
             return value
         return {side: list(ends) for side, *ends in _sides(name, value)}
     if "array" in kinds and "integer" in kinds:

@@ -463,8 +463,9 @@ def sweep(
         What is studied.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-        alpha4=1:1000:50:log in equal ratios; modes too; of a physical case also
-        drive.frequency=60kHz:80kHz:200; once or twice.
+        alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
+        modes too; of a physical case also drive.frequency=60kHz:80kHz:200; once or
+        twice.
     starts : int | None
         Quasi-random starts at each value, spread over a box of states; without it,
         one start from rest (1 to 10000000).
@@ -552,8 +553,8 @@ def window(
         What is studied.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in gap.tip=5nm:25nm:41,
-        drive.free_amplitude=10nm:60nm:26 or omega=2:4:81; twice, the first is the
-        horizontal axis.
+        drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
+        omega=2,2.5,4; twice, the first is the horizontal axis.
     starts : int
         Quasi-random starts of the census at each point (1 to 10000000).
     seed : int

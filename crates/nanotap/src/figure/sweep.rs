@@ -258,11 +258,11 @@ impl SweepTable {
         named.sort();
         let others = frequent.len() > named.len();
         let index: BTreeMap<_, usize> = named.iter().enumerate().map(|(k, m)| (*m, k)).collect();
-        let cells = found
+        let cells: Vec<Option<usize>> = found
             .iter()
-            .map(|motions| Some(index.get(motions).copied().unwrap_or(named.len())));
-        let mut layer =
-            CategoryMap::new(x.values.len(), y.values.len(), cells, x.edges(), y.edges());
+            .map(|motions| Some(index.get(motions).copied().unwrap_or(named.len())))
+            .collect();
+        let mut layer = GridScale::map(x, y, &cells);
         // Several motions at one place have a colour that none of those alone has.
         let alone: BTreeSet<Motion> = named
             .iter()
@@ -444,6 +444,9 @@ impl GridAxis {
     }
 }
 
+/// Cells along an axis whose values are not even.
+const CELLS: usize = 800;
+
 /// The values of a parameter as they are shown.
 pub(crate) struct GridScale {
     pub(crate) values: Vec<f64>,
@@ -463,6 +466,51 @@ impl GridScale {
         axis.unit(&self.unit).tight()
     }
 
+    /// A map of what there is at each point of a grid, row by row.
+    pub(crate) fn map(x: &Self, y: &Self, points: &[Option<usize>]) -> CategoryMap {
+        let (columns, rows) = (x.cells(), y.cells());
+        let width = x.values.len();
+        let cells = rows.iter().flat_map(|row| {
+            columns
+                .iter()
+                .map(move |column| points[row * width + column])
+        });
+        CategoryMap::new(columns.len(), rows.len(), cells, x.edges(), y.edges())
+    }
+
+    /// The value of each cell: they themselves, or the nearest one to each of many even cells
+    /// where they are not even themselves.
+    fn cells(&self) -> Vec<usize> {
+        let last = self.values.len() - 1;
+        if !self.is_uneven() {
+            return (0..=last).collect();
+        }
+        let (from, to) = self.edges();
+        let nearest = |cell: usize| {
+            let at = from + (to - from) * (cell as f64 + 0.5) / CELLS as f64;
+            let above = self.values.partition_point(|v| *v < at).clamp(1, last);
+            let [low, high] = [above - 1, above].map(|k| self.values[k]);
+            if at - low <= high - at {
+                above - 1
+            } else {
+                above
+            }
+        };
+        (0..CELLS).map(nearest).collect()
+    }
+
+    /// Whether the values go neither in equal steps nor, on a logarithmic axis, in equal ratios.
+    fn is_uneven(&self) -> bool {
+        let [from, to] = [self.values.first(), self.values.last()].map(|v| v.copied());
+        let (Some(from), Some(to)) = (from, to) else {
+            return false;
+        };
+        let steps = (self.values.len() - 1) as f64;
+        let step = (to - from) / steps;
+        let even = |(k, v): (usize, &f64)| (v - (from + step * k as f64)).abs() <= 1e-6 * step;
+        !self.log && !self.values.iter().enumerate().all(even)
+    }
+
     /// The outer edges of cells around the values.
     pub(crate) fn edges(&self) -> (f64, f64) {
         let (from, to) = (self.values[0], self.values[self.values.len() - 1]);
@@ -471,6 +519,12 @@ impl GridScale {
             let half = if from == 0.0 { 0.5 } else { 0.05 * from.abs() };
             return (from - half, to + half);
         }
+        if self.is_uneven() {
+            let last = self.values.len() - 1;
+            let low = 0.5 * (self.values[1] - from);
+            let high = 0.5 * (to - self.values[last - 1]);
+            return (from - low, to + high);
+        }
         if self.log {
             let ratio = (to / from).powf(0.5 / steps);
             (from / ratio, to * ratio)
@@ -478,5 +532,32 @@ impl GridScale {
             let half = 0.5 * (to - from) / steps;
             (from - half, to + half)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_of_uneven_values_end_midway() {
+        let scale = GridScale {
+            values: vec![0.0, 1.0, 5.0],
+            label: String::new(),
+            unit: String::new(),
+            log: false,
+        };
+        // Edges −0.5, 0.5, 3, 7: parts 1/7.5, 2.5/7.5, 4/7.5.
+        assert_eq!(scale.edges(), (-0.5, 7.0));
+        let cells = scale.cells();
+        for (value, part) in [1.0 / 7.5, 2.5 / 7.5, 4.0 / 7.5].into_iter().enumerate() {
+            let count = cells.iter().filter(|cell| **cell == value).count();
+            assert!((count as f64 / CELLS as f64 - part).abs() < 2.0 / CELLS as f64);
+        }
+        let even = GridScale {
+            values: vec![0.0, 1.0, 2.0],
+            ..scale
+        };
+        assert_eq!(even.cells(), [0, 1, 2]);
     }
 }

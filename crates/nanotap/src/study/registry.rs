@@ -1,4 +1,39 @@
 //! Every study by name, from JSON to JSON: what the front ends iterate over.
+//!
+//! A case and the JSON of a request go in, with who is told of the progress and what stops the
+//! work; the JSON of a document comes out. What may be asked for, and what comes out, is in the
+//! entry's schemas.
+//!
+//! ```
+//! use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+//!
+//! use nanotap::case::Case;
+//! use nanotap::control::Control;
+//! use nanotap::study::registry::study;
+//! use serde_json::{Value, json};
+//!
+//! let words = ["alpha1=0.1", "alpha2=0.1", "alpha3=0.1", "alpha4=20", "alpha6=0.2", "omega=3"];
+//! let case = Case::parse(None, &words.map(str::to_owned))?;
+//! let attractors = study("attractors").expect("it is in the list");
+//!
+//! let (stop, done) = (AtomicBool::new(false), AtomicUsize::new(0));
+//! let count = |_: usize, _: usize| {
+//!     done.fetch_add(1, Ordering::Relaxed);
+//! };
+//! let control = Control { cancel: Some(&stop), progress: Some(&count) };
+//! let document = attractors.document(&case, json!({"starts": 8}), &control)?;
+//!
+//! let document: Value = serde_json::from_str(&document)?;
+//! assert_eq!(document["starts"], 8);
+//! assert_eq!(document["case"]["omega"], 3.0);
+//! let refused = attractors.document(&case, json!({"startz": 8}), &control);
+//! assert!(refused.unwrap_err().to_string().contains("starts"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A sweep, a window and basins leave a dataset: [`StudyEntry::recipe`] gives what computes it
+//! chunk by chunk. A figure is drawn from the report itself, by the study's function in
+//! [`figure`](crate::figure).
 
 use nanotap_dynamics::Control;
 use schemars::{JsonSchema, Schema};

@@ -256,7 +256,8 @@ impl JsonSchema for Interval {
     }
 }
 
-/// Parameters with their values, each as in `omega=2:4:400`.
+/// Parameters with their values, each as in `omega=2:4:400`; or `{"omega": [2, 2.5, 4]}`, which
+/// is `omega=2,2.5,4`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Axes(pub Vec<String>);
@@ -280,10 +281,22 @@ impl<'de> Deserialize<'de> for Axes {
         enum Given {
             One(String),
             Several(Vec<String>),
+            Listed(serde_json::Map<String, Value>),
         }
+        let listed = |(name, values): (String, Value)| {
+            let values = values.as_array().and_then(|values| {
+                let texts = values.iter().map(|value| Some(Amount::of(value)?.0));
+                texts.collect::<Option<Vec<_>>>()
+            });
+            let values = values.ok_or_else(|| {
+                D::Error::custom(format!("{name}: a list of its values is needed"))
+            })?;
+            Ok(format!("{name}={}", values.join(",")))
+        };
         Ok(Self(match Given::deserialize(deserializer)? {
             Given::One(axis) => vec![axis],
             Given::Several(axes) => axes,
+            Given::Listed(axes) => axes.into_iter().map(listed).collect::<Result<_, _>>()?,
         }))
     }
 }
@@ -298,7 +311,11 @@ impl JsonSchema for Axes {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({"type": ["array", "string"], "items": {"type": "string"}})
+        json_schema!({
+            "type": ["array", "string", "object"],
+            "items": {"type": "string"},
+            "additionalProperties": {"type": "array", "items": {"type": ["number", "string"]}},
+        })
     }
 }
 
@@ -377,6 +394,17 @@ mod tests {
             typed.numbers().unwrap(),
             [("a1".to_owned(), -1.0, 1.0), ("v2".to_owned(), -4.0, 4.0)]
         );
+    }
+
+    #[test]
+    fn values_of_an_axis_may_be_listed() {
+        let axes: Axes = serde_json::from_value(json!({"omega": [2, 2.5, 4]})).unwrap();
+        assert_eq!(axes.0, ["omega=2,2.5,4"]);
+        let texts: Axes = serde_json::from_value(json!(["omega=2:4:400"])).unwrap();
+        assert_eq!(texts.names(), ["omega"]);
+        for wrong in [json!({"omega": 2}), json!({"omega": [null]}), json!(4)] {
+            assert!(serde_json::from_value::<Axes>(wrong).is_err());
+        }
     }
 
     #[test]

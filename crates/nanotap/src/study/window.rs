@@ -11,14 +11,14 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nanotap_dynamics::Control;
-use nanotap_figures::{CategoryMap, Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
+use nanotap_figures::{Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError, Values};
-use crate::figure::sweep::GridAxis;
+use crate::figure::sweep::{GridAxis, GridScale};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::recipe::Recipe;
@@ -248,7 +248,7 @@ impl Window {
             .flatten()
             .map(|c| present.iter().position(|p| p == c))
             .collect();
-        let mut layer = CategoryMap::new(self.x.len(), self.y.len(), cells, x.edges(), y.edges());
+        let mut layer = GridScale::map(&x, &y, &cells);
         for condition in present {
             let share = self.shares.get(condition.name()).copied().unwrap_or(0.0);
             let percent = 100.0 * share;
@@ -306,9 +306,9 @@ fn condition(motions: &[Seen]) -> Condition {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WindowRequest {
-    /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26 or
-    /// omega=2:4:81; twice, the first is the horizontal axis
-    #[schemars(extend("x-value" = "KEY=FROM:TO:COUNT", "x-required" = true))]
+    /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
+    /// omega=2:4:81, or any that ascend, omega=2,2.5,4; twice, the first is the horizontal axis
+    #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
     pub over: Axes,
     /// Starts of the census at each point: rest, the linear responses, and draws of every size
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]

@@ -1,4 +1,4 @@
-//! A parameter and the values that it takes: `omega=2:4:400`.
+//! A parameter and the values that it takes: `omega=2:4:400`, `omega=2,2.5,4`.
 
 use serde::Serialize;
 
@@ -17,6 +17,8 @@ pub enum Spacing {
     Linear,
     /// Equal ratios.
     Log,
+    /// As they are listed.
+    Listed,
 }
 
 /// A parameter and the values that it takes, both ends included.
@@ -32,13 +34,18 @@ pub struct Over {
     pub count: usize,
     /// How they are spaced.
     pub spacing: Spacing,
+    /// The values, where they are listed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub listed: Vec<f64>,
 }
 
 /// Words that name no parameter with values.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OverError {
     /// Not of the form.
-    #[error("`{given}`: {what}; write it as in omega=2:4:400, or omega=2:200:50:log")]
+    #[error(
+        "`{given}`: {what}; write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
+    )]
     Form {
         /// What was given.
         given: String,
@@ -86,8 +93,8 @@ pub enum OverError {
 }
 
 impl Over {
-    /// Reads `key=from:to:count` or `key=from:to:count:log` for `case`; `model.` before
-    /// the key may be left away.
+    /// Reads `key=from:to:count`, `key=from:to:count:log` or the values themselves,
+    /// `key=a,b,c`, for `case`; `model.` before the key may be left away.
     ///
     /// # Errors
     /// [`OverError`] with what was given and what would be right.
@@ -99,20 +106,6 @@ impl Over {
         let (name, range) = given
             .split_once('=')
             .ok_or_else(|| form("there is no `=`"))?;
-        let parts: Vec<&str> = range.split(':').map(str::trim).collect();
-        let (from, to, count, spacing) = match parts.as_slice() {
-            [from, to, count] => (*from, *to, *count, "linear"),
-            [from, to, count, spacing] => (*from, *to, *count, *spacing),
-            [..] if parts.len() < 3 => {
-                return Err(form("first value, last value and count are needed"));
-            }
-            [..] => return Err(form("there are too many `:`")),
-        };
-        let spacing = match spacing {
-            "linear" | "lin" => Spacing::Linear,
-            "log" => Spacing::Log,
-            _ => return Err(form("the spacing is `linear` or `log`")),
-        };
         let key = key(given, name.trim(), case)?;
         let number = |which, text: &str| {
             let no_number = |value: &str| OverError::Number {
@@ -132,27 +125,44 @@ impl Over {
                 }),
             }
         };
-        let (from, to) = (
-            number("the first value", from)?,
-            number("the last value", to)?,
-        );
-        let over = Self {
-            key,
-            from,
-            to,
-            count: count.parse().map_err(|_| OverError::Number {
-                given: given.into(),
-                which: "the count",
-                value: count.into(),
-                wanted: "whole number",
-            })?,
-            spacing,
+        let over = if range.contains(',') && !range.contains(':') {
+            let listed = range
+                .split(',')
+                .map(|text| number("the value", text.trim()));
+            Self::listed(key, listed.collect::<Result<_, _>>()?)
+        } else {
+            let (from, to, count, spacing) = split(range).map_err(form)?;
+            Self {
+                key,
+                from: number("the first value", from)?,
+                to: number("the last value", to)?,
+                count: count.parse().map_err(|_| OverError::Number {
+                    given: given.into(),
+                    which: "the count",
+                    value: count.into(),
+                    wanted: "whole number",
+                })?,
+                spacing,
+                listed: Vec::new(),
+            }
         };
         over.check().map_err(|what| OverError::Range {
             given: given.into(),
             what,
         })?;
         Ok(over)
+    }
+
+    /// `key` with these values.
+    fn listed(key: Key, listed: Vec<f64>) -> Self {
+        Self {
+            key,
+            from: listed.first().copied().unwrap_or(f64::NAN),
+            to: listed.last().copied().unwrap_or(f64::NAN),
+            count: listed.len(),
+            spacing: Spacing::Listed,
+            listed,
+        }
     }
 
     /// Whether the numbers make a range; the reason if not.
@@ -169,7 +179,13 @@ impl Over {
         if count > 1 && from >= to {
             return Err(format!(
                 "from {from} to {to}; the last value must be greater than the first \
-                 (--follow down goes down)"
+                 ({{follow}} down goes down)"
+            ));
+        }
+        if let Some(pair) = self.listed.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(format!(
+                "{} before {}; every value must be greater than the one before",
+                pair[0], pair[1]
             ));
         }
         if self.spacing == Spacing::Log && from <= 0.0 {
@@ -198,6 +214,7 @@ impl Over {
         }
         let share = index as f64 / (self.count - 1) as f64;
         match self.spacing {
+            Spacing::Listed => self.listed.get(index).copied().unwrap_or(self.to),
             Spacing::Linear => self.from + (self.to - self.from) * share,
             Spacing::Log => self.from * (self.to / self.from).powf(share),
         }
@@ -212,6 +229,23 @@ impl Over {
     pub fn apply(&self, case: &Case, index: usize) -> Case {
         case.with(self.key, self.value(index))
     }
+}
+
+/// First value, last value, count and spacing.
+fn split(range: &str) -> Result<(&str, &str, &str, Spacing), &'static str> {
+    let parts: Vec<&str> = range.split(':').map(str::trim).collect();
+    let (from, to, count, spacing) = match parts.as_slice() {
+        [from, to, count] => (*from, *to, *count, "linear"),
+        [from, to, count, spacing] => (*from, *to, *count, *spacing),
+        [..] if parts.len() < 3 => return Err("first value, last value and count are needed"),
+        [..] => return Err("there are too many `:`"),
+    };
+    let spacing = match spacing {
+        "linear" | "lin" => Spacing::Linear,
+        "log" => Spacing::Log,
+        _ => return Err("the spacing is `linear` or `log`"),
+    };
+    Ok((from, to, count, spacing))
 }
 
 fn key(given: &str, name: &str, case: &Case) -> Result<Key, OverError> {
@@ -230,7 +264,7 @@ impl From<OverError> for crate::Error {
         Self::option(
             "over",
             error.to_string(),
-            "write omega=2:4:400: parameter, first value, last value, how many",
+            "write omega=2:4:400: parameter, first value, last value, how many; or the values, omega=2,2.5,4",
         )
     }
 }
@@ -257,6 +291,8 @@ mod tests {
         let case = over.apply(&paper(), 2);
         let case = case.cantilever().unwrap();
         assert_eq!(case.get(Parameter::Alpha4), 100.0);
+        let over = Over::parse("omega = 2, 2.5, 4", &paper()).unwrap();
+        assert_eq!(over.values(), [2.0, 2.5, 4.0]);
         let over = Over::parse("modes=1:5:5", &paper()).unwrap();
         let case = over.apply(&paper(), 3);
         let case = case.cantilever().unwrap();
@@ -281,10 +317,14 @@ mod tests {
             ("omega=2:4:-3", "whole number"),
             ("omega=2:4:2.5", "whole number"),
             ("omega=2:4:99999999", "from 1 to"),
-            ("omega=4:2:400", "--follow down"),
+            ("omega=4:2:400", "{follow} down"),
             ("omega=2:2:400", "greater"),
             ("omega=2:4:1", "one value"),
             ("alpha5=-1:1:50:log", "above 0"),
+            ("omega=2,3,3", "3 before 3"),
+            ("omega=2,1,3", "2 before 1"),
+            ("omega=2,,3", "the value ``"),
+            ("omega=2,x,3", "the value `x`"),
             ("modes=1:5:4", "whole"),
             ("modes=0:5:6", "whole"),
             ("modes=1:99:99", "50"),

@@ -19,9 +19,9 @@ use crate::study::value::{Axes, Intervals};
 #[serde(default, deny_unknown_fields)]
 pub struct SweepRequest {
     /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-    /// alpha4=1:1000:50:log in equal ratios; modes too; of a physical case also
+    /// alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4; modes too; of a physical case also
     /// drive.frequency=60kHz:80kHz:200; once or twice
-    #[schemars(extend("x-value" = "KEY=FROM:TO:COUNT", "x-required" = true))]
+    #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
     pub over: Axes,
     /// Quasi-random starts at each value, spread over a box of states; without it, one start
     /// from rest

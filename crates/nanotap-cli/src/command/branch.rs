@@ -4,10 +4,8 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use nanotap::case::Key;
-use nanotap::case::units;
 use nanotap::dataset::table::shortest;
-use nanotap::figure::branch::{ParameterAxis, Shown, branch_figure};
+use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::observe::{Set, columns, time_series};
 use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
 use nanotap::study::registry::Study as _;
@@ -74,23 +72,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         file::write(path, csv(&report, options.observables, &names).as_bytes())?;
     }
     if let Some(path) = &arguments.plot.plot {
-        let shown = arguments.show.unwrap_or_else(|| default_shown(&studied));
-        let size = report.from.abs().max(report.to.abs());
-        let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
-            (loci.key, loci.range[0].abs().max(loci.range[1].abs()))
-        });
-        let axes = [
-            axis(&studied, report.key, size),
-            axis(&studied, second, reach),
-        ];
-        branch_figure(
-            &report,
-            shown,
-            model.beam.is_some(),
-            &axes,
-            &studied.units(),
-        )
-        .write(path)?;
+        case_figure(&studied, &report, arguments.show).write(path)?;
     }
     output.study(&studied, &report, |report| text(&studied, report))?;
     let cut = report.branches.iter().filter(|b| !b.complete).count();
@@ -99,33 +81,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         return Err(Failure::numerics(format!("{what} cut before the end")));
     }
     Ok(())
-}
-
-/// What is shown if nobody says: the greatest displacement of an oscillator with a wall is
-/// where the wall stands.
-fn default_shown(studied: &GivenCase) -> Shown {
-    let name = if studied.has_rigid_stop() {
-        "impact_speed"
-    } else {
-        "tip_max"
-    };
-    Shown::named(name).unwrap_or(Shown::SpectralRadius)
-}
-
-/// The axis of a parameter that goes up to `size`, in SI where the case has it.
-fn axis(studied: &GivenCase, key: Key, size: f64) -> ParameterAxis {
-    studied.parameter_unit(key).map_or_else(
-        || ParameterAxis::of(key),
-        |unit| {
-            let (factor, name) = units::prefixed(unit.kind, unit.si, size);
-            // A quantity of a physical case is called by its path.
-            let quantity = unit.quantity.replace(['.', '_'], " ");
-            ParameterAxis {
-                label: format!("{quantity} ({name})"),
-                factor,
-            }
-        },
-    )
 }
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the

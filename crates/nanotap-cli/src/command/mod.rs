@@ -8,6 +8,7 @@ mod case;
 mod catalogue;
 mod contact_laws;
 mod convergence;
+mod explore;
 mod generate;
 mod lyapunov;
 mod merge;
@@ -63,6 +64,8 @@ pub(crate) enum Command {
     /// The same lever and drive on every contact law: what difference the sample makes
     #[command(alias = "samples")]
     ContactLaws(contact_laws::Arguments),
+    /// Turn the knobs of a case in a browser and see what the tip does
+    Explore(explore::Arguments),
     /// Every figure and number of the paper, with verdicts and evidence
     Paper(paper::Arguments),
     /// The levers and materials that a case can name
@@ -90,6 +93,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
         Command::Convergence(arguments) => convergence::run(arguments, output),
         Command::ContactLaws(arguments) => contact_laws::run(arguments, output),
+        Command::Explore(arguments) => explore::run(arguments, output),
         Command::Paper(arguments) => paper::run(arguments, output),
         Command::Catalogue(arguments) => catalogue::run(arguments, output),
         Command::Generate(arguments) => generate::run(arguments, output),

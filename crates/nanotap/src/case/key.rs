@@ -350,6 +350,14 @@ impl Key {
         }
     }
 
+    /// The oscillator's parameter that it is.
+    pub fn oscillator_parameter(self) -> Option<OscillatorParameter> {
+        match self.entry().means {
+            Means::Oscillator(parameter) => Some(parameter),
+            _ => None,
+        }
+    }
+
     /// The key of a parameter of the cantilever.
     pub fn of(parameter: Parameter) -> Self {
         let is = |key: &Self| key.entry().means == Means::Cantilever(parameter);

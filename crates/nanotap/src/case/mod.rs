@@ -291,6 +291,14 @@ impl Case {
         found.unwrap_or(f64::NAN)
     }
 
+    /// What a physical case states of a key.
+    pub fn stated(&self, key: Key) -> Option<&Value> {
+        match &self.what {
+            What::Quantities(quantities) => quantities.stated.get(key),
+            _ => None,
+        }
+    }
+
     /// The same case with one value varied (unchanged where it does not have the key). What
     /// stays is said in the module's documentation; whether the value makes sense, by
     /// [`model`](Self::model).

@@ -8,8 +8,8 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
-use crate::case::Key;
-use crate::case::units::Units;
+use crate::case::units::{Units, prefixed};
+use crate::case::{Case, Key};
 pub use crate::figure::shown::Shown;
 use crate::observe::{Observables, PhysicalMotion};
 use crate::study::branch::{BranchReport, PointReport};
@@ -35,6 +35,39 @@ impl ParameterAxis {
         };
         Self { label, factor: 1.0 }
     }
+
+    /// The parameter of a case with values up to `size`, in SI where the case has it.
+    pub fn of_case(case: &Case, key: Key, size: f64) -> Self {
+        case.parameter_unit(key).map_or_else(
+            || Self::of(key),
+            |unit| {
+                let (factor, name) = prefixed(unit.kind, unit.si, size);
+                // A quantity of a physical case is called by its path.
+                let quantity = unit.quantity.replace(['.', '_'], " ");
+                Self {
+                    label: format!("{quantity} ({name})"),
+                    factor,
+                }
+            },
+        )
+    }
+}
+
+/// The figure of a case's branches: against the parameter, in SI where the case has it.
+pub fn case_figure(
+    case: &Case,
+    report: &BranchReport,
+    shown: Option<Shown>,
+) -> Figure {
+    let size = report.from.abs().max(report.to.abs());
+    let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
+        (loci.key, loci.range[0].abs().max(loci.range[1].abs()))
+    });
+    let axes = [(report.key, size), (second, reach)]
+        .map(|(key, size)| ParameterAxis::of_case(case, key, size));
+    let shown = shown.unwrap_or_else(|| Shown::usual(case));
+    let beam = case.oscillator().is_none();
+    branch_figure(report, shown, beam, &axes, &case.units())
 }
 
 pub(crate) const MARKS: [(&str, Shape, Colour); 5] = [

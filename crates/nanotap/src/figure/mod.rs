@@ -4,6 +4,7 @@ pub mod approach;
 pub mod attractors;
 pub mod basin;
 pub mod branch;
+pub mod contact;
 pub mod contact_laws;
 pub mod motion;
 pub mod panels;

@@ -127,7 +127,7 @@ impl<'a> View<'a> {
 }
 
 /// Points that show every turn of every mode on a piece.
-fn points_on(curve: &Curve, piece: &CurvePiece, period: f64) -> usize {
+pub(crate) fn points_on(curve: &Curve, piece: &CurvePiece, period: f64) -> usize {
     let turns = piece.length * curve.fastest(piece) / std::f64::consts::TAU;
     let share = piece.length / period;
     let wanted = (POINTS_PER_TURN * turns).max(FEWEST_POINTS * share);
@@ -149,7 +149,7 @@ fn instants(curve: &Curve, period: f64, periods: f64) -> Vec<f64> {
 }
 
 /// When the tip is in contact, in drive periods.
-fn contact_intervals(model: &Model, recording: &Recording, periods: f64) -> Vec<(f64, f64)> {
+pub(crate) fn contact_intervals(model: &Model, recording: &Recording, periods: f64) -> Vec<(f64, f64)> {
     let period = model.period();
     let mut intervals: Vec<(f64, f64)> = Vec::new();
     for s in recording

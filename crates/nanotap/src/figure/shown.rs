@@ -1,5 +1,6 @@
 //! What of a motion a figure shows along an axis.
 
+use crate::case::Case;
 use crate::case::physical::Kind;
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::units::prefixed;
@@ -34,6 +35,17 @@ impl Shown {
             .filter(|o| o.is_number)
             .map(|o| (o.name, o.words))
             .chain([(SPECTRAL_RADIUS, "largest modulus of a multiplier")])
+    }
+
+    /// What is shown of a case's branches if nobody says: the greatest displacement, but of an
+    /// oscillator with a wall that is where the wall stands.
+    pub fn usual(case: &Case) -> Self {
+        let name = if case.has_rigid_stop() {
+            "impact_speed"
+        } else {
+            "tip_max"
+        };
+        Self::named(name).unwrap_or(Self::SpectralRadius)
     }
 
     /// The observable, if it is one.

@@ -24,6 +24,7 @@ pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
 pub(crate) use reader::{Described, cosine_term, modes, parse, word};
 
+use super::{Case, Kind, Value, What};
 use crate::case::key::Key;
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
@@ -60,6 +61,41 @@ pub fn to_toml(case: &Cantilever) -> String {
         );
     }
     text
+}
+
+impl Case {
+    /// The case as a file that is read back as the same: every number of the equations, or what
+    /// was stated in physical quantities.
+    pub fn to_toml(&self) -> String {
+        use std::fmt::Write as _;
+        let quantities = match &self.what {
+            What::Cantilever(cantilever) => return to_toml(cantilever),
+            What::Oscillator(oscillator) => {
+                let mut text = format!("[model]\nkind = \"{}\"\n", self.model_kind().name());
+                for (key, value) in self.keys().into_iter().filter_map(|key| {
+                    Some((key, oscillator.get(key.oscillator_parameter()?)?))
+                }) {
+                    let _ = writeln!(text, "{} = {value:?}  # {}", key.name(), key.meaning());
+                }
+                return text;
+            }
+            What::Quantities(quantities) => quantities,
+        };
+        let mut text = String::new();
+        let mut section = None;
+        // Keys are sorted as in their table, section by section.
+        for (key, value) in quantities.stated.iter() {
+            if section != Some(key.section()) {
+                section = Some(key.section());
+                let gap = if text.is_empty() { "" } else { "\n" };
+                let _ = writeln!(text, "{gap}[{}]", key.section().name());
+            }
+            let plain = matches!(value, Value::Number(_, Kind::Number));
+            let quote = if plain { "" } else { "\"" };
+            let _ = writeln!(text, "{} = {quote}{}{quote}", key.name(), value.text());
+        }
+        text
+    }
 }
 
 /// Reads the text of a case file.

@@ -1,0 +1,53 @@
+//! `nanotap explore`: the knobs, the motion and what coexists, in a browser.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use nanotap_explorer::{Options, serve};
+
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::progress;
+
+/// Turn the knobs of a case in a browser and see what the tip does
+///
+/// The page is served on this machine only, and only to the address that is printed first:
+/// it carries a token of this start. Ctrl-C ends it.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// The case file shown first; without one, the paper's case
+    #[arg(value_name = "CASE")]
+    file: Option<PathBuf>,
+
+    /// Set a key of the case, as in omega=20; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
+    set: Vec<String>,
+
+    /// Port on 127.0.0.1; 0: any that is free
+    #[arg(long, value_name = "P", default_value_t = 0)]
+    port: u16,
+
+    /// Print the address and open no browser
+    #[arg(long)]
+    no_browser: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let options = Options {
+        case: arguments.file.clone(),
+        set: arguments.set.clone(),
+        port: arguments.port,
+    };
+    // A page that is served has no end to wait for.
+    progress::end();
+    serve(&options, |address| {
+        // Whoever reads it from a pipe waits for this line.
+        let mut out = std::io::stdout().lock();
+        let _ = writeln!(out, "{address}");
+        let _ = out.flush();
+        if !arguments.no_browser && open::that_detached(address).is_err() {
+            output.note("no browser could be opened; open the address above in one");
+        }
+    })
+}

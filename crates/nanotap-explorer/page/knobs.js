@@ -1,0 +1,119 @@
+// The knobs: one for every key of the case, made from the server's table of keys.
+
+import { state } from "./state.js";
+
+const form = document.getElementById("knobs");
+let changed = () => {};
+const opened = new Set();
+
+export function onChange(listener) { changed = listener; }
+
+function element(name, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...children);
+  return made;
+}
+
+/** Builds the knobs for the keys of the present case, keeping the focus where it was. */
+export function build(keys) {
+  const focused = document.activeElement?.id;
+  form.replaceChildren();
+  const sections = new Map();
+  for (const key of keys) {
+    if (!sections.has(key.section)) sections.set(key.section, []);
+    sections.get(key.section).push(key);
+  }
+  for (const [name, own] of sections) {
+    const box = element("fieldset", {}, element("legend", { textContent: name }));
+    const stated = own.filter((key) => key.value !== "");
+    const others = own.filter((key) => key.value === "");
+    box.append(...stated.map(knob));
+    if (others.length) {
+      const more = element("details", { open: opened.has(name) || stated.length === 0 },
+        element("summary", { textContent: `${others.length} not stated` }), ...others.map(knob));
+      more.addEventListener("toggle", () => { if (more.open) opened.add(name); else opened.delete(name); });
+      box.append(more);
+    }
+    form.append(box);
+  }
+  if (focused) document.getElementById(focused)?.focus();
+}
+
+/** Puts the newest values into the knobs that are there, but not under the hand. */
+export function update(keys) {
+  for (const key of keys) {
+    const field = form.querySelector(`[data-key="${key.name}"]`);
+    if (field && field !== document.activeElement) field.value = key.value;
+  }
+}
+
+/** Whether a slider is being moved. */
+export const dragged = () => form.querySelector("[data-slider]:active") !== null;
+
+function knob(key) {
+  const id = `key-${key.name.replace(/[^a-z0-9]/gi, "-")}`;
+  const words = key.symbol && key.symbol !== key.name ? `${key.symbol}  ${key.title}` : key.title;
+  const meaning = element("span", { className: "meaning", id: `${id}-meaning`, textContent: key.meaning });
+  const field = key.choices ? chooser(key, meaning) : typed(key);
+  field.id = id;
+  field.dataset.key = key.name;
+  field.setAttribute("aria-describedby", meaning.id);
+  const box = element("div", { className: "knob" }, element("label", { htmlFor: id, textContent: words }), field);
+  if (key.slider) box.append(slider(key, field, words));
+  box.append(meaning);
+  return box;
+}
+
+function typed(key) {
+  const field = element("input", { type: "text", value: key.value });
+  field.addEventListener("change", () => put(key, field.value.trim(), true));
+  return field;
+}
+
+function chooser(key, meaning) {
+  const field = element("select");
+  if (key.value === "") field.add(new Option("", "", true, true));
+  for (const choice of key.choices) {
+    field.add(new Option(choice.word, choice.word, false, choice.word === key.value));
+    if (choice.word === key.value && choice.meaning) meaning.textContent = `${key.meaning}: ${choice.meaning}`;
+  }
+  field.addEventListener("change", () => put(key, field.value, true));
+  return field;
+}
+
+function slider(key, field, words) {
+  const { from, to, log } = key.slider;
+  const range = element("input", { type: "range", min: 0, max: 1000, step: 1 });
+  range.setAttribute("aria-label", `${words}, slider`);
+  range.dataset.slider = key.name;
+  const whole = key.name === "modes";
+  if (whole) Object.assign(range, { min: from, max: to });
+  const place = (v) => (whole ? v : 1000 * (log ? Math.log(v / from) / Math.log(to / from) : (v - from) / (to - from)));
+  const value = (p) => (whole ? p : log ? from * (to / from) ** (p / 1000) : from + (to - from) * p / 1000);
+  range.value = place(key.number);
+  const move = (finished) => {
+    field.value = `${Number(value(Number(range.value)).toPrecision(5))}${key.unit ? ` ${key.unit}` : ""}`;
+    range.setAttribute("aria-valuetext", field.value);
+    put(key, field.value, finished);
+  };
+  range.addEventListener("input", () => move(false));
+  range.addEventListener("change", () => move(true));
+  return range;
+}
+
+function put(key, text, finished) {
+  if (text === "") delete state.set[key.name];
+  else state.set[key.name] = text;
+  state.start = "";
+  changed(key.name, finished);
+}
+
+/** Marks the fields whose keys an error names. */
+export function mark(message) {
+  for (const field of form.querySelectorAll("[data-key]")) {
+    const name = field.dataset.key.split(".").pop();
+    const bad = Boolean(message) && new RegExp(`(^|[^a-z0-9_])${name}([^a-z0-9_]|$)`, "i").test(message);
+    field.classList.toggle("bad", bad);
+    if (bad) field.setAttribute("aria-invalid", "true"); else field.removeAttribute("aria-invalid");
+  }
+}

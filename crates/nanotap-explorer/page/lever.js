@@ -1,0 +1,76 @@
+// The lever in slow motion: the beam's shape from all its modes, the tip, and the sample that is
+// pushed in. Heights are drawn to one scale; the lever's length is not.
+
+const canvas = document.getElementById("lever");
+const pen = canvas.getContext("2d");
+const clock = document.getElementById("phase");
+const play = document.getElementById("play");
+const speed = document.getElementById("speed");
+let film = null;
+let time = 0;                 // in drive periods
+let before = 0;
+let moving = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+export const frames = { drawn: 0 };
+
+play.addEventListener("click", () => { moving = !moving; label(); });
+function label() { play.textContent = moving ? "Pause" : "Play"; }
+label();
+
+/** Takes a new film: heights of the beam, of the surface and of the rest, sample by sample. */
+export function show(next) { film = next; if (!moving) draw(); }
+
+function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+
+function draw() {
+  const ratio = devicePixelRatio || 1;
+  const width = Math.round(canvas.clientWidth * ratio);
+  const height = Math.round(canvas.clientHeight * ratio);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  pen.clearRect(0, 0, width, height);
+  if (!film) return;
+  const count = film.beam.length;
+  const at = (time % film.periods) / film.periods * count;
+  const k = Math.floor(at) % count;
+  const [low, high] = film.range;
+  const pad = 0.12 * height;
+  const y = (v) => height - pad - (v - low) / (high - low || 1) * (height - 2.4 * pad);
+  const left = 0.06 * width;
+  const right = 0.86 * width;
+  const x = (xi) => left + (right - left) * xi;
+  const tip = film.beam[k][film.beam[k].length - 1];
+  // The sample rests at 0; in contact it lies where the tip has pushed it.
+  const touching = film.contact[k] === 1;
+  const surface = film.surface[k];
+  pen.fillStyle = colour("--sample");
+  pen.beginPath();
+  pen.moveTo(x(0.72), height); pen.lineTo(x(0.72), y(0));
+  for (let s = -1; s <= 1.0001; s += 0.05) pen.lineTo(right + s * 0.1 * width, y(surface * Math.exp(-12 * s * s)));
+  pen.lineTo(width, y(0)); pen.lineTo(width, height);
+  pen.closePath(); pen.fill();
+  // Rest position and clamp.
+  pen.strokeStyle = colour("--line"); pen.lineWidth = ratio; pen.setLineDash([4 * ratio, 4 * ratio]);
+  pen.beginPath(); pen.moveTo(left, y(film.rest)); pen.lineTo(right, y(film.rest)); pen.stroke(); pen.setLineDash([]);
+  pen.fillStyle = colour("--soft");
+  if (film.is_beam) pen.fillRect(left - 0.02 * width, y(film.beam[k][0]) - 0.09 * height, 0.02 * width, 0.18 * height);
+  // Beam; of an oscillator its mass.
+  pen.strokeStyle = touching ? colour("--warm") : colour("--accent");
+  pen.lineWidth = 3 * ratio; pen.lineJoin = "round";
+  pen.beginPath();
+  film.beam[k].forEach((v, j) => pen.lineTo(x(j / (film.beam[k].length - 1)), y(v)));
+  pen.stroke();
+  // Tip: its apex is what meets the sample.
+  pen.fillStyle = pen.strokeStyle;
+  pen.beginPath(); pen.moveTo(right - 7 * ratio, y(tip)); pen.lineTo(right + 7 * ratio, y(tip)); pen.lineTo(right, y(film.apex[k])); pen.closePath(); pen.fill();
+  pen.fillStyle = colour("--ink"); pen.font = `${12 * ratio}px system-ui`;
+  pen.fillText(`height of the picture: ${film.scale}; along the lever not to scale`, left, 16 * ratio);
+  pen.fillText(touching ? "contact" : "", right - 24 * ratio, height - 6 * ratio);
+  clock.textContent = `drive period ${Math.floor(time % film.periods) + 1} of ${film.periods}, phase ${(360 * (time % 1)).toFixed(0)}°`;
+  frames.drawn += 1;
+}
+
+function step(now) {
+  if (moving && film) { time += 10 ** Number(speed.value) * Math.min(0.1, (now - before) / 1000); draw(); }
+  before = now;
+  requestAnimationFrame(step);
+}
+requestAnimationFrame(step);

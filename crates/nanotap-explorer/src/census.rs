@@ -1,0 +1,95 @@
+//! Every motion that coexists, each with where it is started.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use nanotap::control::Control;
+use nanotap::study::attractors::{Attractors, AttractorsRequest, AttractorsStudy};
+use nanotap::study::orbit::OrbitReport;
+use nanotap::study::registry::Study as _;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::App;
+use crate::answer::Refusal;
+use crate::motion::{Start, model_of};
+use crate::preset::Wanted;
+
+/// Longest period of the unstable orbits that are looked for.
+const UNSTABLE: usize = 4;
+
+/// A census as the page asks for it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Census {
+    case: Wanted,
+    #[serde(default)]
+    unstable: bool,
+}
+
+pub(crate) async fn attractors(
+    State(app): State<Arc<App>>,
+    Json(census): Json<Census>,
+) -> Result<Json<Value>, Refusal> {
+    let shared = Arc::clone(&app);
+    app.workers
+        .run(move |control| listed(&shared, &census, control))
+        .await
+        .map(Json)
+}
+
+fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Refusal> {
+    let case = census.case.case(app, control)?;
+    model_of(&case)?;
+    let request = AttractorsRequest {
+        unstable: if census.unstable { UNSTABLE } else { 0 },
+        ..AttractorsRequest::default()
+    };
+    let found = AttractorsStudy::run(&case, &request, control)?;
+    let stable = found.attractors.iter().filter_map(|one| {
+        let share = format!("{:.3} % of the starts", 100.0 * one.share.fraction);
+        if let Some(orbit) = &one.orbit {
+            return Some(entry(orbit, None, &share));
+        }
+        let wandering = one.wandering.as_ref()?;
+        let name = one.classification.name();
+        Some(json!({
+            "words": format!("{name}, {share}"),
+            "start": Start::text(None, &wandering.state),
+            "amplitude": wandering.observables.amplitude,
+        }))
+    });
+    let unstable = found.unstable.iter().flatten();
+    let unstable = unstable.map(|orbit| entry(orbit, Some(orbit.period), "unstable"));
+    let motions: Vec<Value> = stable.chain(unstable).collect();
+    Ok(json!({ "motions": motions, "bound": bound(&found) }))
+}
+
+fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str) -> Value {
+    json!({
+        "words": format!("period {}, {remark}", orbit.period),
+        "start": Start::text(period, &orbit.state),
+        "period": orbit.period,
+        "stable": orbit.stable,
+        "amplitude": orbit.observables.amplitude,
+    })
+}
+
+/// How sure one may be that these are all.
+fn bound(found: &Attractors) -> String {
+    let mut words = format!("{} starts", found.starts);
+    if let Some(unseen) = &found.unseen {
+        words += &format!(
+            "; with 95 % confidence at most {:.2} % of them lead elsewhere",
+            100.0 * unseen.fraction
+        );
+    }
+    if found.undecided_fraction.count > 0 {
+        words += &format!("; {} undecided", found.undecided_fraction.count);
+    }
+    if found.unbounded.count > 0 {
+        words += &format!("; {} left every bound", found.unbounded.count);
+    }
+    words
+}

@@ -1,0 +1,193 @@
+//! The same elsewhere: files to save, the line at the terminal, the lines of Python.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use nanotap::control::Control;
+use nanotap::model::Model;
+use nanotap::observe::time_series;
+use nanotap_figures::{DPI, Figure};
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use crate::App;
+use crate::answer::Refusal;
+use crate::motion::{Asked, Motion, Start, model_of};
+use crate::preset::Wanted;
+
+/// Samples a drive period in the time series, as at the terminal.
+const RESOLUTION: usize = 200;
+/// What the saved case is called.
+const CASE_FILE: &str = "case.toml";
+
+/// What is saved, and in which format.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Wish {
+    #[serde(flatten)]
+    asked: Asked,
+    /// Which of the motion's figures.
+    #[serde(default)]
+    figure: String,
+    format: String,
+}
+
+pub(crate) async fn export(
+    State(app): State<Arc<App>>,
+    Json(wish): Json<Wish>,
+) -> Result<Response, Refusal> {
+    let shared = Arc::clone(&app);
+    let (kind, bytes) = app
+        .workers
+        .run(move |control| exported(&shared, &wish, control))
+        .await?;
+    Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
+}
+
+fn exported(
+    app: &App,
+    wish: &Wish,
+    control: &Control<'_>,
+) -> Result<(&'static str, Vec<u8>), Refusal> {
+    let asked = &wish.asked;
+    if wish.format == "toml" {
+        let case = asked.case.any_distance(app)?;
+        return Ok(("application/toml", case.to_toml().into_bytes()));
+    }
+    let case = asked.case.case(app, control)?;
+    let model = model_of(&case)?;
+    let motion = Motion::find(&model, &Start::parse(&asked.start)?)?;
+    if wish.format == "csv" {
+        return Ok(("text/csv", csv(&model, &motion)?.into_bytes()));
+    }
+    let figure = match wish.figure.as_str() {
+        "contact" => motion.contact_figure(&model, &case),
+        _ => motion.figure(&model, &case),
+    };
+    picture(&figure, &wish.format)
+}
+
+/// A figure in a format by its ending.
+pub(crate) fn picture(
+    figure: &Figure,
+    format: &str,
+) -> Result<(&'static str, Vec<u8>), Refusal> {
+    Ok(match format {
+        "svg" => (
+            "image/svg+xml",
+            figure.to_svg().map_err(Refusal::of)?.into_bytes(),
+        ),
+        "png" => ("image/png", figure.to_png(DPI).map_err(Refusal::of)?),
+        "pdf" => ("application/pdf", figure.to_pdf().map_err(Refusal::of)?),
+        other => {
+            return Err(Refusal::input(
+                format!("there is no format `{other}`"),
+                "there are svg, png, pdf, csv and toml",
+            ));
+        }
+    })
+}
+
+/// The time series of one repetition, in the model's units.
+fn csv(model: &Model, motion: &Motion) -> Result<String, Refusal> {
+    let mut text = time_series::columns(model).join(",");
+    text.push('\n');
+    time_series::sample(model, motion.state(), motion.periods(), RESOLUTION, |row| {
+        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    })
+    .map_err(Refusal::of)?;
+    Ok(text)
+}
+
+/// The case file as it is given elsewhere: the one that was named if nothing differs from it,
+/// else the one to save.
+fn case_path(app: &App, case: &Wanted) -> Result<String, Refusal> {
+    let preset = case.preset(app)?;
+    let unchanged = !preset.path.is_empty() && case.words(preset).is_empty();
+    Ok(if unchanged { &preset.path } else { CASE_FILE }.to_owned())
+}
+
+/// The command that gives the same motion.
+pub(crate) fn orbit_command(app: &App, asked: &Asked) -> Result<String, Refusal> {
+    let mut line = format!("nanotap orbit {}", quoted(&case_path(app, &asked.case)?));
+    let start = Start::parse(&asked.start)?;
+    if let Some(period) = start.period {
+        let _ = write!(line, " --period {period}");
+    }
+    if let Some(state) = &start.state {
+        let _ = write!(line, " --state={}", Start::text(None, state));
+    }
+    Ok(line)
+}
+
+/// The command of a study, by what it was asked for.
+pub(crate) fn study_command(
+    app: &App,
+    case: &Wanted,
+    name: &str,
+    request: &Map<String, Value>,
+) -> Result<String, Refusal> {
+    let mut line = format!("nanotap {name} {}", quoted(&case_path(app, case)?));
+    for (option, value) in request {
+        let flag = option.replace('_', "-");
+        match value {
+            Value::Bool(true) => {
+                let _ = write!(line, " --{flag}");
+            }
+            Value::Array(values) if option == "over" => {
+                for value in values {
+                    let _ = write!(line, " --{flag} {}", quoted(&text(value)));
+                }
+            }
+            Value::Null | Value::Bool(false) => {}
+            Value::Array(values) => {
+                let values: Vec<String> = values.iter().map(text).collect();
+                let _ = write!(line, " --{flag}={}", quoted(&values.join(",")));
+            }
+            other => {
+                let _ = write!(line, " --{flag}={}", quoted(&text(other)));
+            }
+        }
+    }
+    let _ = write!(line, " --plot {name}.svg");
+    Ok(line)
+}
+
+fn text(value: &Value) -> String {
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// A word as a shell takes it as one.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "=:,._/+-".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// The lines of Python that give the same motion.
+pub(crate) fn python(app: &App, asked: &Asked) -> Result<String, Refusal> {
+    let path = case_path(app, &asked.case)?;
+    let start = Start::parse(&asked.start)?;
+    let mut options = String::new();
+    if let Some(period) = start.period {
+        let _ = write!(options, ", period={period}");
+    }
+    if let Some(state) = &start.state {
+        let numbers = Start::text(None, state).replace(',', ", ");
+        let _ = write!(options, ", state=[{numbers}]");
+    }
+    Ok(format!(
+        "import nanotap\n\ncase = nanotap.Case.from_file({path:?})\norbit = nanotap.orbit(case{options})\n"
+    ))
+}

@@ -1,0 +1,118 @@
+//! The film of a motion: heights of the beam, of the tip's apex and of the sample's surface.
+
+use nanotap::case::Case;
+use nanotap::case::quantity::Kind;
+use nanotap::model::Model;
+use nanotap::model::beam::Modes;
+use nanotap::observe::time_series;
+use serde::Serialize;
+
+use crate::answer::Refusal;
+
+/// Instants a drive period.
+const INSTANTS: usize = 90;
+/// Points along the beam.
+const ALONG: usize = 33;
+/// Length of the tip as it is drawn, as a part of the range of heights.
+const TIP: f64 = 0.18;
+
+/// What the page draws, instant by instant. Heights are over the undeformed sample, in the
+/// model's unit of length; the beam is lifted by the length of the tip as drawn.
+#[derive(Debug, Serialize)]
+pub(crate) struct Film {
+    /// Drive periods shown; then it begins again.
+    periods: usize,
+    /// Heights along the beam, clamp to free end; of an oscillator its mass, a constant.
+    beam: Vec<Vec<f32>>,
+    apex: Vec<f32>,
+    surface: Vec<f32>,
+    contact: Vec<u8>,
+    /// Least and greatest height.
+    range: [f64; 2],
+    /// Height of the undeflected beam.
+    rest: f64,
+    /// What the height of the picture measures.
+    scale: String,
+    /// Whether there is a beam.
+    is_beam: bool,
+}
+
+/// The film of `periods` drive periods from `start` at drive phase 0.
+pub(crate) fn film(
+    case: &Case,
+    model: &Model,
+    start: &[f64],
+    periods: usize,
+) -> Result<Film, Refusal> {
+    let is_beam = model.beam.is_some();
+    let modes = if is_beam {
+        (model.dimension() - model.memory) / 2
+    } else {
+        0
+    };
+    let shapes = shapes(modes)?;
+    let (mut beam, mut apex, mut surface, mut contact) = (vec![], vec![], vec![], vec![]);
+    let (mut low, mut high) = (0.0_f64, f64::NEG_INFINITY);
+    let mut base = (0.0, 0.0);
+    time_series::sample(model, start, periods, INSTANTS, |row| {
+        let [_, tip, _, height, _, touching, state @ ..] = row else {
+            return;
+        };
+        // Where the base is, as the tip's height over the sample shows it.
+        let clamp = if is_beam { height - tip } else { *height };
+        let heights: Vec<f64> = shapes
+            .iter()
+            .map(|shape| clamp + shape.iter().zip(state).map(|(s, a)| s * a).sum::<f64>())
+            .collect();
+        let touching = *touching > 0.0;
+        let memory = state.get(2 * modes).filter(|_| model.memory > 0);
+        let dent = if touching {
+            height.min(0.0)
+        } else {
+            memory.map_or(0.0, |s| s.min(0.0))
+        };
+        for value in heights.iter().chain([height, &dent]) {
+            low = low.min(*value);
+            high = high.max(*value);
+        }
+        base = (base.0 + clamp, base.1 + 1.0);
+        beam.push(heights);
+        apex.push(*height as f32);
+        surface.push(dent as f32);
+        contact.push(u8::from(touching));
+    })
+    .map_err(Refusal::of)?;
+    // The last instant is the first one again.
+    beam.truncate(periods * INSTANTS);
+    let tip = TIP * (high - low).max(f64::MIN_POSITIVE);
+    let height = high - low;
+    let scale = match case.units().si(Kind::Length) {
+        Some(metres) => Kind::Length.format_digits(metres * height, 3),
+        None => format!("{} g0", Kind::Number.format_digits(height, 3)),
+    };
+    Ok(Film {
+        periods,
+        beam: beam
+            .into_iter()
+            .map(|heights| heights.into_iter().map(|h| (h + tip) as f32).collect())
+            .collect(),
+        apex,
+        surface,
+        contact,
+        range: [low, high + tip],
+        rest: base.0 / f64::max(base.1, 1.0) + tip,
+        scale,
+        is_beam,
+    })
+}
+
+/// φ_1 … φ_N at points along the beam; of an oscillator nothing at each.
+fn shapes(modes: usize) -> Result<Vec<Vec<f64>>, Refusal> {
+    if modes == 0 {
+        return Ok(vec![Vec::new(); ALONG]);
+    }
+    let beam = Modes::new(modes).map_err(|error| Refusal::failed(error.to_string()))?;
+    Ok((0..ALONG)
+        .map(|k| beam.shapes(k as f64 / (ALONG - 1) as f64).as_slice().to_vec())
+        .collect())
+}

@@ -1,0 +1,105 @@
+//! Who may ask: the browser of the person who started the explorer, and nobody else.
+//!
+//! A page of another site can make a browser send requests to this machine. It cannot read the
+//! token, cannot set the header that carries it, and names itself in `Origin`; a name that was
+//! rebound to this machine shows in `Host`.
+
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse as _, Response};
+
+use crate::App;
+
+/// The header that carries the token.
+pub(crate) const TOKEN_HEADER: &str = "x-nanotap-token";
+/// Everything comes from this server; nothing is written into the page as code or style.
+const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
+    img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
+    frame-ancestors 'none'";
+
+/// 128 random bits in hexadecimal.
+pub(crate) fn new_token() -> Result<String, String> {
+    let mut bytes = [0_u8; 16];
+    getrandom::fill(&mut bytes).map_err(|error| error.to_string())?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Lets a request through, or says why not; adds the headers that keep the page to itself.
+pub(crate) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let mut response = match refusal(&app, &request) {
+        Some((status, words)) => (status, words).into_response(),
+        None => next.run(request).await,
+    };
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, CONTENT_POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CACHE_CONTROL, "no-store"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
+    let headers = request.headers();
+    let own = [
+        format!("127.0.0.1:{}", app.port),
+        format!("localhost:{}", app.port),
+    ];
+    let host = text(headers, header::HOST.as_str()).unwrap_or_default();
+    if !own.iter().any(|own| own == host) {
+        return Some((
+            StatusCode::MISDIRECTED_REQUEST,
+            "this is the nanotap explorer of another address",
+        ));
+    }
+    if let Some(origin) = text(headers, header::ORIGIN.as_str())
+        && origin.strip_prefix("http://") != Some(host)
+    {
+        return Some((
+            StatusCode::FORBIDDEN,
+            "another site's pages may not ask this explorer",
+        ));
+    }
+    let path = request.uri().path();
+    let given = if path.starts_with("/api/") {
+        text(headers, TOKEN_HEADER)
+    } else if path == "/" {
+        token_of(request.uri().query())
+    } else {
+        // The page's own scripts and styles hold no secret.
+        return None;
+    };
+    if given.is_some_and(|given| same(given, &app.token)) {
+        return None;
+    }
+    Some((
+        StatusCode::FORBIDDEN,
+        "open the address that `nanotap explore` printed: it carries the token of this start",
+    ))
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name).map(|v| v.to_str().unwrap_or_default())
+}
+
+fn token_of(query: Option<&str>) -> Option<&str> {
+    query?
+        .split('&')
+        .find_map(|part| part.strip_prefix("token="))
+}
+
+/// Compares in a time that does not tell how much agrees.
+fn same(given: &str, expected: &str) -> bool {
+    given.len() == expected.len()
+        && given
+            .bytes()
+            .zip(expected.bytes())
+            .fold(0, |difference, (a, b)| difference | (a ^ b))
+            == 0
+}

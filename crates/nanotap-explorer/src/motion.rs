@@ -1,0 +1,296 @@
+//! One motion: its figures, its film, what is measured of it, and how to get it elsewhere.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use nanotap::case::Case;
+use nanotap::case::quantity::Kind;
+use nanotap::control::Control;
+use nanotap::figure::contact::contact_figure;
+use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure};
+use nanotap::model::Model;
+use nanotap::observe::table::shown_phase;
+use nanotap::observe::{Dimension, OBSERVABLES, Observables};
+use nanotap::study::orbit::{OrbitError, OrbitReport, OrbitRequest, orbit};
+use nanotap::study::registry::Study as _;
+use nanotap::study::simulate::{
+    Method, SimulateReport, SimulateRequest, SimulateStudy, Simulation, simulate,
+};
+use nanotap::study::value::Steps;
+use nanotap_figures::Figure;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::answer::Refusal;
+use crate::film::film;
+use crate::preset::Wanted;
+use crate::{App, export, knobs, study};
+
+/// Most modes of a motion that follows a dragged knob.
+const MOST_MODES: usize = 20;
+/// Most drive periods that the film and the figures of a motion without a period show.
+const LONGEST: usize = 16;
+/// Drive periods of a run of fixed steps.
+const FIXED_PERIODS: usize = 64;
+
+/// A motion as the page asks for it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Asked {
+    pub(crate) case: Wanted,
+    /// Empty: from rest; else a state, or `n:state` for an orbit of period n near it.
+    #[serde(default)]
+    pub(crate) start: String,
+    /// Runge–Kutta steps a period of the motion beside it; 0: none.
+    #[serde(default)]
+    pub(crate) steps: u32,
+}
+
+/// Where a motion is looked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Start {
+    pub(crate) period: Option<usize>,
+    pub(crate) state: Option<Vec<f64>>,
+}
+
+impl Start {
+    pub(crate) fn parse(text: &str) -> Result<Self, Refusal> {
+        if text.is_empty() {
+            return Ok(Self::default());
+        }
+        let (period, state) = match text.split_once(':') {
+            Some((period, state)) => (Some(period), state),
+            None => (None, text),
+        };
+        let wrong = || {
+            Refusal::input(
+                format!("`{text}` is no state"),
+                "numbers are needed, as in 0.1,-0.02,0.3",
+            )
+        };
+        Ok(Self {
+            period: period
+                .map(|p| p.parse().map_err(|_| wrong()))
+                .transpose()?,
+            state: Some(
+                state
+                    .split(',')
+                    .map(|number| number.trim().parse().map_err(|_| wrong()))
+                    .collect::<Result<_, _>>()?,
+            ),
+        })
+    }
+
+    /// The text that [`parse`](Self::parse) reads.
+    pub(crate) fn text(period: Option<usize>, state: &[f64]) -> String {
+        let numbers: Vec<String> = state.iter().map(ToString::to_string).collect();
+        let prefix = period.map_or_else(String::new, |n| format!("{n}:"));
+        prefix + &numbers.join(",")
+    }
+}
+
+/// A motion that was found.
+pub(crate) enum Motion {
+    Orbit(Box<OrbitReport>),
+    /// It does not close.
+    Run(Box<Simulation>),
+}
+
+impl Motion {
+    pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, Refusal> {
+        let request = OrbitRequest {
+            period: start.period,
+            state: start.state.clone(),
+            ..OrbitRequest::default()
+        };
+        match orbit(model, &request.options()) {
+            Ok(found) => Ok(Self::Orbit(Box::new(found))),
+            Err(OrbitError::NotPeriodic { .. }) => {
+                let request = SimulateRequest {
+                    state: start.state.clone(),
+                    ..SimulateRequest::default()
+                };
+                let run = simulate(model, &request.options()).map_err(Refusal::of)?;
+                Ok(Self::Run(Box::new(run)))
+            }
+            Err(error) => Err(Refusal::of(error)),
+        }
+    }
+
+    pub(crate) fn observables(&self) -> &Observables {
+        match self {
+            Self::Orbit(orbit) => &orbit.observables,
+            Self::Run(run) => &run.observables,
+        }
+    }
+
+    /// Time series, phase portrait, harmonics and multipliers: what the terminal writes.
+    pub(crate) fn figure(&self, model: &Model, case: &Case) -> Figure {
+        match self {
+            Self::Orbit(orbit) => orbit_figure(model, orbit, &case.units()),
+            Self::Run(run) => simulation_figure(model, run, &case.units()),
+        }
+    }
+
+    /// Height and force in time, force against height.
+    pub(crate) fn contact_figure(&self, model: &Model, case: &Case) -> Figure {
+        let trajectory = match self {
+            Self::Orbit(orbit) => &orbit.trajectory,
+            Self::Run(run) => &run.trajectory,
+        };
+        contact_figure(model, trajectory, self.periods(), &case.units())
+    }
+
+    pub(crate) fn state(&self) -> &[f64] {
+        match self {
+            Self::Orbit(orbit) => &orbit.state,
+            Self::Run(run) => &run.start,
+        }
+    }
+
+    pub(crate) fn periods(&self) -> usize {
+        match self {
+            Self::Orbit(orbit) => orbit.period.min(LONGEST),
+            Self::Run(_) => LONGEST,
+        }
+    }
+
+    /// What it is, in a sentence.
+    fn words(&self) -> String {
+        match self {
+            Self::Orbit(orbit) => {
+                let [re, im] = orbit.multipliers.first().copied().unwrap_or_default();
+                format!(
+                    "period {}, {}; largest |multiplier| {}",
+                    orbit.period,
+                    orbit.stability,
+                    Kind::Number.format_digits(re.hypot(im), 4)
+                )
+            }
+            Self::Run(run) => format!("{}: {}", run.classification.name(), run.evidence),
+        }
+    }
+}
+
+pub(crate) async fn motion(
+    State(app): State<Arc<App>>,
+    Json(asked): Json<Asked>,
+) -> Result<Json<Value>, Refusal> {
+    let shared = Arc::clone(&app);
+    app.workers
+        .run(move |control| answer(&shared, &asked, control))
+        .await
+        .map(Json)
+}
+
+fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refusal> {
+    let (case, base) = (
+        asked.case.case(app, control)?,
+        asked.case.base(app, control)?,
+    );
+    let model = model_of(&case)?;
+    let start = Start::parse(&asked.start)?;
+    let motion = Motion::find(&model, &start)?;
+    let remarks: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
+    Ok(json!({
+        "title": case.title(),
+        "summary": motion.words(),
+        "remarks": remarks,
+        "keys": knobs::of(&case, &base),
+        "observables": rows(&case, motion.observables()),
+        "figure": drawn(&motion.figure(&model, &case))?,
+        "contact": drawn(&motion.contact_figure(&model, &case))?,
+        "film": film(&case, &model, motion.state(), motion.periods())?,
+        "fixed_step": fixed_step(&case, &model, asked.steps, start.state)?,
+        "forms": study::forms(&case, &base, &model),
+        "command": export::orbit_command(app, asked)?,
+        "python": export::python(app, asked)?,
+    }))
+}
+
+/// The model of a case that is small enough to follow a dragged knob.
+pub(crate) fn model_of(case: &Case) -> Result<Model, Refusal> {
+    if let Some(cantilever) = case.cantilever()
+        && cantilever.modes > MOST_MODES
+    {
+        return Err(Refusal::input(
+            format!("modes = {} are too many for the explorer", cantilever.modes),
+            format!("{MOST_MODES} at most; the terminal takes more"),
+        ));
+    }
+    case.model().map_err(Refusal::of)
+}
+
+/// A figure as the page takes it.
+pub(crate) fn drawn(figure: &Figure) -> Result<Value, Refusal> {
+    let (svg, map) = figure.to_svg_with_map().map_err(Refusal::of)?;
+    Ok(json!({ "svg": svg, "map": map }))
+}
+
+/// Every observable that the motion has and that is one number: as the terminal's `--json` has
+/// it, and in words with its unit.
+fn rows(case: &Case, observables: &Observables) -> Vec<Value> {
+    let units = case.units();
+    OBSERVABLES
+        .iter()
+        .filter_map(|observable| {
+            let value = (observable.of)(observables).number()?;
+            let dimension = observable.dimension;
+            let si = dimension
+                .kind()
+                .and_then(|kind| Some((kind, units.si(kind)?)));
+            let shown = match (dimension, si) {
+                (Dimension::Angle, _) => format!("{:.2}°", shown_phase(value)),
+                (_, Some((kind, unit))) => kind.format_digits(unit * value, 5),
+                (_, None) => {
+                    let number = Kind::Number.format_digits(value, 5);
+                    match dimension.model_unit() {
+                        "1" => number,
+                        unit => format!("{number} {unit}"),
+                    }
+                }
+            };
+            Some(json!({
+                "name": observable.name,
+                "words": observable.words,
+                "value": value,
+                "shown": shown,
+            }))
+        })
+        .collect()
+}
+
+/// What fixed Runge–Kutta steps make of the case; nothing where nobody asks.
+fn fixed_step(
+    case: &Case,
+    model: &Model,
+    steps: u32,
+    state: Option<Vec<f64>>,
+) -> Result<Option<Value>, Refusal> {
+    if steps == 0 {
+        return Ok(None);
+    }
+    let request = SimulateRequest {
+        method: Method::Rk4,
+        steps: Steps([steps, steps]),
+        periods: FIXED_PERIODS,
+        state,
+        ..SimulateRequest::default()
+    };
+    let report = SimulateStudy::run(case, &request, &Control::default())?;
+    let SimulateReport::FixedStep(run) = report else {
+        return Ok(None);
+    };
+    let shown = run.apparent_period.map_or_else(
+        || format!("no period up to {}", run.longest_apparent),
+        |n| format!("period {n}"),
+    );
+    Ok(Some(json!({
+        "words": format!(
+            "{steps} steps a period show {shown}. The exact flow goes from there to: {}",
+            run.exact.evidence
+        ),
+        "figure": drawn(&fixed_step_figure(model, &run, &case.units()))?,
+    })))
+}

@@ -1,0 +1,205 @@
+//! The cases that the page offers: the one that was named, the paper's, the worked ones.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use nanotap::case::Case;
+use nanotap::case::file::{self, Source};
+use nanotap::control::Control;
+use nanotap::study::setpoint::at_setpoint;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::App;
+use crate::answer::Refusal;
+
+/// A case to start from.
+#[derive(Clone, Debug)]
+pub(crate) struct Preset {
+    pub(crate) name: String,
+    pub(crate) words: String,
+    pub(crate) text: String,
+    /// Words put in place of what the text says.
+    pub(crate) set: Vec<String>,
+    /// The path to give at the terminal; empty of a built-in case.
+    pub(crate) path: String,
+}
+
+impl Preset {
+    pub(crate) fn source(&self) -> Source {
+        Source {
+            name: self.words.clone(),
+            text: self.text.clone(),
+        }
+    }
+}
+
+/// The built-in ones: name, words, text, what is set.
+const BUILT_IN: [(&str, &str, &str, &[&str]); 8] = [
+    (
+        "paper",
+        "The paper's case at Ω = 3",
+        include_str!("../../../docs/cases/paper.toml"),
+        &["omega=3"],
+    ),
+    (
+        "paper-chaos",
+        "The paper's case at Ω = 2.6: chaos",
+        include_str!("../../../docs/cases/paper.toml"),
+        &["omega=2.6"],
+    ),
+    (
+        "paper-fast",
+        "No tip mass at Ω = 20: periods 1 and 4",
+        include_str!("../../../docs/cases/paper.toml"),
+        &["omega=20", "alpha1=0"],
+    ),
+    (
+        "fm-lever",
+        "FM-class lever on polystyrene",
+        include_str!("../../../docs/cases/fm-polystyrene.toml"),
+        &[],
+    ),
+    (
+        "stiff-lever",
+        "NCHR-class lever: two branches",
+        include_str!("../../../docs/cases/stiff-lever.toml"),
+        &[],
+    ),
+    (
+        "soft-sample",
+        "Lever on a soft sample",
+        include_str!("../../../docs/cases/soft-sample.toml"),
+        &[],
+    ),
+    (
+        "two-modes",
+        "Two modes of a lever",
+        include_str!("../../../docs/cases/two-modes.toml"),
+        &[],
+    ),
+    (
+        "impact",
+        "Impact oscillator with a rigid stop",
+        "[model]\nkind = \"impact\"\nstiffness = 1.0\ndamping = 0.1\nforcing = 1.0\nomega = 2.8\ngap = 0.0\nrestitution = 0.8\n",
+        &[],
+    ),
+];
+
+/// Every preset; the case file at `path` comes first.
+pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, nanotap::Error> {
+    let mut presets = Vec::new();
+    if let Some(path) = path {
+        let source = file::read(path)?;
+        Case::parse(Some(source.clone()), set)?;
+        presets.push(Preset {
+            name: "file".into(),
+            words: source.name.clone(),
+            path: source.name,
+            text: source.text,
+            set: set.to_vec(),
+        });
+    }
+    presets.extend(BUILT_IN.iter().map(|(name, words, text, set)| Preset {
+        name: (*name).into(),
+        words: (*words).into(),
+        text: (*text).into(),
+        set: set.iter().map(|word| (*word).to_owned()).collect(),
+        path: String::new(),
+    }));
+    Ok(presets)
+}
+
+/// A case as the page sends it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Wanted {
+    preset: String,
+    #[serde(default)]
+    set: Vec<String>,
+}
+
+impl Wanted {
+    pub(crate) fn preset<'a>(&self, app: &'a App) -> Result<&'a Preset, Refusal> {
+        app.presets
+            .iter()
+            .find(|preset| preset.name == self.preset)
+            .ok_or_else(|| {
+                let known: Vec<&str> = app.presets.iter().map(|p| p.name.as_str()).collect();
+                Refusal::input(
+                    format!("there is no case called `{}`", self.preset),
+                    format!("there are {}", known.join(", ")),
+                )
+            })
+    }
+
+    /// The words put in place of what the preset's text says, each key once.
+    pub(crate) fn words(&self, preset: &Preset) -> Vec<String> {
+        let key = |word: &String| word.split('=').next().unwrap_or_default().trim().to_owned();
+        let mut words: Vec<String> = preset
+            .set
+            .iter()
+            .filter(|word| !self.set.iter().any(|later| key(later) == key(word)))
+            .cloned()
+            .collect();
+        words.extend(self.set.iter().cloned());
+        words
+    }
+
+    /// The case, checked as the terminal does, with the distance left open where a setpoint
+    /// is to tell it.
+    pub(crate) fn any_distance(&self, app: &App) -> Result<Case, Refusal> {
+        let preset = self.preset(app)?;
+        let case = Case::parse(Some(preset.source()), &self.words(preset)).map_err(Refusal::of)?;
+        Ok(case.called(&preset.words))
+    }
+
+    /// The same, at its setpoint.
+    pub(crate) fn case(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+        Ok(at_setpoint(self.any_distance(app)?, control)
+            .map_err(Refusal::of)?
+            .0)
+    }
+
+    /// The case as the preset has it.
+    pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+        let unchanged = Self {
+            preset: self.preset.clone(),
+            set: Vec::new(),
+        };
+        unchanged.case(app, control)
+    }
+}
+
+/// What the page needs to begin.
+pub(crate) async fn about(State(app): State<Arc<App>>) -> Json<Value> {
+    let presets: Vec<Value> = app
+        .presets
+        .iter()
+        .map(|preset| json!({ "name": preset.name, "words": preset.words }))
+        .collect();
+    Json(json!({ "version": env!("CARGO_PKG_VERSION"), "presets": presets }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_read_and_its_case_file_is_the_same_case() {
+        let presets = all(None, &[]).unwrap();
+        assert_eq!(presets.len(), BUILT_IN.len());
+        for preset in presets {
+            let case = Case::parse(Some(preset.source()), &preset.set).unwrap();
+            let saved = Source {
+                name: "case.toml".into(),
+                text: case.to_toml(),
+            };
+            let again = Case::parse(Some(saved), &[]).unwrap();
+            let json = |case: &Case| serde_json::to_value(case).unwrap();
+            assert_eq!(json(&again), json(&case), "{}", preset.name);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Work for a request: off the threads that serve, few pieces at a time, and ended when its
+//! client has gone.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use nanotap::control::Control;
+use serde_json::Value;
+use tokio::sync::{Semaphore, mpsc};
+use tokio_stream::wrappers::ReceiverStream;
+
+use crate::answer::Refusal;
+
+/// Motions computed at once.
+const MOTIONS: usize = 2;
+/// Studies computed at once; each uses every core by itself.
+const STUDIES: usize = 2;
+/// Longest time that one request is worked on.
+const LONGEST: Duration = Duration::from_secs(300);
+/// Messages that may wait for a slow client; a study has fewer stages.
+const WAITING: usize = 64;
+
+/// The places in which requests are worked on: a long study holds up no motion.
+pub(crate) struct Workers {
+    motions: Arc<Semaphore>,
+    studies: Arc<Semaphore>,
+}
+
+impl Default for Workers {
+    fn default() -> Self {
+        Self {
+            motions: Arc::new(Semaphore::new(MOTIONS)),
+            studies: Arc::new(Semaphore::new(STUDIES)),
+        }
+    }
+}
+
+/// Stops the work when dropped, as happens when the client goes away.
+struct StopOnDrop(Arc<AtomicBool>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+fn control(stop: &AtomicBool) -> Control<'_> {
+    Control {
+        cancel: Some(stop),
+        progress: None,
+    }
+}
+
+impl Workers {
+    /// Runs `work` and waits for what it gives.
+    pub(crate) async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
+    ) -> Result<T, Refusal> {
+        let place = Arc::clone(&self.motions).acquire_owned().await;
+        let stop = Arc::new(AtomicBool::new(false));
+        let _guard = StopOnDrop(Arc::clone(&stop));
+        let task = tokio::task::spawn_blocking(move || {
+            let _place = place;
+            work(&control(&stop))
+        });
+        match tokio::time::timeout(LONGEST, task).await {
+            Ok(Ok(done)) => done,
+            Ok(Err(_)) => Err(Refusal::failed("the computation broke off")),
+            Err(_) => Err(too_long()),
+        }
+    }
+
+    /// Runs `work` and sends what it hands over as lines of JSON, as they come.
+    pub(crate) fn stream(
+        &self,
+        work: impl FnOnce(&Control<'_>, &dyn Fn(Value)) -> Result<(), Refusal> + Send + 'static,
+    ) -> Response {
+        let places = Arc::clone(&self.studies);
+        let (sender, receiver) = mpsc::channel::<Result<String, std::convert::Infallible>>(WAITING);
+        tokio::spawn(async move {
+            let gone = sender.clone();
+            let place = tokio::select! {
+                place = places.acquire_owned() => place,
+                () = gone.closed() => return,
+            };
+            let stop = Arc::new(AtomicBool::new(false));
+            let guard = StopOnDrop(Arc::clone(&stop));
+            let task = tokio::task::spawn_blocking(move || {
+                let _place = place;
+                let hand_over = |value: Value| {
+                    // A client that went away, or does not read, stops the work.
+                    if sender.try_send(Ok(format!("{value}\n"))).is_err() {
+                        stop.store(true, Ordering::Relaxed);
+                    }
+                };
+                if let Err(refusal) = work(&control(&stop), &hand_over) {
+                    hand_over(refusal.json());
+                }
+            });
+            tokio::select! {
+                _ = task => {}
+                () = gone.closed() => {}
+                () = tokio::time::sleep(LONGEST) => {
+                    let _ = gone.try_send(Ok(format!("{}\n", too_long().json())));
+                }
+            }
+            drop(guard);
+        });
+        (
+            [(header::CONTENT_TYPE, "application/x-ndjson")],
+            Body::from_stream(ReceiverStream::new(receiver)),
+        )
+            .into_response()
+    }
+}
+
+fn too_long() -> Refusal {
+    Refusal::failed(format!("stopped after {} s", LONGEST.as_secs()))
+}

@@ -72,10 +72,7 @@ fn exported(
 }
 
 /// A figure in a format by its ending.
-pub(crate) fn picture(
-    figure: &Figure,
-    format: &str,
-) -> Result<(&'static str, Vec<u8>), Refusal> {
+pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Vec<u8>), Refusal> {
     Ok(match format {
         "svg" => (
             "image/svg+xml",
@@ -114,8 +111,8 @@ fn case_path(app: &App, case: &Wanted) -> Result<String, Refusal> {
 }
 
 /// The command that gives the same motion.
-pub(crate) fn orbit_command(app: &App, asked: &Asked) -> Result<String, Refusal> {
-    let mut line = format!("nanotap orbit {}", quoted(&case_path(app, &asked.case)?));
+pub(crate) fn command(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
+    let mut line = format!("nanotap {study} {}", quoted(&case_path(app, &asked.case)?));
     let start = Start::parse(&asked.start)?;
     if let Some(period) = start.period {
         let _ = write!(line, " --period {period}");
@@ -176,7 +173,7 @@ fn quoted(word: &str) -> String {
 }
 
 /// The lines of Python that give the same motion.
-pub(crate) fn python(app: &App, asked: &Asked) -> Result<String, Refusal> {
+pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
     let path = case_path(app, &asked.case)?;
     let start = Start::parse(&asked.start)?;
     let mut options = String::new();
@@ -188,6 +185,6 @@ pub(crate) fn python(app: &App, asked: &Asked) -> Result<String, Refusal> {
         let _ = write!(options, ", state=[{numbers}]");
     }
     Ok(format!(
-        "import nanotap\n\ncase = nanotap.Case.from_file({path:?})\norbit = nanotap.orbit(case{options})\n"
+        "import nanotap\n\ncase = nanotap.Case.from_file({path:?})\nmotion = nanotap.{study}(case{options})\n"
     ))
 }

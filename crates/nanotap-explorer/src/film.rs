@@ -113,6 +113,10 @@ fn shapes(modes: usize) -> Result<Vec<Vec<f64>>, Refusal> {
     }
     let beam = Modes::new(modes).map_err(|error| Refusal::failed(error.to_string()))?;
     Ok((0..ALONG)
-        .map(|k| beam.shapes(k as f64 / (ALONG - 1) as f64).as_slice().to_vec())
+        .map(|k| {
+            beam.shapes(k as f64 / (ALONG - 1) as f64)
+                .as_slice()
+                .to_vec()
+        })
         .collect())
 }

@@ -182,7 +182,11 @@ fn range(key: Key, size: f64) -> Slider {
             (false, true) => 0.0,
             (false, false) => size / REACH,
         },
-        to: if zero || signed { 2.0 * size } else { REACH * size },
+        to: if zero || signed {
+            2.0 * size
+        } else {
+            REACH * size
+        },
         log: !zero && !signed,
     }
 }

@@ -70,9 +70,7 @@ impl Start {
             )
         };
         Ok(Self {
-            period: period
-                .map(|p| p.parse().map_err(|_| wrong()))
-                .transpose()?,
+            period: period.map(|p| p.parse().map_err(|_| wrong())).transpose()?,
             state: Some(
                 state
                     .split(',')
@@ -156,6 +154,14 @@ impl Motion {
         }
     }
 
+    /// The study that gives it at the terminal.
+    const fn study(&self) -> &'static str {
+        match self {
+            Self::Orbit(_) => "orbit",
+            Self::Run(_) => "simulate",
+        }
+    }
+
     /// What it is, in a sentence.
     fn words(&self) -> String {
         match self {
@@ -204,8 +210,8 @@ fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refu
         "film": film(&case, &model, motion.state(), motion.periods())?,
         "fixed_step": fixed_step(&case, &model, asked.steps, start.state)?,
         "forms": study::forms(&case, &base, &model),
-        "command": export::orbit_command(app, asked)?,
-        "python": export::python(app, asked)?,
+        "command": export::command(app, asked, motion.study())?,
+        "python": export::python(app, asked, motion.study())?,
     }))
 }
 

@@ -125,7 +125,8 @@ impl Studied<'_> {
 
     /// `key=from:to:count` as the terminal takes it, and what was read.
     fn over(&self, case: &Case, which: &str, count: usize) -> Result<(String, Over), Refusal> {
-        let [key, from, to] = ["key", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
+        let [key, from, to] =
+            ["key", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
         let text = format!("{}={}:{}:{count}", key?, from?, to?).replace(' ', "");
         let over = Over::parse(&text, case).map_err(Refusal::of)?;
         Ok((text, over))
@@ -154,8 +155,9 @@ impl Studied<'_> {
             .ok_or_else(|| Refusal::failed(format!("there is no study `{name}`")))?;
         let recipe = entry.recipe(case, Value::Object(request.clone()), self.control)?;
         let scratch = Scratch::within(&self.app.scratch)?;
-        let store = Store::create_or_resume(&scratch.path().join("data.zarr"), recipe.schema().clone())
-            .map_err(Refusal::of)?;
+        let store =
+            Store::create_or_resume(&scratch.path().join("data.zarr"), recipe.schema().clone())
+                .map_err(Refusal::of)?;
         let work = Work {
             share: Share::WHOLE,
             threads: 0,
@@ -196,7 +198,11 @@ impl Studied<'_> {
                 [y, x] => json!({ "set": { "x": x.json(), "y": y.json() } }),
                 _ => Value::Null,
             };
-            let draw = if response { response_figure } else { sweep_figure };
+            let draw = if response {
+                response_figure
+            } else {
+                sweep_figure
+            };
             let figure = self.dataset(&case, "sweep", &request, |store| {
                 draw(store).map_err(Refusal::of)
             })?;
@@ -216,7 +222,10 @@ impl Studied<'_> {
     }
 
     fn stopped(&self, stage: usize, stages: usize) -> bool {
-        let cancelled = self.control.cancel.is_some_and(|c| c.load(Ordering::Relaxed));
+        let cancelled = self
+            .control
+            .cancel
+            .is_some_and(|c| c.load(Ordering::Relaxed));
         cancelled || stage + 1 == stages
     }
 
@@ -298,7 +307,10 @@ impl Studied<'_> {
                 let [entry, from, to] =
                     ["entry", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
                 let entry = entry?;
-                Ok((entry.to_owned(), format!("{entry}={}:{}:{count}", from?, to?)))
+                Ok((
+                    entry.to_owned(),
+                    format!("{entry}={}:{}:{count}", from?, to?),
+                ))
             };
             let ((x, x_range), (y, y_range)) = (side("x")?, side("y")?);
             let mut request = object(json!({ "x": x_range, "y": y_range }));
@@ -368,7 +380,11 @@ impl Axis {
 
     fn json(&self) -> Value {
         let physical = self.key.is_physical() && self.key.kind() != Kind::Number;
-        let unit = if physical { self.key.kind().si_unit() } else { "" };
+        let unit = if physical {
+            self.key.kind().si_unit()
+        } else {
+            ""
+        };
         json!({ "name": self.key.path(), "factor": self.factor, "unit": unit })
     }
 }
@@ -398,8 +414,19 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         let of_names = names.iter().copied().find(|key| keys.contains(key));
         of_names.or_else(|| keys.first().copied())
     };
-    let frequency = named(&[Key::Omega, Key::OscillatorOmega, Key::DriveFrequency, Key::DriveFrequencyRatio]);
-    let second = named(&[Key::Alpha4, Key::GapTip, Key::DriveFreeAmplitude, Key::Restitution, Key::StopStiffness]);
+    let frequency = named(&[
+        Key::Omega,
+        Key::OscillatorOmega,
+        Key::DriveFrequency,
+        Key::DriveFrequencyRatio,
+    ]);
+    let second = named(&[
+        Key::Alpha4,
+        Key::GapTip,
+        Key::DriveFreeAmplitude,
+        Key::Restitution,
+        Key::StopStiffness,
+    ]);
     let parameter = |which: &str, key: Option<Key>, reach: f64| {
         let [from, to] = key.map_or_else(Default::default, |key| ends(base, key, reach));
         vec![
@@ -445,7 +472,15 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
 /// A range around the value of a key, as it is typed.
 fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {
     let value = base.get(key);
-    let value = if value.is_finite() { value } else { key.entry().example };
-    let reach = if value == 0.0 { 1.0 } else { reach * value.abs() };
+    let value = if value.is_finite() {
+        value
+    } else {
+        key.entry().example
+    };
+    let reach = if value == 0.0 {
+        1.0
+    } else {
+        reach * value.abs()
+    };
     [value - reach, value + reach].map(|value| key.kind().format_digits(value, 5))
 }

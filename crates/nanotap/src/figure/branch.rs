@@ -54,11 +54,7 @@ impl ParameterAxis {
 }
 
 /// The figure of a case's branches: against the parameter, in SI where the case has it.
-pub fn case_figure(
-    case: &Case,
-    report: &BranchReport,
-    shown: Option<Shown>,
-) -> Figure {
+pub fn case_figure(case: &Case, report: &BranchReport, shown: Option<Shown>) -> Figure {
     let size = report.from.abs().max(report.to.abs());
     let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
         (loci.key, loci.range[0].abs().max(loci.range[1].abs()))

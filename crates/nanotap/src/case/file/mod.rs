@@ -72,9 +72,11 @@ impl Case {
             What::Cantilever(cantilever) => return to_toml(cantilever),
             What::Oscillator(oscillator) => {
                 let mut text = format!("[model]\nkind = \"{}\"\n", self.model_kind().name());
-                for (key, value) in self.keys().into_iter().filter_map(|key| {
-                    Some((key, oscillator.get(key.oscillator_parameter()?)?))
-                }) {
+                for (key, value) in self
+                    .keys()
+                    .into_iter()
+                    .filter_map(|key| Some((key, oscillator.get(key.oscillator_parameter()?)?)))
+                {
                     let _ = writeln!(text, "{} = {value:?}  # {}", key.name(), key.meaning());
                 }
                 return text;

@@ -67,8 +67,8 @@ function show(motion) {
   }));
   $("remarks").textContent = motion.remarks.join(" · ");
   $("spurious").textContent = motion.fixed_step?.words ?? OFF;
-  $("fixed").hidden = !motion.fixed_step;
-  if (motion.fixed_step) figure.put($("fixed"), motion.fixed_step.figure);
+  $("fixed").hidden = !motion.fixed_step?.figure;
+  if (motion.fixed_step?.figure) figure.put($("fixed"), motion.fixed_step.figure);
   $("command").textContent = motion.command;
   $("python").textContent = motion.python;
   study.fill(motion.forms);

@@ -78,18 +78,18 @@ fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str) -> Value {
 
 /// How sure one may be that these are all.
 fn bound(found: &Attractors) -> String {
-    let mut words = format!("{} starts", found.starts);
-    if let Some(unseen) = &found.unseen {
-        words += &format!(
-            "; with 95 % confidence at most {:.2} % of them lead elsewhere",
+    let unseen = found.unseen.as_ref().map(|unseen| {
+        format!(
+            "with 95 % confidence at most {:.2} % of them lead elsewhere",
             100.0 * unseen.fraction
-        );
-    }
-    if found.undecided_fraction.count > 0 {
-        words += &format!("; {} undecided", found.undecided_fraction.count);
-    }
-    if found.unbounded.count > 0 {
-        words += &format!("; {} left every bound", found.unbounded.count);
-    }
-    words
+        )
+    });
+    let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
+    let parts = [
+        Some(format!("{} starts", found.starts)),
+        unseen,
+        counted(found.undecided_fraction.count, "undecided"),
+        counted(found.unbounded.count, "left every bound"),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }

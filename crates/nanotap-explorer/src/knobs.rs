@@ -128,7 +128,7 @@ fn rounded(number: f64) -> f64 {
 
 /// The word that a key has.
 fn word(case: &Case, key: Key) -> String {
-    let stated = case.stated(key).map(|value| value.text());
+    let stated = case.stated(key).map(nanotap::case::Value::text);
     let Some(cantilever) = case.cantilever() else {
         return stated.unwrap_or_default();
     };

@@ -284,9 +284,11 @@ fn fixed_step(
         state,
         ..SimulateRequest::default()
     };
-    let report = SimulateStudy::run(case, &request, &Control::default())?;
-    let SimulateReport::FixedStep(run) = report else {
-        return Ok(None);
+    let run = match SimulateStudy::run(case, &request, &Control::default()) {
+        Ok(SimulateReport::FixedStep(run)) => run,
+        Ok(SimulateReport::Exact(_)) => return Ok(None),
+        // Too few steps: the exact motion beside it stands.
+        Err(error) => return Ok(Some(json!({ "words": error.to_string() }))),
     };
     let shown = run.apparent_period.map_or_else(
         || format!("no period up to {}", run.longest_apparent),

@@ -132,7 +132,7 @@ impl Studied<'_> {
         Ok((text, over))
     }
 
-    fn hand(&self, stage: Stage<'_>) -> Result<(), Refusal> {
+    fn hand(&self, stage: &Stage<'_>) -> Result<(), Refusal> {
         let (name, request) = stage.study;
         (self.hand_over)(json!({
             "figure": drawn(&stage.figure)?,
@@ -208,7 +208,7 @@ impl Studied<'_> {
             })?;
             let finest = stages[stages.len() - 1];
             let power = parameters.len() as u32;
-            self.hand(Stage {
+            self.hand(&Stage {
                 figure,
                 clicks: &clicks,
                 words: progress(count.pow(power), finest.pow(power), "values"),
@@ -248,7 +248,7 @@ impl Studied<'_> {
                 "set": { "x": axis.json() },
                 "near": near(&report.points, axis.factor),
             });
-            self.hand(Stage {
+            self.hand(&Stage {
                 figure: case_figure(&case, &report, None),
                 clicks: &clicks,
                 words: progress(values, BRANCHES[BRANCHES.len() - 1], "censuses"),
@@ -284,7 +284,7 @@ impl Studied<'_> {
                     factor,
                 },
             };
-            self.hand(Stage {
+            self.hand(&Stage {
                 figure: approach_figure(&report, &units),
                 clicks: &json!({ "set": { "x": axis.json() } }),
                 words: progress(points, APPROACH[APPROACH.len() - 1], "distances each way"),
@@ -330,7 +330,7 @@ impl Studied<'_> {
             let figure = self.dataset(&case, "basin", &request, |store| {
                 basin::figure(store).map_err(Refusal::of)
             })?;
-            self.hand(Stage {
+            self.hand(&Stage {
                 figure,
                 clicks: &json!({ "start": start }),
                 words: progress(count, BASIN[BASIN.len() - 1], "points each way"),

@@ -1,13 +1,13 @@
 //! What tip and sample do to each other: height and force in time, and force against height.
 
 use nanotap_figures::{Axis, Band, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Rule};
-use nanotap_flow::Trajectory;
 
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::figure::motion::{contact_intervals, points_on};
 use crate::figure::panels::time_axis;
 use crate::model::Model;
+use crate::model::recording::Recording;
 
 /// One instant: time in drive periods, height over the undeformed sample, force on the tip.
 type Instant = [f64; 3];
@@ -16,11 +16,11 @@ type Instant = [f64; 3];
 /// one against the other, over the first `periods` drive periods.
 pub fn contact_figure(
     model: &Model,
-    trajectory: &Trajectory,
+    recording: &Recording,
     periods: usize,
     units: &Units,
 ) -> Figure {
-    let instants = instants(model, trajectory, periods as f64);
+    let instants = instants(model, recording, periods as f64);
     let size = |k: usize| instants.iter().fold(0.0, |m: f64, i| m.max(i[k].abs()));
     let (length, length_unit) = units.axis(Kind::Length, size(1));
     let (force, force_unit) = units.axis(Kind::Force, size(2));
@@ -34,7 +34,7 @@ pub fn contact_figure(
     };
     let height_axis = || Axis::linear(format!("height over the sample{length_unit}"));
     let force_axis = || Axis::linear(format!("force on the tip{force_unit}"));
-    let contacts = contact_intervals(model, trajectory, periods as f64);
+    let contacts = contact_intervals(model, recording, periods as f64);
     let in_time = |y: Axis, line: Line| {
         let mut panel = Panel::new(time_axis(), y).legend(Legend::Above);
         if !contacts.is_empty() {
@@ -55,24 +55,20 @@ pub fn contact_figure(
 }
 
 /// Instants that show every turn of every mode, and both ends of every contact.
-fn instants(model: &Model, trajectory: &Trajectory, periods: f64) -> Vec<Instant> {
+fn instants(model: &Model, recording: &Recording, periods: f64) -> Vec<Instant> {
     let (end, period) = (periods * model.period(), model.period());
-    let height = trajectory.signal(&model.height);
-    let forces: Vec<_> = model.force.iter().map(|f| trajectory.signal(f)).collect();
+    let height = recording.curve(&model.height);
+    let force = recording.force(model);
     let mut instants = Vec::new();
-    for (index, piece) in height.pieces.iter().enumerate() {
-        let middle = piece.start + 0.5 * piece.length;
+    for piece in height.pieces() {
         if piece.start >= end {
             break;
         }
-        let force = trajectory
-            .segment_at(middle)
-            .and_then(|segment| forces.get(segment.regime)?.pieces.get(index));
-        let count = points_on(piece, period);
+        let count = points_on(&height, &piece, period);
         instants.extend((0..=count).map(|k| {
             let s = piece.length * k as f64 / count as f64;
-            let force = force.map_or(0.0, |force| force.signal.at(s));
-            [(piece.start + s) / period, piece.signal.at(s), force]
+            let time = (piece.start + s) / period;
+            [time, height.on(&piece, s), force.on(&piece, s)]
         }));
     }
     instants
@@ -89,7 +85,7 @@ mod tests {
     fn the_force_is_zero_in_flight_and_spring_and_damper_in_contact() {
         let case = Cantilever::paper().with(Parameter::Omega, 3.0);
         let [alpha4, alpha6] = [Parameter::Alpha4, Parameter::Alpha6].map(|p| case.get(p));
-        let model = case.model().unwrap();
+        let model = crate::case::Case::from(case).model().unwrap();
         let found = orbit(&model, &OrbitOptions::default()).unwrap();
         let instants = instants(&model, &found.trajectory, found.period as f64);
         let touching = instants.iter().filter(|i| i[2] != 0.0).count();

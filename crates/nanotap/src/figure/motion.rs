@@ -149,7 +149,11 @@ fn instants(curve: &Curve, period: f64, periods: f64) -> Vec<f64> {
 }
 
 /// When the tip is in contact, in drive periods.
-pub(crate) fn contact_intervals(model: &Model, recording: &Recording, periods: f64) -> Vec<(f64, f64)> {
+pub(crate) fn contact_intervals(
+    model: &Model,
+    recording: &Recording,
+    periods: f64,
+) -> Vec<(f64, f64)> {
     let period = model.period();
     let mut intervals: Vec<(f64, f64)> = Vec::new();
     for s in recording

@@ -501,7 +501,7 @@ impl GridScale {
 
     /// Whether the values go neither in equal steps nor, on a logarithmic axis, in equal ratios.
     fn is_uneven(&self) -> bool {
-        let [from, to] = [self.values.first(), self.values.last()].map(|v| v.copied());
+        let [from, to] = [self.values.first(), self.values.last()].map(Option::<&f64>::copied);
         let (Some(from), Some(to)) = (from, to) else {
             return false;
         };

@@ -125,7 +125,7 @@ impl Sweep {
                 };
                 let seen = case
                     .physical()
-                    .map_or(seen.clone(), |view| seen.in_si(&view.scales));
+                    .map_or(seen, |view| seen.in_si(&view.scales));
                 let at = &place(k)[..shape.len()];
                 found.push(FromNeighbour {
                     at: at.to_vec(),
@@ -152,7 +152,7 @@ impl Sweep {
         store: &Store,
         strobe: usize,
         count: usize,
-    ) -> Result<Vec<Vec<(usize, Vec<f64>)>>, StoreError> {
+    ) -> Result<Vec<Vec<OrbitState>>, StoreError> {
         let schema = store.schema();
         let stride = schema.variables[strobe].stride();
         let columns = schema.coordinate(super::dataset::STATE);
@@ -181,11 +181,14 @@ impl Sweep {
     }
 }
 
+/// Period and state of an orbit on which a run ended.
+type OrbitState = (usize, Vec<f64>);
+
 /// Drive periods over which a motion that does not repeat is measured.
 const UNREPEATED: usize = 64;
 
 /// The stable orbits among the states that runs ended in, each once.
-fn closed(mut map: Strobe, states: &[(usize, Vec<f64>)]) -> Vec<PeriodicOrbit> {
+fn closed(mut map: Strobe, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
     let mut orbits: Vec<PeriodicOrbit> = Vec::new();
     for (period, state) in states {
         let known = orbits.iter().filter(|o| o.period == *period);

@@ -182,10 +182,10 @@ impl Over {
                  ({{follow}} down goes down)"
             ));
         }
-        if let Some(pair) = self.listed.windows(2).find(|pair| pair[0] >= pair[1]) {
+        let mut pairs = self.listed.windows(2);
+        if let Some([before, after]) = pairs.find(|pair| pair[0] >= pair[1]) {
             return Err(format!(
-                "{} before {}; every value must be greater than the one before",
-                pair[0], pair[1]
+                "{before} before {after}; every value must be greater than the one before"
             ));
         }
         if self.spacing == Spacing::Log && from <= 0.0 {

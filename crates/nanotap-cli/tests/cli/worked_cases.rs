@@ -119,8 +119,10 @@ fn no_document_is_left_out() {
         [
             "README.md",
             "approach-curve.md",
+            "dforce.md",
             "fm-lever-on-polystyrene.md",
             "frequency-sweep.md",
+            "liquid.md",
             "period-doubling.md",
             "samples.md",
             "stiff-lever.md",
@@ -141,8 +143,10 @@ macro_rules! follows {
 
 follows! {
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
+    the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
+    the_liquid: "liquid.md", 2 commands, 4 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;

@@ -3,8 +3,11 @@
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
+use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+
+use nanotap_dynamics::StartBox;
 
 use crate::common::{DMT, EV, HERTZ, air, lever};
 
@@ -164,6 +167,32 @@ fn the_repulsive_branch_ends_in_a_fold() {
     // At a fold the phase depends on the distance like a root: of the reference's last digit
     // of zc hangs the fourth of φ.
     digits(seen.phase, 90.6398, 1e-3, "phase at the fold");
+}
+
+/// From starts of the size of the free swing; a start that cannot be followed is undecided.
+#[test]
+fn a_census_finds_the_two_stable_orbits() {
+    let case = air(20.0, 18.0, &DMT);
+    let model = case.model().unwrap();
+    let scales = &case.physical().unwrap().scales;
+    let size = 22e-9 / scales.length / model.tip.row[0].abs();
+    let speed = size * model.frequency();
+    let options = AttractorsOptions {
+        starts: Some(16),
+        start_box: Some(StartBox::new(vec![-size, -speed], vec![size, speed]).unwrap()),
+        ..AttractorsOptions::default()
+    };
+    let found = attractors(&model, &options, &Control::default()).unwrap();
+    let amplitude = |o: &OrbitReport| o.observables.first_harmonic * scales.length * 1e9;
+    let mut stable: Vec<f64> = found
+        .attractors
+        .iter()
+        .map(|a| amplitude(a.orbit.as_ref().unwrap()))
+        .collect();
+    stable.sort_by(f64::total_cmp);
+    assert_eq!(stable.len(), 2, "{stable:?}");
+    digits(stable[0], 17.78633469, 1e-8, "attractive");
+    digits(stable[1], 18.52532864, 1e-8, "repulsive");
 }
 
 #[test]

@@ -36,7 +36,15 @@ FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-OWN = ("tip_max", "tip_min", "amplitude", "first_harmonic", "phase", "contact_fraction", "peak_force")
+OWN = (
+    "tip_max",
+    "tip_min",
+    "amplitude",
+    "first_harmonic",
+    "phase",
+    "contact_fraction",
+    "peak_force",
+)
 
 
 def started(*words: str) -> subprocess.Popen[str]:
@@ -62,7 +70,11 @@ def asked(address: str, path: str, body: Any = None, **headers: str) -> bytes:
     request = urllib.request.Request(
         base + path,
         data=None if body is None else json.dumps(body).encode(),
-        headers={"x-nanotap-token": token, "content-type": "application/json", **headers},
+        headers={
+            "x-nanotap-token": token,
+            "content-type": "application/json",
+            **headers,
+        },
     )
     with urllib.request.urlopen(request, timeout=120) as answer:
         return bytes(answer.read())
@@ -125,7 +137,9 @@ def test_what_is_wrong_gets_words(address: str, body: Any, words: str) -> None:
     assert words in json.loads(refused.value.read())["error"]
 
 
-def test_its_case_file_and_command_give_the_same_numbers(address: str, tmp_path: Path) -> None:
+def test_its_case_file_and_command_give_the_same_numbers(
+    address: str, tmp_path: Path
+) -> None:
     for preset in ("paper", "fm-lever", "impact"):
         shown = motion(address, preset)
         body = {"case": {"preset": preset}, "format": "toml"}
@@ -143,7 +157,10 @@ def test_its_case_file_and_command_give_the_same_numbers(address: str, tmp_path:
         values = {row["name"]: row["value"] for row in shown["observables"]}
         for name in OWN:
             if name in orbit and orbit[name] is not None:
-                assert values[name] == pytest.approx(orbit[name], rel=1e-12), (preset, name)
+                assert values[name] == pytest.approx(orbit[name], rel=1e-12), (
+                    preset,
+                    name,
+                )
 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf", "csv"])
@@ -153,7 +170,9 @@ def test_exports_are_what_they_are_called(address: str, kind: str) -> None:
     assert saved.startswith(begins)
 
 
-def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(address: str) -> None:
+def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(
+    address: str,
+) -> None:
     base, token = address.split("/?token=")
     options = {"key": "omega", "from": "2.2", "to": "4"}
     wanted = {"case": {"preset": "paper"}, "tab": "diagram", "options": options}
@@ -165,7 +184,10 @@ def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(address: str
         client.close()
     begun = time.monotonic()
     assert motion(address)["summary"].startswith("period")
-    wanted |= {"tab": "resonance", "options": {"key": "omega", "from": "2.9", "to": "3.1"}}
+    wanted |= {
+        "tab": "resonance",
+        "options": {"key": "omega", "from": "2.9", "to": "3.1"},
+    }
     lines = asked(address, "/api/study", wanted).splitlines()
     assert [json.loads(text)["words"] for text in lines][-1] == "120 values"
     assert time.monotonic() - begun < 100
@@ -191,7 +213,8 @@ def page(address: str) -> Iterator[Any]:
         page.complaints = []
         page.asked = []
         page.on(
-            "console", lambda m: page.complaints.append(m.text) if m.type == "error" else None
+            "console",
+            lambda m: page.complaints.append(m.text) if m.type == "error" else None,
         )
         page.on("pageerror", lambda error: page.complaints.append(str(error)))
         page.on("request", lambda request: page.asked.append(request.url))
@@ -251,7 +274,9 @@ def test_its_numbers_are_the_servers(page: Any, address: str) -> None:
         assert value(page, name) == values[name]
 
 
-def test_a_knob_changes_the_numbers_and_the_way_back_restores_them(page: Any, address: str) -> None:
+def test_a_knob_changes_the_numbers_and_the_way_back_restores_them(
+    page: Any, address: str
+) -> None:
     opened(page, address, "preset=paper")
     before = value(page, "amplitude")
     page.fill("[data-key=omega]", "3.3")
@@ -287,7 +312,9 @@ def test_a_link_restores_the_view(page: Any, address: str) -> None:
     assert page.input_value("#study-form [name=fromx]") == "-0.5"
 
 
-def test_the_census_lists_what_coexists_and_a_click_shows_it(page: Any, address: str) -> None:
+def test_the_census_lists_what_coexists_and_a_click_shows_it(
+    page: Any, address: str
+) -> None:
     opened(page, address, "preset=paper-fast")
     page.click("#census")
     # Ω = 20 without a tip mass: period 1 and period 4 (the paper's Figs. 15 and 17).
@@ -320,15 +347,26 @@ def test_a_click_on_a_study_goes_to_the_motion_there(
     page.click("#study-form button:has-text('Stop')")
     panel = page.evaluate("document.getElementById('study-figure').panels[0]")
     drawn = page.locator("#study-figure svg").bounding_box()
-    view = page.evaluate("(({width}) => width)(document.querySelector('#study-figure svg').viewBox.baseVal)")
+    view = page.evaluate(
+        "(({width}) => width)(document.querySelector('#study-figure svg').viewBox.baseVal)"
+    )
     scale = drawn["width"] / view
     before = page.url
-    page.mouse.click(
-        drawn["x"] + scale * (panel["left"] + 0.6 * panel["width"]),
-        drawn["y"] + scale * (panel["top"] + 0.5 * panel["height"]),
+    # Scrolls to it, where it lies below the window.
+    page.locator("#study-figure svg").click(
+        position={
+            "x": scale * (panel["left"] + 0.6 * panel["width"]),
+            "y": scale * (panel["top"] + 0.5 * panel["height"]),
+        }
     )
     until(page, lambda: page.url != before)
-    moved = "start=" if tab == "basin" else "set.alpha5=" if tab == "approach" else "set.omega="
+    moved = (
+        "start="
+        if tab == "basin"
+        else "set.alpha5="
+        if tab == "approach"
+        else "set.omega="
+    )
     assert moved in page.url
     if tab in ("diagram", "branches", "resonance"):
         value = float(re.findall(r"set\.omega=([\d.]+)", page.url)[0])
@@ -341,7 +379,9 @@ def test_few_fixed_steps_show_what_is_not_there(page: Any, address: str) -> None
     assert page.locator("#fixed svg").count() == 1
 
 
-def test_nothing_leaves_the_machine_and_nothing_complains(page: Any, address: str) -> None:
+def test_nothing_leaves_the_machine_and_nothing_complains(
+    page: Any, address: str
+) -> None:
     own = address.split("/?")[0]
     assert len(page.asked) > 20
     assert all(url.startswith((own, "data:", "blob:", "about:")) for url in page.asked)

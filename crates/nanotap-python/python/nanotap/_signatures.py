@@ -292,8 +292,8 @@ def branch(
     state: Any = None,
     switch: int | None = None,
     diagram: bool = False,
-    values: int = 5,
-    starts: int = 48,
+    values: int = 65,
+    starts: int = 16,
     seed: int = 1,
     second: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     max_step: float = 0.01,
@@ -556,7 +556,8 @@ def window(
         drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
         omega=2,2.5,4; twice, the first is the horizontal axis.
     starts : int
-        Quasi-random starts of the census at each point (1 to 10000000).
+        Starts of the census at each point: rest, the linear responses, and draws of
+        every size (1 to 10000000).
     seed : int
         Seed of the starts.
     max_period : int

@@ -374,8 +374,8 @@ def test_a_click_on_a_study_goes_to_the_motion_there(
 
 
 def test_few_fixed_steps_show_what_is_not_there(page: Any, address: str) -> None:
-    opened(page, address, "preset=paper&steps=40")
-    assert "40 steps a period show" in page.inner_text("#spurious")
+    opened(page, address, "preset=paper&steps=80")
+    assert "80 steps a period show" in page.inner_text("#spurious")
     assert page.locator("#fixed svg").count() == 1
 
 

@@ -1101,8 +1101,9 @@ fn samples_have_their_laws() {
 
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
-    let cases: [(&[Entry], &str); 9] = [
-        (&[("sample", "law", "hertz")], "kelvin-voigt"),
+    let cases: [(&[Entry], &str); 10] = [
+        (&[("sample", "law", "hertz")], "it is no part of sample.law"),
+        (&[("sample", "law", "hooke")], "kelvin-voigt"),
         (
             &[("sample", "law", "standard-linear-solid")],
             "relaxing arm",

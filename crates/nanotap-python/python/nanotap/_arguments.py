@@ -97,22 +97,6 @@ def real(value: Any, name: str) -> Floats:
     return np.require(array, np.float64, ["C", "A"])
 
 
-def box(value: Box) -> list[tuple[str, float, float]]:
-    """Sides of a box of states: `{"a1": (-1, 1)}`."""
-    if value is None:
-        return []
-    if not isinstance(value, Mapping):
-        message = 'box: name the sides with their ends, as in {"a1": (-1, 1)}'
-        raise TypeError(message)
-    sides = []
-    for name, ends in value.items():
-        low, high = _pair(f"box: {name}", ends)
-        sides.append(
-            (str(name), number(f"box: {name}", low), number(f"box: {name}", high))
-        )
-    return sides
-
-
 def _pair(name: str, value: Any) -> tuple[Any, Any]:
     if isinstance(value, str) or not isinstance(value, Iterable):
         message = f"{name}: a lower and an upper end are needed, not {value!r}"

@@ -10,6 +10,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -163,11 +164,128 @@ def test_its_case_file_and_command_give_the_same_numbers(
                 )
 
 
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (b"", 400),
+        (b"{", 400),
+        (b'{"case": 1}', 422),
+        (b'{"case": {"preset": "paper"}, "what": 1}', 422),
+        (b'{"case": {"preset": "paper"}, "steps": -1}', 422),
+        (b'{"case": {"preset": "' + b"x" * 300_000 + b'"}}', 413),
+    ],
+)
+def test_messages_that_are_none_are_refused(
+    address: str, body: bytes, status: int
+) -> None:
+    base, token = address.split("/?token=")
+    headers = {"x-nanotap-token": token, "content-type": "application/json"}
+    request = urllib.request.Request(base + "/api/motion", data=body, headers=headers)
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(request, timeout=60)
+    assert refused.value.code == status
+    assert refused.value.read()
+
+
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf", "csv"])
 def test_exports_are_what_they_are_called(address: str, kind: str) -> None:
     saved = asked(address, "/api/export", {"case": {"preset": "paper"}, "format": kind})
     begins = {"svg": b"<", "png": b"\x89PNG", "pdf": b"%PDF", "csv": b"tau,tip"}[kind]
     assert saved.startswith(begins)
+
+
+def studied(address: str, **asked_for: Any) -> list[dict[str, Any]]:
+    wanted = {"case": {"preset": "paper"}, **asked_for}
+    lines = asked(address, "/api/study", wanted).splitlines()
+    return [json.loads(line) for line in lines]
+
+
+def test_a_studys_figure_is_saved_and_seen_in_part(address: str) -> None:
+    study = studied(address, tab="approach", options={"to": "0"})[-1]
+    begins = {"svg": b"<", "png": b"\x89PNG", "pdf": b"%PDF", "csv": b"# panel 0, x: "}
+    for kind, first in begins.items():
+        wish = {"number": study["number"], "format": kind}
+        assert asked(address, "/api/figure", wish).startswith(first)
+    views = [{"panel": 1, "x": [1, 2], "y": [10, 40]}]
+    wish = {"number": study["number"], "views": views}
+    panels = json.loads(asked(address, "/api/figure", wish))["map"]
+    # Panels of a column share their horizontal axis.
+    assert [(p["x"]["from"], p["x"]["to"]) for p in panels][1::2] == [(1, 2), (1, 2)]
+    assert (panels[1]["y"]["from"], panels[1]["y"]["to"]) == (10, 40)
+    assert panels[0]["x"]["to"] > 2
+    for wrong in (
+        {"number": 10**9},
+        {"number": study["number"], "format": "gif"},
+        wish | {"views": [{"panel": 0, "x": [1, 1], "y": [0, 1]}]},
+    ):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            asked(address, "/api/figure", wrong)
+        assert refused.value.code == 422
+        assert json.loads(refused.value.read())["error"]
+
+
+def test_a_studys_lines_of_python_give_the_same(address: str, tmp_path: Path) -> None:
+    study = studied(
+        address, tab="resonance", options={"key": "omega", "from": "3", "to": "3.1"}
+    )[0]
+    assert "nanotap sweep case.toml --over omega=3:3.1:30" in study["command"]
+    body = {"case": {"preset": "paper"}, "format": "toml"}
+    (tmp_path / "case.toml").write_bytes(asked(address, "/api/export", body))
+    pytest.importorskip("nanotap")
+    shown = (
+        "import json\n"
+        "print(json.dumps([sweep['omega'].values.tolist(),"
+        " sweep['first_harmonic'].values[:, 0].tolist()]))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", study["python"] + shown],
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    drawn = {round(x, 9): heights[0][0] for x, heights, _ in study["clicks"]["near"]}
+    for x, y in zip(*json.loads(done.stdout), strict=True):
+        assert drawn[round(x, 9)] == pytest.approx(y, rel=1e-9)
+
+
+def test_the_tours_jumps_are_where_it_says(address: str) -> None:
+    # docs/explorer.md: up beyond 332.1 kHz, down at 330.6 kHz.
+    study = studied(
+        address,
+        case={"preset": "stiff-lever"},
+        tab="resonance",
+        options={"key": "drive.frequency", "from": "327.03 kHz", "to": "333.63 kHz"},
+    )[1]
+    met: dict[float, list[float]] = {}
+    for x, heights, start in study["clicks"]["near"]:
+        assert ":" not in start
+        met.setdefault(x, []).append(heights[0][0])
+    assert len(met) == 120
+    apart = [
+        x for x, amplitudes in met.items() if max(amplitudes) - min(amplitudes) > 1
+    ]
+    assert min(apart) == pytest.approx(330.6, abs=0.1)
+    assert max(apart) == pytest.approx(332.1, abs=0.1)
+
+
+def test_slow_and_broken_clients_hold_up_nobody(address: str) -> None:
+    host = ("127.0.0.1", int(re.findall(r":(\d+)/", address)[0]))
+    token = address.split("=")[1]
+    head = (
+        f"POST /api/motion HTTP/1.1\r\nHost: 127.0.0.1:{host[1]}\r\n"
+        f"x-nanotap-token: {token}\r\ncontent-type: application/json\r\n"
+        "content-length: 1000\r\n\r\n"
+    )
+    said = [head.encode() + b"{", head[:40].encode(), b"\x00\xff\r\n\r\n", b""]
+    clients = [socket.create_connection(host, timeout=5) for _ in range(40)]
+    try:
+        for k, client in enumerate(clients):
+            client.sendall(said[k % len(said)])
+        assert motion(address)["summary"].startswith("period")
+    finally:
+        for client in clients:
+            client.close()
 
 
 def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(
@@ -189,7 +307,8 @@ def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(
         "options": {"key": "omega", "from": "2.9", "to": "3.1"},
     }
     lines = asked(address, "/api/study", wanted).splitlines()
-    assert [json.loads(text)["words"] for text in lines][-1] == "120 values"
+    words = [json.loads(text)["words"] for text in lines]
+    assert words[-1].startswith("120 values and")
     assert time.monotonic() - begun < 100
 
 
@@ -199,6 +318,41 @@ def test_ctrl_c_ends_it_at_once() -> None:
         server.send_signal(signal.SIGINT)
         # At once; a loaded machine may take longer to say so.
         server.wait(10)
+
+
+def test_it_ends_in_the_midst_of_work_and_leaves_no_files(tmp_path: Path) -> None:
+    surroundings = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [PROGRAM, "explore", "--no-browser"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=surroundings,
+    ) as server:
+        base, token = line(server).split("/?token=")
+        options = {"key": "omega", "from": "2.2", "to": "4"}
+        wanted = {"case": {"preset": "paper"}, "tab": "diagram", "options": options}
+        client = http.client.HTTPConnection(base.removeprefix("http://"), timeout=60)
+        headers = {"x-nanotap-token": token, "content-type": "application/json"}
+        client.request("POST", "/api/study", json.dumps(wanted), headers)
+        for _ in range(100):
+            if list(tmp_path.glob("nanotap-explorer-*/*")):
+                break
+            time.sleep(0.1)
+        else:
+            pytest.fail("the study began no dataset")
+        server.terminate()
+        server.wait(10)
+        client.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_levers_and_laws_say_what_they_are(address: str) -> None:
+    keys = {key["name"]: key for key in motion(address, "fm-lever")["keys"]}
+    levers = {c["word"]: c["meaning"] for c in keys["cantilever.lever"]["choices"]}
+    assert levers["PPP-FM"] == "k = 2.8 N/m, f0 = 75 kHz"
+    laws = {c["word"]: c["meaning"] for c in keys["sample.law"]["choices"]}
+    assert {"spring-damper", "kelvin-voigt", "hertz", "dmt", "jkr"} <= set(laws)
+    assert all("F = " in meaning for meaning in laws.values())
 
 
 @pytest.fixture(scope="module")
@@ -324,52 +478,277 @@ def test_the_census_lists_what_coexists_and_a_click_shows_it(
     until(page, lambda: "period 4" in page.inner_text("#summary"))
 
 
+def middle(page: Any, name: str) -> tuple[float, float]:
+    box = page.locator(name).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def spot(page: Any, name: str, panel: int, u: float, v: float) -> tuple[float, float]:
+    """Where in the window parts of a panel's axes lie."""
+    page.locator(f"#{name}").scroll_into_view_if_needed()
+    box = page.locator(f"#{name} svg").bounding_box()
+    view = page.evaluate(
+        "(name) => document.querySelector(`#${name} svg`).viewBox.baseVal.width", name
+    )
+    part = panels(page, name)[panel]
+    scale = box["width"] / view
+    return (
+        box["x"] + scale * (part["left"] + u * part["width"]),
+        box["y"] + scale * (part["top"] + (1 - v) * part["height"]),
+    )
+
+
+def panels(page: Any, name: str) -> list[dict[str, Any]]:
+    return list(page.evaluate("(name) => document.getElementById(name).panels", name))
+
+
+def test_a_dragged_slider_moves_the_numbers_on_the_way(page: Any, address: str) -> None:
+    opened(page, address, "preset=paper&set.modes=5")
+    x, y = middle(page, "[data-slider=omega]")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    met = set()
+    for k in range(1, 6):
+        page.mouse.move(x + k, y)
+        idle(page)
+        met.add(value(page, "amplitude"))
+    assert "set.omega" not in page.url
+    page.mouse.up()
+    until(page, lambda: "set.omega=" in page.url)
+    assert len(met) >= 3
+
+
+def test_a_rectangle_zooms_and_a_double_click_shows_all_again(
+    page: Any, address: str
+) -> None:
+    opened(page, address, "preset=paper")
+    before = panels(page, "portrait")[1]
+    page.mouse.move(*spot(page, "portrait", 1, 0.25, 0.25))
+    page.mouse.down()
+    page.mouse.move(*spot(page, "portrait", 1, 0.5, 0.5))
+    page.mouse.move(*spot(page, "portrait", 1, 0.75, 0.5))
+    page.mouse.up()
+    until(page, lambda: "view.portrait.1=" in page.url)
+    after = panels(page, "portrait")[1]
+    for axis, low, high in (("x", 0.25, 0.75), ("y", 0.25, 0.5)):
+        start = before[axis]["from"]
+        reach = before[axis]["to"] - start
+        assert after[axis]["from"] == pytest.approx(
+            start + low * reach, abs=0.02 * reach
+        )
+        assert after[axis]["to"] == pytest.approx(
+            start + high * reach, abs=0.02 * reach
+        )
+    # A link restores it.
+    opened(page, address, page.url.split("#")[1])
+    assert panels(page, "portrait")[1] == after
+    page.mouse.dblclick(*spot(page, "portrait", 1, 0.5, 0.5))
+    until(page, lambda: "view." not in page.url)
+    assert panels(page, "portrait")[1] == before
+
+
+def test_a_figure_is_zoomed_and_read_by_keys(page: Any, address: str) -> None:
+    opened(page, address, "preset=paper")
+    before = panels(page, "contact")[0]
+    page.focus("#contact")
+    page.keyboard.press("ArrowRight")
+    assert "height over the sample" in page.inner_text("#reading")
+    page.keyboard.press("+")
+    until(page, lambda: "view.contact.0=" in page.url)
+    after = panels(page, "contact")[0]
+    reach = [p["x"]["to"] - p["x"]["from"] for p in (before, after)]
+    assert reach[1] == pytest.approx(0.5 * reach[0], rel=0.02)
+    page.keyboard.press("0")
+    until(page, lambda: "view." not in page.url)
+
+
 @pytest.mark.parametrize(
     ("tab", "options"),
     [
-        ("diagram", {"from": "2.2", "to": "2.4"}),
+        ("diagram", {"from": "2.9", "to": "3.1"}),
         ("branches", {"from": "2.9", "to": "3.1"}),
         ("resonance", {"from": "2.9", "to": "3.1"}),
         ("approach", {"to": "0"}),
-        ("basin", {}),
-        ("map", {"from2": "2.9", "to2": "3.1"}),
     ],
 )
-def test_a_click_on_a_study_goes_to_the_motion_there(
+def test_a_click_on_a_drawn_motion_shows_that_motion(
     page: Any, address: str, tab: str, options: dict[str, str]
 ) -> None:
-    opened(page, address, f"preset=paper&tab={tab}")
-    for name, text in options.items():
-        page.fill(f"#study-form [name={name}]", text)
+    shown = {"diagram": "tip_max", "branches": "tip_max"}.get(tab, "first_harmonic")
+    fields = "".join(f"&study.{name}={text}" for name, text in options.items())
+    opened(page, address, f"preset=paper&tab={tab}{fields}")
     page.click("#study-form button[type=submit]")
     page.wait_for_selector("#study-figure svg", timeout=90_000)
     page.click("#study-form button:has-text('Stop')")
-    panel = page.evaluate("document.getElementById('study-figure').panels[0]")
-    drawn = page.locator("#study-figure svg").bounding_box()
-    view = page.evaluate(
-        "(({width}) => width)(document.querySelector('#study-figure svg').viewBox.baseVal)"
+    # A motion in the midst of what is drawn, from the server's own list.
+    study = studied(address, tab=tab, options={"key": "omega", **options})[0]
+    near = study["clicks"]["near"]
+    x, heights, _ = near[len(near) // 3]
+    panel = panels(page, "study-figure")[0]
+    u, v = (
+        (at - panel[axis]["from"]) / (panel[axis]["to"] - panel[axis]["from"])
+        for axis, at in (("x", x), ("y", max(heights[0])))
     )
-    scale = drawn["width"] / view
     before = page.url
-    # Scrolls to it, where it lies below the window.
-    page.locator("#study-figure svg").click(
-        position={
-            "x": scale * (panel["left"] + 0.6 * panel["width"]),
-            "y": scale * (panel["top"] + 0.5 * panel["height"]),
-        }
-    )
+    page.mouse.click(*spot(page, "study-figure", 0, u, v))
     until(page, lambda: page.url != before)
-    moved = (
-        "start="
-        if tab == "basin"
-        else "set.alpha5="
-        if tab == "approach"
-        else "set.omega="
+    assert "start=" in page.url
+    # That motion, or its neighbour on the same curve.
+    reach = panel["y"]["to"] - panel["y"]["from"]
+    assert value(page, shown) == pytest.approx(max(heights[0]), abs=0.05 * reach)
+    assert page.locator("#study-figure svg").count() == 1
+
+
+def test_a_click_meets_the_motion_that_a_run_from_rest_does_not(
+    page: Any, address: str
+) -> None:
+    # Ω = 20 without a tip mass: a run from rest comes to period 1, and period 4 is beside it.
+    options = {"key": "omega", "from": "19.9", "to": "20.1"}
+    fields = "&study.from=19.9&study.to=20.1"
+    opened(page, address, f"preset=paper-fast&tab=branches{fields}")
+    period = page.inner_text("#summary").split("period ")[1][0]
+    other = {"1": 4, "4": 1}[period] if period in "14" else 4
+    page.click("#study-form button[type=submit]")
+    page.wait_for_selector("#study-figure svg", timeout=90_000)
+    page.click("#study-form button:has-text('Stop')")
+    study = studied(
+        address, case={"preset": "paper-fast"}, tab="branches", options=options
+    )[0]
+    found = [
+        (x, heights[0][0])
+        for x, heights, start in study["clicks"]["near"]
+        if start.startswith(f"{other}:") and abs(x - 20) < 0.05
+    ]
+    x, y = found[len(found) // 2]
+    panel = panels(page, "study-figure")[0]
+    u, v = (
+        (at - panel[axis]["from"]) / (panel[axis]["to"] - panel[axis]["from"])
+        for axis, at in (("x", x), ("y", y))
     )
-    assert moved in page.url
-    if tab in ("diagram", "branches", "resonance"):
-        value = float(re.findall(r"set\.omega=([\d.]+)", page.url)[0])
-        assert float(options["from"]) <= value <= float(options["to"])
+    page.mouse.click(*spot(page, "study-figure", 0, u, v))
+    until(page, lambda: f"period {other}" in page.inner_text("#summary"))
+
+
+def test_a_click_on_a_basin_starts_a_run_there(page: Any, address: str) -> None:
+    opened(page, address, "preset=paper&tab=basin&ran=yes")
+    page.wait_for_selector("#study-figure svg", timeout=90_000)
+    page.click("#study-form button:has-text('Stop')")
+    page.mouse.click(*spot(page, "study-figure", 0, 0.6, 0.5))
+    until(page, lambda: "start=" in page.url)
+
+
+@pytest.mark.parametrize(
+    ("shows", "legend"),
+    [
+        ("kinds of motion", "period 1"),
+        ("greatest force", ""),
+        ("number of motions", "one"),
+    ],
+)
+def test_a_map_of_two_parameters_and_a_click_on_it(
+    page: Any, address: str, shows: str, legend: str
+) -> None:
+    ranges = "study.from1=18&study.to1=22&study.from2=3.0&study.to2=3.1"
+    words = shows.replace(" ", "+")
+    opened(page, address, f"preset=paper&tab=map&ran=yes&{ranges}&study.show={words}")
+    page.wait_for_selector("#study-figure svg", timeout=90_000)
+    page.click("#study-form button:has-text('Stop')")
+    said = page.locator("#study-figure svg [aria-label]").evaluate_all(
+        "(all) => all.map((one) => one.getAttribute('aria-label')).join(' ')"
+    )
+    assert legend in said
+    if not legend:
+        assert "greatest force on the tip" in said
+    page.mouse.click(*spot(page, "study-figure", 0, 0.6, 0.5))
+    until(page, lambda: "set.alpha4=" in page.url and "set.omega=" in page.url)
+    alpha4, omega = (
+        float(re.findall(rf"set\.{key}=([\d.]+)", page.url)[0])
+        for key in ("alpha4", "omega")
+    )
+    # Cells reach half a step beyond the ends of the ranges.
+    assert alpha4 == pytest.approx(18 + 0.6 * 4, abs=0.15)
+    assert omega == pytest.approx(3.05, abs=0.005)
+
+
+def test_a_link_computes_its_study_again(page: Any, address: str) -> None:
+    link = "preset=paper&tab=approach&ran=yes&study.to=0&view.study.0=1,2,0,3"
+    opened(page, address, link)
+    page.wait_for_selector("#study-figure svg", timeout=60_000)
+    panel = panels(page, "study-figure")[0]
+    assert (panel["x"]["from"], panel["x"]["to"]) == (1, 2)
+
+
+def test_a_motion_is_followed_as_knobs_turn(page: Any, address: str) -> None:
+    opened(page, address, "preset=paper-fast&follow=yes")
+    page.click("#census")
+    page.wait_for_selector("#attractors button >> nth=1", timeout=60_000)
+    page.click("#attractors button:has-text('period 4')")
+    until(page, lambda: "period 4" in page.inner_text("#summary"))
+    page.fill("[data-key=omega]", "20.01")
+    page.press("[data-key=omega]", "Enter")
+    until(page, lambda: "set.omega=20.01" in page.url)
+    assert "period 4" in page.inner_text("#summary")
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (800, 600), (3840, 2160)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_runs_over_the_edge(
+    page: Any, address: str, size: tuple[int, int], scheme: str
+) -> None:
+    page.emulate_media(color_scheme=scheme)
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    try:
+        opened(page, address, "preset=fm-lever")
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= size[0]
+        ink, back = page.evaluate(
+            """() => ['color', 'backgroundColor'].map(
+                (what) => getComputedStyle(document.body)[what])"""
+        )
+        # Contrast of text of at least 7 : 1, as the guidelines for the web count it.
+        bright, dim = sorted(map(luminance, (ink, back)), reverse=True)
+        assert (bright + 0.05) / (dim + 0.05) > 7
+    finally:
+        page.emulate_media(color_scheme="light")
+        page.set_viewport_size({"width": 1440, "height": 1000})
+
+
+def luminance(colour: str) -> float:
+    parts = [int(part) / 255 for part in re.findall(r"\d+", colour)[:3]]
+    linear = [
+        p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts
+    ]
+    return sum(w * p for w, p in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+def test_the_keyboard_reaches_everything(page: Any, address: str) -> None:
+    opened(page, address, "preset=paper")
+    reached = set()
+    page.focus("#preset")
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        reached.add(
+            page.evaluate(
+                "(one => one.id || one.dataset.slider || one.textContent)(document.activeElement)"
+            )
+        )
+    for wanted in ("key-omega", "omega", "play", "contact", "portrait", "census"):
+        assert wanted in reached
+    for wanted in (
+        "steps",
+        "which",
+        "command",
+        "tab-diagram",
+        "study-figure",
+        "follow",
+    ):
+        assert wanted in reached
+    # Whoever hears the page is told the name of each knob.
+    unnamed = page.locator("#knobs input, #knobs select").evaluate_all(
+        """(all) => all.filter(
+            (one) => !one.labels?.length && !one.getAttribute('aria-label')).length"""
+    )
+    assert unnamed == 0
 
 
 def test_few_fixed_steps_show_what_is_not_there(page: Any, address: str) -> None:

@@ -40,7 +40,7 @@ REFUSED = [
     ("simulate", {"omega": [2, NAN]}, ValueError, "finite"),
     ("simulate", {"omega": [[2, 3]]}, ValueError, "a row of values"),
     ("simulate", {"omega": np.array([])}, ValueError, "a row of values"),
-    ("simulate", {"omega": ["a", "b"]}, TypeError, "real numbers"),
+    ("simulate", {"omega": ["a", "b"]}, ValueError, "text, not a number"),
     ("simulate", {"omega": [2, 3], "threads": 0}, ValueError, "threads"),
     ("orbit", {"period": 0}, ValueError, "period: 0 is out of range"),
     ("orbit", {"omega": 2.6}, RuntimeError, "not periodic"),

@@ -138,6 +138,15 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "attribute `attractors` (JSON), negative where there is none."
         ),
     ),
+    "fit": (
+        (THREADS, PROGRESS),
+        "Fit",
+        (
+            "`parameters` (key, value, standard_error, interval, unit), `chi2`, `undetermined`, "
+            "`correlations`, the `rows` with model and residuals; `best` and `errors` by key, and "
+            "`best_case()`, the case of the best fit."
+        ),
+    ),
     "lyapunov": (
         (),
         "Lyapunov",
@@ -171,6 +180,7 @@ from ._case import Case, Path
 from ._results import (
     Attractors,
     Convergence,
+    Fit,
     Lyapunov,
     Modes,
     Orbit,

@@ -5,7 +5,11 @@ use std::path::PathBuf;
 use clap::builder::styling::{AnsiColor, Styles};
 use clap::{Args, Parser};
 
+use nanotap_figures::Figure;
+
 use crate::command::Command;
+use crate::failure::Failure;
+use crate::file;
 
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Green.on_default().bold())
@@ -69,12 +73,44 @@ pub(crate) struct OutArgument {
     pub(crate) out: Option<PathBuf>,
 }
 
+impl OutArgument {
+    /// Refuses what is not a table's name, before anything is computed.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        let path = self.out.as_deref();
+        path.map_or(Ok(()), |path| file::ending(path, &["csv"]).map(drop))
+    }
+
+    /// Writes the table that `csv` makes, where one is wanted.
+    pub(crate) fn write(&self, csv: impl FnOnce() -> String) -> Result<(), Failure> {
+        let path = self.out.as_deref();
+        path.map_or(Ok(()), |path| file::write(path, csv().as_bytes()))
+    }
+}
+
 /// Where a picture goes.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlotArgument {
     /// Draw the result into this file (.svg, .png or .pdf)
     #[arg(long, value_name = "PATH")]
     pub(crate) plot: Option<PathBuf>,
+}
+
+impl PlotArgument {
+    /// Refuses what is not a picture's name, before anything is computed.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        let path = self.plot.as_deref();
+        path.map_or(Ok(()), |path| {
+            file::ending(path, &["svg", "png", "pdf"]).map(drop)
+        })
+    }
+
+    /// Writes the figure that `figure` makes, where one is wanted.
+    pub(crate) fn draw(&self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
+        if let Some(path) = &self.plot {
+            figure().write(path)?;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -29,6 +29,15 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     })
 }
 
+/// "a, b or c".
+fn alternatives(list: &[String]) -> String {
+    match list {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
 /// The ending of `path`, in lower case, among those that can be written.
 pub(crate) fn ending<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Failure> {
     let given = path
@@ -45,7 +54,7 @@ pub(crate) fn ending<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fa
                     "{}: the ending says no format that is written here",
                     path.display()
                 ),
-                format!("end the name in {}", list.join(" or ")),
+                format!("end the name in {}", alternatives(&list)),
             )
         })
 }

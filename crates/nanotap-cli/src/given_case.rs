@@ -3,7 +3,7 @@
 
 use std::ops::Deref;
 
-use nanotap::case::physical::Severity;
+use nanotap::case::physical::{Kind, Severity};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::study::setpoint::{self, SetpointReport};
@@ -109,15 +109,14 @@ impl GivenCase {
         let Some(cantilever) = self.cantilever() else {
             return "a lever".to_owned();
         };
-        format!(
-            "{} at Ω = {}",
-            number::counted(cantilever.modes, "mode", "modes"),
-            // A physical case's Ω was computed, not chosen.
-            if self.is_physical() {
-                number::significant(cantilever.omega, 6)
-            } else {
-                number::chosen(cantilever.omega)
-            }
-        )
+        let at = self.physical().map_or_else(
+            || format!("Ω = {}", number::chosen(cantilever.omega)),
+            |view| {
+                let hertz = view.scales.frequency * cantilever.omega;
+                Kind::Frequency.format_digits(hertz, 6)
+            },
+        );
+        let modes = number::counted(cantilever.modes, "mode", "modes");
+        format!("{modes} at {at}")
     }
 }

@@ -7,7 +7,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Derivative, Observables, Spectrum};
+use nanotap::observe::{Derivative, Observables, PhysicalMotion, Spectrum};
 use nanotap::study::simulate::Classification;
 
 use crate::output::Output;
@@ -343,9 +343,27 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
     list.join(", ")
 }
 
-/// Says what puts the motion in doubt: another part of the beam than the tip would touch, in
-/// `which` motion, if there are several.
-pub(crate) fn warn(o: &Observables, which: &str, output: &Output) {
+/// Says what puts the motion in doubt, of `which` motion, if there are several: another part of
+/// the beam than the tip would touch, or Hertz's stiffness is that of another depth.
+pub(crate) fn warn(
+    o: &Observables,
+    physical: Option<&PhysicalMotion>,
+    which: &str,
+    output: &Output,
+) {
+    let setting = physical.and_then(|motion| motion.setting.as_ref());
+    if let Some(mismatch) = setting.and_then(|setting| setting.hertz_mismatch) {
+        let depth = physical.map_or(f64::NAN, |motion| motion.observables.indentation);
+        output.warning(&format!(
+            "{which}Hertz's stiffness of {} was taken at an indentation of {}, but the tip sinks in by {}, \
+             where it is {}: give sample.indentation = \"{}\", or sample.law = \"hertz\" for the force itself",
+            Kind::Stiffness.format_digits(mismatch.assumed_stiffness, 4),
+            Kind::Length.format_digits(mismatch.assumed_indentation, 4),
+            Kind::Length.format_digits(depth, 4),
+            Kind::Stiffness.format_digits(mismatch.stiffness, 4),
+            Kind::Length.format_digits(depth, 3),
+        ));
+    }
     let lowest = o.beam_clearance.zip(o.beam_clearance_xi);
     let Some((height, xi)) = lowest.filter(|(height, _)| *height <= 0.0) else {
         return;

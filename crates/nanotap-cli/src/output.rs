@@ -6,7 +6,7 @@ use nanotap::study::registry::Document;
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::{progress, style};
+use crate::{page, progress, style};
 
 /// How results are to be shown.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ impl Output {
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             progress::clear();
-            anstream::eprintln!("{}", style::note(text));
+            anstream::eprintln!("{}", style::note(&page::remark(text)));
         }
     }
 
@@ -73,7 +73,7 @@ impl Output {
     )]
     pub(crate) fn warning(&self, text: &str) {
         progress::clear();
-        anstream::eprintln!("{}", style::warning(text));
+        anstream::eprintln!("{}", style::warning(&page::remark(text)));
     }
 }
 

@@ -40,6 +40,16 @@ pub(crate) fn paragraph(words: &str) -> String {
         .fold(String::new(), |text, line| text + "  " + line + "\n")
 }
 
+/// A remark that follows a word of its own, broken as the terminal is wide; further lines are
+/// indented by two.
+pub(crate) fn remark(text: &str) -> String {
+    if width() == usize::MAX {
+        return text.to_owned();
+    }
+    // Room for "warning: ".
+    broken(text, READABLE.min(width()) - 9).join("\n  ")
+}
+
 /// `text` cut at blanks into lines of at most `width`; a word that is longer has a line of its
 /// own.
 pub(crate) fn broken(text: &str, width: usize) -> Vec<&str> {

@@ -34,6 +34,18 @@ pub(crate) fn advance<M: StroboscopicMap>(
     finite(state)
 }
 
+/// As [`advance`], over several periods without looking in between.
+#[inline]
+pub(crate) fn advance_by<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+    periods: usize,
+) -> Result<(), MapFailure> {
+    map.advance_by(state, periods)
+        .map_err(MapFailure::refused)?;
+    finite(state)
+}
+
 /// As [`advance`], with the Jacobian.
 #[inline]
 pub(crate) fn advance_with_jacobian<M: StroboscopicMap>(
@@ -45,6 +57,21 @@ pub(crate) fn advance_with_jacobian<M: StroboscopicMap>(
         .map_err(MapFailure::refused)?;
     finite(state)?;
     finite(jacobian.as_slice())
+}
+
+/// As [`advance_with_jacobian`], with log|det DP| where it is known by other means.
+#[inline]
+pub(crate) fn advance_with_jacobian_and_determinant<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+    jacobian: &mut DMatrix<f64>,
+) -> Result<Option<f64>, MapFailure> {
+    let determinant = map
+        .advance_with_jacobian_and_determinant(state, jacobian)
+        .map_err(MapFailure::refused)?;
+    finite(state)?;
+    finite(jacobian.as_slice())?;
+    Ok(determinant)
 }
 
 /// As [`advance`], with the extrema of the switching functions.

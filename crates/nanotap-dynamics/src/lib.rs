@@ -10,7 +10,7 @@
 //! | [`orbit`] | which orbit closes near here, and is it stable |
 //! | [`neighbourhood`] | from where every motion goes to a given orbit |
 //! | [`lyapunov`] | how fast neighbouring motions part |
-//! | [`classify`] | what the motion from one start comes to |
+//! | [`classify()`] | what the motion from one start comes to |
 //! | [`mod@census`] | which attractors a set of starts goes to, and what it may have missed |
 //! | [`global`] | which attractors there are all over a grid of parameter values |
 //! | [`basin`] | which points of a slice go to which attractor |
@@ -33,12 +33,12 @@ mod vector;
 
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
 pub use census::{
-    Attractor, AttractorKind, Census, CensusOptions, Fate, Fraction, Lifetime, SizeCount, StartBox,
-    StartBoxError, StartOrigin, StartSet, TransientChaos, Unseen, census, census_of,
+    Attractor, AttractorKind, Census, CensusOptions, Fraction, Lifetime, SizeCount, StartBox,
+    StartBoxError, StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen, census, census_of,
 };
 pub use classify::{
-    Candidate, Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict, birkhoff_digits,
-    candidate_periods, settle,
+    Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,
+    birkhoff_digits, candidate_periods, classify,
 };
 pub use continuation::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ContinuationError,
@@ -46,10 +46,10 @@ pub use continuation::{
     assemble_diagram, continue_orbit, switch_at_flip,
 };
 pub use control::Control;
-pub use curve::{CurveEnd, Locus, LocusOptions, LocusPoint, trace_locus};
+pub use curve::{BifurcationCurve, CurveEnd, CurveOptions, CurvePoint, trace_curve};
 pub use failure::MapFailure;
 pub use global::{
-    GlobalAttractor, GlobalOptions, GlobalValue, attractors_along, attractors_over, orbits_shared,
+    GlobalAttractor, GlobalOptions, GlobalValue, attractors_along, grid_neighbours, orbits_shared,
 };
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, lyapunov_spectrum};
 pub use map::{MapFamily, StroboscopicMap, Tangency, TwoParameterFamily};

@@ -57,14 +57,19 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), Self::Error>;
 
-    /// log|det DP| at `state` by other means than the Jacobian (the trace of the
-    /// equations, integrated), where the system has any: exact where the determinant
-    /// of a matrix drowns in rounding. `None` where it has none.
+    /// As [`advance_with_jacobian`](Self::advance_with_jacobian), and log|det DP| by other
+    /// means than the Jacobian (the trace of the equations, integrated), where the system has
+    /// any: exact where the determinant of a matrix drowns in rounding. `None` where it has
+    /// none.
     ///
     /// # Errors
     /// When the period cannot be computed from this state.
-    fn log_determinant(&mut self, state: &[f64]) -> Result<Option<f64>, Self::Error> {
-        let _ = state;
+    fn advance_with_jacobian_and_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<Option<f64>, Self::Error> {
+        self.advance_with_jacobian(state, jacobian)?;
         Ok(None)
     }
 

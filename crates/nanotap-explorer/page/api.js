@@ -36,6 +36,15 @@ export async function bytes(kind, path, body) {
   return (await send(kind, path, body)).blob();
 }
 
+/** Saves a file under a name. */
+export function save(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
 export function stop(kind) {
   running.get(kind)?.abort();
 }

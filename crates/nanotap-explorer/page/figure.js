@@ -1,14 +1,56 @@
-// Figures come drawn from the server, the same that the terminal writes, with a map of their axes.
+// Figures come drawn from the server, the same that the terminal writes, with a map of their axes:
+// here they are put into the page, asked for the values under the pointer, and zoomed.
 
 const SVG = "http://www.w3.org/2000/svg";
+const DRAG = 6;               // pixels beyond which a press is no click
 
-/** Puts a drawn figure into its place. */
+/** Puts a drawn figure into its place. What is the same as before stays: a curve that follows a
+ *  knob costs that curve, not every letter of the figure. */
 export function put(element, drawn) {
-  const parsed = new DOMParser().parseFromString(drawn.svg, "image/svg+xml").documentElement;
-  parsed.removeAttribute("width");
-  parsed.removeAttribute("height");
-  element.replaceChildren(document.importNode(parsed, true));
+  // Names in the figure carry a prefix that changes with it.
+  const text = drawn.svg.replace(/\bf[0-9a-f]{8}-/g, `${element.id}-`);
+  const fresh = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
+  join(fresh);
+  fresh.removeAttribute("width");
+  fresh.removeAttribute("height");
+  fresh.setAttribute("class", "drawn");
+  const old = element.querySelector("svg.drawn");
+  if (old) turn(old, fresh);
+  else element.replaceChildren(document.importNode(fresh, true));
   element.panels = drawn.map;
+}
+
+/** Makes `old` the same as `fresh`. */
+function turn(old, fresh) {
+  for (const { name } of [...old.attributes]) if (!fresh.hasAttribute(name)) old.removeAttribute(name);
+  for (const { name, value } of fresh.attributes) if (old.getAttribute(name) !== value) old.setAttributeNS(name.startsWith("xlink:") ? "http://www.w3.org/1999/xlink" : null, name, value);
+  const olds = [...old.childNodes];
+  const freshes = [...fresh.childNodes];
+  freshes.forEach((next, k) => {
+    const now = olds[k];
+    if (!now) old.append(document.importNode(next, true));
+    else if (now.isEqualNode(next)) return;
+    else if (now.nodeName !== next.nodeName || now.nodeType !== Node.ELEMENT_NODE) now.replaceWith(document.importNode(next, true));
+    else turn(now, next);
+  });
+  for (const rest of olds.slice(freshes.length)) rest.remove();
+}
+
+/** Makes one path of the letters of each word, which is drawn many times faster. A letter is a
+ *  path of relative steps, so that it can begin anywhere. */
+function join(svg) {
+  const letters = new Map();
+  for (const path of svg.querySelectorAll("defs > path")) {
+    letters.set(`#${path.id}`, path.getAttribute("d"));
+    path.remove();
+  }
+  for (const run of svg.querySelectorAll("g[role=text] > g")) {
+    const word = document.createElementNS(SVG, "path");
+    word.setAttribute("transform", run.getAttribute("transform"));
+    word.setAttribute("d", [...run.children].map((use) =>
+      `M${use.getAttribute("x") ?? 0} ${use.getAttribute("y") ?? 0}${letters.get(use.getAttribute("xlink:href"))}`).join(""));
+    run.replaceWith(word);
+  }
 }
 
 /** The panel at a point of the window and the values there; `null` outside of all. */
@@ -27,32 +69,118 @@ export function under(element, clientX, clientY) {
   return null;
 }
 
+const within = (part) => Math.min(1, Math.max(0, part));
 const at = (panel, u, v) => ({ panel, u, v, x: value(panel.x, u), y: value(panel.y, v) });
+const logarithmic = (axis) => axis.scale.toLowerCase() === "log";
+
+function value(axis, part) {
+  if (logarithmic(axis)) return axis.from * (axis.to / axis.from) ** part;
+  return axis.from + (axis.to - axis.from) * part;
+}
+
+/** Where a value lies on an axis, as a part of it. */
+export function part(axis, v) {
+  if (logarithmic(axis)) return Math.log(v / axis.from) / Math.log(axis.to / axis.from);
+  return (v - axis.from) / (axis.to - axis.from);
+}
+
+/** What the axes say at a place. */
+export function words(place) {
+  const said = (axis) => `${place.panel[axis].label.replaceAll("$", "")} ${Number(place[axis].toPrecision(6))} ${place.panel[axis].unit}`.trim();
+  return `${said("x")}, ${said("y")}`;
+}
 
 /** The place a hundredth further; from nowhere, the middle of the first panel. */
-export function moved(element, place, [across, up]) {
+function moved(element, place, [across, up]) {
   if (!element.panels?.length) return null;
   if (!place) return at(element.panels[0], 0.5, 0.5);
-  const within = (part) => Math.min(1, Math.max(0, part));
   return at(place.panel, within(place.u + 0.01 * across), within(place.v + 0.01 * up));
 }
 
-/** Draws the cross at a place. */
-export function cross(element, place) {
+/** Draws over a figure what belongs to the pointer. */
+function over(element, name, path) {
   const svg = element.querySelector("svg");
   if (!svg) return;
-  svg.querySelector(".cross")?.remove();
-  if (!place) return;
-  const { panel, u, v } = place;
-  const x = panel.left + u * panel.width;
-  const y = panel.top + (1 - v) * panel.height;
-  const path = document.createElementNS(SVG, "path");
-  path.setAttribute("class", "cross");
-  path.setAttribute("d", `M${x} ${panel.top}v${panel.height}M${panel.left} ${y}h${panel.width}`);
-  svg.append(path);
+  svg.querySelector(`.${name}`)?.remove();
+  if (!path) return;
+  const drawn = document.createElementNS(SVG, "path");
+  drawn.setAttribute("class", name);
+  drawn.setAttribute("d", path);
+  svg.append(drawn);
 }
 
-function value(axis, part) {
-  if (axis.scale.toLowerCase() === "log") return axis.from * (axis.to / axis.from) ** part;
-  return axis.from + (axis.to - axis.from) * part;
+function cross(element, place) {
+  if (!place) { over(element, "cross", ""); return; }
+  const { panel, u, v } = place;
+  over(element, "cross", `M${panel.left + u * panel.width} ${panel.top}v${panel.height}M${panel.left} ${panel.top + (1 - v) * panel.height}h${panel.width}`);
+}
+
+/** Makes a figure answer pointer and keys. `tell(place)` is called where the cross goes, `go(place)`
+ *  for a click or Enter, `zoom(views)` for another part: a list of {panel, x, y}. */
+export function alive(element, { views, tell, go, zoom }) {
+  let place = null;
+  let pressed = null;
+  let swallow = false;         // the click that ends a drag
+  const here = (event) => under(element, event.clientX, event.clientY);
+  const move = (next) => { place = next; cross(element, place); tell?.(place); };
+  const see = (panel, x, y) => {
+    const index = element.panels.indexOf(panel);
+    if (index < 0 || !(x[0] !== x[1] && y[0] !== y[1])) return;
+    const exact = (range) => range.map((v) => Number(v.toPrecision(6)));
+    zoom([...views().filter((view) => view.panel !== index), { panel: index, x: exact(x), y: exact(y) }]);
+  };
+  const around = (to, factor) => {
+    const side = (axis, middle) => [middle - factor * middle, middle + factor * (1 - middle)].map((p) => value(to.panel[axis], p));
+    see(to.panel, side("x", to.u), side("y", to.v));
+  };
+  element.addEventListener("pointerdown", (event) => {
+    swallow = false;
+    if (event.button === 0 && here(event)) { pressed = { place: here(event), x: event.clientX, y: event.clientY }; event.preventDefault(); element.focus({ preventScroll: true }); }
+  });
+  element.addEventListener("pointermove", (event) => {
+    const next = here(event);
+    if (pressed && next?.panel === pressed.place.panel && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) > DRAG) {
+      const { panel, u, v } = pressed.place;
+      over(element, "zone", `M${panel.left + u * panel.width} ${panel.top + (1 - v) * panel.height}h${(next.u - u) * panel.width}v${(v - next.v) * panel.height}h${(u - next.u) * panel.width}z`);
+      pressed.to = next;
+    }
+    move(next);
+  });
+  element.addEventListener("pointerup", () => {
+    over(element, "zone", "");
+    if (pressed?.to) {
+      swallow = true;
+      const { place: from, to } = pressed;
+      const span = (axis, a, b) => [Math.min(a, b), Math.max(a, b)].map((p) => value(from.panel[axis], p));
+      see(from.panel, span("x", from.u, to.u), span("y", from.v, to.v));
+    }
+    pressed = null;
+  });
+  element.addEventListener("pointerleave", () => { pressed = null; over(element, "zone", ""); });
+  element.addEventListener("click", (event) => { if (!swallow) { move(here(event)); if (place) go?.(place); } swallow = false; });
+  element.addEventListener("dblclick", () => { if (views().length) zoom([]); });
+  element.addEventListener("wheel", (event) => {
+    // Alone, the wheel scrolls the page.
+    if (!(event.ctrlKey || event.altKey) || !here(event)) return;
+    event.preventDefault();
+    around(here(event), event.deltaY < 0 ? 0.8 : 1.25);
+  }, { passive: false });
+  element.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (step) move(moved(element, place, event.shiftKey ? step.map((s) => 10 * s) : step));
+    else if (event.key === "n" && element.panels) { const next = (element.panels.indexOf(place?.panel) + 1) % element.panels.length; move(at(element.panels[next], 0.5, 0.5)); }
+    else if (event.key === "+" && place) around(place, 0.5);
+    else if (event.key === "-" && place) around(place, 2);
+    else if ((event.key === "0" || event.key === "Escape") && views().length) zoom([]);
+    else if (event.key === "Enter" && place) go?.(place);
+    else return;
+    event.preventDefault();
+  });
+  /** After the figure was drawn anew: the cross stays where it was. */
+  return () => {
+    if (!place) return;
+    const panel = element.panels?.find((one) => Math.abs(one.left - place.panel.left) < 1e-9 && Math.abs(one.top - place.panel.top) < 1e-9);
+    place = panel ? at(panel, place.u, place.v) : null;
+    cross(element, place);
+  };
 }

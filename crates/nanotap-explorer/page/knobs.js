@@ -4,7 +4,11 @@ import { state } from "./state.js";
 
 const form = document.getElementById("knobs");
 let changed = () => {};
+let now = "";                 // state at drive phase 0 of the motion that is shown
 const opened = new Set();
+
+/** Which motion a turned knob goes on from, where it is to. */
+export function follows(start) { now = start; }
 
 export function onChange(listener) { changed = listener; }
 
@@ -43,7 +47,7 @@ export function build(keys) {
 export function update(keys) {
   for (const key of keys) {
     const field = form.querySelector(`[data-key="${key.name}"]`);
-    if (field && field !== document.activeElement) field.value = key.value;
+    if (field && field !== document.activeElement && field.value !== key.value) field.value = key.value;
   }
 }
 
@@ -54,7 +58,7 @@ function knob(key) {
   const id = `key-${key.name.replace(/[^a-z0-9]/gi, "-")}`;
   const words = key.symbol && key.symbol !== key.name ? `${key.symbol}  ${key.title}` : key.title;
   const meaning = element("span", { className: "meaning", id: `${id}-meaning`, textContent: key.meaning });
-  const field = key.choices ? chooser(key, meaning) : typed(key);
+  const field = !key.choices ? typed(key) : key.sums ? summed(key, meaning) : chooser(key, meaning);
   field.id = id;
   field.dataset.key = key.name;
   field.setAttribute("aria-describedby", meaning.id);
@@ -74,10 +78,26 @@ function chooser(key, meaning) {
   const field = element("select");
   if (key.value === "") field.add(new Option("", "", true, true));
   for (const choice of key.choices) {
-    field.add(new Option(choice.word, choice.word, false, choice.word === key.value));
+    const words = choice.meaning ? `${choice.word}: ${choice.meaning}` : choice.word;
+    field.add(new Option(words, choice.word, false, choice.word === key.value));
     if (choice.word === key.value && choice.meaning) meaning.textContent = `${key.meaning}: ${choice.meaning}`;
   }
   field.addEventListener("change", () => put(key, field.value, true));
+  return field;
+}
+
+/** One of some words, or a sum of them with +. */
+function summed(key, meaning) {
+  const field = typed(key);
+  const list = element("datalist", { id: `words-${key.name.replace(/[^a-z0-9]/gi, "-")}` },
+    ...key.choices.map((choice) => new Option(choice.meaning, choice.word)));
+  field.setAttribute("list", list.id);
+  const terms = key.value.split("+").map((word) => word.trim());
+  const said = key.choices.filter((choice) => terms.includes(choice.word)).map((choice) => choice.meaning);
+  const known = element("details", {}, element("summary", { textContent: "laws" }),
+    element("dl", {}, ...key.choices.flatMap((choice) => [element("dt", { textContent: choice.word }), element("dd", { textContent: choice.meaning })])));
+  meaning.textContent = said.length ? said.join("; ") : key.meaning;
+  meaning.append(known, list);
   return field;
 }
 
@@ -104,7 +124,7 @@ function slider(key, field, words) {
 function put(key, text, finished) {
   if (text === "") delete state.set[key.name];
   else state.set[key.name] = text;
-  state.start = "";
+  state.start = state.follow === "yes" ? now : "";
   changed(key.name, finished);
 }
 

@@ -17,9 +17,16 @@ function label() { play.textContent = moving ? "Pause" : "Play"; }
 label();
 
 /** Takes a new film: heights of the beam, of the surface and of the rest, sample by sample. */
-export function show(next) { film = next; if (!moving) draw(); }
+export function show(next) {
+  // Heights come as whole numbers of a step.
+  const full = (row) => row.map((height) => height * next.step);
+  film = { ...next, beam: next.beam.map(full), apex: full(next.apex), surface: full(next.surface) };
+  if (!moving) draw();
+}
 
-function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+let palette = null;
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = null; });
+function colour(name) { return (palette ??= getComputedStyle(document.documentElement)).getPropertyValue(name).trim(); }
 
 function draw() {
   const ratio = devicePixelRatio || 1;

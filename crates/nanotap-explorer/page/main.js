@@ -2,18 +2,20 @@
 // changes below.
 
 import { state, decode, remember, theCase } from "./state.js";
-import { ask, bytes, superseded } from "./api.js";
+import { ask, bytes, save, superseded } from "./api.js";
 import * as knobs from "./knobs.js";
 import * as lever from "./lever.js";
 import * as figure from "./figure.js";
 import * as study from "./study.js";
 
 const $ = (id) => document.getElementById(id);
+const PATIENCE = 300;          // milliseconds before it is said that there is a wait
 const OFF = "0: off. Few steps show motions that the equations do not have.";
 let about = null;
 let wanted = false;           // a change that came while a motion was under way
 let underway = false;
 let shown = "";               // the case whose knobs stand there
+const redrawn = [];            // what is to be done when figures were drawn anew
 
 export function say(error) {
   const message = $("message");
@@ -27,24 +29,44 @@ export function say(error) {
 export async function refresh() {
   if (underway) { wanted = true; return; }
   underway = true;
-  do {
-    wanted = false;
-    document.body.dataset.busy = "yes";
-    $("busy").textContent = "computing …";
-    try {
-      const motion = await ask("motion", "/api/motion", { case: theCase(), start: state.start, steps: state.steps });
+  document.body.dataset.busy = "yes";
+  const patience = setTimeout(() => { $("busy").textContent = "computing …"; }, PATIENCE);
+  let next = request();
+  while (next) {
+    const { motion, error } = await next;
+    // The server computes the next motion while this one is drawn.
+    next = wanted ? request() : null;
+    if (motion) {
       say(null);
       show(motion);
-    } catch (error) {
-      if (!superseded(error)) say(error);
-    }
-  } while (wanted);
+      study.fill(motion.forms);
+    } else if (state.follow && state.start && /state/.test(error.message)) {
+      // Another number of modes has other states: the motion is looked for from rest then.
+      state.start = "";
+      wanted = true;
+    } else if (!superseded(error)) say(error);
+    if (!next && wanted) next = request();
+  }
+  clearTimeout(patience);
   $("busy").textContent = "";
   document.body.dataset.busy = "no";
   underway = false;
 }
 
+/** The motion at the present knobs, or why there is none. */
+function request() {
+  wanted = false;
+  const wish = { case: theCase(), start: state.start, steps: state.steps, views: motionViews() };
+  return ask("motion", "/api/motion", wish).then((motion) => ({ motion }), (error) => ({ error }));
+}
+
+/** The parts of the motion's figures that are seen. */
+function motionViews() {
+  return Object.fromEntries(["contact", "portrait"].filter((name) => state.views[name]?.length).map((name) => [name, state.views[name]]));
+}
+
 function show(motion) {
+  knobs.follows(motion.start);
   $("summary").textContent = `${motion.title}: ${motion.summary}`;
   // Knobs are made anew where other keys are stated, but not under the hand.
   const keys = state.preset + motion.keys.map((key) => `${key.name}${key.value === ""}${key.choices ? key.value : ""}`).join();
@@ -53,25 +75,38 @@ function show(motion) {
   figure.put($("portrait"), motion.figure);
   figure.put($("contact"), motion.contact);
   lever.show(motion.film);
-  $("observables").tBodies[0].replaceChildren(...motion.observables.map((row) => {
-    const line = document.createElement("tr");
-    const name = document.createElement("th");
-    name.scope = "row";
-    name.textContent = row.words;
-    const value = document.createElement("td");
-    value.textContent = row.shown;
-    value.dataset.observable = row.name;
-    value.dataset.value = row.value;
-    line.append(name, value);
-    return line;
-  }));
+  for (const again of redrawn) again();
+  table(motion.observables);
   $("remarks").textContent = motion.remarks.join(" · ");
   $("spurious").textContent = motion.fixed_step?.words ?? OFF;
   $("fixed").hidden = !motion.fixed_step?.figure;
   if (motion.fixed_step?.figure) figure.put($("fixed"), motion.fixed_step.figure);
   $("command").textContent = motion.command;
   $("python").textContent = motion.python;
-  study.fill(motion.forms);
+}
+
+/** Values change in place; lines are made anew where others are there. */
+function table(rows) {
+  const body = $("observables").tBodies[0];
+  const names = rows.map((row) => row.name).join();
+  if (body.dataset.names !== names) {
+    body.dataset.names = names;
+    body.replaceChildren(...rows.map((row) => {
+      const line = document.createElement("tr");
+      const name = document.createElement("th");
+      name.scope = "row";
+      name.textContent = row.words;
+      const value = document.createElement("td");
+      value.dataset.observable = row.name;
+      line.append(name, value);
+      return line;
+    }));
+  }
+  rows.forEach((row, k) => {
+    const value = body.rows[k].cells[1];
+    value.textContent = row.shown;
+    value.dataset.value = row.value;
+  });
 }
 
 async function census() {
@@ -103,21 +138,14 @@ async function census() {
 
 /** A census is of one case only. */
 function forgetCensus() {
+  if (!$("bound").textContent) return;
   $("attractors").replaceChildren();
   $("bound").textContent = "";
 }
 
-export function save(blob, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}
-
 async function exported(format) {
-  const blob = await bytes("export", "/api/export", { case: theCase(), start: state.start, format });
-  save(blob, format === "toml" ? "case.toml" : `motion.${format}`);
+  const blob = await bytes("export", "/api/export", { case: theCase(), start: state.start, views: motionViews(), figure: $("which").value, format });
+  save(blob, format === "toml" ? "case.toml" : format === "csv" ? "motion.csv" : `${$("which").value}.${format}`);
 }
 
 function takeOver() {
@@ -125,6 +153,7 @@ function takeOver() {
   if (!about.presets.some((p) => p.name === state.preset)) state.preset = about.presets[0].name;
   $("preset").value = state.preset;
   $("steps").value = state.steps;
+  $("follow").checked = state.follow === "yes";
   forgetCensus();
   study.restore();
   refresh();
@@ -137,12 +166,25 @@ async function begin() {
   document.title = `nanotap explorer ${about.version}`;
   for (const preset of about.presets) $("preset").add(new Option(preset.words, preset.name));
   $("preset").addEventListener("change", () => {
-    Object.assign(state, { preset: $("preset").value, set: {}, start: "", study: {} });
+    Object.assign(state, { preset: $("preset").value, set: {}, start: "", study: {}, ran: "", views: {} });
     remember(true);
     takeOver();
   });
-  knobs.onChange((_, finished) => { remember(finished); forgetCensus(); refresh(); });
+  knobs.onChange((_, finished) => {
+    // While a slider moves, the address stands still.
+    if (finished) remember(true);
+    forgetCensus();
+    refresh();
+  });
   $("steps").addEventListener("change", () => { state.steps = Number($("steps").value) || 0; remember(true); refresh(); });
+  $("follow").addEventListener("change", () => { state.follow = $("follow").checked ? "yes" : ""; remember(true); });
+  for (const name of ["contact", "portrait"]) {
+    redrawn.push(figure.alive($(name), {
+      views: () => state.views[name] ?? [],
+      tell: (place) => { $("reading").textContent = place ? figure.words(place) : ""; },
+      zoom: (views) => { state.views[name] = views; remember(true); refresh(); },
+    }));
+  }
   $("census").addEventListener("click", census);
   for (const button of document.querySelectorAll("[data-export]")) {
     button.addEventListener("click", () => exported(button.dataset.export).catch(say));

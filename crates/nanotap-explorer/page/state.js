@@ -1,15 +1,20 @@
 // What the page shows, and the address that holds all of it: a link reproduces a view.
 
-export const state = {
+const empty = () => ({
   preset: "",                 // which case the values start from
   set: {},                    // keys of the case that differ from it: key -> text
   start: "",                  // state at drive phase 0 from which the motion is looked for
+  follow: "",                 // "yes": a turned knob goes on from the motion that is shown
   tab: "diagram",
   steps: 0,                   // Runge-Kutta steps a period of the motion beside; 0: none
   study: {},                  // fields of the study's form: name -> text
-};
+  ran: "",                    // "yes": the study was computed
+  views: {},                  // parts of figures that are seen: name -> list of {panel, x, y}
+});
 
-const FIELDS = ["preset", "start", "tab", "steps"];
+export const state = empty();
+
+const FIELDS = ["preset", "start", "follow", "tab", "steps", "ran"];
 
 /** The fragment of the address that says all of `state`. */
 export function encoded() {
@@ -17,25 +22,34 @@ export function encoded() {
   for (const name of FIELDS) if (state[name]) words.set(name, state[name]);
   for (const [key, value] of Object.entries(state.set)) words.set(`set.${key}`, value);
   for (const [key, value] of Object.entries(state.study)) words.set(`study.${key}`, value);
+  for (const [name, views] of Object.entries(state.views)) {
+    for (const { panel, x, y } of views) words.set(`view.${name}.${panel}`, [...x, ...y].join(","));
+  }
   return words.toString();
 }
 
 /** Takes over what the address says. */
 export function decode(fragment) {
-  const words = new URLSearchParams(fragment.replace(/^#/, ""));
-  Object.assign(state, { preset: "", set: {}, start: "", tab: "diagram", steps: 0, study: {} });
-  for (const [name, value] of words) {
+  Object.assign(state, empty());
+  for (const [name, value] of new URLSearchParams(fragment.replace(/^#/, ""))) {
     if (name.startsWith("set.")) state.set[name.slice(4)] = value;
     else if (name.startsWith("study.")) state.study[name.slice(6)] = value;
+    else if (name.startsWith("view.")) view(name.slice(5).split("."), value.split(",").map(Number));
     else if (name === "steps") state.steps = Math.max(0, Math.min(4000, Number(value) || 0));
     else if (FIELDS.includes(name)) state[name] = value;
   }
 }
 
+function view([name, panel], numbers) {
+  if (numbers.length !== 4 || !numbers.every(Number.isFinite) || !/^\d+$/.test(panel)) return;
+  (state.views[name] ??= []).push({ panel: Number(panel), x: numbers.slice(0, 2), y: numbers.slice(2) });
+}
+
 /** Writes the address: a new entry of the history for a finished change, else in place. */
 export function remember(finished) {
   const address = `${location.pathname}${location.search}#${encoded()}`;
-  if (finished && address !== `${location.pathname}${location.search}${location.hash}`) history.pushState(null, "", address);
+  if (address === `${location.pathname}${location.search}${location.hash}`) return;
+  if (finished) history.pushState(null, "", address);
   else history.replaceState(null, "", address);
 }
 

@@ -2,7 +2,7 @@
 // to the motion there.
 
 import { state, remember, theCase } from "./state.js";
-import { stream, stop, superseded } from "./api.js";
+import { ask, bytes, save, stream, stop, superseded } from "./api.js";
 import * as figure from "./figure.js";
 
 const $ = (id) => document.getElementById(id);
@@ -10,11 +10,17 @@ const TABS = {
   diagram: "Diagram", branches: "Branches", resonance: "Resonance", approach: "Approach",
   basin: "Basins", map: "Two parameters",
 };
+const NEAR = 0.05;            // parts of a panel within which a click means what is drawn there
 let forms = null;
 let filled = "";              // the form that stands there
-let gone = () => {};
-let place = null;             // of the cross
+let drawnFor = "";            // what the figure was computed for
+let number = 0;               // under which the server keeps the figure
 let clicks = null;
+let gone = () => {};
+let redrawn = () => {};
+
+const views = () => state.views.study ?? [];
+const asked = () => JSON.stringify([state.preset, state.tab, state.study]);
 
 /** `motionChanged` is called when a click went to another motion. */
 export function begin(motionChanged) {
@@ -23,7 +29,14 @@ export function begin(motionChanged) {
     const tab = document.createElement("button");
     Object.assign(tab, { type: "button", id: `tab-${name}`, textContent: words });
     tab.setAttribute("role", "tab");
-    tab.addEventListener("click", () => { state.tab = name; state.study = {}; restore(); fill(forms); remember(true); });
+    tab.setAttribute("aria-controls", "study-panel");
+    tab.addEventListener("click", () => {
+      Object.assign(state, { tab: name, study: {}, ran: "" });
+      delete state.views.study;
+      restore();
+      fill(forms);
+      remember(true);
+    });
     $("tabs").append(tab);
   }
   $("tabs").addEventListener("keydown", (event) => {
@@ -34,26 +47,24 @@ export function begin(motionChanged) {
     next.focus();
     next.click();
   });
-  const drawn = $("study-figure");
-  $("study-form").addEventListener("submit", (event) => { event.preventDefault(); compute(); });
-  drawn.addEventListener("pointermove", (event) => { place = figure.under(drawn, event.clientX, event.clientY); hover(); });
-  drawn.addEventListener("click", (event) => { place = figure.under(drawn, event.clientX, event.clientY); go(); });
-  drawn.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-    if (step) { place = figure.moved(drawn, place, step); hover(); event.preventDefault(); }
-    if (event.key === "Enter") go();
+  $("study-form").addEventListener("submit", (event) => { event.preventDefault(); state.ran = "yes"; remember(true); compute(); });
+  redrawn = figure.alive($("study-figure"), {
+    views,
+    tell: (place) => { $("hover").textContent = place ? `${figure.words(place)}${nearest(place) ? ": a motion is drawn here" : ""}` : ""; },
+    go,
+    zoom: (next) => { state.views.study = next; remember(true); look(); },
   });
-  $("save-study").addEventListener("click", () => {
-    const text = new XMLSerializer().serializeToString(drawn.querySelector("svg:not(.cross)"));
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
-    link.download = `${state.tab}.svg`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  });
+  for (const button of document.querySelectorAll("[data-study-export]")) {
+    button.addEventListener("click", async () => {
+      const format = button.dataset.studyExport;
+      try {
+        save(await bytes("export", "/api/figure", { number, views: views(), format }), `${state.tab}.${format}`);
+      } catch (error) { if (!superseded(error)) $("progress").textContent = error.message; }
+    });
+  }
 }
 
-/** Shows the tab of the state, without a figure. */
+/** Shows the tab of the state. */
 export function restore() {
   if (!(state.tab in TABS)) state.tab = "diagram";
   for (const tab of $("tabs").children) {
@@ -61,22 +72,17 @@ export function restore() {
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
   }
+  $("study-panel").setAttribute("aria-labelledby", `tab-${state.tab}`);
   filled = "";
 }
 
-/** Makes the form of the tab, its first values those of the server. */
+/** Makes the form of the tab, its first values those of the server. A figure that was computed for
+ *  this very form stays; one that the address says was computed is computed again. */
 export function fill(next) {
   forms = next;
-  const now = `${state.preset} ${state.tab}`;
+  const now = asked();
   if (now === filled) return;
   filled = now;
-  stop("study");
-  $("study-figure").replaceChildren();
-  $("study-export").hidden = true;
-  $("progress").textContent = "";
-  $("hover").textContent = "";
-  clicks = null;
-  place = null;
   const form = $("study-form");
   form.replaceChildren(...forms[state.tab].map((field) => {
     const label = document.createElement("label");
@@ -84,47 +90,68 @@ export function fill(next) {
     const input = document.createElement(field.choices ? "select" : "input");
     for (const choice of field.choices ?? []) input.add(new Option(choice, choice));
     Object.assign(input, { name: field.name, value: state.study[field.name] ?? field.value });
-    if (!field.choices) Object.assign(input, { size: 10, placeholder: field.hint ?? "" });
-    input.addEventListener("change", () => { state.study[field.name] = input.value; remember(true); });
+    if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: field.hint ?? "" });
+    input.addEventListener("change", () => { state.study[field.name] = input.value; filled = asked(); remember(true); });
     label.append(input);
     return label;
   }));
-  const compute = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compute" });
+  const compute_ = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compute" });
   const end = Object.assign(document.createElement("button"), { type: "button", textContent: "Stop" });
   end.addEventListener("click", () => stop("study"));
-  form.append(compute, end);
+  form.append(compute_, end);
+  if (drawnFor === now) { look(); return; }
+  stop("study");
+  drawnFor = "";
+  clicks = null;
+  $("study-figure").replaceChildren();
+  $("study-export").hidden = true;
+  $("progress").textContent = "";
+  $("hover").textContent = "";
+  if (state.ran === "yes") compute();
 }
 
 async function compute() {
   const options = Object.fromEntries(new FormData($("study-form")));
   $("progress").textContent = "computing …";
-  const begun = `${state.preset} ${state.tab}`;
+  const begun = asked();
+  drawnFor = begun;
   try {
-    await stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options }, (message) => {
-      if (begun !== filled) return;
-      figure.put($("study-figure"), message.figure);
+    await stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options }, async (message) => {
+      if (drawnFor !== begun) return;
+      number = message.number;
       clicks = message.clicks;
       $("progress").textContent = message.words;
       $("study-command").textContent = message.command;
+      $("study-python").textContent = message.python;
       $("study-export").hidden = false;
+      if (views().length) look();
+      else draw(message.figure);
     });
   } catch (error) {
-    if (begun === filled) $("progress").textContent = superseded(error) ? "stopped" : error.message;
+    if (drawnFor === begun) $("progress").textContent = superseded(error) ? "stopped" : error.message;
   }
 }
 
-function hover() {
-  const drawn = $("study-figure");
-  figure.cross(drawn, place);
-  const words = (axis) => `${place.panel[axis].label.replaceAll("$", "")} ${Number(place[axis].toPrecision(6))} ${place.panel[axis].unit}`.trim();
-  $("hover").textContent = place ? `${words("x")}, ${words("y")}; a click or Enter goes there` : "";
+function draw(drawn) {
+  figure.put($("study-figure"), drawn);
+  redrawn();
+}
+
+/** Draws the part of the figure that is to be seen. */
+async function look() {
+  if (!number || !drawnFor) return;
+  try {
+    draw(await ask("look", "/api/figure", { number, views: views() }));
+  } catch (error) {
+    if (!superseded(error)) $("progress").textContent = error.message;
+  }
 }
 
 /** Sets what the axes say, and shows the motion there. */
-function go() {
-  if (!place || !clicks) return;
+function go(place) {
+  if (!clicks) return;
+  const orbit = nearest(place);
   state.start = "";
-  const orbit = clicks.near ? nearest(clicks.near) : null;
   for (const [axis, key] of Object.entries(clicks.set ?? {})) {
     const value = (orbit && axis === "x" ? orbit[0] : place[axis]) / key.factor;
     state.set[key.name] = `${orbit ? value : Number(value.toPrecision(7))}${key.unit ? ` ${key.unit}` : ""}`;
@@ -135,15 +162,19 @@ function go() {
   gone();
 }
 
-/** The drawn orbit that is nearest to the cross, if one is near. */
-function nearest(orbits) {
-  const { panel } = place;
-  const part = (axis, v) => (v - panel[axis].from) / (panel[axis].to - panel[axis].from);
+/** The drawn motion that is nearest to a place, if one is near: [x, heights by panel, start]. */
+function nearest(place) {
+  const { panel, u, v } = place;
+  const index = $("study-figure").panels.indexOf(panel);
   let best = null;
-  let least = 0.05;
-  for (const orbit of orbits) {
-    const distance = Math.hypot(part("x", orbit[0]) - part("x", place.x), part("y", orbit[1]) - part("y", place.y));
-    if (distance < least) { least = distance; best = orbit; }
+  let least = NEAR;
+  for (const orbit of clicks?.near ?? []) {
+    const across = Math.abs(figure.part(panel.x, orbit[0]) - u);
+    if (across >= least) continue;
+    for (const height of orbit[1][index] ?? []) {
+      const distance = Math.hypot(across, figure.part(panel.y, height) - v);
+      if (distance < least) { least = distance; best = orbit; }
+    }
   }
   return best;
 }

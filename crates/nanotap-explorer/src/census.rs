@@ -34,7 +34,7 @@ pub(crate) async fn attractors(
 ) -> Result<Json<Value>, Refusal> {
     let shared = Arc::clone(&app);
     app.workers
-        .run(move |control| listed(&shared, &census, control))
+        .run_long(move |control| listed(&shared, &census, control))
         .await
         .map(Json)
 }
@@ -52,12 +52,12 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Re
         if let Some(orbit) = &one.orbit {
             return Some(entry(orbit, None, &share));
         }
-        let wandering = one.wandering.as_ref()?;
+        let non_periodic = one.non_periodic.as_ref()?;
         let name = one.classification.name();
         Some(json!({
             "words": format!("{name}, {share}"),
-            "start": Start::text(None, &wandering.state),
-            "amplitude": wandering.observables.amplitude,
+            "start": Start::text(None, &non_periodic.state),
+            "amplitude": non_periodic.observables.amplitude,
         }))
     });
     let unstable = found.unstable.iter().flatten();

@@ -10,12 +10,12 @@ use axum::response::{IntoResponse as _, Response};
 use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
-use nanotap_figures::{DPI, Figure};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::App;
 use crate::answer::Refusal;
+use crate::figures::{picture, viewed};
 use crate::motion::{Asked, Motion, Start, model_of};
 use crate::preset::Wanted;
 
@@ -68,25 +68,16 @@ fn exported(
         "contact" => motion.contact_figure(&model, &case),
         _ => motion.figure(&model, &case),
     };
+    let place = if wish.figure == "contact" {
+        "contact"
+    } else {
+        "portrait"
+    };
+    let figure = match asked.views.get(place) {
+        Some(views) => viewed(figure, views),
+        None => figure,
+    };
     picture(&figure, &wish.format)
-}
-
-/// A figure in a format by its ending.
-pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Vec<u8>), Refusal> {
-    Ok(match format {
-        "svg" => (
-            "image/svg+xml",
-            figure.to_svg().map_err(Refusal::of)?.into_bytes(),
-        ),
-        "png" => ("image/png", figure.to_png(DPI).map_err(Refusal::of)?),
-        "pdf" => ("application/pdf", figure.to_pdf().map_err(Refusal::of)?),
-        other => {
-            return Err(Refusal::input(
-                format!("there is no format `{other}`"),
-                "there are svg, png, pdf, csv and toml",
-            ));
-        }
-    })
 }
 
 /// The time series of one repetition, in the model's units.
@@ -187,4 +178,30 @@ pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Re
     Ok(format!(
         "import nanotap\n\ncase = nanotap.Case.from_file({path:?})\nmotion = nanotap.{study}(case{options})\n"
     ))
+}
+
+/// The lines of Python that give the same studies.
+pub(crate) fn study_python(
+    app: &App,
+    case: &Wanted,
+    studies: &[(&str, &Map<String, Value>)],
+) -> Result<String, Refusal> {
+    let path = case_path(app, case)?;
+    let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?})\n");
+    for (name, request) in studies {
+        let _ = write!(text, "{name} = nanotap.{name}(case");
+        for (option, value) in *request {
+            // `from` is a word of the language.
+            let option = if option == "from" { "from_" } else { option };
+            let value = match value {
+                Value::Bool(true) => "True".to_owned(),
+                Value::Bool(false) => "False".to_owned(),
+                Value::Null => "None".to_owned(),
+                other => other.to_string(),
+            };
+            let _ = write!(text, ", {option}={value}");
+        }
+        text.push_str(")\n");
+    }
+    Ok(text)
 }

@@ -15,6 +15,8 @@ const INSTANTS: usize = 90;
 const ALONG: usize = 33;
 /// Length of the tip as it is drawn, as a part of the range of heights.
 const TIP: f64 = 0.18;
+/// Steps in the range of heights, more than a screen has points.
+const STEPS: f64 = 5000.0;
 
 /// What the page draws, instant by instant. Heights are over the undeformed sample, in the
 /// model's unit of length; the beam is lifted by the length of the tip as drawn.
@@ -22,10 +24,12 @@ const TIP: f64 = 0.18;
 pub(crate) struct Film {
     /// Drive periods shown; then it begins again.
     periods: usize,
+    /// What the whole numbers below count, in the model's unit of length.
+    step: f64,
     /// Heights along the beam, clamp to free end; of an oscillator its mass, a constant.
-    beam: Vec<Vec<f32>>,
-    apex: Vec<f32>,
-    surface: Vec<f32>,
+    beam: Vec<Vec<i32>>,
+    apex: Vec<i32>,
+    surface: Vec<i32>,
     contact: Vec<u8>,
     /// Least and greatest height.
     range: [f64; 2],
@@ -77,8 +81,8 @@ pub(crate) fn film(
         }
         base = (base.0 + clamp, base.1 + 1.0);
         beam.push(heights);
-        apex.push(*height as f32);
-        surface.push(dent as f32);
+        apex.push(*height);
+        surface.push(dent);
         contact.push(u8::from(touching));
     })
     .map_err(Refusal::of)?;
@@ -86,6 +90,8 @@ pub(crate) fn film(
     beam.truncate(periods * INSTANTS);
     let tip = TIP * (high - low).max(f64::MIN_POSITIVE);
     let height = high - low;
+    let step = (height + tip) / STEPS;
+    let whole = |height: f64| (height / step).round() as i32;
     let scale = match case.units().si(Kind::Length) {
         Some(metres) => Kind::Length.format_digits(metres * height, 3),
         None => format!("{} g0", Kind::Number.format_digits(height, 3)),
@@ -94,10 +100,11 @@ pub(crate) fn film(
         periods,
         beam: beam
             .into_iter()
-            .map(|heights| heights.into_iter().map(|h| (h + tip) as f32).collect())
+            .map(|heights| heights.into_iter().map(|h| whole(h + tip)).collect())
             .collect(),
-        apex,
-        surface,
+        apex: apex.into_iter().map(whole).collect(),
+        surface: surface.into_iter().map(whole).collect(),
+        step,
         contact,
         range: [low, high + tip],
         rest: base.0 / f64::max(base.1, 1.0) + tip,

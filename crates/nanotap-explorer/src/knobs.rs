@@ -4,6 +4,8 @@ use nanotap::case::key::{ModelKind, Section, Takes};
 use nanotap::case::physical::Catalogue;
 use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key, quantity::Kind};
+use nanotap::model::contact::ContactLaw;
+use nanotap_volterra::laws::TABLE;
 use serde::Serialize;
 
 /// A key of the case as the page shows it.
@@ -22,6 +24,8 @@ pub(crate) struct Knob {
     /// What it may be, where it takes one of some words.
     #[serde(skip_serializing_if = "Option::is_none")]
     choices: Option<Vec<Choice>>,
+    /// Whether it may be a sum of such words.
+    sums: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     slider: Option<Slider>,
 }
@@ -117,13 +121,14 @@ fn knob(case: &Case, base: &Case, key: Key) -> Knob {
         number,
         unit,
         choices,
+        sums: matches!(key.entry().takes, Takes::Law),
         slider,
     }
 }
 
 /// Without the last digits, which changes of unit spoil.
 fn rounded(number: f64) -> f64 {
-    format!("{number:.12e}").parse().unwrap_or(number)
+    format!("{number:.7e}").parse().unwrap_or(number)
 }
 
 /// The word that a key has.
@@ -153,21 +158,44 @@ fn choices(key: Key) -> Option<Vec<Choice>> {
         };
         words.into_iter().map(choice).collect()
     };
+    let linear = ContactLaw::ALL.iter().map(|law| Choice {
+        word: law.name().to_owned(),
+        meaning: format!("{}: F = {}", law.meaning(), formula(*law)),
+    });
     Some(match key.entry().takes {
-        Takes::Word(_) if matches!(key, Key::Contact | Key::SampleLaw) => {
-            nanotap::model::contact::ContactLaw::ALL
-                .iter()
-                .map(|law| Choice {
-                    word: law.name().to_owned(),
-                    meaning: law.meaning().to_owned(),
-                })
-                .collect()
-        }
+        Takes::Word(_) if key == Key::Contact => linear.collect(),
         Takes::Word(words) => plain(words.iter().map(|word| (*word).to_owned()).collect()),
-        Takes::LeverName => plain(catalogue.levers().map(|l| l.name.clone()).collect()),
+        Takes::Law => linear
+            .chain(TABLE.iter().map(|law| Choice {
+                word: law.entry.name.to_owned(),
+                meaning: format!("{}: F = {}", law.entry.words, law.entry.formula),
+            }))
+            .collect(),
+        Takes::LeverName => catalogue
+            .levers()
+            .map(|lever| Choice {
+                word: lever.name.clone(),
+                meaning: format!(
+                    "k = {}, f0 = {}",
+                    Kind::Stiffness.format_digits(lever.k, 3),
+                    Kind::Frequency.format_digits(lever.f0, 3)
+                ),
+            })
+            .collect(),
         Takes::MaterialName => plain(catalogue.materials().map(|m| m.name.clone()).collect()),
         _ => return None,
     })
+}
+
+/// The force of a linear contact on the tip.
+const fn formula(law: ContactLaw) -> &'static str {
+    match law {
+        ContactLaw::SpringDamper => "−(K1 h + C1 dh/dt) at heights h < 0, none above",
+        ContactLaw::KelvinVoigt => "−(K1 h + C1 dh/dt) while this pushes, then none",
+        ContactLaw::StandardLinearSolid => {
+            "−K1 h + Fm, Fm + τm dFm/dt = −km τm dh/dt, while this pushes, then none"
+        }
+    }
 }
 
 /// Around a value above zero its eighth to its eightfold; else both signs, or up from zero.

@@ -9,10 +9,14 @@
 mod answer;
 mod assets;
 mod census;
+mod clicks;
 mod export;
+mod figures;
 mod film;
+mod forms;
 mod guard;
 mod knobs;
+mod maps;
 mod motion;
 mod preset;
 mod scratch;
@@ -30,6 +34,7 @@ use nanotap::Error;
 use tokio::net::TcpListener;
 use tokio::sync::Notify;
 
+use crate::figures::Shelf;
 use crate::preset::Preset;
 use crate::scratch::Scratch;
 use crate::work::Workers;
@@ -54,11 +59,13 @@ pub(crate) struct App {
     pub(crate) port: u16,
     pub(crate) presets: Vec<Preset>,
     pub(crate) workers: Workers,
+    /// Figures of studies that may be asked for again.
+    pub(crate) figures: Shelf,
     /// Where datasets of studies stand while their figures are drawn.
     pub(crate) scratch: PathBuf,
 }
 
-/// Serves the explorer until Ctrl-C; `ready` gets the address to open.
+/// Serves the explorer until Ctrl-C or the system's wish that it ends; `ready` gets the address to open.
 ///
 /// # Errors
 /// When the case cannot be read or the port not be listened on.
@@ -90,6 +97,7 @@ pub fn serve(options: &Options, ready: impl FnOnce(&str)) -> Result<(), Error> {
             port,
             presets,
             workers: Workers::default(),
+            figures: Shelf::default(),
             scratch: scratch.path().to_owned(),
         });
         tokio::select! {
@@ -110,6 +118,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/api/motion", post(motion::motion))
         .route("/api/attractors", post(census::attractors))
         .route("/api/study", post(study::study))
+        .route("/api/figure", post(figures::figure))
         .route("/api/export", post(export::export))
         .layer(DefaultBodyLimit::max(LONGEST_REQUEST))
         .layer(axum::middleware::from_fn_with_state(

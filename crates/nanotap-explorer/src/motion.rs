@@ -23,9 +23,10 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::answer::Refusal;
+use crate::figures::{Views, drawn, viewed};
 use crate::film::film;
 use crate::preset::Wanted;
-use crate::{App, export, knobs, study};
+use crate::{App, export, forms, knobs};
 
 /// Most modes of a motion that follows a dragged knob.
 const MOST_MODES: usize = 20;
@@ -45,6 +46,9 @@ pub(crate) struct Asked {
     /// Runge–Kutta steps a period of the motion beside it; 0: none.
     #[serde(default)]
     pub(crate) steps: u32,
+    /// Which parts of the figures are to be seen.
+    #[serde(default)]
+    pub(crate) views: Views,
 }
 
 /// Where a motion is looked for.
@@ -205,11 +209,12 @@ fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refu
         "remarks": remarks,
         "keys": knobs::of(&case, &base),
         "observables": rows(&case, motion.observables()),
-        "figure": drawn(&motion.figure(&model, &case))?,
-        "contact": drawn(&motion.contact_figure(&model, &case))?,
+        "start": Start::text(None, motion.state()),
+        "figure": unlettered(motion.figure(&model, &case), &asked.views, "portrait")?,
+        "contact": unlettered(motion.contact_figure(&model, &case), &asked.views, "contact")?,
         "film": film(&case, &model, motion.state(), motion.periods())?,
         "fixed_step": fixed_step(&case, &model, asked.steps, start.state)?,
-        "forms": study::forms(&case, &base, &model),
+        "forms": forms::forms(&case, &base, &model),
         "command": export::command(app, asked, motion.study())?,
         "python": export::python(app, asked, motion.study())?,
     }))
@@ -228,10 +233,13 @@ pub(crate) fn model_of(case: &Case) -> Result<Model, Refusal> {
     case.model().map_err(Refusal::of)
 }
 
-/// A figure as the page takes it.
-pub(crate) fn drawn(figure: &Figure) -> Result<Value, Refusal> {
-    let (svg, map) = figure.to_svg_with_map().map_err(Refusal::of)?;
-    Ok(json!({ "svg": svg, "map": map }))
+/// The page says what a figure is about; letters are for what is published.
+fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, Refusal> {
+    let figure = figure.letters(false);
+    match views.get(name) {
+        Some(views) => drawn(&viewed(figure, views)),
+        None => drawn(&figure),
+    }
 }
 
 /// Every observable that the motion has and that is one number: as the terminal's `--json` has
@@ -253,6 +261,7 @@ fn rows(case: &Case, observables: &Observables) -> Vec<Value> {
                     let number = Kind::Number.format_digits(value, 5);
                     match dimension.model_unit() {
                         "1" => number,
+                        "1/drive period" => format!("{number} per drive period"),
                         unit => format!("{number} {unit}"),
                     }
                 }

@@ -37,7 +37,7 @@ impl Preset {
 }
 
 /// The built-in ones: name, words, text, what is set.
-const BUILT_IN: [(&str, &str, &str, &[&str]); 8] = [
+const BUILT_IN: [(&str, &str, &str, &[&str]); 13] = [
     (
         "paper",
         "The paper's case at Ω = 3",
@@ -78,6 +78,36 @@ const BUILT_IN: [(&str, &str, &str, &[&str]); 8] = [
         "two-modes",
         "Two modes of a lever",
         include_str!("../../../docs/cases/two-modes.toml"),
+        &[],
+    ),
+    (
+        "dmt",
+        "DMT forces, in air",
+        include_str!("../../../docs/cases/dforce-dmt.toml"),
+        &[],
+    ),
+    (
+        "hertz",
+        "Hertz contact, in air",
+        include_str!("../../../docs/cases/dforce-hertz.toml"),
+        &[],
+    ),
+    (
+        "bistable",
+        "Two states in attraction and repulsion",
+        include_str!("../../../docs/cases/bistable-lever.toml"),
+        &[],
+    ),
+    (
+        "capillary",
+        "A capillary bridge",
+        include_str!("../../../docs/cases/capillary-bridge.toml"),
+        &[],
+    ),
+    (
+        "liquid",
+        "Kelvin–Voigt sample in a liquid",
+        include_str!("../../../docs/cases/liquid-kelvin-voigt.toml"),
         &[],
     ),
     (

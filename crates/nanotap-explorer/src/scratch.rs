@@ -2,8 +2,13 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use nanotap::Error;
+
+/// How often and after which pause a folder is tried to be removed.
+const ATTEMPTS: usize = 20;
+const PAUSE: Duration = Duration::from_millis(25);
 
 /// A folder of this process alone.
 pub(crate) struct Scratch(PathBuf);
@@ -31,7 +36,15 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What cannot be removed is left to the system, which empties that folder.
-        let _ = std::fs::remove_dir_all(&self.0);
+        // Work that was stopped may write one last file. What cannot be removed is left to the
+        // system, which empties that folder.
+        for _ in 0..ATTEMPTS {
+            match std::fs::remove_dir_all(&self.0) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    std::thread::sleep(PAUSE);
+                }
+                _ => return,
+            }
+        }
     }
 }

@@ -8,19 +8,16 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use nanotap::case::quantity::Kind;
-use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::figure::approach::approach_figure;
-use nanotap::figure::branch::case_figure;
-use nanotap::model::Model;
+use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::observe::time_series::state_names;
 use nanotap::study::approach::{ApproachRequest, ApproachStudy};
-use nanotap::study::branch::{BranchRequest, BranchStudy, PointReport};
+use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy};
 use nanotap::study::registry::{Study as _, study as study_named};
 use nanotap::study::request::read;
-use nanotap::study::start_box::default_box;
 use nanotap::study::sweep::{figure as sweep_figure, response_figure};
 use nanotap::study::{basin, sweep::Over};
 use nanotap_figures::Figure;
@@ -29,9 +26,11 @@ use serde_json::{Map, Value, json};
 
 use crate::App;
 use crate::answer::Refusal;
-use crate::export::study_command;
-use crate::knobs;
-use crate::motion::{Start, drawn, model_of};
+use crate::clicks::{self, Axis, Height};
+use crate::export::{study_command, study_python};
+use crate::figures::drawn;
+use crate::maps::{self, Shows};
+use crate::motion::{Start, model_of};
 use crate::preset::Wanted;
 use crate::scratch::Scratch;
 
@@ -45,6 +44,10 @@ const BASIN: [usize; 3] = [40, 120, 300];
 const APPROACH: [usize; 2] = [40, 150];
 /// Values at which a census is taken in the stages of a diagram of branches.
 const BRANCHES: [usize; 2] = [5, 15];
+/// Values at which a census is taken for branches that are drawn over another figure.
+const OVERLAID: usize = 7;
+/// What the panels of an approach show.
+const APPROACH_SHOWS: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
 /// Starts at each value of a diagram, and of a map.
 const STARTS: (usize, usize) = (6, 3);
 /// Drive periods recorded at each value.
@@ -99,16 +102,19 @@ struct Stage<'a> {
     figure: Figure,
     clicks: &'a Value,
     words: String,
-    /// Name and request of the study.
-    study: (&'a str, &'a Map<String, Value>),
+    /// Names and requests of the studies that it shows.
+    studies: &'a [Asking<'a>],
 }
+
+/// A study by its name, and what it is asked for.
+type Asking<'a> = (&'a str, &'a Map<String, Value>);
 
 impl Studied<'_> {
     fn run(&self) -> Result<(), Refusal> {
         match self.asked.tab {
-            Tab::Diagram => self.sweep(&DIAGRAM, &[""], STARTS.0, false),
-            Tab::Resonance => self.sweep(&DIAGRAM[..2], &[""], 0, true),
-            Tab::Map => self.sweep(&MAP, &["1", "2"], STARTS.1, false),
+            Tab::Diagram => self.sweep(&DIAGRAM, STARTS.0, false),
+            Tab::Resonance => self.sweep(&DIAGRAM[..2], 0, true),
+            Tab::Map => self.map(),
             Tab::Branches => self.branches(),
             Tab::Approach => self.approach(),
             Tab::Basin => self.basin(),
@@ -133,12 +139,17 @@ impl Studied<'_> {
     }
 
     fn hand(&self, stage: &Stage<'_>) -> Result<(), Refusal> {
-        let (name, request) = stage.study;
+        let case = &self.asked.case;
+        let command = |(name, request): &Asking<'_>| study_command(self.app, case, name, request);
+        let commands = stage.studies.iter().map(command);
+        let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
         (self.hand_over)(json!({
             "figure": drawn(&stage.figure)?,
+            "number": self.app.figures.put(stage.figure.clone()),
             "clicks": stage.clicks,
             "words": stage.words,
-            "command": study_command(self.app, &self.asked.case, name, request)?,
+            "command": commands.join("\n"),
+            "python": study_python(self.app, case, stage.studies)?,
         }));
         Ok(())
     }
@@ -170,63 +181,124 @@ impl Studied<'_> {
         use_it(&store)
     }
 
-    fn sweep(
-        &self,
-        stages: &[usize],
-        parameters: &[&str],
-        starts: usize,
-        response: bool,
-    ) -> Result<(), Refusal> {
+    /// A diagram or a resonance curve, then the branches over it.
+    fn sweep(&self, stages: &[usize], starts: usize, response: bool) -> Result<(), Refusal> {
         let case = self.asked.case.case(self.app, self.control)?;
         model_of(&case)?;
+        let (draw, names): (fn(&Store) -> _, &[&str]) = if response {
+            (response_figure, &["first_harmonic", "phase"])
+        } else {
+            (sweep_figure, &["tip_max"])
+        };
         for (stage, &count) in stages.iter().enumerate() {
-            let over: Vec<(String, Over)> = parameters
-                .iter()
-                .map(|which| self.over(&case, which, count))
-                .collect::<Result<_, _>>()?;
-            let texts: Vec<&String> = over.iter().map(|(text, _)| text).collect();
-            let mut request = object(json!({ "over": texts, "periods": RECORDED, "strobe": 1 }));
+            let (text, over) = self.over(&case, "", count)?;
+            let mut request = object(json!({ "over": [text], "periods": RECORDED, "strobe": 1 }));
             if response {
                 request.insert("follow".into(), "both".into());
             } else {
                 request.insert("starts".into(), starts.into());
             }
-            let axes: Vec<Axis> = over.iter().map(|(_, over)| Axis::of(over)).collect();
-            // Of two parameters, the first is a line of the map: its vertical axis.
-            let clicks = match axes.as_slice() {
-                [x] => json!({ "set": { "x": x.json() } }),
-                [y, x] => json!({ "set": { "x": x.json(), "y": y.json() } }),
-                _ => Value::Null,
-            };
-            let draw = if response {
-                response_figure
-            } else {
-                sweep_figure
-            };
-            let figure = self.dataset(&case, "sweep", &request, |store| {
-                draw(store).map_err(Refusal::of)
+            let x = Axis::of(&over);
+            let (mut figure, mut near) = self.dataset(&case, "sweep", &request, |store| {
+                let figure = draw(store).map_err(Refusal::of)?;
+                let heights = Height::of(&figure, names);
+                let near = clicks::in_sweep(store, x, &heights, response).map_err(Refusal::of)?;
+                Ok((figure, near))
             })?;
-            let finest = stages[stages.len() - 1];
-            let power = parameters.len() as u32;
+            let last = stage + 1 == stages.len();
+            let hand = |figure: &Figure, near: &[Value], words, studies: &[Asking<'_>]| {
+                self.hand(&Stage {
+                    figure: figure.clone(),
+                    clicks: &json!({ "set": { "x": x.json() }, "near": near }),
+                    words,
+                    studies,
+                })
+            };
+            let words = progress(count, stages[stages.len() - 1], "values");
+            let swept = ("sweep", &request);
+            if !last {
+                hand(&figure, &near, words, &[swept])?;
+                if self.stopped(stage, stages.len()) {
+                    break;
+                }
+                continue;
+            }
+            hand(
+                &figure,
+                &near,
+                format!("{count} values; following branches …"),
+                &[swept],
+            )?;
+            if self.cancelled() {
+                break;
+            }
+            let (report, followed) = self.followed(&case, &over, OVERLAID)?;
+            let heights = Height::of(&figure, names);
+            clicks::drawn_over(&mut figure, &report, x, &heights, &case.units());
+            near.extend(clicks::on_branches(&report, x, &heights, &case.units()));
+            let words = format!(
+                "{count} values and {} orbits on branches",
+                report.points.len()
+            );
+            hand(&figure, &near, words, &[swept, ("branch", &followed)])?;
+        }
+        Ok(())
+    }
+
+    /// What there is over two parameters.
+    fn map(&self) -> Result<(), Refusal> {
+        let case = self.asked.case.case(self.app, self.control)?;
+        model_of(&case)?;
+        let shows = self.field("show").ok().and_then(Shows::named);
+        for (stage, &count) in MAP.iter().enumerate() {
+            let over = [self.over(&case, "1", count)?, self.over(&case, "2", count)?];
+            let texts: Vec<&String> = over.iter().map(|(text, _)| text).collect();
+            let request = object(
+                json!({ "over": texts, "periods": RECORDED, "strobe": 1, "starts": STARTS.1 }),
+            );
+            let [x, y] = [&over[0].1, &over[1].1].map(|over| Axis::of(over).json());
+            let figure = self.dataset(&case, "sweep", &request, |store| {
+                maps::figure(store, shows.unwrap_or_default()).map_err(Refusal::of)
+            })?;
+            let finest = MAP[MAP.len() - 1];
             self.hand(&Stage {
                 figure,
-                clicks: &clicks,
-                words: progress(count.pow(power), finest.pow(power), "values"),
-                study: ("sweep", &request),
+                clicks: &json!({ "set": { "x": x, "y": y } }),
+                words: progress(count.pow(2), finest.pow(2), "values"),
+                studies: &[("sweep", &request)],
             })?;
-            if self.stopped(stage, stages.len()) {
+            if self.stopped(stage, MAP.len()) {
                 break;
             }
         }
         Ok(())
     }
 
+    /// The branches over a parameter through what censuses at so many values find.
+    fn followed(
+        &self,
+        case: &Case,
+        over: &Over,
+        values: usize,
+    ) -> Result<(BranchReport, Map<String, Value>), Refusal> {
+        let request = object(json!({
+            "parameter": over.key.path(),
+            "from": self.field("from")?,
+            "to": self.field("to")?,
+            "diagram": true,
+            "values": values,
+        }));
+        let asked: BranchRequest = read(Value::Object(request.clone()))?;
+        Ok((BranchStudy::run(case, &asked, self.control)?, request))
+    }
+
     fn stopped(&self, stage: usize, stages: usize) -> bool {
-        let cancelled = self
-            .control
-            .cancel
-            .is_some_and(|c| c.load(Ordering::Relaxed));
-        cancelled || stage + 1 == stages
+        self.cancelled() || stage + 1 == stages
+    }
+
+    fn cancelled(&self) -> bool {
+        let cancel = self.control.cancel;
+        cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
     fn branches(&self) -> Result<(), Refusal> {
@@ -234,25 +306,17 @@ impl Studied<'_> {
         model_of(&case)?;
         let (_, over) = self.over(&case, "", 2)?;
         for (stage, &values) in BRANCHES.iter().enumerate() {
-            let request = object(json!({
-                "parameter": over.key.path(),
-                "from": self.field("from")?,
-                "to": self.field("to")?,
-                "diagram": true,
-                "values": values,
-            }));
-            let asked: BranchRequest = read(Value::Object(request.clone()))?;
-            let report = BranchStudy::run(&case, &asked, self.control)?;
+            let (report, request) = self.followed(&case, &over, values)?;
             let axis = Axis::of(&over);
-            let clicks = json!({
-                "set": { "x": axis.json() },
-                "near": near(&report.points, axis.factor),
-            });
+            let figure = case_figure(&case, &report, None);
+            let shown = Shown::usual(&case).observable().map_or("", |o| o.name);
+            let heights = Height::of(&figure, &[shown]);
+            let near = clicks::on_branches(&report, axis, &heights, &case.units());
             self.hand(&Stage {
-                figure: case_figure(&case, &report, None),
-                clicks: &clicks,
+                figure,
+                clicks: &json!({ "set": { "x": axis.json() }, "near": near }),
                 words: progress(values, BRANCHES[BRANCHES.len() - 1], "censuses"),
-                study: ("branch", &request),
+                studies: &[("branch", &request)],
             })?;
             if self.stopped(stage, BRANCHES.len()) {
                 break;
@@ -284,11 +348,14 @@ impl Studied<'_> {
                     factor,
                 },
             };
+            let figure = approach_figure(&report, &units);
+            let heights = Height::of(&figure, &APPROACH_SHOWS);
+            let near = clicks::of_approach(&report, factor, &heights, &units);
             self.hand(&Stage {
-                figure: approach_figure(&report, &units),
-                clicks: &json!({ "set": { "x": axis.json() } }),
+                figure,
+                clicks: &json!({ "set": { "x": axis.json() }, "near": near }),
                 words: progress(points, APPROACH[APPROACH.len() - 1], "distances each way"),
-                study: ("approach", &request),
+                studies: &[("approach", &request)],
             })?;
             if self.stopped(stage, APPROACH.len()) {
                 break;
@@ -334,7 +401,7 @@ impl Studied<'_> {
                 figure,
                 clicks: &json!({ "start": start }),
                 words: progress(count, BASIN[BASIN.len() - 1], "points each way"),
-                study: ("basin", &request),
+                studies: &[("basin", &request)],
             })?;
             if self.stopped(stage, BASIN.len()) {
                 break;
@@ -354,133 +421,4 @@ fn object(value: Value) -> Map<String, Value> {
         Value::Object(map) => map,
         _ => Map::new(),
     }
-}
-
-/// An axis of a figure on which a click sets a key.
-struct Axis {
-    key: Key,
-    /// What values of the key, in SI, are multiplied with to be drawn.
-    factor: f64,
-}
-
-impl Axis {
-    fn of(over: &Over) -> Self {
-        let kind = over.key.kind();
-        let (from, to) = (over.from, over.to);
-        let factor = if over.key.is_physical() && kind != Kind::Number {
-            prefixed(kind, 1.0, from.abs().max(to.abs())).0
-        } else {
-            1.0
-        };
-        Self {
-            key: over.key,
-            factor,
-        }
-    }
-
-    fn json(&self) -> Value {
-        let physical = self.key.is_physical() && self.key.kind() != Kind::Number;
-        let unit = if physical {
-            self.key.kind().si_unit()
-        } else {
-            ""
-        };
-        json!({ "name": self.key.path(), "factor": self.factor, "unit": unit })
-    }
-}
-
-/// Where the orbits of a diagram are, as drawn, with what starts them.
-fn near(points: &[PointReport], factor: f64) -> Vec<Value> {
-    points
-        .iter()
-        .map(|point| {
-            json!([
-                factor * point.parameter,
-                point.observables.tip_max,
-                Start::text(Some(point.period), &point.state)
-            ])
-        })
-        .collect()
-}
-
-/// The fields of the forms with their first values.
-pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
-    let keys: Vec<Key> = knobs::keys(case)
-        .filter(|key| key.cannot_vary().is_none() && case.get(*key).is_finite())
-        .filter(|key| !case.is_physical() || key.is_physical())
-        .collect();
-    let choices: Vec<Value> = keys.iter().map(|key| json!(key.path())).collect();
-    let named = |names: &[Key]| {
-        let of_names = names.iter().copied().find(|key| keys.contains(key));
-        of_names.or_else(|| keys.first().copied())
-    };
-    let frequency = named(&[
-        Key::Omega,
-        Key::OscillatorOmega,
-        Key::DriveFrequency,
-        Key::DriveFrequencyRatio,
-    ]);
-    let second = named(&[
-        Key::Alpha4,
-        Key::GapTip,
-        Key::DriveFreeAmplitude,
-        Key::Restitution,
-        Key::StopStiffness,
-    ]);
-    let parameter = |which: &str, key: Option<Key>, reach: f64| {
-        let [from, to] = key.map_or_else(Default::default, |key| ends(base, key, reach));
-        vec![
-            json!({ "name": format!("key{which}"), "words": "parameter", "choices": choices, "value": key.map_or("", Key::path) }),
-            json!({ "name": format!("from{which}"), "words": "from", "value": from }),
-            json!({ "name": format!("to{which}"), "words": "to", "value": to }),
-        ]
-    };
-    let names = state_names(model);
-    let sides = default_box(model).ok();
-    let entry = |which: &str, k: usize| {
-        let side = sides
-            .as_ref()
-            .and_then(|sides| Some((*sides.lower().get(k)?, *sides.upper().get(k)?)))
-            .unwrap_or((-1.0, 1.0));
-        let short = |v: f64| Kind::Number.format_digits(v, 3);
-        vec![
-            json!({ "name": format!("entry{which}"), "words": "coordinate", "choices": names, "value": names.get(k) }),
-            json!({ "name": format!("from{which}"), "words": "from", "value": short(side.0) }),
-            json!({ "name": format!("to{which}"), "words": "to", "value": short(side.1) }),
-        ]
-    };
-    let velocity = (names.len() - model.memory) / 2;
-    // A lever of high Q answers in a narrow band.
-    let band = case.physical().map_or(0.25, |view| {
-        (4.0 / view.lever.quality_factor).clamp(1e-3, 0.25)
-    });
-    let plane = [parameter("1", second, 0.5), parameter("2", frequency, 0.25)].concat();
-    let slice = [entry("x", 0), entry("y", velocity)].concat();
-    json!({
-        "diagram": parameter("", frequency, 0.25),
-        "branches": parameter("", frequency, 0.25),
-        "resonance": parameter("", frequency, band),
-        "approach": [
-            json!({ "name": "from", "words": "from", "value": "", "hint": "clear of the sample" }),
-            json!({ "name": "to", "words": "to", "value": "", "hint": "0" }),
-        ],
-        "map": plane,
-        "basin": slice,
-    })
-}
-
-/// A range around the value of a key, as it is typed.
-fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {
-    let value = base.get(key);
-    let value = if value.is_finite() {
-        value
-    } else {
-        key.entry().example
-    };
-    let reach = if value == 0.0 {
-        1.0
-    } else {
-        reach * value.abs()
-    };
-    [value - reach, value + reach].map(|value| key.kind().format_digits(value, 5))
 }

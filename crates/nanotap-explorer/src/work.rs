@@ -56,12 +56,27 @@ fn control(stop: &AtomicBool) -> Control<'_> {
 }
 
 impl Workers {
-    /// Runs `work` and waits for what it gives.
+    /// Runs `work` that follows a dragged knob, and waits for what it gives.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Refusal> {
-        let place = Arc::clone(&self.motions).acquire_owned().await;
+        Self::run_in(&self.motions, work).await
+    }
+
+    /// Runs `work` that may take long, beside the studies.
+    pub(crate) async fn run_long<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
+    ) -> Result<T, Refusal> {
+        Self::run_in(&self.studies, work).await
+    }
+
+    async fn run_in<T: Send + 'static>(
+        places: &Arc<Semaphore>,
+        work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
+    ) -> Result<T, Refusal> {
+        let place = Arc::clone(places).acquire_owned().await;
         let stop = Arc::new(AtomicBool::new(false));
         let _guard = StopOnDrop(Arc::clone(&stop));
         let task = tokio::task::spawn_blocking(move || {

@@ -6,7 +6,8 @@ use crate::{Complex, Flow, FlowError};
 use nalgebra::{DMatrix, DVector};
 
 /// Carries `∂q/∂x₀` along a flow, in modal coordinates: a column for each
-/// component of the initial state.
+/// component of the initial state. The default is empty: [`Jacobian::begin`] makes it the
+/// identity.
 #[derive(Clone, Debug)]
 pub struct Jacobian {
     /// `[Re; Im]` of `∂q/∂x₀`, `2m × n`.
@@ -16,22 +17,38 @@ pub struct Jacobian {
     scratch: Vec<Complex>,
 }
 
+impl Default for Jacobian {
+    fn default() -> Self {
+        Self {
+            columns: DMatrix::zeros(0, 0),
+            next: DMatrix::zeros(0, 0),
+            scratch: Vec::new(),
+        }
+    }
+}
+
 impl Jacobian {
     /// The identity, for a flow that is in `regime`.
     pub fn identity(regime: &Regime) -> Self {
+        let mut identity = Self::default();
+        identity.begin(regime);
+        identity
+    }
+
+    /// Becomes the identity, for a flow that is in `regime`.
+    pub fn begin(&mut self, regime: &Regime) {
         let left = &regime.basis().left;
         let (m, n) = left.shape();
-        let mut columns = DMatrix::zeros(2 * m, n);
-        columns
-            .view_mut((0, 0), (m, n))
-            .copy_from(&left.map(|z| z.re));
-        columns
-            .view_mut((m, 0), (m, n))
-            .copy_from(&left.map(|z| z.im));
-        Self {
-            next: columns.clone(),
-            columns,
-            scratch: Vec::new(),
+        if self.columns.shape() != (2 * m, n) {
+            self.columns = DMatrix::zeros(2 * m, n);
+        }
+        let columns = self.columns.as_mut_slice().chunks_exact_mut(2 * m);
+        for (column, left) in columns.zip(left.as_slice().chunks_exact(m)) {
+            let (real, imaginary) = column.split_at_mut(m);
+            for ((re, im), z) in real.iter_mut().zip(imaginary).zip(left) {
+                *re = z.re;
+                *im = z.im;
+            }
         }
     }
 
@@ -40,12 +57,13 @@ impl Jacobian {
         let right = &regime.basis().right;
         let (n, m) = right.shape();
         jacobian.fill(0.0);
-        for j in 0..self.columns.ncols() {
-            for k in 0..m {
-                let (re, im) = (self.columns[(k, j)], self.columns[(m + k, j)]);
-                for i in 0..n {
-                    let r = right[(i, k)];
-                    jacobian[(i, j)] += r.re * re - r.im * im;
+        let columns = self.columns.as_slice().chunks_exact(2 * m);
+        for (out, column) in jacobian.as_mut_slice().chunks_exact_mut(n).zip(columns) {
+            let (real, imaginary) = column.split_at(m);
+            let modes = right.as_slice().chunks_exact(n);
+            for ((re, im), mode) in real.iter().zip(imaginary).zip(modes) {
+                for (out, r) in out.iter_mut().zip(mode) {
+                    *out += r.re * re - r.im * im;
                 }
             }
         }

@@ -3,7 +3,7 @@
 
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
-use super::laboratory::{Counted, Laboratory};
+use super::runs::{Counted, Runs};
 use super::section::{Section, Table};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
@@ -70,10 +70,7 @@ impl Coexistence {
 }
 
 /// Every attractor of the cases of Figs. 6–17.
-pub(super) fn section(
-    laboratory: &Laboratory<'_>,
-    mut section: Section,
-) -> Result<Section, PaperError> {
+pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, PaperError> {
     let mut table = Table::new(
         "Every attractor found, from seeded starts in a box that fits the case",
         [
@@ -93,12 +90,12 @@ pub(super) fn section(
         let mut agreeing = Vec::new();
         let mut evidence = String::new();
         let mut again = String::new();
-        for modes in 1..=laboratory.either(MOST_MODES, 3) {
+        for modes in 1..=runs.either(MOST_MODES, 3) {
             let case = Cantilever::paper()
                 .with_modes(modes)
                 .with(Parameter::Omega, claim.omega)
                 .with(Parameter::Alpha1, claim.alpha1);
-            let counted = laboratory.count(&case)?;
+            let counted = runs.count(&case)?;
             rows(&mut table, &counted)?;
             kinds.push(format!("N = {modes}: {}", counted.kinds().join(", ")));
             if claim.holds(&counted) {

@@ -7,8 +7,8 @@ use nanotap_figures::{Figure, Panel};
 
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
-use super::laboratory::{Counted, Laboratory, how_many};
 use super::motion_view::{KEY, View, empty_portrait};
+use super::runs::{Counted, Runs, how_many};
 use super::section::{Picture, Section};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
@@ -29,12 +29,12 @@ struct Reading {
 }
 
 impl Reading {
-    fn new(laboratory: &Laboratory<'_>, omega: f64) -> Result<Self, PaperError> {
+    fn new(runs: &Runs<'_>, omega: f64) -> Result<Self, PaperError> {
         let case = Cantilever::paper()
             .with(Parameter::Alpha1, 0.0)
             .with(Parameter::Omega, omega);
-        let counted = laboratory.count(&case)?;
-        let orbits = laboratory.orbits(&counted, LONGEST, 256)?;
+        let counted = runs.count(&case)?;
+        let orbits = runs.orbits(&counted, LONGEST, 256)?;
         Ok(Self { counted, orbits })
     }
 
@@ -99,10 +99,10 @@ impl Reading {
 }
 
 impl Bare {
-    fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
+    fn new(runs: &Runs<'_>) -> Result<Self, PaperError> {
         Ok(Self {
-            fast: Reading::new(laboratory, 20.0)?,
-            slow: Reading::new(laboratory, 2.6)?,
+            fast: Reading::new(runs, 20.0)?,
+            slow: Reading::new(runs, 2.6)?,
         })
     }
 
@@ -174,8 +174,8 @@ fn picture(
 }
 
 /// Fig. 15.
-pub(super) fn fig15(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let bare = Bare::new(laboratory)?;
+pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let bare = Bare::new(runs)?;
     let kinds = |r: &Reading| r.counted.kinds().join(", ");
     // The captions' reading is the better one if only there a subharmonic attracts.
     let subharmonic = |r: &Reading| {
@@ -233,8 +233,8 @@ pub(super) fn fig15(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
 }
 
 /// Fig. 16.
-pub(super) fn fig16(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let bare = Bare::new(laboratory)?;
+pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let bare = Bare::new(runs)?;
     let shown = match (bare.fast.best(2), bare.slow.best(2)) {
         (Some(orbit), _) => (&bare.fast, orbit, 2, "The period-2 orbit."),
         (None, Some(orbit)) => (&bare.slow, orbit, 2, "The period-2 orbit."),
@@ -285,8 +285,8 @@ pub(super) fn fig16(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
 }
 
 /// Fig. 17.
-pub(super) fn fig17(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let bare = Bare::new(laboratory)?;
+pub(super) fn fig17(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let bare = Bare::new(runs)?;
     let stable: Vec<&PeriodicOrbit> = bare
         .fast
         .counted
@@ -304,7 +304,7 @@ pub(super) fn fig17(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
     if rows.is_empty() {
         rows.push(None);
     }
-    let tip = laboratory.count(&Cantilever::paper())?;
+    let tip = runs.count(&Cantilever::paper())?;
     let with_tip = tip.stable(4).is_empty();
     Ok(section
         .picture(picture(

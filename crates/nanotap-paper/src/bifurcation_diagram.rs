@@ -8,7 +8,7 @@ use nanotap_figures::{
 use super::check::{Check, Verdict};
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::frequency_sweep::{Column, Kind, draw, spaced, stretches, sweep, where_seen};
-use super::laboratory::{Laboratory, SEED};
+use super::runs::{Runs, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::Case;
@@ -30,37 +30,34 @@ const ENTRY: f64 = 3.5;
 const ENTRY_TWO: f64 = 2.75;
 
 /// Fig. 5.
-pub(super) fn section(
-    laboratory: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
-    let (count, starts) = (laboratory.either(400, 40), laboratory.either(8, 2));
+pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let (count, starts) = (runs.either(400, 40), runs.either(8, 2));
     let case = Cantilever::paper();
     let subject = Case::from(case.clone());
     let wide = sweep(
-        laboratory,
+        runs,
         &subject,
         OMEGA,
         &spaced(RANGE.0, RANGE.1, count),
         starts,
     )?;
-    let close_count = laboratory.either(181, 20);
+    let close_count = runs.either(181, 20);
     let close = sweep(
-        laboratory,
+        runs,
         &subject,
         OMEGA,
         &spaced(CLOSE.0, CLOSE.1, close_count),
         starts,
     )?;
     let window = sweep(
-        laboratory,
+        runs,
         &subject,
         OMEGA,
-        &spaced(WINDOW.0, WINDOW.1, laboratory.either(31, 4)),
+        &spaced(WINDOW.0, WINDOW.1, runs.either(31, 4)),
         starts,
     )?;
-    let one = FollowedBranch::from_rest(laboratory, &subject, (ENTRY, 1), RANGE)?;
-    let two = FollowedBranch::from_rest(laboratory, &subject, (ENTRY_TWO, 2), CLOSE)?;
+    let one = FollowedBranch::from_rest(runs, &subject, (ENTRY, 1), RANGE)?;
+    let two = FollowedBranch::from_rest(runs, &subject, (ENTRY_TWO, 2), CLOSE)?;
     let mut table = Table::new(
         format!(
             "What attracts, N = 3, {starts} seeded starts a value of Ω; shorter stretches than five values left out"
@@ -99,13 +96,7 @@ pub(super) fn section(
             RANGE.1
         ),
     );
-    let beyond = sweep(
-        laboratory,
-        &subject,
-        OMEGA,
-        &inside_the_tori(&one),
-        starts.max(4),
-    )?;
+    let beyond = sweep(runs, &subject, OMEGA, &inside_the_tori(&one), starts.max(4))?;
     let checks = [
         subharmonics(&wide, [&one, &two], &again),
         nonperiodic_window(&window, &close, &window_again),

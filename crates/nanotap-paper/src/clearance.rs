@@ -3,7 +3,7 @@
 
 use super::check::{Check, Verdict, digits};
 use super::damped_limit::response;
-use super::laboratory::Laboratory;
+use super::runs::Runs;
 use super::section::{Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
@@ -24,10 +24,7 @@ struct Row {
 }
 
 /// Fig. 2f.
-pub(super) fn section(
-    laboratory: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
+pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let mut rows = Vec::new();
     let undamped = Cantilever::paper_eq24();
     let (model, orbit) = response(&undamped)?;
@@ -48,7 +45,7 @@ pub(super) fn section(
         let case = Cantilever::paper()
             .with(Parameter::Omega, omega)
             .with(Parameter::Alpha1, alpha1);
-        let counted = laboratory.count(&case)?;
+        let counted = runs.count(&case)?;
         for (orbit, _) in counted.all_stable() {
             let motion = format!("period {}", orbit.period);
             rows.extend(row(
@@ -61,7 +58,7 @@ pub(super) fn section(
             )?);
         }
         for chaos in counted.chaos() {
-            let watched = laboratory.either(WATCHED, 50);
+            let watched = runs.either(WATCHED, 50);
             rows.extend(row(
                 figure,
                 "chaos".into(),

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::check::{Check, Verdict, digits};
 use super::damped_limit::response;
-use super::laboratory::Laboratory;
 use super::motion_view::View;
+use super::runs::Runs;
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
@@ -32,11 +32,8 @@ struct Response {
 }
 
 /// Fig. 4.
-pub(super) fn section(
-    laboratory: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
-    let most = laboratory.either(MOST, 8);
+pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let most = runs.either(MOST, 8);
     let responses: Vec<Response> = (1..=most)
         .into_par_iter()
         .map(|modes| {
@@ -107,7 +104,7 @@ pub(super) fn section(
              the damped case (Eq. 26) becomes when the damping is taken away, solved for by shooting. All its \
              multipliers lie on the unit circle: it neither attracts nor repels.",
         )
-        .picture(overlay(&responses, laboratory)?)
+        .picture(overlay(&responses, runs)?)
         .picture(convergence(&responses, &to, most))
         .table(table)
         .check(
@@ -188,7 +185,7 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn overlay(responses: &[Response], laboratory: &Laboratory<'_>) -> Result<Picture, PaperError> {
+fn overlay(responses: &[Response], runs: &Runs<'_>) -> Result<Picture, PaperError> {
     let time = || Axis::linear("time $τ / T$ (drive periods)").tight();
     let tip = || Axis::linear("tip deflection $W$");
     let mut periodic = Panel::new(time(), tip())
@@ -218,11 +215,7 @@ fn overlay(responses: &[Response], laboratory: &Laboratory<'_>) -> Result<Pictur
                 .label(format!("N = {}", r.modes))
         };
         periodic = periodic.with(style(view.tip_line()));
-        let rest = View::new(
-            &model,
-            &vec![0.0; model.dimension()],
-            laboratory.either(RUN, 8),
-        )?;
+        let rest = View::new(&model, &vec![0.0; model.dimension()], runs.either(RUN, 8))?;
         from_rest = from_rest.with(style(rest.tip_line()));
     }
     Ok(Picture::new(

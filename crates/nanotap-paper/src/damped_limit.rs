@@ -1,7 +1,7 @@
 //! The periodic response of an undamped case: there is no attractor to wait for, so the
 //! damped one of Eq. (26) is followed by Newton while all damping is taken away.
 
-use nanotap_dynamics::{SettleOptions, ShootingOptions, Verdict, close_orbit, settle};
+use nanotap_dynamics::{ClassifyOptions, MotionKind, ShootingOptions, classify, close_orbit};
 
 use super::PaperError;
 use nanotap::model::Model;
@@ -35,9 +35,9 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
     };
     let model = damped(1.0)?;
     let rest = vec![0.0; model.dimension()];
-    let settled = settle(&mut Strobe::new(&model), &rest, &SettleOptions::default());
-    let (Verdict::Periodic(mut orbit) | Verdict::TransientChaos { mut orbit, .. }) =
-        settled.verdict
+    let classified = classify(&mut Strobe::new(&model), &rest, &ClassifyOptions::default());
+    let (MotionKind::Periodic(mut orbit) | MotionKind::TransientChaos { mut orbit, .. }) =
+        classified.kind
     else {
         return Err(failed("the damped motion is not periodic".into()));
     };

@@ -1,7 +1,7 @@
 //! The numbers of Eqs. (7), (14), (23), (25) and of section 4's ten samples.
 
 use super::check::{Check, Verdict, digits, rounds_to};
-use super::laboratory::Laboratory;
+use super::runs::Runs;
 use super::section::{Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::physical::sample::{Elastic, reduced_modulus};
@@ -12,7 +12,7 @@ use nanotap::study::modes::ModeTable;
 
 /// Eq. (7): α3 and α6 as printed are not pure numbers.
 #[allow(clippy::unnecessary_wraps)] // One signature for every section.
-pub(super) fn damping_units(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn damping_units(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let lever = DampedLever {
         length: 100e-6,
         mass: 1e-7,
@@ -76,10 +76,7 @@ impl DampedLever {
 }
 
 /// Eq. (14): the printed cosine term lacks the Ω of Eq. (6). Does it matter?
-pub(super) fn cosine_term(
-    laboratory: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
+pub(super) fn cosine_term(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let mut table = Table::new(
         "Attractors with the cosine term of Eq. (6) and with that printed in Eq. (14)",
         ["N", "Ω", "α₁", "Eq. (6)", "Eq. (14) as printed"],
@@ -89,8 +86,8 @@ pub(super) fn cosine_term(
         let case = Cantilever::paper()
             .with(Parameter::Omega, omega)
             .with(Parameter::Alpha1, alpha1);
-        let corrected = laboratory.count(&case)?;
-        let printed = laboratory.count(&Cantilever {
+        let corrected = runs.count(&case)?;
+        let printed = runs.count(&Cantilever {
             cosine_term: CosineTerm::Printed,
             ..case.clone()
         })?;
@@ -133,10 +130,7 @@ pub(super) fn cosine_term(
 }
 
 /// Eq. (23).
-pub(super) fn bare_frequencies(
-    _: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
+pub(super) fn bare_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let exact = exact_beam::frequencies(0.0, 0.0, 3).map_err(nanotap::model::ModelError::from)?;
     let printed = [(3.52, 2), (22.03, 2), (61.7, 1)];
     let holds = agree(&exact, &printed);
@@ -162,10 +156,7 @@ const MOST_MODES: usize = 10;
 const EQ25: [(f64, i32); 3] = [(7.79, 2), (20.33, 2), (55.81, 2)];
 
 /// Eq. (25).
-pub(super) fn contact_frequencies(
-    _: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
+pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let table_of = |modes: usize| {
         ModeTable::new(&Cantilever::paper_eq24().with_modes(modes)).map_err(|error| {
             PaperError::Failed {
@@ -313,7 +304,7 @@ const SILICON: Elastic = Elastic {
 
 /// Section 4: α4 of ten samples from Hertz's contact.
 #[allow(clippy::unnecessary_wraps)] // One signature for every section.
-pub(super) fn samples(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn samples(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let (low, high) = slopes(|modulus| modulus);
     let rigid = low <= high;
     // With the tip's own compliance there must be one Poisson ratio for all.
@@ -404,7 +395,7 @@ fn slopes(modulus_of: impl Fn(f64) -> f64) -> (f64, f64) {
 }
 
 /// Section 3: with α5 = 0 nothing depends on the size of the motion.
-pub(super) fn scaling(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     use nanotap_dynamics::StroboscopicMap as _;
     let map_of = |alpha2: f64| -> Result<_, PaperError> {
         let case = Cantilever::paper().with(Parameter::Alpha2, alpha2);

@@ -8,9 +8,9 @@ use nanotap_figures::{Axis, Colour, Figure, Legend, Line, Markers, Panel};
 
 use super::PaperError;
 use super::check::{Check, Verdict, digits, rounds_to};
-use super::laboratory::{Counted, Laboratory, how_many};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
+use super::runs::{Counted, Runs, how_many};
 use super::section::{Picture, Section};
 use super::time_step::{GridMotion, Scan, fast_case};
 use nanotap::model::cantilever::{Cantilever, CantileverError};
@@ -30,8 +30,8 @@ struct Fast {
 }
 
 impl Fast {
-    fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
-        let counted = laboratory.count(&fast_case(3))?;
+    fn new(runs: &Runs<'_>) -> Result<Self, PaperError> {
+        let counted = runs.count(&fast_case(3))?;
         let attractor = counted
             .all_stable()
             .first()
@@ -45,7 +45,7 @@ impl Fast {
         Ok(Self {
             counted,
             attractor,
-            scan: laboratory.spurious()?,
+            scan: runs.spurious()?,
         })
     }
 
@@ -141,10 +141,10 @@ fn below(motion: Option<&GridMotion>) -> String {
 }
 
 /// Fig. 8.
-pub(super) fn fig8(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let fast = Fast::new(laboratory)?;
+pub(super) fn fig8(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let fast = Fast::new(runs)?;
     let look = fast.counted.look(&fast.attractor)?.observables;
-    let single = laboratory.count(&fast_case(1))?;
+    let single = runs.count(&fast_case(1))?;
     let found = fast.counted.stable(1).len();
     let one_mode = fast.scan.exact_amplitude(1).unwrap_or(f64::NAN);
     let matches = rounds_to(one_mode, 0.145, 3);
@@ -228,13 +228,13 @@ pub(super) fn fig8(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
             ))
             .rerun(again),
         )
-        .check(less_distorted(laboratory, &fast)?))
+        .check(less_distorted(runs, &fast)?))
 }
 
 /// "Compared with Ω = 2.6, the period-1 motions at Ω = 20 are much less distorted."
-fn less_distorted(laboratory: &Laboratory<'_>, fast: &Fast) -> Result<Check, PaperError> {
-    let slow = laboratory.count(&Cantilever::paper())?;
-    let orbits = laboratory.orbits(&slow, 1, 64)?;
+fn less_distorted(runs: &Runs<'_>, fast: &Fast) -> Result<Check, PaperError> {
+    let slow = runs.count(&Cantilever::paper())?;
+    let orbits = runs.orbits(&slow, 1, 64)?;
     let at_slow = orbits.iter().find(|o| o.period == 1);
     let at_slow = at_slow.map(|o| slow.look(o)).transpose()?;
     let here = fast.counted.look(&fast.attractor)?.spectrum.thd;
@@ -255,8 +255,8 @@ fn less_distorted(laboratory: &Laboratory<'_>, fast: &Fast) -> Result<Check, Pap
 }
 
 /// Fig. 9.
-pub(super) fn fig9(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let fast = Fast::new(laboratory)?;
+pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let fast = Fast::new(runs)?;
     let grid = fast.scan.subharmonic(0.148);
     let found = fast.counted.stable(1).len();
     let from_one = fast
@@ -319,17 +319,17 @@ struct LongPeriod {
 }
 
 fn long_period(
-    laboratory: &Laboratory<'_>,
+    runs: &Runs<'_>,
     section: Section,
     figure: &LongPeriod,
 ) -> Result<Section, PaperError> {
-    let fast = Fast::new(laboratory)?;
+    let fast = Fast::new(runs)?;
     let (period, amplitude) = (figure.period, figure.amplitude);
     let grid = fast
         .scan
         .nearest(Some(period), amplitude, figure.claimed - 1);
     let found = fast.counted.stable(period).len();
-    let orbits = laboratory.orbits(&fast.counted, period, 0)?;
+    let orbits = runs.orbits(&fast.counted, period, 0)?;
     let unstable = orbits.iter().filter(|o| o.period == period).count();
     let spurious = fast.scan.of_period(period);
     let look = fast.counted.look(&fast.attractor)?.observables;
@@ -368,7 +368,7 @@ fn long_period(
 }
 
 /// Fig. 10.
-pub(super) fn fig10(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         name: "fig10",
         id: "fig10",
@@ -377,11 +377,11 @@ pub(super) fn fig10(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
         claimed: 1,
         amplitude: 1.18,
     };
-    long_period(laboratory, section, &figure)
+    long_period(runs, section, &figure)
 }
 
 /// Fig. 11.
-pub(super) fn fig11(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         name: "fig11",
         id: "fig11",
@@ -390,11 +390,11 @@ pub(super) fn fig11(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
         claimed: 1,
         amplitude: 1.45,
     };
-    long_period(laboratory, section, &figure)
+    long_period(runs, section, &figure)
 }
 
 /// Fig. 12.
-pub(super) fn fig12(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         name: "fig12",
         id: "fig12",
@@ -403,11 +403,11 @@ pub(super) fn fig12(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
         claimed: 1,
         amplitude: 0.34,
     };
-    long_period(laboratory, section, &figure)
+    long_period(runs, section, &figure)
 }
 
 /// Fig. 13.
-pub(super) fn fig13(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn fig13(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         name: "fig13",
         id: "fig13",
@@ -416,12 +416,12 @@ pub(super) fn fig13(laboratory: &Laboratory<'_>, section: Section) -> Result<Sec
         claimed: 2,
         amplitude: 0.245,
     };
-    long_period(laboratory, section, &figure)
+    long_period(runs, section, &figure)
 }
 
 /// Fig. 14.
-pub(super) fn fig14(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let fast = Fast::new(laboratory)?;
+pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let fast = Fast::new(runs)?;
     let grid = fast.scan.nearest(None, 1.3, 0);
     let rest = vec![0.0; fast.counted.model.dimension()];
     let nonperiodic = !fast.counted.chaos().is_empty();

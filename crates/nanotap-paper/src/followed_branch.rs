@@ -2,13 +2,13 @@
 //! sections ask of it: its extrema, its bifurcations, where it attracts.
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, ContinuationOptions, Direction, PeriodicOrbit,
-    SettleOptions, Verdict as Settled, continue_orbit, settle,
+    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationOptions, Direction,
+    MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
 };
 
 use super::PaperError;
 use super::frequency_sweep::maxima;
-use super::laboratory::Laboratory;
+use super::runs::Runs;
 use super::section::Table;
 use nanotap::case::{Case, Key};
 use nanotap::model::strobe::Strobe;
@@ -36,22 +36,22 @@ struct Point {
 impl FollowedBranch {
     /// Follows the orbit of `period` on which a run from rest settles at Ω = `entry`.
     pub(super) fn from_rest(
-        laboratory: &Laboratory<'_>,
+        runs: &Runs<'_>,
         case: &Case,
         (entry, period): (f64, usize),
         range: (f64, f64),
     ) -> Result<Self, PaperError> {
         let model = case.with(OMEGA, entry).model()?;
-        let settled = settle(
+        let classified = classify(
             &mut Strobe::new(&model),
             &vec![0.0; model.dimension()],
-            &SettleOptions::default(),
+            &ClassifyOptions::default(),
         );
-        match settled.verdict {
+        match classified.kind {
             Settled::Periodic(orbit) | Settled::TransientChaos { orbit, .. }
                 if orbit.period == period =>
             {
-                Self::from_orbit(laboratory, case, entry, &orbit, range)
+                Self::from_orbit(runs, case, entry, &orbit, range)
             }
             _ => Err(PaperError::Failed {
                 what: format!("the period-{period} branch"),
@@ -62,7 +62,7 @@ impl FollowedBranch {
 
     /// Follows `orbit`, which exists at Ω = `entry`.
     pub(super) fn from_orbit(
-        laboratory: &Laboratory<'_>,
+        runs: &Runs<'_>,
         case: &Case,
         entry: f64,
         orbit: &PeriodicOrbit,
@@ -71,14 +71,13 @@ impl FollowedBranch {
         let family = case.family(OMEGA);
         let options = ContinuationOptions::over(range.0, range.1);
         let follow = |direction| -> Result<Branch, PaperError> {
-            laboratory
-                .controlled(|control| {
-                    continue_orbit(&family, entry, orbit, direction, &options, control)
-                })
-                .map_err(|error| PaperError::Failed {
-                    what: format!("the period-{} branch from Ω = {entry}", orbit.period),
-                    why: error.to_string(),
-                })
+            runs.controlled(|control| {
+                continue_orbit(&family, entry, orbit, direction, &options, control)
+            })
+            .map_err(|error| PaperError::Failed {
+                what: format!("the period-{} branch from Ω = {entry}", orbit.period),
+                why: error.to_string(),
+            })
         };
         let (down, up) = (
             follow(Direction::Decreasing)?,

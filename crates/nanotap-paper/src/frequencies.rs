@@ -3,7 +3,7 @@
 use nanotap_figures::{Axis, Figure, Line, Panel, Rule};
 
 use super::check::{Check, Verdict, digits};
-use super::laboratory::Laboratory;
+use super::runs::Runs;
 use super::section::{Picture, Section};
 use super::{PaperError, rerun};
 use nanotap::model::beam::Modes;
@@ -13,7 +13,7 @@ use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::ModeTable;
 
 /// Fig. 2e.
-pub(super) fn mode_shapes(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn mode_shapes(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     const POINTS: usize = 401;
     let beam =
         Modes::new(3).map_err(|e| nanotap::model::ModelError::from(CantileverError::from(e)))?;
@@ -68,7 +68,7 @@ const STIFFNESSES: (f64, f64) = (1e-2, 1e3);
 const POINTS: usize = 241;
 
 /// Fig. 3.
-pub(super) fn maps(_: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
+pub(super) fn maps(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let failed = |error: CantileverError| PaperError::from(nanotap::model::ModelError::from(error));
     let bare = exact_beam::frequencies(0.0, 0.0, 2).map_err(failed)?;
     let at = |alpha1: f64, alpha4: f64| exact_beam::frequencies(alpha1, alpha4, 2).map_err(failed);

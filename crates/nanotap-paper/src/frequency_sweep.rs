@@ -1,14 +1,14 @@
 //! What attracts at each drive frequency, from several starts: the columns of a
 //! bifurcation diagram, of the cantilever or of an oscillator.
 
-use nanotap_dynamics::{LyapunovOptions, PeriodicOrbit, SettleOptions, Verdict, settle};
+use nanotap_dynamics::{ClassifyOptions, LyapunovOptions, MotionKind, PeriodicOrbit, classify};
 use nanotap_figures::{Colour, Panel, Points};
 use nanotap_flow::Trajectory;
 use nanotap_flow::trajectory::PiecewiseSignal;
 use rayon::prelude::*;
 
 use super::PaperError;
-use super::laboratory::{Laboratory, SEED};
+use super::runs::{Runs, SEED};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::strobe::Strobe;
@@ -83,14 +83,14 @@ pub(super) fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
 
 /// The columns at `values` of a parameter, from `starts` starts each.
 pub(super) fn sweep(
-    laboratory: &Laboratory<'_>,
+    runs: &Runs<'_>,
     subject: &Case,
     key: Key,
     values: &[f64],
     starts: usize,
 ) -> Result<Vec<Column>, PaperError> {
     let done = std::sync::atomic::AtomicUsize::new(0);
-    laboratory.controlled(|control| {
+    runs.controlled(|control| {
         values
             .par_iter()
             .map(|&value| {
@@ -109,8 +109,8 @@ pub(super) fn sweep(
 }
 
 /// Budgets small enough for thousands of starts: exponents to a hundredth, tori to six digits.
-fn budgets() -> SettleOptions {
-    SettleOptions {
+fn budgets() -> ClassifyOptions {
+    ClassifyOptions {
         max_period: LONGEST,
         max_transient: 512,
         lyapunov: LyapunovOptions {
@@ -122,7 +122,7 @@ fn budgets() -> SettleOptions {
         },
         birkhoff_periods: 1024,
         torus_digits: 6.0,
-        ..SettleOptions::default()
+        ..ClassifyOptions::default()
     }
 }
 
@@ -136,14 +136,14 @@ fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> 
     let budgets = budgets();
     let mut motions: Vec<Seen> = Vec::new();
     for start in area.starts(SEED, starts) {
-        let settled = settle(&mut map, &start, &budgets);
-        let (kind, orbit) = match settled.verdict {
-            Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } => {
+        let classified = classify(&mut map, &start, &budgets);
+        let (kind, orbit) = match classified.kind {
+            MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
                 (Kind::Periodic(orbit.period), Some(orbit))
             }
-            Verdict::QuasiPeriodic(_) => (Kind::Torus, None),
-            Verdict::Chaotic(_) => (Kind::Chaos, None),
-            Verdict::Unbounded | Verdict::Undecided { .. } => (Kind::Undecided, None),
+            MotionKind::QuasiPeriodic(_) => (Kind::Torus, None),
+            MotionKind::Chaotic(_) => (Kind::Chaos, None),
+            MotionKind::Unbounded | MotionKind::Undecided { .. } => (Kind::Undecided, None),
         };
         let known = motions.iter().any(|m| match (&m.orbit, &orbit) {
             (Some(a), Some(b)) => a.is_same_as(b),
@@ -153,7 +153,7 @@ fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> 
         if !known {
             let (state, periods) = match &orbit {
                 Some(orbit) => (&orbit.states[0], orbit.period),
-                None => (&settled.state, SHOWN),
+                None => (&classified.state, SHOWN),
             };
             let maxima = maxima(&model, state, periods)?;
             motions.push(Seen {
@@ -319,12 +319,12 @@ mod tests {
                 .with(nanotap::model::parameter::Parameter::Omega, 2.8),
         )
         .unwrap();
-        let settled = settle(
+        let classified = classify(
             &mut Strobe::new(&model),
             &[0.0; 6],
-            &SettleOptions::default(),
+            &ClassifyOptions::default(),
         );
-        let Verdict::Periodic(orbit) = settled.verdict else {
+        let MotionKind::Periodic(orbit) = classified.kind else {
             panic!("Ω = 2.8 is periodic")
         };
         assert_eq!(orbit.period, 2);

@@ -3,15 +3,15 @@
 //! and with a soft one, and the way from one to the other as the stop stiffens.
 
 use nanotap_dynamics::{
-    BifurcationKind, ContinuationOptions, Direction, PeriodicOrbit, SettleOptions, ShootingOptions,
-    Verdict as Settled, close_orbit, continue_orbit, settle,
+    BifurcationKind, ClassifyOptions, ContinuationOptions, Direction, MotionKind as Settled,
+    PeriodicOrbit, ShootingOptions, classify, close_orbit, continue_orbit,
 };
 use nanotap_figures::{Axis, Colour, Dash, Figure, Legend, Line, Markers, Panel, Rule, Shape};
 use rayon::prelude::*;
 
 use super::check::{Check, Verdict, digits};
 use super::frequency_sweep::{Column, Kind, draw, spaced, sweep};
-use super::laboratory::{Laboratory, SEED};
+use super::runs::{Runs, SEED};
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::{Case, Key};
@@ -73,17 +73,14 @@ const fn rigid() -> Oscillator {
 const KNOWN_FLIPS: [f64; 2] = [1.260_676_6, 2.653_347_7];
 
 /// The impact oscillator beside the soft sample.
-pub(super) fn section(
-    laboratory: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
-    let (count, starts) = (laboratory.either(400, 30), laboratory.either(8, 2));
+pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let (count, starts) = (runs.either(400, 30), runs.either(8, 2));
     let values = spaced(RANGE.0, RANGE.1, count);
-    let columns = |o: Oscillator| sweep(laboratory, &Case::from(o), OMEGA, &values, starts);
+    let columns = |o: Oscillator| sweep(runs, &Case::from(o), OMEGA, &values, starts);
     let (hard, soft_columns) = (columns(rigid())?, columns(soft(SOFT))?);
     let limit = Orbit::find(rigid())?;
-    let flips = laboratory.controlled(|control| limit.flips(control))?;
-    let way = way_to_rigid(laboratory, &limit)?;
+    let flips = runs.controlled(|control| limit.flips(control))?;
+    let way = way_to_rigid(runs, &limit)?;
     let fits = KNOWN_FLIPS
         .iter()
         .all(|known| flips.iter().any(|f| (f - known).abs() < 5e-8));
@@ -214,7 +211,7 @@ impl Orbit {
         let mut map = Strobe::new(&model);
         let area = default_box(&model).map_err(|error| failed(error.to_string()))?;
         let found = area.starts(SEED, 32).into_iter().find_map(|start| {
-            match settle(&mut map, &start, &SettleOptions::default()).verdict {
+            match classify(&mut map, &start, &ClassifyOptions::default()).kind {
                 Settled::Periodic(orbit) if orbit.period == 1 => Some(orbit),
                 _ => None,
             }
@@ -310,8 +307,8 @@ fn softened(limit: &Orbit, omega: f64, stiffnesses: &[f64]) -> Result<Vec<Orbit>
 }
 
 /// Every stop on the way, softest first.
-fn way_to_rigid(laboratory: &Laboratory<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperError> {
-    let per_decade = laboratory.either(2, 1);
+fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperError> {
+    let per_decade = runs.either(2, 1);
     let decades = (STIFFNESSES.1 / STIFFNESSES.0).log10().round() as usize;
     let stiffnesses: Vec<f64> = (0..=decades * per_decade)
         .rev()
@@ -320,7 +317,7 @@ fn way_to_rigid(laboratory: &Laboratory<'_>, limit: &Orbit) -> Result<Vec<Waypoi
     let entries = softened(limit, ENTRY, &stiffnesses)?;
     let measured = softened(limit, MEASURED_AT, &stiffnesses)?;
     let reach = measured[0].reach;
-    let mut way: Vec<Waypoint> = laboratory.controlled(|control| {
+    let mut way: Vec<Waypoint> = runs.controlled(|control| {
         stiffnesses
             .par_iter()
             .zip(&entries[1..])

@@ -19,10 +19,10 @@ mod frequencies;
 mod frequency_sweep;
 mod html;
 mod impact;
-mod laboratory;
 mod markdown;
 mod motion_view;
 mod rerun;
+mod runs;
 mod section;
 mod slow_drive;
 mod time_step;
@@ -35,7 +35,7 @@ use nanotap::case::near_name::near_name;
 use nanotap::study::orbit::OrbitError;
 
 pub use check::{About, Check, Verdict};
-use laboratory::Laboratory;
+use runs::Runs;
 pub use section::{Picture, Section, Table};
 pub use write::Written;
 
@@ -153,7 +153,7 @@ struct Topic {
     title: &'static str,
     /// About how many seconds it takes, of two cores.
     weight: u32,
-    make: fn(&Laboratory<'_>, Section) -> Result<Section, PaperError>,
+    make: fn(&Runs<'_>, Section) -> Result<Section, PaperError>,
 }
 
 /// Every section, in the order of the paper; evidence that serves several comes last.
@@ -324,16 +324,13 @@ const TOPICS: &[Topic] = &[
 pub fn report(options: &Options, control: &Control<'_>) -> Result<Report, PaperError> {
     let topics = chosen(&options.only)?;
     let whole: u32 = topics.iter().map(|topic| topic.weight).sum();
-    let laboratory = Laboratory::new(options.quick, control);
+    let runs = Runs::new(options.quick, control);
     let mut sections = Vec::with_capacity(topics.len());
     let mut begun = 0;
     for topic in topics {
         let share = |weight: u32| f64::from(weight) / f64::from(whole);
-        laboratory.begin(share(begun), share(topic.weight));
-        sections.push((topic.make)(
-            &laboratory,
-            Section::new(topic.id, topic.title),
-        )?);
+        runs.begin(share(begun), share(topic.weight));
+        sections.push((topic.make)(&runs, Section::new(topic.id, topic.title))?);
         if control.is_cancelled() {
             return Err(PaperError::Cancelled);
         }

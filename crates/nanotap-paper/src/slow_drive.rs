@@ -3,16 +3,16 @@
 use std::rc::Rc;
 
 use nanotap_dynamics::{
-    PeriodicOrbit, SettleOptions, StroboscopicMap as _, Verdict as Settled, settle,
+    ClassifyOptions, MotionKind, PeriodicOrbit, StroboscopicMap as _, classify,
 };
 use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Points, Shape};
 
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
-use super::laboratory::{Counted, Laboratory, SEED, how_many};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
+use super::runs::{Counted, Runs, SEED, how_many};
 use super::section::{Picture, Section, Table};
 use super::time_step::Grid;
 use nanotap::case::Case;
@@ -38,13 +38,13 @@ struct Slow {
 }
 
 impl Slow {
-    fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
-        Self::with_modes(laboratory, Cantilever::paper().modes)
+    fn new(runs: &Runs<'_>) -> Result<Self, PaperError> {
+        Self::with_modes(runs, Cantilever::paper().modes)
     }
 
-    fn with_modes(laboratory: &Laboratory<'_>, modes: usize) -> Result<Self, PaperError> {
-        let counted = laboratory.count(&Cantilever::paper().with_modes(modes))?;
-        let orbits = laboratory.orbits(&counted, LONGEST, laboratory.either(3000, 600))?;
+    fn with_modes(runs: &Runs<'_>, modes: usize) -> Result<Self, PaperError> {
+        let counted = runs.count(&Cantilever::paper().with_modes(modes))?;
+        let orbits = runs.orbits(&counted, LONGEST, runs.either(3000, 600))?;
         Ok(Self { counted, orbits })
     }
 
@@ -84,12 +84,12 @@ impl Slow {
     /// The branch of an orbit that exists at Ω = `omega`.
     fn branch(
         &self,
-        laboratory: &Laboratory<'_>,
+        runs: &Runs<'_>,
         omega: f64,
         orbit: &PeriodicOrbit,
     ) -> Result<FollowedBranch, PaperError> {
         let subject = Case::from(self.counted.case.clone());
-        FollowedBranch::from_orbit(laboratory, &subject, omega, orbit, BRANCH_RANGE)
+        FollowedBranch::from_orbit(runs, &subject, omega, orbit, BRANCH_RANGE)
     }
 
     fn rerun_orbit(&self, period: usize) -> String {
@@ -104,14 +104,10 @@ impl Slow {
     }
 
     /// Where the first orbit of a period attracts, followed over [`BRANCH_RANGE`].
-    fn attracting(
-        &self,
-        laboratory: &Laboratory<'_>,
-        period: usize,
-    ) -> Result<Vec<(f64, f64)>, PaperError> {
+    fn attracting(&self, runs: &Runs<'_>, period: usize) -> Result<Vec<(f64, f64)>, PaperError> {
         match self.of_period(period).first() {
             Some(orbit) => Ok(self
-                .branch(laboratory, self.counted.case.omega, orbit)?
+                .branch(runs, self.counted.case.omega, orbit)?
                 .attracting()),
             None => Ok(Vec::new()),
         }
@@ -121,7 +117,7 @@ impl Slow {
     /// frequency that is printed alike leaves the statement open.
     fn check(
         &self,
-        laboratory: &Laboratory<'_>,
+        runs: &Runs<'_>,
         id: &str,
         paper: &str,
         period: usize,
@@ -134,7 +130,7 @@ impl Slow {
             self.describe(period)?
         );
         let mut evidence = format!("{}; {}", self.counted.summary(), self.counted.missed());
-        let attracting = self.attracting(laboratory, period)?;
+        let attracting = self.attracting(runs, period)?;
         if !attracting.is_empty() {
             evidence = format!(
                 "{evidence}; the orbit attracts at Ω = {}",
@@ -177,15 +173,15 @@ fn multiplier(orbit: &PeriodicOrbit) -> String {
 }
 
 /// Fig. 6.
-pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let slow = Slow::new(laboratory)?;
+pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let slow = Slow::new(runs)?;
     let model = &slow.counted.model;
     let mut figure = Figure::new(2, 2).column_widths([1.7, 1.0]);
     let mut words = Vec::new();
     if let Some(chaos) = slow.counted.chaos().first() {
         let series = View::new(model, chaos.state, SHOWN.0)?;
-        let tangle = View::new(model, chaos.state, laboratory.either(SHOWN.1, 60))?;
-        let dots = View::new(model, chaos.state, laboratory.either(3000, 300))?.strobe_dots();
+        let tangle = View::new(model, chaos.state, runs.either(SHOWN.1, 60))?;
+        let dots = View::new(model, chaos.state, runs.either(3000, 300))?.strobe_dots();
         let portrait = tangle
             .tangle_into(empty_portrait("chaos"), Colour::SKY)
             .with(dots.colour(Colour::BLACK));
@@ -214,7 +210,7 @@ pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
         words.push("(c, d) The only period-1 orbit that Newton found.");
     }
     let check = slow.check(
-        laboratory,
+        runs,
         "fig6",
         "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1",
         1,
@@ -232,8 +228,8 @@ pub(super) fn fig6(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
 }
 
 /// Fig. 7.
-pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Section, PaperError> {
-    let slow = Slow::new(laboratory)?;
+pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let slow = Slow::new(runs)?;
     let model = &slow.counted.model;
     let mut figure = Figure::new(2, 2).column_widths([1.7, 1.0]);
     let mut captions = vec!["Eq. (26), N = 3.".to_owned()];
@@ -258,7 +254,7 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     if slow.of_period(3).is_empty()
         && let Some(chaos) = slow.counted.chaos().first()
     {
-        let returns = Returns::of(model, chaos.state, laboratory.either(4000, 400))?;
+        let returns = Returns::of(model, chaos.state, runs.either(4000, 400))?;
         figure = figure.with(returns.panel()).with(returns.pieces(model));
         no_three = returns.words();
         captions.push(format!(
@@ -270,14 +266,14 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     }
     captions.push(KEY.to_owned());
     let two = slow.check(
-        laboratory,
+        runs,
         "fig7-period-2",
         "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1",
         2,
         1,
     )?;
     let mut three = slow.check(
-        laboratory,
+        runs,
         "fig7-period-3",
         "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1",
         3,
@@ -288,7 +284,7 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
     }
     let subject = Case::from(slow.counted.case.clone());
     if let Some((omega, orbit)) = period_three(&subject)? {
-        let branch = slow.branch(laboratory, omega, &orbit)?;
+        let branch = slow.branch(runs, omega, &orbit)?;
         let (from, to) = branch.extent();
         three.evidence = format!(
             "{}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and attracts at {}",
@@ -309,15 +305,15 @@ pub(super) fn fig7(laboratory: &Laboratory<'_>, section: Section) -> Result<Sect
              sample presses a little at rest (a small negative α₅) has each of these kinds, at different gaps; fixed \
              steps at Ω = 2.6 show several periods that the equations do not have.",
         )
-        .table(doubled_by_modes(laboratory)?)
-        .table(pressed_at_rest(laboratory)?)
-        .table(slow_grids(laboratory)?)
+        .table(doubled_by_modes(runs)?)
+        .table(pressed_at_rest(runs)?)
+        .table(slow_grids(runs)?)
         .check(two)
         .check(three))
 }
 
 /// Where the period-2 orbit attracts, with one to five modes: how near Ω = 2.6 comes to it.
-fn doubled_by_modes(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
+fn doubled_by_modes(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let mut table = Table::new(
         format!(
             "Where the period-2 orbit that exists at Ω = 2.6 attracts, for Ω from {} to {}",
@@ -325,10 +321,10 @@ fn doubled_by_modes(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
         ),
         ["N", "μ at Ω = 2.6", "attracts at Ω ="],
     );
-    for modes in 1..=laboratory.either(5, 2) {
-        let slow = Slow::with_modes(laboratory, modes)?;
+    for modes in 1..=runs.either(5, 2) {
+        let slow = Slow::with_modes(runs, modes)?;
         for orbit in slow.of_period(2) {
-            let branch = slow.branch(laboratory, slow.counted.case.omega, orbit)?;
+            let branch = slow.branch(runs, slow.counted.case.omega, orbit)?;
             table.row([
                 modes.to_string(),
                 multiplier(orbit),
@@ -340,7 +336,7 @@ fn doubled_by_modes(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
 }
 
 /// What attracts at Ω = 2.6 where the sample presses the tip a little at rest.
-fn pressed_at_rest(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
+fn pressed_at_rest(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let mut table = Table::new(
         "What attracts at Ω = 2.6, α₁ = 0.1, N = 3 with a small negative gap: the kinds of motion in Figs. 6 and 7, \
          but not all at once",
@@ -348,7 +344,7 @@ fn pressed_at_rest(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
     );
     for alpha5 in [-0.10, -0.05, -0.045] {
         let case = Cantilever::paper().with(Parameter::Alpha5, alpha5);
-        let counted = laboratory.count(&case)?;
+        let counted = runs.count(&case)?;
         table.row([
             alpha5.to_string().replace('-', "−"),
             counted.kinds().join(", "),
@@ -362,10 +358,10 @@ fn pressed_at_rest(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
 const SLOW_GRIDS: ([u32; 2], usize) = ([34, 40], 48);
 
 /// What fixed steps settle on at Ω = 2.6 with two modes.
-fn slow_grids(laboratory: &Laboratory<'_>) -> Result<Table, PaperError> {
-    let counted = laboratory.count(&Cantilever::paper().with_modes(2))?;
+fn slow_grids(runs: &Runs<'_>) -> Result<Table, PaperError> {
+    let counted = runs.count(&Cantilever::paper().with_modes(2))?;
     let (steps, most) = SLOW_GRIDS;
-    let starts = Laboratory::starts(&counted, laboratory.either(most, most / 4))?;
+    let starts = Runs::starts(&counted, runs.either(most, most / 4))?;
     let mut table = Table::new(
         format!(
             "What fixed steps that switch on their grid settle on at Ω = 2.6, α₁ = 0.1, N = 2; the exact flow has: {}",
@@ -404,8 +400,8 @@ fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperErr
     })?;
     let mut map = Strobe::new(&model);
     let found = area.starts(SEED, 32).into_iter().find_map(|start| {
-        match settle(&mut map, &start, &SettleOptions::default()).verdict {
-            Settled::Periodic(orbit) if orbit.period == 3 => Some(orbit),
+        match classify(&mut map, &start, &ClassifyOptions::default()).kind {
+            MotionKind::Periodic(orbit) if orbit.period == 3 => Some(orbit),
             _ => None,
         }
     });

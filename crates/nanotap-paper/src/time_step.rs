@@ -2,13 +2,13 @@
 //! steps that switch on their grid. At Ω = 20 it shows coexisting subharmonics of long
 //! periods, others at every step; under the exact flow all of them go to one period-1 orbit.
 
-use nanotap_dynamics::{SettleOptions, ShootingOptions, Verdict as Settled, close_orbit, settle};
+use nanotap_dynamics::{ClassifyOptions, MotionKind, ShootingOptions, classify, close_orbit};
 use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Rule, Shape};
 use nanotap_flow::fixed_step::{FixedStep, Switching};
 use rayon::prelude::*;
 
 use super::check::{Check, Verdict, digits};
-use super::laboratory::Laboratory;
+use super::runs::Runs;
 use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
@@ -124,11 +124,11 @@ fn grids(quick: bool) -> Vec<Grid> {
 }
 
 impl Scan {
-    pub(super) fn new(laboratory: &Laboratory<'_>) -> Result<Self, PaperError> {
-        let grids = grids(laboratory.quick());
+    pub(super) fn new(runs: &Runs<'_>) -> Result<Self, PaperError> {
+        let grids = grids(runs.quick());
         let mut counted = Vec::new();
         for modes in [1, 2, 3] {
-            counted.push(laboratory.count(&fast_case(modes))?);
+            counted.push(runs.count(&fast_case(modes))?);
         }
         let mut exact = Vec::new();
         for c in &counted {
@@ -139,9 +139,9 @@ impl Scan {
         let models: Vec<Model> = counted.iter().map(|c| c.model.clone()).collect();
         let seeds: Vec<Vec<Vec<f64>>> = counted
             .iter()
-            .map(|c| Laboratory::starts(c, 16))
+            .map(|c| Runs::starts(c, 16))
             .collect::<Result<_, _>>()?;
-        let motions: Vec<GridMotion> = laboratory.controlled(|control| {
+        let motions: Vec<GridMotion> = runs.controlled(|control| {
             let done = std::sync::atomic::AtomicUsize::new(0);
             let total = grids.len();
             grids
@@ -160,7 +160,7 @@ impl Scan {
                 })
                 .collect()
         });
-        let fates: Vec<(bool, bool)> = motions
+        let outcomes_by_start: Vec<(bool, bool)> = motions
             .par_iter()
             .filter(|m| m.period != Some(1))
             .map(|m| m.exactly(&models[m.grid.modes - 1]))
@@ -168,9 +168,9 @@ impl Scan {
         Ok(Self {
             grids: grids.len(),
             exact,
-            subharmonics: fates.len(),
-            vanished: fates.iter().filter(|f| f.0).count(),
-            closed: fates.iter().filter(|f| f.1).count(),
+            subharmonics: outcomes_by_start.len(),
+            vanished: outcomes_by_start.iter().filter(|f| f.0).count(),
+            closed: outcomes_by_start.iter().filter(|f| f.1).count(),
             motions,
         })
     }
@@ -244,7 +244,7 @@ impl Grid {
     pub(super) fn motions(&self, model: &Model, starts: &[Vec<f64>]) -> Vec<GridMotion> {
         let mut found: Vec<GridMotion> = Vec::new();
         for start in starts.iter().take(self.starts) {
-            let Some(motion) = self.settle(model, start) else {
+            let Some(motion) = self.classify(model, start) else {
                 continue;
             };
             let near = |a: f64, b: f64| (a - b).abs() <= SAME * motion.amplitude;
@@ -263,7 +263,7 @@ impl Grid {
     }
 
     /// Where one start settles; `None` where the numbers overflow or no regime holds it.
-    fn settle(&self, model: &Model, start: &[f64]) -> Option<GridMotion> {
+    fn classify(&self, model: &Model, start: &[f64]) -> Option<GridMotion> {
         let mut run = FixedStep::new(&model.system, start, &self.steps, self.switching).ok()?;
         for _ in 0..self.transient {
             run.run_period(|_, _| {});
@@ -344,8 +344,8 @@ impl GridMotion {
     /// exact orbit of its own period from its strobe states.
     fn exactly(&self, model: &Model) -> (bool, bool) {
         let mut map = Strobe::new(model);
-        let settled = settle(&mut map, &self.state, &SettleOptions::default());
-        let vanishes = matches!(&settled.verdict, Settled::Periodic(orbit) if orbit.period == 1);
+        let classified = classify(&mut map, &self.state, &ClassifyOptions::default());
+        let vanishes = matches!(&classified.kind, MotionKind::Periodic(orbit) if orbit.period == 1);
         let closes = self.period.is_some_and(|period| {
             close_orbit(
                 &mut map,
@@ -410,11 +410,8 @@ impl GridMotion {
 }
 
 /// The evidence that long periods at Ω = 20 can come from the time step.
-pub(super) fn section(
-    laboratory: &Laboratory<'_>,
-    section: Section,
-) -> Result<Section, PaperError> {
-    let scan = laboratory.spurious()?;
+pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    let scan = runs.spurious()?;
     let mut periods: Vec<usize> = scan
         .motions
         .iter()

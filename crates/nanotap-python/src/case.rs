@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use nanotap::case::document::{CaseDocument, MappingDocument};
 use nanotap::case::file::{self, Source};
 use nanotap::case::key::{ModelKind, Section};
-use nanotap::case::physical::{Catalogue, Physical, Severity};
+use nanotap::case::physical::{Catalogue, Kind, Physical, Severity};
 use nanotap::case::{Case, Key};
 use nanotap::observe::time_series::state_names;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase, at_setpoint};
@@ -207,21 +207,19 @@ fn text_of(path: &Path) -> Result<String, Failure> {
         .map_err(|error| Failure::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
-/// The keys of a case file by table, each with the other name that it goes by and the paths
-/// of the keys that say the same in another way.
+/// A key of a case file: its name, the other name that it goes by, and its SI unit, empty of what
+/// is no quantity.
+type KeyRow = (&'static str, &'static str, &'static str);
+
+/// The keys of a case file by table.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a table for Python, read once")]
-pub(crate) fn case_keys() -> Vec<(
-    &'static str,
-    Vec<(&'static str, &'static str, Vec<&'static str>)>,
-)> {
+pub(crate) fn case_keys() -> Vec<(&'static str, Vec<KeyRow>)> {
     let row = |key: Key| {
-        let others = key.alternatives().map(|(other, _)| other.path());
-        (
-            key.name(),
-            key.alias().unwrap_or(key.name()),
-            others.collect(),
-        )
+        let unit = match key.kind() {
+            Kind::Number => "",
+            kind => kind.si_unit(),
+        };
+        (key.name(), key.alias().unwrap_or(key.name()), unit)
     };
     let of = |section: Section| match section {
         Section::Model => ModelKind::Cantilever.keys().map(row).collect(),

@@ -205,7 +205,7 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
 pub(crate) fn window(path: PathBuf) -> PyResult<String> {
     let window = || -> Result<String, Failure> {
         let (store, _) = opened(&path)?;
-        Ok(serde_json::to_string(&Window::of(&store)?)?)
+        Ok(serde_json::to_string(&Window::kept(&store)?)?)
     };
     Ok(window()?)
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use nanotap::Error;
+use nanotap::study::fit::Table;
 use nanotap::study::lyapunov::{LyapunovRequest, LyapunovStudy};
 use nanotap::study::registry::{self, Document, Study as _};
 use nanotap::study::request::read;
@@ -53,6 +54,14 @@ pub(crate) fn studies() -> Vec<(&'static str, &'static str, &'static str, String
         (entry.name, entry.about, entry.counted, schema)
     };
     registry::STUDIES.iter().map(row).collect()
+}
+
+/// A table of measured values from a CSV file, as JSON.
+#[pyfunction]
+pub(crate) fn table(path: PathBuf) -> PyResult<String> {
+    let table = Table::read(&path).map_err(Failure::from)?;
+    let text = serde_json::to_string(&table).map_err(Error::from);
+    Ok(text.map_err(Failure::from)?)
 }
 
 /// The JSON of a request.

@@ -1,5 +1,6 @@
 //! `nanotap approach`: amplitude, phase, force and energy against the distance, both ways.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -21,7 +22,7 @@ use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
-use crate::{file, motion, number, progress, style};
+use crate::{motion, number, progress, style};
 
 /// Amplitude, phase, force and energy against the distance to the sample, both ways, with the
 /// branches that coexist.
@@ -52,17 +53,13 @@ struct Written<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        file::ending(path, &["svg", "png", "pdf"])?;
-    }
-    let studied = GivenCase::with_any_distance(&arguments.case, output)?;
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::with_any_distance(&arguments.case, output)?;
     let report = progress::watched(output, ApproachStudy::COUNTED, |control| {
         arguments
             .threads
-            .install(|| ApproachStudy::run(&studied, &request, control))
+            .install(|| ApproachStudy::run(&case, &request, control))
     })???;
     if report.cancelled {
         output.warning("stopped before it was done");
@@ -73,20 +70,19 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
              sample: the model does not hold there",
         );
     }
-    if let Some(path) = &arguments.out.out {
-        file::write(path, csv(&report).as_bytes())?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        approach_figure(&report, &studied.units()).write(path)?;
-    }
+    arguments.out.write(|| csv(&report))?;
+    arguments
+        .plot
+        .draw(|| approach_figure(&report, &case.units()))?;
     let written = Written {
         path: arguments.out.out.clone(),
         report: &report,
     };
-    output.study(&studied, &written, |_| text(&studied, &report))
+    output.study(&case, &written, |_| text(&case, &report))
 }
 
-/// A row a distance, there and back; of a physical case the SI columns follow.
+/// A row a distance, there and back, then what coexists; of a physical case the SI columns
+/// follow.
 fn csv(report: &ApproachReport) -> String {
     let physical = report.table.iter().any(|p| p.zc.is_some());
     let mut header: Vec<String> = [
@@ -103,7 +99,7 @@ fn csv(report: &ApproachReport) -> String {
         header.push("zc (m)".to_owned());
     }
     let mut csv = header.join(",") + "\n";
-    for p in &report.table {
+    for p in report.table.iter().chain(&report.coexisting) {
         let si = physical.then_some(p.physical.as_ref());
         let mut row = vec![p.spectral_radius];
         row.extend(columns::cells(Set::COMMON, p.observables.as_ref(), si));
@@ -129,8 +125,8 @@ fn csv(report: &ApproachReport) -> String {
 /// Rows of the table that a terminal shows of each way.
 const SHOWN: usize = 16;
 
-fn text(studied: &GivenCase, report: &ApproachReport) -> String {
-    let units = studied.units();
+fn text(case: &GivenCase, report: &ApproachReport) -> String {
+    let units = case.units();
     let shown = |kind: Kind, value: f64| {
         units.si(kind).map_or_else(
             || number::significant(value, 5),
@@ -139,8 +135,8 @@ fn text(studied: &GivenCase, report: &ApproachReport) -> String {
     };
     let heading = format!(
         "{}: {}, distances from {} to {} and back",
-        studied.title(),
-        studied.summary(),
+        case.title(),
+        case.summary(),
         shown(Kind::Length, report.from),
         shown(Kind::Length, report.to)
     );
@@ -202,6 +198,17 @@ fn text(studied: &GivenCase, report: &ApproachReport) -> String {
     text.push('\n');
     if report.hysteresis.is_empty() {
         text.push_str("  both ways show the same motions\n");
+    }
+    if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {
+        let periods: BTreeSet<usize> = report.coexisting.iter().filter_map(|p| p.period).collect();
+        let periods: Vec<String> = periods.iter().map(ToString::to_string).collect();
+        text.push_str(&motion::paragraph(&format!(
+            "from {} to {} further motions attract that neither way met (period {}): --out and \
+             --plot have them",
+            shown(Kind::Length, last.gap),
+            shown(Kind::Length, first.gap),
+            periods.join(", ")
+        )));
     }
     for interval in &report.hysteresis {
         text.push_str(&motion::paragraph(&format!(

@@ -19,7 +19,7 @@ use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
-use crate::{file, motion, number, progress, style};
+use crate::{motion, number, progress, style};
 
 /// Every motion that coexists: a census from many seeded starts.
 #[derive(Args, Debug)]
@@ -40,36 +40,34 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let model = studied.model()?;
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let model = case.model()?;
     let found = progress::watched(output, AttractorsStudy::COUNTED, |control| {
         arguments
             .threads
-            .install(|| AttractorsStudy::run(&studied, &request, control))
+            .install(|| AttractorsStudy::run(&case, &request, control))
     })???;
-    if let Some(path) = &arguments.out.out {
-        file::write(path, csv(&model, &found).as_bytes())?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        attractors_figure(&model, &found, &studied.units()).write(path)?;
-    }
+    arguments.out.write(|| csv(&model, &found))?;
+    arguments
+        .plot
+        .draw(|| attractors_figure(&model, &found, &case.units()))?;
     if found.cancelled {
         output.warning("stopped before all starts were done: the fractions are of what was done");
     }
     for (k, attractor) in found.attractors.iter().enumerate() {
         let of_orbit = attractor.orbit.as_ref().map(|orbit| &orbit.observables);
-        let wandering = attractor
-            .wandering
+        let non_periodic = attractor
+            .non_periodic
             .as_ref()
-            .map(|wandering| &wandering.observables);
-        for observables in of_orbit.into_iter().chain(wandering) {
-            motion::warn(observables, &format!("attractor {}: ", k + 1), output);
+            .map(|non_periodic| &non_periodic.observables);
+        for observables in of_orbit.into_iter().chain(non_periodic) {
+            let which = format!("attractor {}: ", k + 1);
+            motion::warn(observables, attractor.physical.as_ref(), &which, output);
         }
     }
-    output.study(&studied, &found, |found| text(&studied, found))
+    output.study(&case, &found, |found| text(&case, found))
 }
 
 /// A row a strobe point of each attractor (of one that does not repeat, one point).
@@ -83,9 +81,9 @@ fn csv(model: &Model, found: &Attractors) -> String {
             .orbit
             .as_ref()
             .map_or_else(String::new, |o| o.period.to_string());
-        let states = match (&attractor.orbit, &attractor.wandering) {
+        let states = match (&attractor.orbit, &attractor.non_periodic) {
             (Some(orbit), _) => orbit.states.clone(),
-            (None, Some(wandering)) => vec![wandering.state.clone()],
+            (None, Some(non_periodic)) => vec![non_periodic.state.clone()],
             (None, None) => Vec::new(),
         };
         for (point, state) in states.iter().enumerate() {
@@ -103,12 +101,12 @@ fn csv(model: &Model, found: &Attractors) -> String {
     csv
 }
 
-fn text(studied: &GivenCase, found: &Attractors) -> String {
-    let units = studied.units();
+fn text(case: &GivenCase, found: &Attractors) -> String {
+    let units = case.units();
     let heading = format!(
         "{}: {}, {} from seed {}",
-        studied.title(),
-        studied.summary(),
+        case.title(),
+        case.summary(),
         number::counted(found.starts, "start", "starts"),
         found.seed
     );
@@ -151,8 +149,8 @@ fn text(studied: &GivenCase, found: &Attractors) -> String {
             chaos.lifetime_interval[1],
             chaos.escapes,
             to.join(", "),
-            number::counted(chaos.wandering.count, "start", "starts"),
-            number::significant(100.0 * chaos.wandering.fraction, 3),
+            number::counted(chaos.unescaped.count, "start", "starts"),
+            number::significant(100.0 * chaos.unescaped.fraction, 3),
             motion::exponents(&chaos.lyapunov, Some(&chaos.lyapunov_errors)),
         )));
     }
@@ -256,7 +254,7 @@ fn table(attractors: &[AttractorReport], units: &Units) -> String {
             .orbit
             .as_ref()
             .map(|o| &o.observables)
-            .or(attractor.wandering.as_ref().map(|w| &w.observables));
+            .or(attractor.non_periodic.as_ref().map(|w| &w.observables));
         let percent = |part: f64| number::significant(100.0 * part, 3);
         let [low, high] = attractor.share.fraction_interval;
         table.row([

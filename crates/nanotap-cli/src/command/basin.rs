@@ -13,7 +13,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, number, progress};
+use crate::{number, progress};
 
 /// Basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
@@ -40,20 +40,18 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let mut request = arguments.request.read()?;
     request.attractors = arguments.attractors.as_deref().map(states).transpose()?;
     let options = request.options()?;
-    let studied = GivenCase::of(&arguments.case, output)?;
+    let case = GivenCase::of(&arguments.case, output)?;
     let dataset = &arguments.dataset;
     let name = derived_name(
         arguments.case.file.as_deref(),
         &["basin", &options.x.name, &options.y.name],
     );
     let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
-    if let Some(path) = &arguments.plot.plot {
-        file::ending(path, &["svg", "png", "pdf"])?;
-    }
+    arguments.plot.check()?;
     let basin = progress::watched(output, "starts of the census", |control| {
         dataset
             .threads
-            .install(|| Basin::new(&studied, &options, control))
+            .install(|| Basin::new(&case, &options, control))
     })???;
     let store = dataset.compute(
         &destination.store,
@@ -65,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let plot = arguments.plot.plot.as_deref();
     let seed = request.seed;
     let done = DatasetReport::of(&store, destination, plot, begun, seed, shares, figure)?;
-    output.study(&studied, &done, |done| text(&studied, &options, done))
+    output.study(&case, &done, |done| text(&case, &options, done))
 }
 
 /// The states on the attractors that a file of `nanotap attractors --json` names.
@@ -99,11 +97,11 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(studied: &GivenCase, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
+fn text(case: &GivenCase, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
-        studied.title(),
-        studied.summary(),
+        case.title(),
+        case.summary(),
         options.x.count,
         options.y.count,
         options.x.name,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use nanotap::case::physical::Kind;
 use nanotap::dataset::table::shortest;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::observe::{Set, columns, time_series};
@@ -49,32 +50,31 @@ fn shown() -> impl TypedValueParser<Value = Shown> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let mut options = request.options(&studied)?;
-    studied.say_held(&[options.key], output);
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let mut options = request.options(&case)?;
+    case.say_held(&[options.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
     let report = progress::watched(output, BranchStudy::COUNTED, |control| {
         arguments
             .threads
-            .install(|| followed(&studied, &options, control))
+            .install(|| followed(&case, &options, control))
     })???;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
-    let model = studied.model()?;
+    let model = case.model()?;
     if let Some(path) = &arguments.out.out {
         let names = time_series::state_names(&model);
         file::write(path, csv(&report, options.observables, &names).as_bytes())?;
     }
-    if let Some(path) = &arguments.plot.plot {
-        case_figure(&studied, &report, arguments.show).write(path)?;
-    }
-    output.study(&studied, &report, |report| text(&studied, report))?;
+    arguments
+        .plot
+        .draw(|| case_figure(&case, &report, arguments.show))?;
+    output.study(&case, &report, |report| text(&case, report))?;
     let cut = report.branches.iter().filter(|b| !b.complete).count();
     if cut > 0 && !report.cancelled {
         let what = number::counted(cut, "branch was", "branches were");
@@ -144,20 +144,26 @@ fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn text(studied: &GivenCase, report: &BranchReport) -> String {
-    let unit = studied.parameter_unit(report.key);
-    let shown = |value: f64| {
-        let plain = number::significant(value, 10);
-        unit.as_ref().map_or(plain.clone(), |unit| {
-            format!("{plain} ({})", unit.kind.format(unit.si * value))
-        })
+fn text(case: &GivenCase, report: &BranchReport) -> String {
+    let told = |key, value: f64, digits| {
+        case.parameter_unit(key).map_or_else(
+            || number::significant(value, digits),
+            |unit| unit.kind.format_digits(unit.si * value, digits),
+        )
+    };
+    let shown = |value, digits| told(report.key, value, digits);
+    let length = |value: f64| {
+        case.units().si(Kind::Length).map_or_else(
+            || number::significant(value, 5),
+            |unit| Kind::Length.format_digits(unit * value, 5),
+        )
     };
     let heading = format!(
         "{}: {} from {} to {}",
-        studied.title(),
+        case.title(),
         report.parameter,
-        number::significant(report.from, 6),
-        number::significant(report.to, 6)
+        shown(report.from, 6),
+        shown(report.to, 6)
     );
     let mut text = format!("{}\n\n", style::bold(&heading));
     let mut table = Table::new([
@@ -185,8 +191,8 @@ fn text(studied: &GivenCase, report: &BranchReport) -> String {
             stable.to_string(),
             format!(
                 "{} … {}",
-                number::significant(branch.range[0], 6),
-                number::significant(branch.range[1], 6)
+                shown(branch.range[0], 6),
+                shown(branch.range[1], 6)
             ),
             branch.end.clone(),
         ]);
@@ -213,12 +219,12 @@ fn text(studied: &GivenCase, report: &BranchReport) -> String {
             table.row([
                 (b.branch + 1).to_string(),
                 b.kind.to_owned(),
-                shown(b.parameter),
+                shown(b.parameter, 10),
                 b.period.to_string(),
                 format!(
                     "{} … {}",
-                    number::significant(b.observables.tip_min, 5),
-                    number::significant(b.observables.tip_max, 5)
+                    length(b.observables.tip_min),
+                    length(b.observables.tip_max)
                 ),
                 number::significant(100.0 * b.observables.contact_fraction, 4),
                 extra,
@@ -240,22 +246,18 @@ fn text(studied: &GivenCase, report: &BranchReport) -> String {
             (loci.second, Align::Left),
             ("ends at", Align::Left),
         ]);
-        let range = |values: &[f64]| {
+        let range = |key, values: &[f64]| {
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
             let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            format!(
-                "{} … {}",
-                number::significant(low, 6),
-                number::significant(high, 6)
-            )
+            format!("{} … {}", told(key, low, 6), told(key, high, 6))
         };
         for curve in &loci.curves {
             table.row([
                 curve.kind.to_owned(),
                 curve.period.to_string(),
                 curve.first.len().to_string(),
-                range(&curve.first),
-                range(&curve.second),
+                range(report.key, &curve.first),
+                range(loci.key, &curve.second),
                 curve.ends.join("; "),
             ]);
         }
@@ -267,7 +269,7 @@ fn text(studied: &GivenCase, report: &BranchReport) -> String {
             text.push_str(&motion::paragraph(&format!(
                 "{} = {}: {}",
                 report.parameter,
-                number::significant(failure.parameter, 8),
+                shown(failure.parameter, 8),
                 failure.reason
             )));
         }

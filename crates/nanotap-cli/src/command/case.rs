@@ -8,10 +8,12 @@ use nanotap::case::physical::force::SampleForce;
 use nanotap::case::physical::{Kind, Physical, Severity};
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::{Case, Key};
+use nanotap::model::beam::Modes;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::table::shown_phase;
+use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase};
 
 use crate::arguments::{CaseArguments, OutArgument};
@@ -21,7 +23,7 @@ use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{file, number, style};
 
-/// Check a case and show it view.
+/// Check a case and show it resolved.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -32,13 +34,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let read = super::case_of(&arguments.case)?;
-    // The case is shown also where no distance has the setpoint.
-    let (case, setpoint_solved) = match at_setpoint(read.clone(), output) {
-        Ok(solved) => solved,
-        Err(error) if error.kind == ErrorKind::Numerics => {
-            output.warning(&error.to_string());
-            (read, None)
-        }
+    // The case is shown also where no distance has the setpoint, which ends every study of it.
+    let (case, setpoint_solved, unreached) = match at_setpoint(read.clone(), output) {
+        Ok((case, solved)) => (case, solved, None),
+        Err(error) if error.kind == ErrorKind::Numerics => (read, None, Some(error)),
         Err(other) => return Err(other),
     };
     let document = SolvedCase {
@@ -73,7 +72,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 format!("{}{rest}{solved}", physical(case.title(), view))
             },
         )
-    })
+    })?;
+    unreached.map_or(Ok(()), Err)
 }
 
 /// Writes the dimensionless case where `--out` says.
@@ -159,7 +159,15 @@ fn physical(title: &str, view: &Physical) -> String {
     given.row([
         "k",
         &Kind::Stiffness.format(lever.k),
-        "spring constant at the tip",
+        &format!(
+            "static spring constant at the tip, 3EI/L³; {} {} % stiffer",
+            if case.modes == 1 {
+                "1 mode is".to_owned()
+            } else {
+                format!("{} modes are", case.modes)
+            },
+            number::significant(100.0 * static_excess(case.modes), 2)
+        ),
     ]);
     given.row([
         "f0",
@@ -169,8 +177,23 @@ fn physical(title: &str, view: &Physical) -> String {
     given.row([
         "Q",
         &number::significant(lever.quality_factor, 4),
-        "quality factor",
+        "quality factor of the first mode",
     ]);
+    if let Some(quality) = ModeTable::new(case).ok().and_then(|table| table.quality) {
+        let measured = case.higher_modes.quality;
+        for (k, quality) in quality.iter().enumerate().skip(1).take(2) {
+            let source = if measured[k - 1] > 0.0 {
+                "as given"
+            } else {
+                "by damping in proportion to mass, several times that of real levers in air"
+            };
+            given.row([
+                &format!("Q{}", k + 1),
+                &number::significant(*quality, 4),
+                source,
+            ]);
+        }
+    }
     given.row([
         "mL",
         &Kind::Mass.format(lever.beam_mass),
@@ -236,6 +259,11 @@ fn physical(title: &str, view: &Physical) -> String {
         given.render(),
         mapping.render()
     )
+}
+
+/// By how much so many modes are stiffer than the beam, see [`Modes::static_excess`].
+fn static_excess(modes: usize) -> f64 {
+    Modes::shared(modes).map_or(f64::NAN, |modes| modes.static_excess())
 }
 
 /// Where the undriven lever can rest.

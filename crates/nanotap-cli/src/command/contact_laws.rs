@@ -3,8 +3,12 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::case::physical::Kind;
+use nanotap::case::quantity::format_electronvolts;
+use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::figure::contact_laws::sample_figure;
+use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{
     Comparison, ContactLawsRequest, ContactLawsStudy, SampleMotion,
 };
@@ -16,7 +20,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, motion, number, style};
+use crate::{motion, number, style};
 
 /// The same lever and drive on every contact law: what difference the sample makes.
 #[derive(Args, Debug)]
@@ -35,37 +39,55 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let result = ContactLawsStudy::run(&studied, &request, &Control::default())?;
-    if let Some(path) = &arguments.out.out {
-        file::write(path, csv(&result).as_bytes())?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        sample_figure(&result, &studied.units()).write(path)?;
-    }
-    output.study(&studied, &result, |result| text(&studied, result))
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let result = ContactLawsStudy::run(&case, &request, &Control::default())?;
+    arguments.out.write(|| csv(&result, &case.units()))?;
+    arguments
+        .plot
+        .draw(|| sample_figure(&result, &case.units()))?;
+    output.study(&case, &result, |result| text(&case, result))
 }
 
-/// The loops, a row a point.
-fn csv(result: &Comparison) -> String {
-    let mut csv = String::from("contact,indentation,force\n");
+/// The loops, a row a point; of a physical case the SI columns follow.
+fn csv(result: &Comparison, units: &Units) -> String {
+    let shown = [("indentation", Kind::Length), ("force", Kind::Force)];
+    let si = shown.map(|(_, kind)| units.si(kind));
+    let mut csv = String::from("contact,indentation,force");
+    for (name, kind) in shown.iter().filter(|(_, kind)| units.si(*kind).is_some()) {
+        let _ = write!(csv, ",{name} ({})", kind.si_unit());
+    }
+    csv.push('\n');
     for sample in &result.samples {
         for point in sample.orbit.iter().flat_map(|o| &o.force_loop) {
-            let _ = writeln!(csv, "{},{}", sample.contact, number::row(*point));
+            let in_si = si
+                .iter()
+                .zip(point)
+                .filter_map(|(unit, v)| Some((*unit)? * v));
+            let row = number::row(point.iter().copied().chain(in_si));
+            let _ = writeln!(csv, "{},{row}", sample.contact);
         }
     }
     csv
 }
 
-fn text(studied: &GivenCase, result: &Comparison) -> String {
+fn text(case: &GivenCase, result: &Comparison) -> String {
+    let units = case.units();
+    let shown = |kind: Kind, value: f64| {
+        units.si(kind).map_or_else(
+            || number::significant(value, 5),
+            |unit| kind.format_digits(unit * value, 5),
+        )
+    };
     let heading = format!(
-        "{}: the period-{} orbit on each sample at Ω = {}",
-        studied.title(),
+        "{}: the period-{} orbit on each sample at {}",
+        case.title(),
         result.period,
-        number::significant(result.omega, 6)
+        match units.si(Kind::Frequency) {
+            Some(unit) => Kind::Frequency.format_digits(unit * result.omega, 6),
+            None => format!("Ω = {}", number::significant(result.omega, 6)),
+        }
     );
     let mut table = Table::new([
         ("sample", Align::Left),
@@ -88,16 +110,18 @@ fn text(studied: &GivenCase, result: &Comparison) -> String {
             } else {
                 o.least_force
             };
-            let values = [
-                orbit.spectral_radius,
-                o.first_harmonic,
-                o.dissipation,
-                o.peak_force,
-                least,
-                o.indentation,
-                100.0 * o.contact_fraction,
-            ];
-            cells.extend(values.map(|v| number::significant(v, 5)));
+            cells.extend([
+                number::significant(orbit.spectral_radius, 5),
+                shown(Kind::Length, o.first_harmonic),
+                units.si(Kind::Energy).map_or_else(
+                    || number::significant(o.dissipation, 5),
+                    |unit| format_electronvolts(unit * o.dissipation),
+                ),
+                shown(Kind::Force, o.peak_force),
+                shown(Kind::Force, least),
+                shown(Kind::Length, o.indentation),
+                number::significant(100.0 * o.contact_fraction, 5),
+            ]);
         }
         cells.resize(9, String::new());
         table.row(cells);
@@ -105,13 +129,30 @@ fn text(studied: &GivenCase, result: &Comparison) -> String {
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
     let linear = result.samples.iter().all(|s| s.case.law.is_none());
     if let Some(solid) = result.samples.last().filter(|_| linear) {
+        let of_parameter = |parameter: Parameter| {
+            let value = solid.case.get(parameter);
+            case.physical().map_or_else(
+                || number::significant(value, 5),
+                |view| {
+                    let unit = view.scales.of(parameter, solid.case.actuation);
+                    let kind = match parameter {
+                        Parameter::RelaxationTime => Kind::Time,
+                        _ => Kind::Stiffness,
+                    };
+                    kind.format_digits(unit * value, 5)
+                },
+            )
+        };
         text.push_str(&motion::paragraph(&format!(
-            "all have the spring α₄ = {} and the damper of the case; the solid has it in series with an arm of \
+            "all have the spring {} and the damper of the case; the solid has it in series with an arm of \
              stiffness {}, so that its force relaxes in {}. E_dis is the energy that the sample takes in one \
              drive period, F the force on the tip: negative where the sample pulls",
-            number::significant(solid.case.alpha4, 5),
-            number::significant(solid.case.relaxation_stiffness, 5),
-            number::significant(solid.case.relaxation_time, 5),
+            match case.physical() {
+                None => format!("α₄ = {}", number::significant(solid.case.alpha4, 5)),
+                Some(_) => of_parameter(Parameter::Alpha4),
+            },
+            of_parameter(Parameter::RelaxationStiffness),
+            of_parameter(Parameter::RelaxationTime),
         )));
     }
     for sample in &result.samples {

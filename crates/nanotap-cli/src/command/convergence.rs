@@ -7,6 +7,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::control::Control;
 use nanotap::figure::motion::convergence_figure;
+use nanotap::observe::table::shown_phase;
 use nanotap::study::convergence::{Convergence, ConvergenceRequest, ConvergenceStudy};
 use nanotap::study::registry::Study as _;
 
@@ -16,7 +17,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, motion, number, style};
+use crate::{motion, number, style};
 
 /// The same motion with N = 1 … K modes: how many are enough.
 #[derive(Args, Debug)]
@@ -35,18 +36,15 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let result = ConvergenceStudy::run(&studied, &request, &Control::default())?;
-    if let Some(path) = &arguments.out.out {
-        file::write(path, csv(&result).as_bytes())?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        convergence_figure(&result, &studied.units()).write(path)?;
-    }
-    output.study(&studied, &result, |result| text(&studied, result))
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let result = ConvergenceStudy::run(&case, &request, &Control::default())?;
+    arguments.out.write(|| csv(&result))?;
+    arguments
+        .plot
+        .draw(|| convergence_figure(&result, &case.units()))?;
+    output.study(&case, &result, |result| text(&case, result))
 }
 
 fn csv(result: &Convergence) -> String {
@@ -69,11 +67,15 @@ fn csv(result: &Convergence) -> String {
     csv
 }
 
-fn text(studied: &GivenCase, result: &Convergence) -> String {
+fn text(case: &GivenCase, result: &Convergence) -> String {
+    let units = case.units();
     let heading = format!(
-        "{}: how many modes at Ω = {}",
-        studied.title(),
-        number::significant(studied.omega(), 6)
+        "{}: how many modes at {}",
+        case.title(),
+        units.si(Kind::Frequency).map_or_else(
+            || format!("Ω = {}", number::significant(case.omega(), 6)),
+            |unit| Kind::Frequency.format_digits(unit * case.omega(), 6),
+        )
     );
     let mut table = Table::new([
         ("modes", Align::Right),
@@ -86,6 +88,13 @@ fn text(studied: &GivenCase, result: &Convergence) -> String {
     ]);
     let digits =
         |value: Option<f64>, n| value.map_or_else(String::new, |v| number::significant(v, n));
+    let length = |value: Option<f64>| {
+        let si = units.si(Kind::Length).zip(value);
+        si.map_or_else(
+            || digits(value, 6),
+            |(unit, value)| Kind::Length.format_digits(unit * value, 5),
+        )
+    };
     for (motion, difference) in result.motions.iter().zip(&result.difference) {
         let what = match (motion.period, &motion.reason) {
             (Some(n), _) => format!("period {n}"),
@@ -96,8 +105,8 @@ fn text(studied: &GivenCase, result: &Convergence) -> String {
             motion.modes.to_string(),
             digits(difference.filter(|d| *d > 0.0), 3),
             what,
-            digits(motion.tip_max, 6),
-            digits(motion.tip_min, 6),
+            length(motion.tip_max),
+            length(motion.tip_min),
             digits(motion.contact_fraction.map(|c| 100.0 * c), 4),
             digits(motion.spectral_radius, 6),
         ]);
@@ -116,13 +125,13 @@ fn text(studied: &GivenCase, result: &Convergence) -> String {
         )));
     }
     let _ = write!(text, "\n  {}\n\n", style::bold(&result.verdict));
-    text.push_str(&readings(studied, result));
+    text.push_str(&readings(case, result));
     text
 }
 
 /// What an experimenter reads with each number of modes, and the part of each mode.
-fn readings(studied: &GivenCase, result: &Convergence) -> String {
-    let units = studied.units();
+fn readings(case: &GivenCase, result: &Convergence) -> String {
+    let units = case.units();
     let shown = |kind: Kind, value: f64| {
         units.si(kind).map_or_else(
             || number::significant(value, 5),
@@ -152,7 +161,7 @@ fn readings(studied: &GivenCase, result: &Convergence) -> String {
         match reading {
             Some(r) => row.extend([
                 shown(Kind::Length, r.first_harmonic),
-                number::significant(r.phase, 5),
+                number::significant(shown_phase(r.phase), 5),
                 energy(r.dissipation),
                 shown(Kind::Force, r.peak_force),
             ]),

@@ -14,7 +14,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, motion, number, style};
+use crate::{motion, number, style};
 
 /// Lyapunov spectrum with error bars, and a Poincaré section.
 #[derive(Args, Debug)]
@@ -33,26 +33,23 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let mut request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let model = studied.model()?;
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let model = case.model()?;
     let wanted = arguments.out.out.is_some() || arguments.plot.plot.is_some();
     if !wanted {
         request.points = 0;
     }
-    let report = LyapunovStudy::run(&studied, &request, &Control::default())?;
+    let report = LyapunovStudy::run(&case, &request, &Control::default())?;
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }
-    if let Some(path) = &arguments.out.out {
-        file::write(path, csv(&model, &report).as_bytes())?;
-    }
-    if let Some(path) = &arguments.plot.plot {
-        section_figure(&model, &report, &studied.units()).write(path)?;
-    }
-    output.study(&studied, &report, |report| text(&studied, report))
+    arguments.out.write(|| csv(&model, &report))?;
+    arguments
+        .plot
+        .draw(|| section_figure(&model, &report, &case.units()))?;
+    output.study(&case, &report, |report| text(&case, report))
 }
 
 /// A row a point of the section.
@@ -67,8 +64,8 @@ fn csv(model: &Model, report: &LyapunovReport) -> String {
     csv
 }
 
-fn text(studied: &GivenCase, report: &LyapunovReport) -> String {
-    let heading = format!("{}: {}", studied.title(), studied.summary());
+fn text(case: &GivenCase, report: &LyapunovReport) -> String {
+    let heading = format!("{}: {}", case.title(), case.summary());
     let mut table = Table::new([
         ("", Align::Right),
         ("exponent per drive period", Align::Point),

@@ -9,6 +9,7 @@ mod catalogue;
 mod contact_laws;
 mod convergence;
 mod explore;
+mod fit;
 mod generate;
 mod lyapunov;
 mod merge;
@@ -49,6 +50,8 @@ pub(crate) enum Command {
     Branch(branch::Arguments),
     /// Amplitude, phase, force and energy against the distance, both ways
     Approach(approach::Arguments),
+    /// Parameters of lever and sample from measured curves
+    Fit(fit::Arguments),
     /// How the motion changes with one or two parameters, from any number of starts
     Sweep(sweep::Arguments),
     /// The operating window over two parameters: where only one motion exists
@@ -86,6 +89,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Attractors(arguments) => attractors::run(arguments, output),
         Command::Branch(arguments) => branch::run(arguments, output),
         Command::Approach(arguments) => approach::run(arguments, output),
+        Command::Fit(arguments) => fit::run(arguments, output),
         Command::Sweep(arguments) => sweep::run(arguments, output),
         Command::Window(arguments) => window::run(arguments, output),
         Command::Basin(arguments) => basin::run(arguments, output),

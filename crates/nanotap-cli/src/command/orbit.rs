@@ -43,9 +43,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for path in arguments.out.out.iter().chain(&arguments.harmonics_out) {
         file::ending(path, &["csv"])?;
     }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let model = studied.model()?;
-    let found = OrbitStudy::run(&studied, &request, &Control::default())?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let model = case.model()?;
+    let found = OrbitStudy::run(&case, &request, &Control::default())?;
     let found = &found;
     let orbit = &found.motion;
     if let Some(asked) = request.period.filter(|n| *n != orbit.period) {
@@ -61,19 +61,17 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             &orbit.state,
             orbit.period,
             request.resolution,
-            &studied.units(),
+            &case.units(),
         )?;
     }
     if let Some(path) = &arguments.harmonics_out {
         file::write(path, harmonics_csv(orbit).as_bytes())?;
     }
-    if let Some(path) = &arguments.plot.plot {
-        orbit_figure(&model, orbit, &studied.units()).write(path)?;
-    }
-    motion::warn(&orbit.observables, "", output);
-    output.study(&studied, found, |found| {
-        text(&studied, &model, &found.motion)
-    })
+    arguments
+        .plot
+        .draw(|| orbit_figure(&model, orbit, &case.units()))?;
+    motion::warn(&orbit.observables, found.physical.as_ref(), "", output);
+    output.study(&case, found, |found| text(&case, &model, &found.motion))
 }
 
 fn harmonics_csv(orbit: &OrbitReport) -> String {
@@ -88,9 +86,9 @@ fn harmonics_csv(orbit: &OrbitReport) -> String {
     csv
 }
 
-fn text(studied: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
-    let units = studied.units();
-    let heading = format!("{}: {}", studied.title(), studied.summary());
+fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
+    let units = case.units();
+    let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
     let verdict = format!("a period-{} orbit, {}", orbit.period, orbit.stability);
     let _ = writeln!(text, "  {}", style::bold(&verdict));

@@ -20,7 +20,7 @@ use crate::motion;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, number, series, style};
+use crate::{number, series, style};
 
 /// One run: its steady state, or how it gets there.
 #[derive(Args, Debug)]
@@ -39,46 +39,43 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
-    if let Some(path) = &arguments.out.out {
-        file::ending(path, &["csv"])?;
-    }
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let model = studied.model()?;
-    let report = SimulateStudy::run(&studied, &request, &Control::default())?;
-    let units = studied.units();
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let model = case.model()?;
+    let report = SimulateStudy::run(&case, &request, &Control::default())?;
+    let units = case.units();
     match &report {
-        SimulateReport::Exact(run) => {
-            let run = &run.motion;
+        SimulateReport::Exact(report) => {
+            let run = &report.motion;
             if let Some(path) = &arguments.out.out {
                 let resolution = request.resolution;
                 series::write(path, &model, &run.start, run.periods, resolution, &units)?;
             }
-            if let Some(path) = &arguments.plot.plot {
-                simulation_figure(&model, run, &units).write(path)?;
-            }
-            motion::warn(&run.observables, "", output);
+            arguments
+                .plot
+                .draw(|| simulation_figure(&model, run, &units))?;
+            motion::warn(&run.observables, report.physical.as_ref(), "", output);
         }
         SimulateReport::FixedStep(run) => {
-            if let Some(path) = &arguments.out.out {
-                file::write(path, curve(run).as_bytes())?;
-            }
-            if let Some(path) = &arguments.plot.plot {
-                fixed_step_figure(&model, run, &units).write(path)?;
-            }
+            arguments.out.write(|| curve(run))?;
+            arguments
+                .plot
+                .draw(|| fixed_step_figure(&model, run, &units))?;
             output.note(
                 "rk4 is the paper's own method, kept to show what a time step does; nothing it says is certified",
             );
         }
     }
-    output.study(&studied, &report, |report| match report {
-        SimulateReport::Exact(run) => text(&studied, &model, &run.motion),
-        SimulateReport::FixedStep(run) => rk4_text(&studied, run),
+    output.study(&case, &report, |report| match report {
+        SimulateReport::Exact(run) => text(&case, &model, &run.motion),
+        SimulateReport::FixedStep(run) => rk4_text(&case, run),
     })
 }
 
-fn text(studied: &GivenCase, model: &Model, run: &Simulation) -> String {
-    let units = studied.units();
-    let heading = format!("{}: {}", studied.title(), studied.summary());
+fn text(case: &GivenCase, model: &Model, run: &Simulation) -> String {
+    let units = case.units();
+    let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
     let _ = writeln!(
         text,
@@ -151,12 +148,12 @@ fn curve(run: &FixedStepRun) -> String {
     csv
 }
 
-fn rk4_text(studied: &GivenCase, run: &FixedStepRun) -> String {
-    let units: Units = studied.units();
+fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {
+    let units: Units = case.units();
     let heading = format!(
         "{}: {}, Runge–Kutta with {} steps a period in flight and {} in contact",
-        studied.title(),
-        studied.summary(),
+        case.title(),
+        case.summary(),
         run.steps[0],
         run.steps[1]
     );

@@ -27,8 +27,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     request: Request<SweepRequest>,
 
-    /// What --plot shows of one parameter; without it the response over drive.frequency, else
-    /// the diagram
+    /// What --plot shows; without it the response over drive.frequency or over two parameters of
+    /// a physical case, else the diagram
     #[arg(long, value_enum)]
     show: Option<Show>,
 
@@ -41,19 +41,21 @@ pub(crate) struct Arguments {
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Show {
-    /// Greatest deflection in each drive period: a bifurcation diagram
+    /// Greatest deflection in each drive period: a bifurcation diagram; over two parameters a map
+    /// of what motions there are
     Diagram,
-    /// Amplitude and phase at the drive's frequency: a resonance curve
+    /// Amplitude and phase at the drive's frequency: a resonance curve; over two parameters also
+    /// maps of amplitude, phase, greatest force, dissipation and contact
     Response,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
     let begun = Instant::now();
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let sweep = request.sweep(&studied)?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let sweep = request.sweep(&case)?;
     let keys: Vec<Key> = sweep.options().over.iter().map(|o| o.key).collect();
-    studied.say_held(&keys, output);
+    case.say_held(&keys, output);
     let names: Vec<&str> = keys.iter().map(|key| key.path()).collect();
     let name = derived_name(
         arguments.case.file.as_deref(),
@@ -61,9 +63,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     );
     let dataset = &arguments.dataset;
     let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
-    if let Some(path) = &arguments.plot.plot {
-        crate::file::ending(path, &["svg", "png", "pdf"])?;
-    }
+    arguments.plot.check()?;
     let noun = if sweep.options().follow == Follow::Off {
         "values"
     } else {
@@ -78,8 +78,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     )?;
     let shown = arguments.show.unwrap_or_else(|| {
         // A resonance curve is what one sees of the drive's frequency.
-        let key = sweep.options().over[0].key.name();
-        if key.starts_with("drive.frequency") {
+        let key = sweep.options().over[0].key.path();
+        let two = sweep.options().over.len() == 2;
+        if key.starts_with("drive.frequency") || (two && case.physical().is_some()) {
             Show::Response
         } else {
             Show::Diagram
@@ -92,10 +93,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let plot = arguments.plot.plot.as_deref();
     let seed = request.seed;
     let done = DatasetReport::of(&store, destination, plot, begun, seed, summary, drawn)?;
-    output.study(&studied, &done, |done| text(&studied, &sweep, done))
+    output.study(&case, &done, |done| text(&case, &sweep, done))
 }
 
-fn text(studied: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
+fn text(case: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
     let options = sweep.options();
     let ranges: Vec<String> = options
         .over
@@ -103,7 +104,7 @@ fn text(studied: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> St
         .map(|over| {
             format!(
                 "{} from {} to {} in {} values",
-                over.key.name(),
+                over.key.path(),
                 value(over, over.from),
                 value(over, over.to),
                 over.count
@@ -112,7 +113,7 @@ fn text(studied: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> St
         .collect();
     let heading = format!(
         "{}: {}, {}",
-        studied.title(),
+        case.title(),
         ranges.join(", "),
         number::counted(sweep.runs(), "run", "runs")
     );
@@ -156,10 +157,9 @@ fn counts(summary: &Summary) -> String {
     match summary.from_neighbours.len() {
         0 => table.render(),
         more => format!(
-            "{}\n  {} more that no start met, but that {} of neighbouring values to\n",
+            "{}\n  {} that no start met, but to which those of neighbouring values lead\n",
             table.render(),
-            number::counted(more, "motion", "motions"),
-            if more == 1 { "one leads" } else { "those lead" }
+            number::counted(more, "further motion", "further motions"),
         ),
     }
 }

@@ -39,19 +39,17 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let request = arguments.request.read()?;
     let begun = Instant::now();
     let names = request.over.names();
-    let studied = GivenCase::of(&arguments.case, output)?;
-    let sweep = request.sweep(&studied)?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let sweep = request.sweep(&case)?;
     let keys: Vec<Key> = sweep.options().over.iter().map(|over| over.key).collect();
-    studied.say_held(&keys, output);
+    case.say_held(&keys, output);
     let name = derived_name(
         arguments.case.file.as_deref(),
         &[&["window"], names.as_slice()].concat(),
     );
     let plot = arguments.plot.plot.as_deref();
     let destination = arguments.dataset.destination(&name, plot)?;
-    if let Some(path) = plot {
-        crate::file::ending(path, &["svg", "png", "pdf"])?;
-    }
+    arguments.plot.check()?;
     let store = arguments.dataset.compute(
         &destination.store,
         sweep.schema(),
@@ -61,11 +59,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     )?;
     let drawn = |store: &_| -> Result<_, StoreError> { Window::of(store)?.figure(store) };
     let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, Window::of, drawn)?;
-    output.study(&studied, &done, |done| {
+    let done = DatasetReport::of(&store, destination, plot, begun, seed, Window::kept, drawn)?;
+    output.study(&case, &done, |done| {
         let heading = format!(
             "{}: operating window over {} and {}, {} at each of {} points",
-            studied.title(),
+            case.title(),
             names[0],
             names[1],
             number::counted(request.starts, "start", "starts"),

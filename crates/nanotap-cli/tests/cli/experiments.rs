@@ -110,7 +110,7 @@ fn a_setpoint_serves_every_command() {
     assert!((amplitude / 16e-9 - 1.0).abs() < 1e-9, "{amplitude}");
     let text = folder.run(&["case", "lever.toml"]).stdout;
     assert!(text.contains("stable, reached on approach"), "{text}");
-    // Too low to be reached: a command fails with the reason, the case is shown all the same.
+    // Too low to be reached: every command fails with the reason; the case is shown before that.
     folder.write("low.toml", at_setpoint("1 pm"));
     let failed = folder.run(&["orbit", "low.toml"]);
     assert_eq!(failed.code, 1);
@@ -120,8 +120,9 @@ fn a_setpoint_serves_every_command() {
         failed.stderr
     );
     let shown = folder.run(&["case", "low.toml"]);
-    assert_eq!(shown.code, 0);
+    assert_eq!(shown.code, 1);
     assert!(shown.stderr.contains("is not reached"), "{}", shown.stderr);
+    assert!(shown.stdout.contains("42 N/m"), "{}", shown.stdout);
 }
 
 #[test]

@@ -16,12 +16,12 @@ fn documents() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/cases")
 }
 
-/// A folder with the case files of the documentation.
+/// A folder with the case files and data of the documentation.
 fn with_cases() -> Folder {
     let folder = Folder::new();
     for entry in std::fs::read_dir(documents()).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "toml") {
+        if path.extension().is_some_and(|e| e == "toml" || e == "csv") {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             folder.write(&name, std::fs::read(&path).unwrap());
         }
@@ -120,9 +120,11 @@ fn no_document_is_left_out() {
             "README.md",
             "approach-curve.md",
             "dforce.md",
+            "fit.md",
             "fm-lever-on-polystyrene.md",
             "frequency-sweep.md",
             "liquid.md",
+            "measured-modes.md",
             "period-doubling.md",
             "samples.md",
             "stiff-lever.md",
@@ -142,11 +144,13 @@ macro_rules! follows {
 }
 
 follows! {
+    fit: "fit.md", 2 commands, 14 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_liquid: "liquid.md", 2 commands, 4 numbers;
+    the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;

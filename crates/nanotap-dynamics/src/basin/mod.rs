@@ -12,7 +12,7 @@
 //! the label of a start within rounding of a basin boundary is a matter of chance.
 
 use crate::census::{Attractor, AttractorKind};
-use crate::failure::{MapFailure, advance};
+use crate::failure::{MapFailure, advance, advance_by};
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::vector::norm;
@@ -243,13 +243,14 @@ impl Basins {
         state: &mut [f64],
         scratch: &mut [f64],
     ) -> Result<Label, MapFailure> {
+        let max_periods = self.options.max_periods;
         // Boxes that have held every one of the last states, as bits.
         let mut inside = vec![true; self.boxes.len()];
-        for period in 0..=self.options.max_periods {
-            if period > 0 {
-                advance(map, state)?;
-            }
-            if norm(state) > self.options.bound {
+        let mut wait = Wait::new(&self.balls);
+        let mut period = 0;
+        loop {
+            let size = norm(state);
+            if size > self.options.bound {
                 return Ok(Label::Unbounded);
             }
             for (label, ball) in &self.balls {
@@ -257,7 +258,7 @@ impl Basins {
                     return Ok(Label::Attractor(*label));
                 }
             }
-            if period + LAST > self.options.max_periods {
+            if period + LAST > max_periods {
                 for (flag, (_, low, high)) in inside.iter_mut().zip(&self.boxes) {
                     *flag &= state
                         .iter()
@@ -265,12 +266,67 @@ impl Basins {
                         .all(|(x, (l, h))| l <= x && x <= h);
                 }
             }
+            if period == max_periods {
+                break;
+            }
+            // The last states are all looked at, and those of a motion that may run off.
+            let unwatched = (max_periods + 1).saturating_sub(period + LAST);
+            let periods = if size > SMALL * self.options.bound {
+                1
+            } else {
+                wait.after(state).min(unwatched).max(1)
+            };
+            advance_by(map, state, periods)?;
+            period += periods;
         }
         let mut held = self.boxes.iter().zip(&inside).filter(|(_, f)| **f);
         Ok(match (held.next(), held.next()) {
             (Some(((label, ..), _)), None) => Label::Attractor(*label),
             _ => Label::Unsettled,
         })
+    }
+}
+
+/// How long a start need not be looked at: half of what it would take to the nearest ball at
+/// the ball's own rate. A start that is in a ball meanwhile stays there, so this decides nothing
+/// but when its label is found.
+struct Wait<'a> {
+    balls: &'a [(u32, Neighbourhood)],
+    /// Looks in a row that see every phase of every orbit.
+    phases: usize,
+    looks: usize,
+    /// Periods to the nearest ball in any of these looks.
+    nearest: f64,
+}
+
+/// Periods that a start is not looked at, at most.
+const LONGEST_WAIT: f64 = 64.0;
+/// Size of a state, as a part of the bound, up to which it may be left alone.
+const SMALL: f64 = 1e-4;
+
+impl<'a> Wait<'a> {
+    fn new(balls: &'a [(u32, Neighbourhood)]) -> Self {
+        Self {
+            balls,
+            phases: balls.iter().map(|(_, b)| b.period()).max().unwrap_or(1),
+            looks: 0,
+            nearest: f64::INFINITY,
+        }
+    }
+
+    /// Periods to the next look, after one at `state`.
+    fn after(&mut self, state: &[f64]) -> usize {
+        for (_, ball) in self.balls {
+            self.nearest = self.nearest.min(ball.periods_away(state));
+        }
+        self.looks += 1;
+        if self.looks < self.phases {
+            return 1;
+        }
+        let wait = (0.5 * self.nearest).min(LONGEST_WAIT);
+        self.looks = 0;
+        self.nearest = f64::INFINITY;
+        wait as usize
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::census::escapes::Escapes;
 use crate::census::{
-    Attractor, AttractorKind, Census, Fate, Fraction, Lifetime, Outcome, SizeCount, StartOrigin,
-    StartSet, TransientChaos, Unseen,
+    Attractor, AttractorKind, Census, Fraction, Lifetime, Outcome, SizeCount, StartOrigin,
+    StartOutcome, StartSet, TransientChaos, Unseen,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -38,8 +38,8 @@ pub(crate) fn assemble(
     let chaos_lasts = escapes.chaos_lasts();
     let mut undecided = Vec::new();
     let mut unbounded = Vec::new();
-    let mut wandering = Vec::new();
-    let mut wandering_spectrum = transient_spectrum;
+    let mut unescaped = Vec::new();
+    let mut unescaped_spectrum = transient_spectrum;
     for (k, outcome) in outcomes.iter().enumerate() {
         match outcome {
             Outcome::Orbit { index, .. } => groups[*index].members.push(k),
@@ -57,9 +57,9 @@ pub(crate) fn assemble(
                 }
             }
             Outcome::Chaos(chaos, _) if !chaos_lasts => {
-                wandering.push(k);
-                if wandering.len() == 1 {
-                    wandering_spectrum = Some(chaos.spectrum.clone());
+                unescaped.push(k);
+                if unescaped.len() == 1 {
+                    unescaped_spectrum = Some(chaos.spectrum.clone());
                 }
             }
             Outcome::Chaos(chaos, state) => {
@@ -103,34 +103,34 @@ pub(crate) fn assemble(
         let first = groups[g].members.first().copied().unwrap_or(usize::MAX);
         (usize::MAX - members(&groups[g]).count, first)
     });
-    let mut fates = vec![Fate::Undecided; total];
+    let mut outcomes_by_start = vec![StartOutcome::Undecided; total];
     for (index, &g) in order.iter().enumerate() {
         for &k in &groups[g].members {
-            fates[k] = Fate::Attractor {
+            outcomes_by_start[k] = StartOutcome::Attractor {
                 index,
                 periods: periods_of(&outcomes[k]),
             };
         }
     }
-    for &k in &wandering {
-        fates[k] = Fate::Wandering {
+    for &k in &unescaped {
+        outcomes_by_start[k] = StartOutcome::TransientChaos {
             periods: periods_of(&outcomes[k]),
         };
     }
-    for (fate, outcome) in fates.iter_mut().zip(outcomes) {
+    for (outcome_of_start, outcome) in outcomes_by_start.iter_mut().zip(outcomes) {
         if matches!(outcome, Outcome::Unbounded) {
-            *fate = Fate::Unbounded;
+            *outcome_of_start = StartOutcome::Unbounded;
         }
     }
-    let transient_chaos = wandering_spectrum
-        .filter(|_| escapes.escaped.len() + wandering.len() > 0)
+    let transient_chaos = unescaped_spectrum
+        .filter(|_| escapes.escaped.len() + unescaped.len() > 0)
         .map(|spectrum| TransientChaos {
             spectrum,
             lifetime: escapes.lifetime(),
-            wandering: counts.of(&wandering),
-            destinations: destinations(&escapes.escaped, &fates, order.len()),
+            unescaped: counts.of(&unescaped),
+            destinations: destinations(&escapes.escaped, &outcomes_by_start, order.len()),
         });
-    let by_size = counts.by_size(&fates, order.len());
+    let by_size = counts.by_size(&outcomes_by_start, order.len());
     let unseen = (!by_size.is_empty()).then(|| Unseen::new(order.len(), row));
     let mut slots: Vec<Option<Group>> = groups.into_iter().map(Some).collect();
     let attractors = order
@@ -148,7 +148,7 @@ pub(crate) fn assemble(
         transient_chaos,
         unbounded: counts.of(&unbounded),
         undecided,
-        fates,
+        outcomes_by_start,
         counted: counts.counted,
         by_size,
         unseen,
@@ -177,12 +177,12 @@ pub(crate) fn periods_of(outcome: &Outcome) -> usize {
 
 fn destinations(
     escaped: &[(usize, usize)],
-    fates: &[Fate],
+    outcomes_by_start: &[StartOutcome],
     attractors: usize,
 ) -> Vec<(usize, usize)> {
     let mut counts = vec![0; attractors];
     for &(k, _) in escaped {
-        if let Fate::Attractor { index, .. } = fates[k] {
+        if let StartOutcome::Attractor { index, .. } = outcomes_by_start[k] {
             counts[index] += 1;
         }
     }
@@ -220,15 +220,15 @@ impl<'a> Counts<'a> {
         Fraction::new(count, self.counted)
     }
 
-    fn by_size(&self, fates: &[Fate], attractors: usize) -> Vec<SizeCount> {
+    fn by_size(&self, outcomes_by_start: &[StartOutcome], attractors: usize) -> Vec<SizeCount> {
         let scales = self.starts.scales();
         (0..scales.len())
             .map(|size| {
-                let of_this_size: Vec<Fate> = (0..fates.len())
+                let of_this_size: Vec<StartOutcome> = (0..outcomes_by_start.len())
                     .filter(|&k| self.starts.origin(k) == Some(StartOrigin::Drawn(size)))
-                    .map(|k| fates[k])
+                    .map(|k| outcomes_by_start[k])
                     .collect();
-                let part = |is: &dyn Fn(&Fate) -> bool| {
+                let part = |is: &dyn Fn(&StartOutcome) -> bool| {
                     let count = of_this_size.iter().filter(|f| is(f)).count();
                     Fraction::new(count, of_this_size.len())
                 };
@@ -237,11 +237,11 @@ impl<'a> Counts<'a> {
                     starts: of_this_size.len(),
                     attractors: (0..attractors)
                         .map(|a| {
-                            part(&|f| matches!(f, Fate::Attractor { index, .. } if *index == a))
+                            part(&|f| matches!(f, StartOutcome::Attractor { index, .. } if *index == a))
                         })
                         .collect(),
-                    unbounded: part(&|f| matches!(f, Fate::Unbounded)),
-                    undecided: part(&|f| matches!(f, Fate::Undecided | Fate::Wandering { .. })),
+                    unbounded: part(&|f| matches!(f, StartOutcome::Unbounded)),
+                    undecided: part(&|f| matches!(f, StartOutcome::Undecided | StartOutcome::TransientChaos { .. })),
                 }
             })
             .collect()

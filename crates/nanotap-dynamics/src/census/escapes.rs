@@ -10,7 +10,7 @@ pub(crate) struct Escapes {
     /// Start and periods of each escape.
     pub(crate) escaped: Vec<(usize, usize)>,
     /// Periods watched of each start that is still chaotic.
-    wandering: Vec<usize>,
+    unescaped: Vec<usize>,
 }
 
 impl Escapes {
@@ -23,27 +23,27 @@ impl Escapes {
     /// Counts the escapes that came `after` so many periods.
     pub(crate) fn count(outcomes: &[Outcome], after: f64) -> Self {
         let mut escaped = Vec::new();
-        let mut wandering = Vec::new();
+        let mut unescaped = Vec::new();
         for (k, outcome) in outcomes.iter().enumerate() {
             match outcome {
                 Outcome::Orbit { periods, .. } if *periods as f64 > after => {
                     escaped.push((k, *periods));
                 }
-                Outcome::Chaos(chaos, _) => wandering.push(chaos.observed),
+                Outcome::Chaos(chaos, _) => unescaped.push(chaos.observed),
                 _ => {}
             }
         }
         Self {
             after,
             escaped,
-            wandering,
+            unescaped,
         }
     }
 
     /// End of the first quarter of the time for which all wanderers were watched that
     /// were watched for long enough to count.
     fn early(&self) -> f64 {
-        let watched = self.wandering.iter().map(|&t| t as f64);
+        let watched = self.unescaped.iter().map(|&t| t as f64);
         let end = watched.filter(|&t| t > self.after).fold(f64::NAN, f64::min);
         self.after + 0.25 * (end - self.after).max(0.0)
     }
@@ -51,7 +51,7 @@ impl Escapes {
     fn exposure_between(&self, from: f64, to: f64) -> f64 {
         let share = |t: usize| ((t as f64).min(to) - from).max(0.0);
         self.escaped.iter().map(|&(_, t)| share(t)).sum::<f64>()
-            + self.wandering.iter().map(|&t| share(t)).sum::<f64>()
+            + self.unescaped.iter().map(|&t| share(t)).sum::<f64>()
     }
 
     pub(crate) fn lifetime(&self) -> Lifetime {
@@ -65,7 +65,7 @@ impl Escapes {
     /// enough to count, and none escaped, or escapes stopped early in a way that a
     /// constant rate would show with probability below 1 %.
     pub(crate) fn chaos_lasts(&self) -> bool {
-        if !self.wandering.iter().any(|&t| t as f64 > self.after) {
+        if !self.unescaped.iter().any(|&t| t as f64 > self.after) {
             return false;
         }
         if self.escaped.is_empty() {

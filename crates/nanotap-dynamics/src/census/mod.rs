@@ -40,7 +40,8 @@ use rayon::prelude::*;
 
 use crate::census::escapes::Escapes;
 use crate::classify::{
-    Arrival, Chaos, Known, SettleOptions, Settled, Torus, UndecidedReason, Verdict, arrive, watch,
+    Chaos, Classified, ClassifyOptions, Known, MotionKind, RunEnd, Torus, UndecidedReason,
+    follow_start, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -68,7 +69,7 @@ pub struct CensusOptions {
     /// Starts that are classified without knowledge of any attractor.
     pub pilots: usize,
     /// Budgets of each start.
-    pub settle: SettleOptions,
+    pub classify: ClassifyOptions,
     /// Drawn starts go on until the share that may lead to motions not yet found is
     /// below this with 95 % confidence.
     pub unseen: f64,
@@ -82,7 +83,7 @@ impl Default for CensusOptions {
     fn default() -> Self {
         Self {
             pilots: 32,
-            settle: SettleOptions::default(),
+            classify: ClassifyOptions::default(),
             unseen: 0.002,
             max_starts: 5000,
             max_periods: 2_000_000,
@@ -106,10 +107,10 @@ pub struct Census {
     pub transient_chaos: Option<TransientChaos>,
     /// Starts that left every bound.
     pub unbounded: Fraction,
-    /// Starts without a verdict, by index.
+    /// Starts left undecided, by index.
     pub undecided: Vec<(usize, UndecidedReason)>,
     /// What happened to each start.
-    pub fates: Vec<Fate>,
+    pub outcomes_by_start: Vec<StartOutcome>,
     /// What the fractions are of: all starts of a set of given ones, the drawn starts
     /// of one that is drawn.
     pub counted: usize,
@@ -133,7 +134,7 @@ pub struct SizeCount {
     pub attractors: Vec<Fraction>,
     /// Part that left every bound.
     pub unbounded: Fraction,
-    /// Part without a verdict, or on transient chaos.
+    /// Part left undecided, or on transient chaos.
     pub undecided: Fraction,
 }
 
@@ -188,15 +189,15 @@ pub struct TransientChaos {
     pub spectrum: LyapunovSpectrum,
     /// Mean lifetime in periods, by maximum likelihood with the wanderers censored.
     pub lifetime: Lifetime,
-    /// Starts still wandering at the end.
-    pub wandering: Fraction,
+    /// Starts still on transient chaos at the end.
+    pub unescaped: Fraction,
     /// Attractors (by index) that escaped starts went to, with counts.
     pub destinations: Vec<(usize, usize)>,
 }
 
 /// What happened to a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
+pub enum StartOutcome {
     /// It went to this attractor, and was known to after so many periods.
     Attractor {
         /// Index into [`Census::attractors`].
@@ -205,13 +206,13 @@ pub enum Fate {
         periods: usize,
     },
     /// It was still on the transient chaos after so many periods.
-    Wandering {
+    TransientChaos {
         /// Periods run.
         periods: usize,
     },
     /// It left every bound.
     Unbounded,
-    /// No verdict; the reason is in [`Census::undecided`].
+    /// Undecided; the reason is in [`Census::undecided`].
     Undecided,
 }
 
@@ -302,7 +303,7 @@ struct Work<'a, M> {
     patience: usize,
     /// Periods run so far.
     periods: usize,
-    /// Drawn starts with a verdict since the last new motion.
+    /// Drawn starts decided since the last new motion.
     row: usize,
 }
 
@@ -328,7 +329,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         let mut classified = Vec::new();
         for (k, arrival) in range.into_iter().zip(arrivals) {
             let before = self.orbits.len() + self.chaos.len();
-            if matches!(arrival, Some(Arrival::Settled(_))) {
+            if matches!(arrival, Some(RunEnd::Classified(_))) {
                 classified.push(k);
             }
             let outcome = self.outcome(arrival, &known);
@@ -351,7 +352,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .fold(0, usize::max)
             .clamp(
                 LEAST_PATIENCE,
-                self.options.settle.max_transient.max(LEAST_PATIENCE),
+                self.options.classify.max_transient.max(LEAST_PATIENCE),
             );
     }
 
@@ -365,7 +366,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         balls.map(|(_, ball)| ball.clone()).collect()
     }
 
-    fn run(&self, indices: &[usize], count: bool) -> Vec<Option<Arrival>> {
+    fn run(&self, indices: &[usize], count: bool) -> Vec<Option<RunEnd>> {
         let balls = self.balls();
         let known = Known {
             balls: &balls,
@@ -381,7 +382,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
                         return None;
                     }
                     let start = self.starts.start(k)?;
-                    let arrival = arrive(map, &start, known, &self.options.settle);
+                    let arrival = follow_start(map, &start, known, &self.options.classify);
                     if count {
                         self.control.report(&self.done, self.last);
                     }
@@ -391,29 +392,29 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .collect()
     }
 
-    fn outcome(&mut self, arrival: Option<Arrival>, known: &[usize]) -> Outcome {
-        let settled = match arrival {
+    fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize]) -> Outcome {
+        let classified = match arrival {
             None => return Outcome::Undecided(UndecidedReason::Cancelled),
-            Some(Arrival::Entered { index, periods }) => {
+            Some(RunEnd::Entered { index, periods }) => {
                 return Outcome::Orbit {
                     index: known[index],
                     periods,
                 };
             }
-            Some(Arrival::Settled(settled)) => *settled,
+            Some(RunEnd::Classified(classified)) => *classified,
         };
-        let Settled {
-            verdict,
+        let Classified {
+            kind,
             periods,
             state,
             met,
-        } = settled;
-        let outcome = match verdict {
-            Verdict::Periodic(orbit) => Outcome::Orbit {
+        } = classified;
+        let outcome = match kind {
+            MotionKind::Periodic(orbit) => Outcome::Orbit {
                 index: merge(&mut self.orbits, orbit),
                 periods,
             },
-            Verdict::TransientChaos {
+            MotionKind::TransientChaos {
                 orbit, spectrum, ..
             } => {
                 self.transient_spectrum.get_or_insert(spectrum);
@@ -422,16 +423,16 @@ impl<M: StroboscopicMap> Work<'_, M> {
                     periods,
                 }
             }
-            Verdict::QuasiPeriodic(torus) => {
+            MotionKind::QuasiPeriodic(torus) => {
                 self.know(&torus.spectrum);
                 Outcome::Torus(torus, state)
             }
-            Verdict::Chaotic(chaos) => {
+            MotionKind::Chaotic(chaos) => {
                 self.know(&chaos.spectrum);
                 Outcome::Chaos(chaos, state)
             }
-            Verdict::Unbounded => Outcome::Unbounded,
-            Verdict::Undecided { reason, .. } => Outcome::Undecided(reason),
+            MotionKind::Unbounded => Outcome::Unbounded,
+            MotionKind::Undecided { reason, .. } => Outcome::Undecided(reason),
         };
         for orbit in met {
             merge(&mut self.orbits, orbit);
@@ -483,7 +484,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         for (&k, arrival) in checked.iter().zip(self.run(&checked, false)) {
             let (
                 Outcome::Orbit { index, periods },
-                Some(Arrival::Entered {
+                Some(RunEnd::Entered {
                     index: ball,
                     periods: after,
                 }),
@@ -522,14 +523,14 @@ impl<M: StroboscopicMap> Work<'_, M> {
             })
             .collect();
         let balls = self.balls();
-        let ends: Vec<Result<Vec<f64>, Arrival>> = watched
+        let ends: Vec<Result<Vec<f64>, RunEnd>> = watched
             .par_iter()
             .map_init(
                 || self.map.clone(),
                 |map, &k| match &self.outcomes[k] {
                     Outcome::Chaos(chaos, state) => {
                         let periods = enough - chaos.observed;
-                        watch(map, state, &balls, periods, &self.options.settle)
+                        watch(map, state, &balls, periods, &self.options.classify)
                     }
                     _ => Ok(Vec::new()),
                 },

@@ -13,7 +13,7 @@
 //! It speaks of the set of starts, not of motions: one whose basin has no part of the
 //! set is not bounded. Draws are taken as random; quasi-random ones are spread more
 //! evenly, and drawing the sizes in turn only lowers (1 − p)ⁿ (the geometric mean of
-//! the sizes' shares is below the arithmetic one). Starts without a verdict are no
+//! the sizes' shares is below the arithmetic one). Starts left undecided are no
 //! trials: the share is of those that have one.
 
 /// Probability that the bound is wrong.
@@ -24,7 +24,7 @@ const ERROR: f64 = 0.05;
 pub struct Unseen {
     /// Motions found.
     pub motions: usize,
-    /// Drawn starts with a verdict since the last of them was found.
+    /// Drawn starts decided since the last of them was found.
     pub starts: usize,
     /// With 95 % confidence, at most this share of starts leads to motions not found.
     pub share: f64,

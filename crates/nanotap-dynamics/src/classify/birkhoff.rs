@@ -7,7 +7,7 @@
 //! number of digits to which two consecutive stretches agree tells them apart.
 //!
 //! Fails: near a rotation number that is almost rational, convergence sets in late
-//! (few digits: no verdict follows); a motion still drifting has few digits too. A
+//! (few digits: nothing follows); a motion still drifting has few digits too. A
 //! periodic motion has all digits, so this says "torus" only of what Newton could
 //! not close.
 

@@ -1,4 +1,4 @@
-//! Where one start settles.
+//! What the motion from one start is.
 //!
 //! The run is looked at after 16, 32, 64, … periods. Each time the best candidate
 //! periods go to Newton; a closed orbit counts only if its multipliers are stable
@@ -9,7 +9,7 @@
 //! how nearly the run repeats ever decides.
 //!
 //! What does not close is measured on: Lyapunov spectrum with error bars, still
-//! looking for an escape, then weighted Birkhoff averages. The verdicts:
+//! looking for an escape, then weighted Birkhoff averages. A motion is called
 //!
 //! - periodic: closed, stable, approached;
 //! - transient chaos: the exponents were positive by more than five standard errors,
@@ -37,12 +37,12 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
-pub(crate) use run::{Arrival, Known, arrive, watch};
+pub(crate) use run::{Known, RunEnd, follow_start, watch};
 pub use undecided::UndecidedReason;
 
-/// Budgets of [`settle`].
+/// Budgets of [`classify`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct SettleOptions {
+pub struct ClassifyOptions {
     /// Longest period tried at every look.
     pub max_period: usize,
     /// Longest period tried where none of these closed the motion, before it is called
@@ -64,7 +64,7 @@ pub struct SettleOptions {
     pub torus_digits: f64,
 }
 
-impl Default for SettleOptions {
+impl Default for ClassifyOptions {
     fn default() -> Self {
         Self {
             max_period: 64,
@@ -82,12 +82,12 @@ impl Default for SettleOptions {
     }
 }
 
-/// Where a start settled.
+/// What the motion from a start was found to be.
 #[derive(Clone, Debug)]
-pub struct Settled {
+pub struct Classified {
     /// What the motion is.
-    pub verdict: Verdict,
-    /// Periods run up to the verdict.
+    pub kind: MotionKind,
+    /// Periods run until that was known.
     pub periods: usize,
     /// The state there.
     pub state: Vec<f64>,
@@ -98,7 +98,7 @@ pub struct Settled {
 
 /// What a motion is.
 #[derive(Clone, Debug)]
-pub enum Verdict {
+pub enum MotionKind {
     /// It goes to this stable orbit.
     Periodic(PeriodicOrbit),
     /// It was chaotic for a while and then went to this stable orbit.
@@ -153,12 +153,16 @@ pub struct Chaos {
     pub longest_period: usize,
 }
 /// Follows the motion from `start` until it can be named, within the budgets.
-pub fn settle<M: StroboscopicMap>(map: &mut M, start: &[f64], options: &SettleOptions) -> Settled {
-    match arrive(map, start, Known::default(), options) {
-        Arrival::Settled(settled) => *settled,
+pub fn classify<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    options: &ClassifyOptions,
+) -> Classified {
+    match follow_start(map, start, Known::default(), options) {
+        RunEnd::Classified(end) => *end,
         // No neighbourhood was given, so none can have been entered.
-        Arrival::Entered { periods, .. } => Settled {
-            verdict: Verdict::Undecided {
+        RunEnd::Entered { periods, .. } => Classified {
+            kind: MotionKind::Undecided {
                 reason: UndecidedReason::Cancelled,
                 spectrum: None,
             },

@@ -1,9 +1,9 @@
-//! One start on its way to a verdict.
+//! One start followed until its motion is known.
 
 use crate::classify::approach::approaches;
 use crate::classify::birkhoff::birkhoff_digits;
 use crate::classify::candidates::candidate_periods;
-use crate::classify::{Chaos, SettleOptions, Settled, Torus, UndecidedReason, Verdict};
+use crate::classify::{Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason};
 use crate::failure::{MapFailure, advance};
 use crate::lyapunov::{LyapunovRun, LyapunovSpectrum};
 use crate::map::StroboscopicMap;
@@ -18,9 +18,14 @@ const FIRST_LOOK: usize = 16;
 /// Newton steps of a guess: near an orbit half as many are needed, and far from one
 /// Newton would only wander to some orbit that the run does not go to.
 const CLOSING_STEPS: usize = 10;
+/// Shortest part of a Newton step of a guess: near the orbit that a run goes to full steps hold.
+const SHORTEST_STEP: f64 = 0.5;
+/// Growth over a near return beyond which it is no sign of a stable orbit: where a run does go
+/// to one, the linearised return comes to shrink.
+const HOPELESS_GROWTH: f64 = 100.0;
 /// Closure, as a part of the motion's spread, up to which a period is worth trying.
 const WORTH_TRYING: f64 = 0.2;
-/// The same for periods beyond [`SettleOptions::max_period`], where Newton costs more.
+/// The same for periods beyond [`ClassifyOptions::max_period`], where Newton costs more.
 const LONG_WORTH_TRYING: f64 = 1e-2;
 /// The same in the last search before a motion is called anything but periodic.
 const LAST_WORTH_TRYING: f64 = 0.1;
@@ -39,21 +44,21 @@ pub(crate) struct Known<'a> {
 
 /// Where a start arrives when some attractors are known already.
 #[derive(Clone, Debug)]
-pub(crate) enum Arrival {
+pub(crate) enum RunEnd {
     /// In the neighbourhood of a known attractor, after so many periods.
     Entered {
         index: usize,
         periods: usize,
     },
-    Settled(Box<Settled>),
+    Classified(Box<Classified>),
 }
 
-pub(crate) fn arrive<M: StroboscopicMap>(
+pub(crate) fn follow_start<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
     known: Known<'_>,
-    options: &SettleOptions,
-) -> Arrival {
+    options: &ClassifyOptions,
+) -> RunEnd {
     let d = map.dimension();
     let bad = if start.len() != d || d == 0 {
         Some(format!("{} numbers given, {d} needed", start.len()))
@@ -64,8 +69,8 @@ pub(crate) fn arrive<M: StroboscopicMap>(
             .map(|v| format!("{v} is not finite"))
     };
     if let Some(reason) = bad {
-        return Arrival::Settled(Box::new(Settled {
-            verdict: undecided(UndecidedReason::BadStart(reason), None),
+        return RunEnd::Classified(Box::new(Classified {
+            kind: undecided(UndecidedReason::BadStart(reason), None),
             periods: 0,
             state: start.to_vec(),
             met: Vec::new(),
@@ -73,7 +78,7 @@ pub(crate) fn arrive<M: StroboscopicMap>(
     }
     let mut run = Run::new(start, known, options);
     match run.follow(map) {
-        Ok(verdict) => run.settled(verdict),
+        Ok(kind) => run.classified(kind),
         Err(stop) => run.stopped(stop),
     }
 }
@@ -84,8 +89,8 @@ pub(crate) fn watch<M: StroboscopicMap>(
     state: &[f64],
     balls: &[Neighbourhood],
     periods: usize,
-    options: &SettleOptions,
-) -> Result<Vec<f64>, Arrival> {
+    options: &ClassifyOptions,
+) -> Result<Vec<f64>, RunEnd> {
     let known = Known {
         balls,
         ..Known::default()
@@ -99,8 +104,8 @@ pub(crate) fn watch<M: StroboscopicMap>(
     Ok(run.state)
 }
 
-fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Verdict {
-    Verdict::Undecided { reason, spectrum }
+fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> MotionKind {
+    MotionKind::Undecided { reason, spectrum }
 }
 
 /// Why following a start ended early.
@@ -126,13 +131,13 @@ struct Run<'a> {
     recent: Vec<f64>,
     keep: usize,
     known: Known<'a>,
-    options: &'a SettleOptions,
+    options: &'a ClassifyOptions,
     closing: ShootingOptions,
     met: Vec<PeriodicOrbit>,
 }
 
 impl<'a> Run<'a> {
-    fn new(start: &[f64], known: Known<'a>, options: &'a SettleOptions) -> Self {
+    fn new(start: &[f64], known: Known<'a>, options: &'a ClassifyOptions) -> Self {
         let keep = (2 * longest(options)).max(FIRST_LOOK) * start.len();
         Self {
             d: start.len(),
@@ -145,42 +150,45 @@ impl<'a> Run<'a> {
             options,
             closing: ShootingOptions {
                 max_iterations: options.shooting.max_iterations.min(CLOSING_STEPS),
+                max_growth: HOPELESS_GROWTH,
+                min_damping: options.shooting.min_damping.max(SHORTEST_STEP),
+                explains_stalls: false,
                 ..options.shooting.clone()
             },
             met: Vec::new(),
         }
     }
 
-    fn settled(self, verdict: Verdict) -> Arrival {
-        Arrival::Settled(Box::new(Settled {
-            verdict,
+    fn classified(self, kind: MotionKind) -> RunEnd {
+        RunEnd::Classified(Box::new(Classified {
+            kind,
             periods: self.periods,
             state: self.state,
             met: self.met,
         }))
     }
 
-    fn stopped(self, stop: Stop) -> Arrival {
+    fn stopped(self, stop: Stop) -> RunEnd {
         let periods = self.periods;
         match stop {
-            Stop::Entered(index) => Arrival::Entered { index, periods },
-            Stop::Unbounded => self.settled(Verdict::Unbounded),
+            Stop::Entered(index) => RunEnd::Entered { index, periods },
+            Stop::Unbounded => self.classified(MotionKind::Unbounded),
             Stop::Failed(failure) => {
                 let reason = UndecidedReason::Map { periods, failure };
-                self.settled(undecided(reason, None))
+                self.classified(undecided(reason, None))
             }
         }
     }
 
-    fn follow<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Verdict, Stop> {
+    fn follow<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let mut target = FIRST_LOOK.max(self.known.patience);
         loop {
             let target_now = target.min(self.options.max_transient);
             while self.periods < target_now {
                 self.step(map)?;
             }
-            if let Some(verdict) = self.look(map)? {
-                return Ok(verdict);
+            if let Some(kind) = self.look(map)? {
+                return Ok(kind);
             }
             if target >= self.options.max_transient {
                 break;
@@ -191,17 +199,17 @@ impl<'a> Run<'a> {
     }
 
     fn step<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
-        // A motion that runs off ends in an overflow; that is its verdict.
+        // A motion that runs off ends in an overflow; that is what it is.
         match advance(map, &mut self.state) {
             Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
             other => other?,
         }
-        self.arrived(map)
+        self.after_period(map)
     }
 
     /// Bookkeeping after every period: history, bounds, known neighbourhoods.
     #[inline]
-    fn arrived<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
+    fn after_period<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
         self.periods += 1;
         if self.recent.len() >= 4 * self.keep {
             let cut = self.recent.len() - self.keep;
@@ -220,9 +228,9 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Tries to close the motion; a verdict if it goes to a stable orbit or sits on
+    /// Tries to close the motion; its kind if it goes to a stable orbit or sits on
     /// another.
-    fn look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Option<Verdict>, Stop> {
+    fn look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Option<MotionKind>, Stop> {
         let long = longest(self.options);
         let mut guesses = self.guesses(self.options.max_period, WORTH_TRYING);
         if self.periods >= 2 * long {
@@ -258,7 +266,7 @@ impl<'a> Run<'a> {
         &mut self,
         map: &mut M,
         guesses: Vec<(usize, Vec<f64>)>,
-    ) -> Result<Option<Verdict>, Stop> {
+    ) -> Result<Option<MotionKind>, Stop> {
         let mut tried: Vec<PeriodicOrbit> = Vec::new();
         for (period, points) in guesses {
             let Ok(orbit) = close_orbit_from_points(map, &points, period, &self.closing) else {
@@ -269,7 +277,7 @@ impl<'a> Run<'a> {
             }
             if orbit.is_stable() {
                 if approaches(map, &self.state, &orbit)? {
-                    return Ok(Some(Verdict::Periodic(orbit)));
+                    return Ok(Some(MotionKind::Periodic(orbit)));
                 }
                 if !self.met.iter().any(|m| m.is_same_as(&orbit)) {
                     self.met.push(orbit.clone());
@@ -309,7 +317,7 @@ impl<'a> Run<'a> {
     }
 
     /// Exponents of what does not close, looking for an escape after every doubling.
-    fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Verdict, Stop> {
+    fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
         let mut exponents = LyapunovRun::new(self.d);
         for _ in 0..budget.alignment {
@@ -322,14 +330,14 @@ impl<'a> Run<'a> {
                 self.step_with(map, &mut exponents)?;
                 exponents.record(&self.state);
             }
-            if let Some(verdict) = self.look(map)? {
-                return Ok(match (verdict, before.filter(is_chaotic)) {
-                    (Verdict::Periodic(orbit), Some(spectrum)) => Verdict::TransientChaos {
+            if let Some(kind) = self.look(map)? {
+                return Ok(match (kind, before.filter(is_chaotic)) {
+                    (MotionKind::Periodic(orbit), Some(spectrum)) => MotionKind::TransientChaos {
                         orbit,
                         spectrum,
                         lasted: self.periods,
                     },
-                    (verdict, _) => verdict,
+                    (kind, _) => kind,
                 });
             }
             let spectrum = exponents.spectrum();
@@ -344,7 +352,7 @@ impl<'a> Run<'a> {
             target = (2 * target).min(budget.max_periods);
         };
         if is_chaotic(&spectrum) {
-            return Ok(Verdict::Chaotic(Chaos {
+            return Ok(MotionKind::Chaotic(Chaos {
                 spectrum,
                 observed: self.periods,
                 lifetime_above: self.periods as f64 / 3.0,
@@ -363,7 +371,7 @@ impl<'a> Run<'a> {
             Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
             other => other?,
         }
-        self.arrived(map)
+        self.after_period(map)
     }
 
     /// A motion without a clearly positive exponent that did not close so far.
@@ -371,15 +379,15 @@ impl<'a> Run<'a> {
         &mut self,
         map: &mut M,
         spectrum: LyapunovSpectrum,
-    ) -> Result<Verdict, Stop> {
+    ) -> Result<MotionKind, Stop> {
         let longest_period = longest(self.options);
         let (exponent, error) = spectrum.largest();
         while self.recent.len() < 2 * longest_period * self.d {
             self.step(map)?;
         }
         let last_guesses = self.guesses(longest_period, LAST_WORTH_TRYING);
-        if let Some(verdict) = self.close(map, last_guesses)? {
-            return Ok(verdict);
+        if let Some(kind) = self.close(map, last_guesses)? {
+            return Ok(kind);
         }
         // The average of a bounded logarithm is off by its bound over the length.
         let zero = (3.0 * error).max(10.0 / spectrum.periods as f64);
@@ -441,7 +449,7 @@ impl<'a> Run<'a> {
         let digits = birkhoff_digits(map, &mut self.state, stretch)?;
         self.periods += 2 * stretch;
         if digits >= self.options.torus_digits && exponent <= zero {
-            return Ok(Verdict::QuasiPeriodic(Torus {
+            return Ok(MotionKind::QuasiPeriodic(Torus {
                 spectrum,
                 birkhoff_digits: digits,
                 nearest_return: nearest.map_or(f64::INFINITY, |c| c.closure),
@@ -461,7 +469,7 @@ impl<'a> Run<'a> {
 }
 
 /// The longest period that is ever tried.
-fn longest(options: &SettleOptions) -> usize {
+fn longest(options: &ClassifyOptions) -> usize {
     options.long_period.max(options.max_period)
 }
 

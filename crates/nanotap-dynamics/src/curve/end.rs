@@ -60,6 +60,16 @@ pub enum CurveEnd {
 }
 
 impl CurveEnd {
+    /// What is met there, in a word: nothing at the edge of the window, or of a closed curve.
+    pub fn meets(&self) -> Option<&'static str> {
+        match self {
+            Self::Window | Self::Closed => None,
+            Self::Grazing { .. } => Some("grazing"),
+            Self::CodimensionTwo { .. } => Some("codimension two"),
+            _ => Some("cut"),
+        }
+    }
+
     /// True if the curve was cut rather than came to an end.
     pub fn is_failure(&self) -> bool {
         match self {

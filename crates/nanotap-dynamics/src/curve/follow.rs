@@ -3,19 +3,19 @@
 use crate::continuation::ContinuationError;
 use crate::control::Control;
 use crate::curve::end::CurveEnd;
-use crate::curve::solver::{LocusNode, LocusSolver};
-use crate::curve::{LocusOptions, LocusPoint};
+use crate::curve::solver::{CurveNode, CurveSolver};
+use crate::curve::{CurveOptions, CurvePoint};
 use crate::map::TwoParameterFamily;
 use crate::vector::norm;
 
-impl<F: TwoParameterFamily> LocusSolver<'_, F> {
+impl<F: TwoParameterFamily> CurveSolver<'_, F> {
     /// The points from `start` along its tangent, and why there are no more.
     pub(super) fn follow(
         &mut self,
-        start: &LocusNode,
-        options: &LocusOptions,
+        start: &CurveNode,
+        options: &CurveOptions,
         control: &Control<'_>,
-    ) -> Result<(Vec<LocusPoint>, CurveEnd), ContinuationError> {
+    ) -> Result<(Vec<CurvePoint>, CurveEnd), ContinuationError> {
         let d = self.d;
         let mut points = vec![self.point(start)?];
         let mut node = start.clone();
@@ -116,7 +116,7 @@ impl<F: TwoParameterFamily> LocusSolver<'_, F> {
         Ok((points, CurveEnd::PointLimit))
     }
 
-    fn end_at(&self, node: &LocusNode, points: &[LocusPoint], reason: String) -> CurveEnd {
+    fn end_at(&self, node: &CurveNode, points: &[CurvePoint], reason: String) -> CurveEnd {
         let here = (node.u[self.d], node.u[self.d + 1]);
         match points.last() {
             Some(last) => {

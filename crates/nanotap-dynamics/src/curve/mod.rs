@@ -27,13 +27,13 @@ use crate::continuation::{Bifurcation, BifurcationKind, ContinuationError};
 use crate::control::Control;
 use crate::map::TwoParameterFamily;
 use crate::orbit::PeriodicOrbit;
-use solver::LocusSolver;
+use solver::CurveSolver;
 
 pub use end::CurveEnd;
 
 /// How a locus is followed. Steps are fractions of the box of parameters.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LocusOptions {
+pub struct CurveOptions {
     /// Range of the first parameter, lower end first.
     pub first: (f64, f64),
     /// Range of the second parameter.
@@ -52,7 +52,7 @@ pub struct LocusOptions {
     pub bound: f64,
 }
 
-impl LocusOptions {
+impl CurveOptions {
     /// Defaults for a box of parameters.
     pub fn over(first: (f64, f64), second: (f64, f64)) -> Self {
         Self {
@@ -70,7 +70,7 @@ impl LocusOptions {
 
 /// One point of a locus.
 #[derive(Clone, Debug)]
-pub struct LocusPoint {
+pub struct CurvePoint {
     /// First parameter.
     pub first: f64,
     /// Second parameter.
@@ -82,11 +82,11 @@ pub struct LocusPoint {
 
 /// A curve of bifurcation points.
 #[derive(Clone, Debug)]
-pub struct Locus {
+pub struct BifurcationCurve {
     /// What happens along it (angle or time: at the starting point).
     pub kind: BifurcationKind,
     /// Points in order, from one end through the starting point to the other.
-    pub points: Vec<LocusPoint>,
+    pub points: Vec<CurvePoint>,
     /// Why it ends, at the first and at the last point.
     pub ends: [CurveEnd; 2],
 }
@@ -96,15 +96,15 @@ pub struct Locus {
 ///
 /// # Errors
 /// If the options make no sense or the point cannot be corrected.
-pub fn trace_locus<F: TwoParameterFamily>(
+pub fn trace_curve<F: TwoParameterFamily>(
     family: &F,
     point: &Bifurcation,
     second: f64,
-    options: &LocusOptions,
+    options: &CurveOptions,
     control: &Control<'_>,
-) -> Result<Locus, ContinuationError> {
+) -> Result<BifurcationCurve, ContinuationError> {
     check(options, point.parameter, second)?;
-    let mut solver = LocusSolver::new(family, point, options);
+    let mut solver = CurveSolver::new(family, point, options);
     let mut u = point.orbit.states[0].clone();
     u.extend([point.parameter, second]);
     // The curve may run along either parameter here.
@@ -131,14 +131,14 @@ pub fn trace_locus<F: TwoParameterFamily>(
     let (forward, last_end) = solver.follow(&start, options, control)?;
     points.reverse();
     points.extend(forward.into_iter().skip(1));
-    Ok(Locus {
+    Ok(BifurcationCurve {
         kind: point.kind,
         points,
         ends: [first_end, last_end],
     })
 }
 
-fn check(options: &LocusOptions, first: f64, second: f64) -> Result<(), ContinuationError> {
+fn check(options: &CurveOptions, first: f64, second: f64) -> Result<(), ContinuationError> {
     for (range, value) in [(options.first, first), (options.second, second)] {
         let usable = range.0 < range.1 && (range.1 - range.0).is_finite();
         if !usable || !(range.0..=range.1).contains(&value) {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::continuation::{Bifurcation, BifurcationKind, ContinuationError, OrbitTangency};
-use crate::curve::{LocusOptions, LocusPoint};
+use crate::curve::{CurveOptions, CurvePoint};
 use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
 use crate::map::TwoParameterFamily;
 use crate::orbit::Multipliers;
@@ -12,7 +12,7 @@ use crate::vector::{distance, norm, unit};
 
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.
 #[derive(Clone, Debug)]
-pub(super) struct LocusNode {
+pub(super) struct CurveNode {
     pub(super) u: Vec<f64>,
     pub(super) tangent: Vec<f64>,
     pub(super) iterations: usize,
@@ -46,7 +46,7 @@ struct Evaluation {
     scalar: f64,
 }
 
-pub(super) struct LocusSolver<'a, F> {
+pub(super) struct CurveSolver<'a, F> {
     family: &'a F,
     pub(super) kind: BifurcationKind,
     pub(super) d: usize,
@@ -60,8 +60,8 @@ pub(super) struct LocusSolver<'a, F> {
     pub(super) time: f64,
 }
 
-impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
-    pub(super) fn new(family: &'a F, point: &Bifurcation, options: &LocusOptions) -> Self {
+impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
+    pub(super) fn new(family: &'a F, point: &Bifurcation, options: &CurveOptions) -> Self {
         let d = point.orbit.dimension();
         let size = point.orbit.scale();
         let mut scales = vec![if size > 0.0 { size } else { 1.0 }; d];
@@ -295,7 +295,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
         guess: &[f64],
         row: &[f64],
         orientation: &[f64],
-    ) -> Result<LocusNode, String> {
+    ) -> Result<CurveNode, String> {
         let d = self.d;
         let mut u = guess.to_vec();
         let mut last = f64::INFINITY;
@@ -347,7 +347,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
         {
             self.time = t.time;
         }
-        Ok(LocusNode {
+        Ok(CurveNode {
             u,
             tangent: (tangent / length).as_slice().to_vec(),
             iterations,
@@ -362,7 +362,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
             .sum()
     }
 
-    pub(super) fn point(&self, node: &LocusNode) -> Result<LocusPoint, ContinuationError> {
+    pub(super) fn point(&self, node: &CurveNode) -> Result<CurvePoint, ContinuationError> {
         let Trajectory {
             mut segments, end, ..
         } = self.orbit_from(&node.u)?;
@@ -372,7 +372,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
             .error_estimate()
             .unwrap_or(f64::INFINITY)
             .max(residual);
-        Ok(LocusPoint {
+        Ok(CurvePoint {
             first: node.u[self.d],
             second: node.u[self.d + 1],
             orbit: segments.into_orbit(residual, error)?,
@@ -381,7 +381,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
 
     /// Measures the state in units of the orbit as it is at `node` from here on, but not
     /// less than at the beginning.
-    pub(super) fn rescale(&mut self, node: &mut LocusNode) {
+    pub(super) fn rescale(&mut self, node: &mut CurveNode) {
         let scale = norm(&node.u[..self.d]).max(self.least);
         if scale > 0.0 {
             self.scales[..self.d].fill(scale);
@@ -393,7 +393,7 @@ impl<'a, F: TwoParameterFamily> LocusSolver<'a, F> {
     }
 
     /// Every extremum of the switching functions along the orbit.
-    pub(super) fn tangencies(&self, node: &LocusNode) -> Vec<OrbitTangency> {
+    pub(super) fn tangencies(&self, node: &CurveNode) -> Vec<OrbitTangency> {
         let mut found = Vec::new();
         let Ok(mut map) = self.map_at(&node.u) else {
             return found;

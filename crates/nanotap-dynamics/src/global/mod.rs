@@ -23,9 +23,9 @@ use rayon::prelude::*;
 use crate::census::{
     Attractor, AttractorKind, Census, CensusOptions, Fraction, Lifetime, StartSet, census_of,
 };
-use crate::classify::{SettleOptions, Verdict, settle};
+use crate::classify::{ClassifyOptions, MotionKind, classify};
 use crate::control::Control;
-use crate::map::{MapFamily, StroboscopicMap, TwoParameterFamily};
+use crate::map::{MapFamily, StroboscopicMap};
 use crate::orbit::{PeriodicOrbit, close_orbit_from_points};
 
 /// Part of an orbit's size by which it may move from one value to the next and still be
@@ -71,33 +71,16 @@ pub fn attractors_along<F: MapFamily>(
     control: &Control<'_>,
 ) -> Vec<GlobalValue> {
     let at = |k: usize| family.at(values[k]).map_err(|e| e.to_string());
-    let neighbours = |k: usize| {
-        let last = values.len() - 1;
-        [k.checked_sub(1), (k < last).then_some(k + 1)]
-            .into_iter()
-            .flatten()
-            .collect()
-    };
+    let neighbours = grid_neighbours(&[values.len()]);
     over_graph(values.len(), at, neighbours, starts, options, control)
 }
 
-/// The attractors of a two-parameter family at each pair of values; the index of a pair
-/// is that of `second` times the number of `first` plus that of `first`.
-pub fn attractors_over<F: TwoParameterFamily>(
-    family: &F,
-    first: &[f64],
-    second: &[f64],
-    starts: impl Fn(usize, &F::Map) -> StartSet + Sync,
-    options: &GlobalOptions,
-    control: &Control<'_>,
-) -> Vec<GlobalValue> {
-    let (columns, rows) = (first.len(), second.len());
-    let at = |k: usize| {
-        family
-            .at(first[k % columns], second[k / columns])
-            .map_err(|e| e.to_string())
-    };
-    let neighbours = |k: usize| {
+/// The values beside each value of a grid of one or two parameters with so many values each;
+/// the index of a value runs fastest along the first.
+pub fn grid_neighbours(shape: &[usize]) -> impl Fn(usize) -> Vec<usize> + use<> {
+    let columns = shape.first().copied().unwrap_or(1).max(1);
+    let rows = shape.get(1).copied().unwrap_or(1);
+    move |k| {
         let (x, y) = (k % columns, k / columns);
         [
             (x > 0).then(|| k - 1),
@@ -108,8 +91,7 @@ pub fn attractors_over<F: TwoParameterFamily>(
         .into_iter()
         .flatten()
         .collect()
-    };
-    over_graph(columns * rows, at, neighbours, starts, options, control)
+    }
 }
 
 /// One attractor of one value.
@@ -153,18 +135,18 @@ fn over_graph<M: StroboscopicMap>(
             value
         })
         .collect();
-    shared(values, at, neighbours, &options.census.settle, control)
+    shared(values, at, neighbours, &options.census.classify, control)
 }
 
 /// Orbits that are known at some values, tried at the neighbouring ones in turn until no
 /// value gains one: the last step of [`attractors_along`] where runs were made already.
 /// `known` has the stable orbits at each value, `at` is the map there, `neighbours` are the
-/// values beside it.
+/// values beside it ([`grid_neighbours`]).
 pub fn orbits_shared<M: StroboscopicMap>(
     known: Vec<Vec<PeriodicOrbit>>,
     at: impl Fn(usize) -> Result<M, String> + Sync,
     neighbours: impl Fn(usize) -> Vec<usize>,
-    settle: &SettleOptions,
+    classify: &ClassifyOptions,
     control: &Control<'_>,
 ) -> Vec<GlobalValue> {
     let values = known.into_iter().map(|orbits| GlobalValue {
@@ -184,7 +166,7 @@ pub fn orbits_shared<M: StroboscopicMap>(
         census: None,
         failure: None,
     });
-    shared(values.collect(), at, neighbours, settle, control)
+    shared(values.collect(), at, neighbours, classify, control)
 }
 
 /// Tries what is known at each value at its neighbours until none gains anything.
@@ -192,7 +174,7 @@ fn shared<M: StroboscopicMap>(
     mut values: Vec<GlobalValue>,
     at: impl Fn(usize) -> Result<M, String> + Sync,
     neighbours: impl Fn(usize) -> Vec<usize>,
-    settle: &SettleOptions,
+    classify: &ClassifyOptions,
     control: &Control<'_>,
 ) -> Vec<GlobalValue> {
     let mut links: Vec<(Place, Place)> = Vec::new();
@@ -211,7 +193,7 @@ fn shared<M: StroboscopicMap>(
                 }
                 let attractor = &values[from.0].attractors[from.1].attractor;
                 let mut map = at(k).ok()?;
-                let (kind, state, continued) = tried(&mut map, attractor, settle)?;
+                let (kind, state, continued) = tried(&mut map, attractor, classify)?;
                 Some(Trial {
                     from,
                     at: k,
@@ -280,7 +262,7 @@ fn places(values: &[GlobalValue]) -> Vec<Place> {
 fn tried<M: StroboscopicMap>(
     map: &mut M,
     attractor: &Attractor,
-    options: &SettleOptions,
+    options: &ClassifyOptions,
 ) -> Option<(AttractorKind, Vec<f64>, bool)> {
     if let AttractorKind::Periodic(orbit) = &attractor.kind
         && let Ok(closed) =
@@ -291,25 +273,25 @@ fn tried<M: StroboscopicMap>(
         let state = closed.states[0].clone();
         return Some((AttractorKind::Periodic(closed), state, continued));
     }
-    let settled = settle(map, &attractor.state, options);
-    let (kind, continued) = match settled.verdict {
-        Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } => {
+    let classified = classify(map, &attractor.state, options);
+    let (kind, continued) = match classified.kind {
+        MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
             (AttractorKind::Periodic(orbit), false)
         }
-        Verdict::QuasiPeriodic(torus) => (
+        MotionKind::QuasiPeriodic(torus) => (
             AttractorKind::QuasiPeriodic(torus),
             matches!(attractor.kind, AttractorKind::QuasiPeriodic(_)),
         ),
-        Verdict::Chaotic(chaos) => (
+        MotionKind::Chaotic(chaos) => (
             AttractorKind::Chaotic {
                 spectrum: chaos.spectrum,
                 lifetime: Lifetime::new(0, chaos.observed as f64),
             },
             matches!(attractor.kind, AttractorKind::Chaotic { .. }),
         ),
-        Verdict::Unbounded | Verdict::Undecided { .. } => return None,
+        MotionKind::Unbounded | MotionKind::Undecided { .. } => return None,
     };
-    Some((kind, settled.state, continued))
+    Some((kind, classified.state, continued))
 }
 
 /// True if the second orbit is the first moved by little of its size.

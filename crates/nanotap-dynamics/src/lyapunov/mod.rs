@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 
 use block_average::BlockAverage;
 
-use crate::failure::{MapFailure, advance_with_jacobian};
+use crate::failure::{MapFailure, advance_with_jacobian_and_determinant};
 use crate::map::StroboscopicMap;
 
 /// Part of a Jacobian's largest entry below which a stretch is rounding.
@@ -79,7 +79,7 @@ pub struct LyapunovSpectrum {
     pub mean_errors: Vec<f64>,
     /// Mean of log|det DP| over the same periods, which the sum of the exponents must
     /// be: by other means than the Jacobian where the map has any
-    /// ([`StroboscopicMap::log_determinant`]), else by its LU factors.
+    /// ([`StroboscopicMap::advance_with_jacobian_and_determinant`]), else by its LU factors.
     pub log_determinant: f64,
 }
 
@@ -225,8 +225,7 @@ impl LyapunovRun {
         state: &mut [f64],
     ) -> Result<(), MapFailure> {
         let d = self.d;
-        let exact = map.log_determinant(state).map_err(MapFailure::refused)?;
-        advance_with_jacobian(map, state, &mut self.jacobian)?;
+        let exact = advance_with_jacobian_and_determinant(map, state, &mut self.jacobian)?;
         let jacobian = self.jacobian.as_slice();
         self.image.fill(0.0);
         for (image, frame) in self

@@ -153,6 +153,18 @@ impl Neighbourhood {
         Ok(after <= self.rate * before || after <= self.floor)
     }
 
+    /// Drive periods after which it comes round again.
+    pub(crate) fn period(&self) -> usize {
+        self.period
+    }
+
+    /// Periods after which `state` would have come to the ball if it came at the rate of the
+    /// largest multiplier; 0 in the ball.
+    pub(crate) fn periods_away(&self, state: &[f64]) -> f64 {
+        let distance = self.norm.distance(state, &self.center);
+        (distance / self.radius).ln().max(0.0) / self.decay
+    }
+
     /// Periods after which a motion that comes from a box with these sides, and decays
     /// as the largest multiplier says, has entered the ball.
     pub(crate) fn expected_entry(&self, sides: &[f64]) -> f64 {

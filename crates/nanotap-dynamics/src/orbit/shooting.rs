@@ -34,6 +34,13 @@ pub struct ShootingOptions {
     /// iteration stalls is not an orbit. Set it to the accuracy of the map; the
     /// residual reached is normally far below.
     pub residual_tolerance: f64,
+    /// Newton gives up where the linearised return from the points it has come to stretches
+    /// some direction by more than this: the orbits near are unstable. Infinite where those
+    /// are wanted too.
+    pub max_growth: f64,
+    /// Whether a stall beside a multiplier +1 is told from any other, which takes the
+    /// multipliers.
+    pub explains_stalls: bool,
 }
 
 impl Default for ShootingOptions {
@@ -42,6 +49,8 @@ impl Default for ShootingOptions {
             max_iterations: 40,
             min_damping: 1.0 / 256.0,
             residual_tolerance: 1e-10,
+            max_growth: f64::INFINITY,
+            explains_stalls: true,
         }
     }
 }
@@ -95,6 +104,9 @@ pub enum DivergenceReason {
     /// The allowed number of steps was used up.
     #[error("too many steps")]
     TooManySteps,
+    /// Only unstable orbits are near, and they were not wanted.
+    #[error("only unstable orbits are near")]
+    Unstable,
 }
 
 /// Closes a period-`period` orbit near the trajectory that starts at `guess`
@@ -191,12 +203,20 @@ impl Segments {
         }
     }
 
-    /// Residuals and Jacobians at the present points.
-    fn evaluate<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), MapFailure> {
+    /// Residuals, and Jacobians if wanted, at the present points.
+    fn evaluate<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        jacobians: bool,
+    ) -> Result<(), MapFailure> {
         let (d, n) = (self.d, self.n);
         for k in 0..n {
             self.state.copy_from_slice(&self.points[k * d..(k + 1) * d]);
-            advance_with_jacobian(map, &mut self.state, &mut self.jacobians[k])?;
+            if jacobians {
+                advance_with_jacobian(map, &mut self.state, &mut self.jacobians[k])?;
+            } else {
+                advance(map, &mut self.state)?;
+            }
             let next = (k + 1) % n;
             for i in 0..d {
                 self.residuals[k * d + i] = self.state[i] - self.points[next * d + i];
@@ -215,13 +235,16 @@ impl Segments {
         let mut system = BlockCyclic::new(self.d, self.n);
         let mut step = vec![0.0; self.points.len()];
         self.scale = self.scale.max(norm(&self.points));
-        self.evaluate(map)?;
+        self.evaluate(map, true)?;
         for iteration in 0..options.max_iterations {
             let residual = norm(&self.residuals);
             if residual == 0.0 {
                 return Ok(());
             }
             let small = residual <= options.residual_tolerance * self.scale;
+            if !small && options.max_growth.is_finite() && self.growth() > options.max_growth {
+                return Err(self.diverged(iteration, DivergenceReason::Unstable));
+            }
             system.factor(&self.jacobians, &self.residuals, None);
             if system.solve(&mut step).is_none() || step.iter().any(|v| !v.is_finite()) {
                 return Err(self.singular(residual));
@@ -232,11 +255,13 @@ impl Segments {
                 for ((t, x), s) in trial.points.iter_mut().zip(&self.points).zip(&step) {
                     *t = x + damping * s;
                 }
-                // A map that refuses the trial point is one more reason to go less far.
-                let lowered = trial.evaluate(map).is_ok() && {
-                    let wanted = 1.0 - 0.5 * damping;
-                    sum_of_squares(&trial.residuals) < wanted * wanted * merit
-                };
+                // A map that refuses the trial point is one more reason to go less far. A full
+                // step mostly holds; of a shorter one the Jacobians are computed once it does.
+                let full = damping == 1.0;
+                let wanted = 1.0 - 0.5 * damping;
+                let lowered = trial.evaluate(map, full).is_ok()
+                    && sum_of_squares(&trial.residuals) < wanted * wanted * merit
+                    && (full || trial.evaluate(map, true).is_ok());
                 if lowered {
                     trial.scale = self.scale.max(norm(&trial.points));
                     std::mem::swap(self, &mut trial);
@@ -248,7 +273,7 @@ impl Segments {
                 }
                 damping *= 0.5;
                 if damping < options.min_damping {
-                    return Err(self.stalled(iteration, DivergenceReason::NoDescent));
+                    return Err(self.stalled(iteration, DivergenceReason::NoDescent, options));
                 }
             }
         }
@@ -256,8 +281,42 @@ impl Segments {
         if residual <= options.residual_tolerance * self.scale {
             Ok(())
         } else {
-            Err(self.stalled(options.max_iterations, DivergenceReason::TooManySteps))
+            Err(self.stalled(
+                options.max_iterations,
+                DivergenceReason::TooManySteps,
+                options,
+            ))
         }
+    }
+
+    /// What the second of two linearised returns does to the length of a vector: near the
+    /// largest modulus of the multipliers, and above it where they are not normal.
+    fn growth(&self) -> f64 {
+        let d = self.d;
+        let mut v: Vec<f64> = (0..d).map(|i| 1.0 + (mix(i as u64) & 7) as f64).collect();
+        let mut image = vec![0.0; d];
+        let mut logarithm = 0.0;
+        for turn in 0..2 {
+            for jacobian in &self.jacobians {
+                image.fill(0.0);
+                for (column, x) in jacobian.as_slice().chunks_exact(d).zip(&v) {
+                    for (o, a) in image.iter_mut().zip(column) {
+                        *o += a * x;
+                    }
+                }
+                let length = sum_of_squares(&image).sqrt();
+                if length < f64::MIN_POSITIVE {
+                    return 0.0;
+                }
+                if turn == 1 {
+                    logarithm += length.ln();
+                }
+                for (x, o) in v.iter_mut().zip(&image) {
+                    *x = o / length;
+                }
+            }
+        }
+        logarithm.exp()
     }
 
     fn distance_from_one(&self) -> f64 {
@@ -276,21 +335,32 @@ impl Segments {
         }
     }
 
-    fn stalled(&self, iterations: usize, reason: DivergenceReason) -> ShootingError {
-        let residual = norm(&self.residuals);
+    fn stalled(
+        &self,
+        iterations: usize,
+        reason: DivergenceReason,
+        options: &ShootingOptions,
+    ) -> ShootingError {
+        if !options.explains_stalls {
+            return self.diverged(iterations, reason);
+        }
         // A stall beside a multiplier +1 is the mark of a fold just passed.
         let distance = self.distance_from_one();
         if distance < 1e-6 {
             return ShootingError::Singular {
                 period: self.n,
                 distance,
-                residual,
+                residual: norm(&self.residuals),
             };
         }
+        self.diverged(iterations, reason)
+    }
+
+    fn diverged(&self, iterations: usize, reason: DivergenceReason) -> ShootingError {
         ShootingError::Diverged {
             period: self.n,
             iterations,
-            residual,
+            residual: norm(&self.residuals),
             reason,
         }
     }

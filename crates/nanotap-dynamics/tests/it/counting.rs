@@ -4,9 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, Control, Fate, LyapunovOptions, Neighbourhood,
-    OrbitSearch, SettleOptions, ShootingOptions, StartBox, StartSet, census, census_of,
-    find_orbits,
+    AttractorKind, Census, CensusOptions, ClassifyOptions, Control, LyapunovOptions, Neighbourhood,
+    OrbitSearch, ShootingOptions, StartBox, StartOutcome, StartSet, census, census_of, find_orbits,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -84,10 +83,10 @@ fn chaos_is_claimed_with_a_pooled_bound() {
     let (largest, error) = spectrum.largest();
     assert!((largest - 0.41922).abs() < 5.0 * error);
     let watched: usize = result
-        .fates
+        .outcomes_by_start
         .iter()
         .map(|f| match f {
-            Fate::Attractor { periods, .. } => *periods,
+            StartOutcome::Attractor { periods, .. } => *periods,
             _ => 0,
         })
         .sum();
@@ -101,13 +100,13 @@ fn chaos_is_claimed_with_a_pooled_bound() {
 #[test]
 fn transient_chaos_has_its_exact_lifetime() {
     let options = CensusOptions {
-        settle: SettleOptions {
+        classify: ClassifyOptions {
             lyapunov: LyapunovOptions {
                 min_periods: 1500,
                 max_periods: 1500,
                 ..LyapunovOptions::default()
             },
-            ..SettleOptions::default()
+            ..ClassifyOptions::default()
         },
         ..CensusOptions::default()
     };
@@ -120,7 +119,7 @@ fn transient_chaos_has_its_exact_lifetime() {
         "{transient:?}"
     );
     assert!((transient.lifetime.mean / exact - 1.0).abs() < 0.15);
-    assert!(transient.wandering.count > 0);
+    assert!(transient.unescaped.count > 0);
     assert_eq!(
         transient.destinations,
         vec![(0, transient.lifetime.escapes)]
@@ -285,7 +284,7 @@ fn the_census_stops_when_nothing_new_has_come_for_long_enough() {
         unseen.starts >= 478 && unseen.starts < 478 + 32 + 128,
         "{unseen:?}"
     );
-    assert!(long.counted + 1 == long.fates.len());
+    assert!(long.counted + 1 == long.outcomes_by_start.len());
     let short = of(0.01, 100);
     assert_eq!(short.counted, 100);
     assert!(short.unseen.unwrap().share > 0.04);

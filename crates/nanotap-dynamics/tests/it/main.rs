@@ -4,11 +4,11 @@
 mod systems;
 
 mod branching;
+mod classifying;
 mod closing;
 mod counting;
 mod exponents;
 mod properties;
-mod settling;
 mod slicing;
 mod spreading;
 mod tracing;

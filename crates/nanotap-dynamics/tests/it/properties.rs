@@ -3,8 +3,8 @@
 use std::convert::Infallible;
 
 use nanotap_dynamics::{
-    CensusOptions, Control, DMatrix, Fate, LyapunovOptions, Neighbourhood, SettleOptions,
-    ShootingOptions, StartBox, StroboscopicMap, Verdict, census, close_orbit, settle,
+    CensusOptions, ClassifyOptions, Control, DMatrix, LyapunovOptions, MotionKind, Neighbourhood,
+    ShootingOptions, StartBox, StartOutcome, StroboscopicMap, census, classify, close_orbit,
 };
 use proptest::prelude::*;
 
@@ -77,9 +77,9 @@ proptest! {
         map in contraction(),
         start in prop::collection::vec(-50.0f64..50.0, 4),
     ) {
-        let settled = settle(&mut map.clone(), &start, &SettleOptions::default());
-        let Verdict::Periodic(orbit) = settled.verdict else {
-            return Err(TestCaseError::fail(format!("{:?}", settled.verdict)));
+        let classified = classify(&mut map.clone(), &start, &ClassifyOptions::default());
+        let MotionKind::Periodic(orbit) = classified.kind else {
+            return Err(TestCaseError::fail(format!("{:?}", classified.kind)));
         };
         let offset = DMatrix::from_column_slice(4, 1, &map.offset);
         let exact = (DMatrix::identity(4, 4) - &map.matrix).lu().solve(&offset).unwrap();
@@ -112,36 +112,36 @@ proptest! {
         prop_assert!((end[0] - fixed[0]).abs() < 1e-9);
     }
 
-    /// Every start of a census has exactly one fate, and fractions add up to one.
+    /// Every start of a census has exactly one outcome_of_start, and fractions add up to one.
     #[test]
     fn every_start_is_counted_once(r in 1.1f64..4.0, seed: u64) {
         let starts = StartBox::new(vec![-0.2], vec![1.2]).unwrap().starts(seed, 24);
         let options = CensusOptions {
             pilots: 8,
-            settle: SettleOptions {
+            classify: ClassifyOptions {
                 lyapunov: LyapunovOptions { min_periods: 500, max_periods: 1000, ..LyapunovOptions::default() },
                 birkhoff_periods: 256,
-                ..SettleOptions::default()
+                ..ClassifyOptions::default()
             },
             ..CensusOptions::default()
         };
         let result = census(&System(Logistic(r)), &starts, &options, &Control::default());
         let attracted: usize = result.attractors.iter().map(|a| a.fraction.count).sum();
-        let wandering = result.transient_chaos.as_ref().map_or(0, |t| t.wandering.count);
+        let unescaped = result.transient_chaos.as_ref().map_or(0, |t| t.unescaped.count);
         prop_assert_eq!(
-            attracted + wandering + result.unbounded.count + result.undecided.len(),
+            attracted + unescaped + result.unbounded.count + result.undecided.len(),
             starts.len()
         );
         for (index, attractor) in result.attractors.iter().enumerate() {
-            let fates = result.fates.iter().filter(
-                |f| matches!(f, Fate::Attractor { index: i, .. } if *i == index),
+            let outcomes_by_start = result.outcomes_by_start.iter().filter(
+                |f| matches!(f, StartOutcome::Attractor { index: i, .. } if *i == index),
             );
-            prop_assert_eq!(fates.count(), attractor.fraction.count);
+            prop_assert_eq!(outcomes_by_start.count(), attractor.fraction.count);
         }
         // Outside [0, 1] all runs off, inside nothing does.
-        for (start, fate) in starts.iter().zip(&result.fates) {
+        for (start, outcome_of_start) in starts.iter().zip(&result.outcomes_by_start) {
             let inside = (0.0..=1.0).contains(&start[0]);
-            prop_assert_eq!(*fate != Fate::Unbounded, inside);
+            prop_assert_eq!(*outcome_of_start != StartOutcome::Unbounded, inside);
         }
         // The logistic map has one attractor at most (negative Schwarzian derivative).
         prop_assert!(result.attractors.len() <= 1, "{:?}", result.attractors);

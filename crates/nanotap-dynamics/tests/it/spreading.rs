@@ -1,10 +1,8 @@
 //! Attractors over grids of parameter values.
 
-use std::convert::Infallible;
-
 use nanotap_dynamics::{
-    AttractorKind, CensusOptions, Control, DMatrix, GlobalOptions, GlobalValue, StartBox, StartSet,
-    StroboscopicMap, TwoParameterFamily, attractors_along, attractors_over,
+    AttractorKind, CensusOptions, Control, GlobalOptions, GlobalValue, MotionKind, StartBox,
+    StartSet, attractors_along, classify, grid_neighbours, orbits_shared,
 };
 
 use crate::systems::{Cubic, Family, Logistic, Nested, System};
@@ -94,49 +92,33 @@ fn a_window_keeps_its_period() {
     }
 }
 
-struct NestedPlane;
-
-impl TwoParameterFamily for NestedPlane {
-    type Map = System<Nested>;
-    type Error = Infallible;
-
-    fn at(&self, r: f64, s: f64) -> Result<System<Nested>, Infallible> {
-        Ok(System(Nested { r, s }))
-    }
-
-    fn advance_with_derivatives(
-        &self,
-        _: [f64; 2],
-        map: &mut System<Nested>,
-        state: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-        _: [&mut [f64]; 2],
-    ) -> Result<(), Infallible> {
-        map.advance_with_jacobian(state, jacobian)
-    }
-}
-
-/// Small motions met at one corner of a plane are known all over it.
+/// Small motions known at one corner of a plane are known all over it.
 #[test]
 fn a_plane_fills_from_one_corner() {
     let first: Vec<f64> = (0..6).map(|k| 1.2 + 0.1 * f64::from(k)).collect();
     let second: Vec<f64> = (0..5).map(|k| 1e-3 * 1.3f64.powi(k)).collect();
-    let starts = |k: usize, _: &System<Nested>| {
-        let mut states = vec![vec![1.5], vec![-1.5]];
-        if k == 0 {
-            states.extend([vec![4e-4], vec![-4e-4]]);
-        }
-        StartSet::given(states)
+    let at = |k: usize| {
+        let (r, s) = (first[k % 6], second[k / 6]);
+        Ok(System(Nested { r, s }))
     };
-    let one = attractors_over(
-        &NestedPlane,
-        &first,
-        &second,
-        starts,
-        &few(),
-        &Control::default(),
-    );
-    assert_eq!(one.len(), 30);
+    let mut known = vec![Vec::new(); 30];
+    for start in [1.5, -1.5, 4e-4, -4e-4] {
+        let settled = classify(&mut at(0).unwrap(), &[start], &few().census.classify);
+        let MotionKind::Periodic(orbit) = settled.kind else {
+            panic!("{:?}", settled.kind);
+        };
+        known[0].push(orbit);
+    }
+    let filled = || {
+        orbits_shared(
+            known.clone(),
+            at,
+            grid_neighbours(&[6, 5]),
+            &few().census.classify,
+            &Control::default(),
+        )
+    };
+    let one = filled();
     for (k, value) in one.iter().enumerate() {
         let (r, s) = (first[k % 6], second[k / 6]);
         let points = fixed_points(value);
@@ -149,15 +131,6 @@ fn a_plane_fills_from_one_corner() {
         .num_threads(3)
         .build()
         .unwrap();
-    let again = pool.install(|| {
-        attractors_over(
-            &NestedPlane,
-            &first,
-            &second,
-            starts,
-            &few(),
-            &Control::default(),
-        )
-    });
+    let again = pool.install(filled);
     assert_eq!(format!("{one:?}"), format!("{again:?}"));
 }

@@ -3,9 +3,10 @@
 use std::convert::Infallible;
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, CensusOptions, ContinuationOptions, Control, CurveEnd, DMatrix,
-    DiagramOptions, Direction, Locus, LocusOptions, MapFamily, ShootingOptions, StartBox,
-    TwoParameterFamily, assemble_diagram, census, close_orbit, continue_orbit, trace_locus,
+    Bifurcation, BifurcationCurve, BifurcationKind, CensusOptions, ContinuationOptions, Control,
+    CurveEnd, CurveOptions, DMatrix, DiagramOptions, Direction, MapFamily, ShootingOptions,
+    StartBox, TwoParameterFamily, assemble_diagram, census, close_orbit, continue_orbit,
+    trace_curve,
 };
 
 use crate::systems::{Family, Formula, Grazing, Henon, Logistic, System};
@@ -75,7 +76,7 @@ fn first_of<F: MapFamily>(
         .unwrap()
 }
 
-fn check(locus: &Locus, second: (f64, f64), exact: impl Fn(f64) -> f64, tolerance: f64) {
+fn check(locus: &BifurcationCurve, second: (f64, f64), exact: impl Fn(f64) -> f64, tolerance: f64) {
     assert!(locus.points.len() > 20);
     for p in &locus.points {
         let e = exact(p.second);
@@ -100,7 +101,7 @@ fn check(locus: &Locus, second: (f64, f64), exact: impl Fn(f64) -> f64, toleranc
 #[test]
 fn henon_folds_and_flips_follow_their_parabolas() {
     let family: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
-    let options = LocusOptions::over((-1.0, 1.5), (-0.2, 0.6));
+    let options = CurveOptions::over((-1.0, 1.5), (-0.2, 0.6));
     let fold = first_of(
         &family,
         0.2,
@@ -109,7 +110,7 @@ fn henon_folds_and_flips_follow_their_parabolas() {
         (-0.5, 0.3),
         |k| *k == BifurcationKind::Fold,
     );
-    let locus = trace_locus(&HENON, &fold, 0.3, &options, &Control::default()).unwrap();
+    let locus = trace_curve(&HENON, &fold, 0.3, &options, &Control::default()).unwrap();
     check(&locus, (-0.2, 0.6), |b| -(1.0 - b).powi(2) / 4.0, 1e-11);
     let flip = first_of(
         &family,
@@ -119,7 +120,7 @@ fn henon_folds_and_flips_follow_their_parabolas() {
         (0.0, 0.6),
         |k| *k == BifurcationKind::Flip,
     );
-    let locus = trace_locus(&HENON, &flip, 0.3, &options, &Control::default()).unwrap();
+    let locus = trace_curve(&HENON, &flip, 0.3, &options, &Control::default()).unwrap();
     check(
         &locus,
         (-0.2, 0.6),
@@ -136,7 +137,7 @@ fn soft_grazing_loci() {
         second: |_, x, out| out[0] = x[0].max(0.0).powf(1.5),
     };
     let family: Family<Grazing> = Family(|mu| Grazing { mu, a: 0.4, b: 1.5 });
-    let options = LocusOptions::over((-0.3, 0.3), (0.8, 3.0));
+    let options = CurveOptions::over((-0.3, 0.3), (0.8, 3.0));
     let start = |wanted| {
         first_of(
             &family,
@@ -148,7 +149,7 @@ fn soft_grazing_loci() {
         )
     };
     let fold = start(|k| *k == BifurcationKind::Fold);
-    let locus = trace_locus(&plane, &fold, 1.5, &options, &Control::default()).unwrap();
+    let locus = trace_curve(&plane, &fold, 1.5, &options, &Control::default()).unwrap();
     check(
         &locus,
         (0.8, 3.0),
@@ -156,7 +157,7 @@ fn soft_grazing_loci() {
         1e-11,
     );
     let grazing = start(|k| matches!(k, BifurcationKind::Grazing { .. }));
-    let locus = trace_locus(&plane, &grazing, 1.5, &options, &Control::default()).unwrap();
+    let locus = trace_curve(&plane, &grazing, 1.5, &options, &Control::default()).unwrap();
     check(&locus, (0.8, 3.0), |_| 0.0, 1e-12);
 }
 
@@ -201,8 +202,8 @@ fn a_neimark_sacker_locus() {
         (1.4, 2.6),
         |k| matches!(k, BifurcationKind::NeimarkSacker { .. }),
     );
-    let options = LocusOptions::over((1.2, 3.0), (-0.2, 0.3));
-    let locus = trace_locus(&plane, &point, 0.0, &options, &Control::default()).unwrap();
+    let options = CurveOptions::over((1.2, 3.0), (-0.2, 0.3));
+    let locus = trace_curve(&plane, &point, 0.0, &options, &Control::default()).unwrap();
     check(&locus, (-0.2, 0.3), |c| 2.0 / (1.0 + c), 1e-11);
 }
 
@@ -222,8 +223,8 @@ fn boxes_that_do_not_hold_the_start_are_refused() {
         ((0.0, 1.0), (0.3, 0.3)),
         ((1.0, 0.0), (0.0, 1.0)),
     ] {
-        let options = LocusOptions::over(first, second);
-        assert!(trace_locus(&HENON, &flip, 0.3, &options, &Control::default()).is_err());
+        let options = CurveOptions::over(first, second);
+        assert!(trace_curve(&HENON, &flip, 0.3, &options, &Control::default()).is_err());
     }
 }
 

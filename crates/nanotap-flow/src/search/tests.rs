@@ -2,7 +2,7 @@
 
 use super::on_table;
 use super::table::{Followed, Table};
-use super::{Start, Statistics, first_crossing};
+use super::{Crossing, Start, Statistics, first_crossing};
 use crate::regime::Kernel;
 use crate::signal::Signal;
 use crate::simd::{Plain, WIDTH, layout};
@@ -63,6 +63,33 @@ fn oscillators(most: usize) -> impl Strategy<Value = Oscillators> {
     proptest::collection::vec(one, 1..most)
 }
 
+/// Two searches of one signal found the same, to what rounding leaves.
+fn same_crossing(
+    found: Option<&Crossing>,
+    expected: Option<&Crossing>,
+    signal: &Signal,
+    length: f64,
+) -> Result<(), TestCaseError> {
+    match (found, expected) {
+        (None, None) => {}
+        (Some(a), Some(b)) => {
+            // A crossing at speed r is known to the value's rounding over r.
+            let known = 1e-14 + signal.noise() / b.rate.abs();
+            prop_assert!((a.at - b.at).abs() <= 4.0 * known, "{a:?} {b:?}");
+            let slack = 1e-9 * (1.0 + signal.fastest() * signal.size());
+            prop_assert!((a.rate - b.rate).abs() <= slack, "{a:?} {b:?}");
+        }
+        // At the very end, rounding decides.
+        (Some(one), None) | (None, Some(one)) => {
+            prop_assert!(
+                length - one.at < 1e-12,
+                "{found:?} {expected:?} of {length}"
+            );
+        }
+    }
+    Ok(())
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -81,20 +108,7 @@ proptest! {
             &table, &mut signal, &mut Followed::default(), length, start, &mut statistics,
         );
         let expected = first_crossing(&signal, length, start, &mut statistics);
-        match (found, expected) {
-            (None, None) => {}
-            (Some(a), Some(b)) => {
-                // A crossing at speed r is known to the value's rounding over r.
-                let known = 1e-14 + signal.noise() / b.rate.abs();
-                prop_assert!((a.at - b.at).abs() <= 4.0 * known, "{a:?} {b:?}");
-                let slack = 1e-9 * (1.0 + signal.fastest() * signal.size());
-                prop_assert!((a.rate - b.rate).abs() <= slack, "{a:?} {b:?}");
-            }
-            // At the very end, rounding decides.
-            (Some(one), None) | (None, Some(one)) => {
-                prop_assert!(length - one.at < 1e-12, "{found:?} {expected:?} of {length}");
-            }
-        }
+        same_crossing(found.as_ref(), expected.as_ref(), &signal, length)?;
     }
 
     /// From the surface, with the rate known.
@@ -113,16 +127,7 @@ proptest! {
             &table, &mut signal, &mut Followed::default(), length, start, &mut statistics,
         );
         let expected = first_crossing(&signal, length, start, &mut statistics);
-        match (found, expected) {
-            (None, None) => {}
-            (Some(a), Some(b)) => {
-                let known = 1e-14 + signal.noise() / b.rate.abs();
-                prop_assert!((a.at - b.at).abs() <= 4.0 * known, "{a:?} {b:?}");
-            }
-            (Some(one), None) | (None, Some(one)) => {
-                prop_assert!(length - one.at < 1e-12, "{found:?} {expected:?} of {length}");
-            }
-        }
+        same_crossing(found.as_ref(), expected.as_ref(), &signal, length)?;
     }
 }
 

@@ -2,7 +2,7 @@
 
 A `Case` says which cantilever, sample and drive; a function for every command of the
 terminal says what it does: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`,
-`branch`, `approach`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`.
+`branch`, `approach`, `fit`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`.
 Results carry the names that the terminal's JSON has, as xarray Datasets, objects and lists of
 objects. A `Map` is the exact stroboscopic map itself, for algorithms of one's own.
 
@@ -24,6 +24,7 @@ from ._results import (
     Attractor,
     Attractors,
     Convergence,
+    Fit,
     Lyapunov,
     Modes,
     Orbit,
@@ -37,6 +38,7 @@ from ._signatures import (
     branch,
     contact_laws,
     convergence,
+    fit,
     lyapunov,
     modes,
     orbit,
@@ -54,6 +56,7 @@ __all__ = [
     "Attractors",
     "Case",
     "Convergence",
+    "Fit",
     "Interrupted",
     "Lyapunov",
     "Map",
@@ -72,6 +75,7 @@ __all__ = [
     "contact_laws",
     "convergence",
     "export",
+    "fit",
     "lyapunov",
     "merge",
     "modes",
@@ -88,7 +92,12 @@ __all__ = [
 def __getattr__(name: str) -> object:
     # matplotlib and pyarrow take longer to import than everything else together.
     if name in {"plot", "export"}:
-        return import_module(f".{name}", __name__)
+        try:
+            return import_module(f".{name}", __name__)
+        except ModuleNotFoundError as error:
+            # An attribute that is missing, so that `help` and `dir` go on without it.
+            message = f"nanotap.{name} needs {error.name}: pip install {error.name}"
+            raise AttributeError(message) from error
     message = f"module 'nanotap' has no attribute {name!r}"
     raise AttributeError(message)
 

@@ -3,6 +3,7 @@
 import json
 import math
 import operator
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _nanotap
+from ._quantity import in_si, many, text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,10 +111,11 @@ def _pair(name: str, value: Any) -> tuple[Any, Any]:
 
 
 def quantity(name: str, value: Any) -> str:
-    """A number, or a text with a unit, as the extension reads it."""
+    """A number (of a physical key in SI), or a text with a unit, as the extension reads it."""
+    value = in_si(name, value)
     if isinstance(value, str):
         return value
-    return repr(number(name, value))
+    return text(name, number(name, value))
 
 
 def axis(name: str, values: Any) -> str:
@@ -121,25 +124,30 @@ def axis(name: str, values: Any) -> str:
         if len(values) not in (3, 4):
             message = f"{name}: first, last and how many are needed, as in (2, 4, 400)"
             raise ValueError(message)
-        first, last, many, *spacing = values
-        words = [quantity(name, first), quantity(name, last), str(count(name, many))]
+        first, last, number_of, *spacing = values
+        words = [
+            quantity(name, first),
+            quantity(name, last),
+            str(count(name, number_of)),
+        ]
         return f"{name}={':'.join([*words, *map(str, spacing)])}"
-    if isinstance(values, list) and values and all(isinstance(v, str) for v in values):
-        return f"{name}={','.join(values)}"
+    values = many(name, values)
+    if values.ndim == 1 and values.dtype.kind == "U":
+        return f"{name}={','.join(values.tolist())}"
     array = real(values, name)
     if array.ndim != 1 or array.size == 0:
         message = f"{name}: a row of values is needed, as in numpy.linspace(2, 4, 400)"
         raise ValueError(message)
-    first, last, many = float(array[0]), float(array[-1]), array.size
-    if np.allclose(array, np.linspace(first, last, many), rtol=1e-12, atol=0):
-        return f"{name}={first!r}:{last!r}:{many}"
+    first, last, size = float(array[0]), float(array[-1]), array.size
+    if np.allclose(array, np.linspace(first, last, size), rtol=1e-12, atol=0):
+        return f"{name}={text(name, first)}:{text(name, last)}:{size}"
     if (
         first > 0
         and last > 0
-        and np.allclose(array, np.geomspace(first, last, many), rtol=1e-12, atol=0)
+        and np.allclose(array, np.geomspace(first, last, size), rtol=1e-12, atol=0)
     ):
-        return f"{name}={first!r}:{last!r}:{many}:log"
-    return f"{name}={','.join(map(repr, array.tolist()))}"
+        return f"{name}={text(name, first)}:{text(name, last)}:{size}:log"
+    return f"{name}={','.join(text(name, value) for value in array.tolist())}"
 
 
 def axes(over: str | Sequence[str] | Mapping[str, Any]) -> list[str]:
@@ -212,7 +220,11 @@ def _plain(name: str, value: Any, schema: Mapping[str, Any]) -> Any:
     if "array" in kinds and "integer" in kinds:
         many = [value] if isinstance(value, int | np.integer) else list(value)
         return [whole(name, one) for one in many]
-    if "array" in kinds and schema.get("items", {}).get("type") in ("string", "array"):
+    if "array" in kinds and schema.get("items", {}).get("type") in (
+        "string",
+        "array",
+        "object",
+    ):
         return value
     if "array" in kinds:
         return [_finite(one) for one in row(name, value).tolist()]
@@ -228,6 +240,65 @@ def _plain(name: str, value: Any, schema: Mapping[str, Any]) -> Any:
 def _finite(value: float) -> float | str:
     """JSON has no infinity: its word is refused with what would be right."""
     return value if math.isfinite(value) else str(value)
+
+
+def names(name: str, value: Any) -> list[str]:
+    """Names, of which one may be a text of its own."""
+    given = [value] if isinstance(value, str) else value
+    if not isinstance(given, Iterable) or not all(isinstance(v, str) for v in given):
+        message = f"{name}: names are needed, not {value!r}"
+        raise TypeError(message)
+    return list(given)
+
+
+def tables(data: Any) -> list[dict[str, Any]]:
+    """Measured curves as tables: files, mappings of columns, data frames, datasets, or several."""
+    if isinstance(data, str | os.PathLike):
+        table: dict[str, Any] = json.loads(_nanotap.table(os.fspath(data)))
+        return [table]
+    if hasattr(data, "data_vars"):  # xarray
+        return [{"columns": _of_dataset(data)}]
+    if hasattr(data, "columns") and not isinstance(data, Mapping):  # pandas, polars
+        return [{"columns": {str(c): column(str(c), data[c]) for c in data.columns}}]
+    if isinstance(data, Mapping):
+        if data and all(
+            isinstance(v, Mapping) or hasattr(v, "columns") or hasattr(v, "data_vars")
+            for v in data.values()
+        ):
+            return [
+                {**tables(table)[0], "name": str(name)} for name, table in data.items()
+            ]
+        return [{"columns": {str(c): column(str(c), v) for c, v in data.items()}}]
+    if isinstance(data, Iterable):
+        many = [table for one in data for table in tables(one)]
+        return [
+            {**table, "name": table.get("name", f"curve {k + 1}")}
+            for k, table in enumerate(many)
+        ]
+    message = f"data: a table of columns is needed, not {data!r}"
+    raise TypeError(message)
+
+
+def _of_dataset(data: "xr.Dataset") -> dict[str, list[Any]]:
+    units = {str(n): v.attrs.get("units", "") for n, v in data.variables.items()}
+    frame = data.to_dataframe().reset_index()
+    named = {c: f"{c} ({units[c]})" if units.get(c) else c for c in map(str, frame)}
+    return {header: column(c, frame[c]) for c, header in named.items()}
+
+
+def column(name: str, values: Any) -> list[Any]:
+    """Entries of a column: numbers, texts, nothing for what is not a number."""
+    array = np.asarray(values)
+    if array.ndim != 1:
+        message = f"{name}: a row of entries is needed, not an array of {array.ndim} dimensions"
+        raise ValueError(message)
+    if array.dtype.kind in "iuf":
+        return [None if math.isnan(v) else _finite(v) for v in array.tolist()]
+    missing = (None, "")
+    return [
+        None if v in missing or (isinstance(v, float) and math.isnan(v)) else v
+        for v in array.tolist()
+    ]
 
 
 def _sides(name: str, value: Any) -> list[tuple[str, Any, Any]]:

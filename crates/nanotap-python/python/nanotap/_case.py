@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from . import _nanotap
+from ._quantity import in_si, si_unit, text
 from ._results import Record
 
 if TYPE_CHECKING:
@@ -25,13 +26,18 @@ _OTHER_NAMES = {
 }
 
 
+# What `to_dict` has beside the keys: it follows from them.
+_FOLLOWS = {"period", "physical"}
+
+
 class Case:
     """A checked case: a cantilever (dimensionless or in physical units) or an oscillator.
 
     Keys are those of the case file. Dimensionless: `modes`, `alpha1` … `alpha6`, `omega`,
     or their readable names (`tip_mass_ratio`, `drive_amplitude`, `beam_damping`,
     `contact_stiffness`, `gap`, `contact_damping`, `drive_frequency`). Physical: the tables
-    as dictionaries, with quantities and their units.
+    as dictionaries, with quantities and their units: texts (`"10 nm"`), numbers in SI (`1e-8`), or
+    quantities of pint, astropy or unyt.
 
     >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
     2.6
@@ -195,6 +201,12 @@ class Case:
             message = f"the case has no `{name}`; it has {', '.join(self._document)}"
             raise AttributeError(message) from None
 
+    def __setattr__(self, name: str, value: object) -> None:
+        if name not in Case.__slots__:
+            message = f"a case does not change: case.with_({name}=…) is another one"
+            raise AttributeError(message)
+        super().__setattr__(name, value)
+
     def __getitem__(self, name: str) -> Any:
         return self._document[_OTHER_NAMES.get(name, name)]
 
@@ -272,6 +284,8 @@ def _words(keys: Mapping[str, Any]) -> dict[str, str]:
     words: dict[str, str] = {}
     typed: dict[str, str] = {}
     for key, value in keys.items():
+        if key in _FOLLOWS or (value is None and key == "tone2_ratio"):
+            continue
         if isinstance(value, Mapping):
             for inner, quantity in value.items():
                 name = f"{key}.{inner}"
@@ -290,12 +304,13 @@ def _words(keys: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _written(name: str, value: Any) -> str:
+    value = in_si(name, value)
     if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:
         value = value.item()
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return repr(value)
+        return json.dumps(text(name, value)) if si_unit(name) else repr(value)
     message = f"{name}: a number or a text is needed, not {value!r}"
     raise TypeError(message)
 

@@ -208,6 +208,8 @@ def _computed(
     del ds.attrs["path"]
     # What was read is in memory, whatever it was read from.
     ds.close()
+    # It may be written anywhere: how the store compressed it is no longer of use.
+    ds = ds.drop_encoding()
     if stopped:
         message = "stopped; what was not reached is missing"
         raise Interrupted(message, ds)

@@ -14,6 +14,7 @@ from ._case import Case
 from ._describe import case_attributes, describe
 from ._interrupt import Interrupted
 from ._progress import bar
+from ._quantity import in_si, many, si_unit
 from ._results import Modes, Orbit
 
 if TYPE_CHECKING:
@@ -130,8 +131,8 @@ def _split(
         if near:
             message = f"{key}: there is no such argument and no such key; did you mean {near[0]}?"
             raise TypeError(message)
-        many = np.ndim(value) > 0 if not isinstance(value, str | Mapping) else False
-        (varied if many else fixed)[key] = value
+        one = isinstance(value, str | Mapping) or np.ndim(in_si(key, value)) == 0
+        (fixed if one else varied)[key] = value
     return _cased(case).with_(**fixed), varied
 
 
@@ -282,14 +283,14 @@ def _over(
         case.with_(**{key: array.values[index] for key, array in broadcast.items()})
         for index in product(*map(range, shape))
     ]
-    many = _arguments.optional_count("threads", threads)
+    most = _arguments.optional_count("threads", threads)
     noun = "orbits" if study == "orbit" else "runs"
     with bar(progress, noun) as show:
         found, interrupted = _nanotap.observe(
             [one._core for one in cases],
             study,
             request,
-            threads=many,
+            threads=most,
             progress=show,
         )
     coords: dict[str, Any] = {}
@@ -300,10 +301,10 @@ def _over(
         if key not in dims:
             coords[key] = array
     documents = [None if text is None else _document(text) for text, _ in found]
-    entries = case.state_names
-    ds = _stacked(documents, entries, shape, tuple(map(str, dims))).assign_coords(
-        coords
-    )
+    names = [one.state_names for one in cases]
+    entries = max(names, key=len)
+    ds = _stacked(documents, names, entries, shape, tuple(map(str, dims)))
+    ds = ds.assign_coords(coords)
     failures = np.array([reason for _, reason in found], dtype=object).reshape(shape)
     ds = ds.assign(failure=(dims, failures.astype(str)))
     ds.failure.attrs.update(
@@ -325,30 +326,45 @@ def _as_array(key: str, value: Any) -> "xr.DataArray":
 
     if isinstance(value, xr.DataArray):
         return value
-    array = np.asarray(value)
+    array = many(key, value)
     if array.ndim != 1 or array.size == 0:
         message = (
             f"{key}: a row of values is needed, not an array of shape {array.shape}; for more "
             "dimensions give an xarray.DataArray, which names them"
         )
         raise ValueError(message)
-    if array.dtype.kind not in "iuf":
+    if array.dtype.kind not in "iufU":
         message = f"{key}: real numbers are needed, not {array.dtype}"
         raise TypeError(message)
-    return xr.DataArray(array, dims=key, coords={key: array}, name=key)
+    values = xr.DataArray(array, dims=key, coords={key: array}, name=key)
+    if si_unit(key) and array.dtype.kind != "U":
+        values[key].attrs["units"] = si_unit(key)
+    return values
+
+
+def _among(entries: list[str], own: list[str], dims: Any, values: Any) -> Any:
+    """A variable whose states have the entries `own`, with room for all `entries`."""
+    inner = (dims,) if isinstance(dims, str) else tuple(dims)
+    if own == entries or not inner or inner[-1] != "state":
+        return dims, values
+    room = np.full((*np.shape(values)[:-1], len(entries)), np.nan)
+    room[..., [entries.index(name) for name in own]] = values
+    return dims, room
 
 
 def _stacked(
     documents: list[dict[str, Any] | None],
+    names_of: list[list[str]],
     entries: list[str],
     shape: tuple[int, ...],
     dims: tuple[str, ...],
 ) -> "xr.Dataset":
-    """What is a number, a word or a vector of one length in every document."""
+    """What is a number, a word or a vector of one length in every document; states among
+    `entries` by the names that each case gives them."""
     import xarray as xr
 
     rows: list[dict[str, Any]] = []
-    for document in documents:
+    for document, own in zip(documents, names_of, strict=True):
         if document is None:
             rows.append({})
             continue
@@ -358,10 +374,10 @@ def _stacked(
                 abs(complex(*pair)) for pair in multipliers
             )
         strobe = document.pop("strobe", None)
-        row = _variables(document, entries)[0]
+        row = _variables(document, own)[0]
         if strobe:
             row["strobe"] = (("strobe_period", "state"), np.array(strobe, dtype=float))
-        rows.append(row)
+        rows.append({name: _among(entries, own, *row[name]) for name in row})
     names = list(dict.fromkeys(name for row in rows for name in row))
     variables: dict[str, Any] = {}
     coords: dict[str, Any] = {}

@@ -1,5 +1,6 @@
 """What results are: objects with the names of the terminal's JSON."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
@@ -56,6 +57,41 @@ class Record(Mapping[str, Any]):
     def to_dict(self) -> dict[str, Any]:
         """The same as plain dictionaries and lists."""
         return {key: _plain(value) for key, value in self._entries.items()}
+
+
+class Fit(Record):
+    """What a fit found, by the names of the terminal's JSON."""
+
+    __slots__ = ()
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The best values by key; of parameters one a curve, `key of curve`."""
+        return {_of_curve(p): float(p["value"]) for p in self["parameters"]}
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Their standard errors; not a number where the data do not determine them."""
+        return {
+            _of_curve(p): math.nan
+            if p["standard_error"] is None
+            else float(p["standard_error"])
+            for p in self["parameters"]
+        }
+
+    def best_case(self) -> "Case":
+        """The case of the best fit."""
+        from ._case import Case
+
+        return Case.from_toml(self["case_file"])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Fit, (self.to_dict(),)
+
+
+def _of_curve(parameter: Mapping[str, Any]) -> str:
+    key, curve = parameter["key"], parameter.get("curve")
+    return str(key) if curve is None else f"{key} of {curve}"
 
 
 def _wrapped(value: Any) -> Any:

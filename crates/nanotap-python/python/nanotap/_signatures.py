@@ -11,6 +11,7 @@ from ._case import Case, Path
 from ._results import (
     Attractors,
     Convergence,
+    Fit,
     Lyapunov,
     Modes,
     Orbit,
@@ -435,6 +436,79 @@ def approach(
         "max_period": max_period,
     }
     return _studies.approach(case, options, threads, progress)
+
+def fit(
+    case: Case,
+    *,
+    data: Any = None,
+    free: Any = None,
+    per_curve: Any = None,
+    bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    columns: Any = None,
+    starts: int = 8,
+    seed: int = 0,
+    max_period: int = 4,
+    profile: bool = True,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Fit:
+    """Parameters of lever and sample from measured curves.
+
+    Parameters
+    ----------
+    case : Case
+        What is studied.
+    data : Any
+        Measured curves: tables whose columns are named as in `distance (nm)`,
+        `amplitude (nm)`, `phase (deg)`.
+    free : Any
+        Parameters to find: keys of the case, gap.offset, and NAME.offset or
+        NAME.scale of a column.
+    per_curve : Any
+        Parameters to find, one value a curve.
+    bounds : Mapping[str, tuple[float | str, float | str]] | str | None
+        Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m".
+    columns : Any
+        Columns of the data that count; without it, all.
+    starts : int
+        Starts to try as long as nothing describes the data (1 to 1000).
+    seed : int
+        Seed of the further starts.
+    max_period : int
+        Longest period of the orbits looked for (1 to 64).
+    profile : bool
+        Intervals by the profile of the likelihood.
+    threads : int | None
+        Threads; without it, one a core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with what is done and
+        the total.
+
+    Returns
+    -------
+    `parameters` (key, value, standard_error, interval, unit), `chi2`,
+    `undetermined`, `correlations`, the `rows` with model and residuals; `best` and
+    `errors` by key, and `best_case()`, the case of the best fit.
+
+    Raises
+    ------
+    ValueError
+        Something that was asked for is not right.
+    RuntimeError
+        The computation did not succeed.
+    """
+    options = {
+        "data": data,
+        "free": free,
+        "per_curve": per_curve,
+        "bounds": bounds,
+        "columns": columns,
+        "starts": starts,
+        "seed": seed,
+        "max_period": max_period,
+        "profile": profile,
+    }
+    return _studies.fit(case, options, threads, progress)
 
 def sweep(
     case: Case,

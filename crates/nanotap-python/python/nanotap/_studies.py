@@ -13,7 +13,7 @@ from ._describe import case_attributes, describe
 from ._interrupt import Interrupted
 from ._motions import _cased, _document, words
 from ._progress import bar
-from ._results import Attractors, Convergence, Lyapunov, Paper, Record
+from ._results import Attractors, Convergence, Fit, Lyapunov, Paper, Record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -192,6 +192,11 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     if further:
         coords["state"] = words(entries)
         ds = ds.assign(further).assign_coords(state=words(entries))
+    for entry in report["coexisting"]:
+        physical = entry.pop("physical", None) or {}
+        entry |= {f"physical_{key}": value for key, value in physical.items()}
+        entry.pop("way")
+    ds = ds.assign(_columns(report["coexisting"], "coexisting_point", "coexisting_", 0))
     for key in ("free_amplitude", "free_phase", "free_reach"):
         ds[key] = report[key]
     ds.attrs.update(case_attributes(case, "approach and retract"))
@@ -245,6 +250,27 @@ def contact_laws(
     """The motion under each contact law."""
     document, interrupted = _run("contact-laws", case, options, threads, progress)
     found = Record(document)
+    if interrupted:
+        message = "stopped before it was done"
+        raise Interrupted(message, found)
+    return found
+
+
+def fit(
+    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+) -> Fit:
+    """The free parameters that describe measured curves."""
+    if options["data"] is None:
+        message = "data: measured curves are needed"
+        raise TypeError(message)
+    lists = {
+        name: _arguments.names(name, options[name])
+        for name in ("free", "per_curve", "columns")
+        if options[name] is not None
+    }
+    asked = {**options, **lists, "data": _arguments.tables(options["data"])}
+    document, interrupted = _run("fit", case, asked, threads, progress)
+    found = Fit(document)
     if interrupted:
         message = "stopped before it was done"
         raise Interrupted(message, found)

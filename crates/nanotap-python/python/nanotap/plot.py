@@ -15,7 +15,7 @@ import numpy as np
 from . import _nanotap, _signatures
 from ._case import Case
 from ._figure import STYLE, Picture, draw, page
-from ._results import Attractors, Convergence, Lyapunov, Modes, Orbit
+from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +32,7 @@ __all__ = [
     "basin",
     "branch",
     "convergence",
+    "fit",
     "modes",
     "orbit",
     "page",
@@ -385,6 +386,12 @@ def approach(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
             x, y = x_scale * ds[f"{prefix}parameter"], by * ds[f"{prefix}{plain}"]
             return _rows(x=x, y=y, **{key: ds[f"{prefix}{key}"] for key in more})
 
+        def coexisting(by: float = shown, plain: str = plain) -> Any:
+            name = f"coexisting_{plain}"
+            if name not in ds:
+                return []
+            return _points(x_scale * ds.coexisting_gap.values, by * ds[name].values)
+
         panels.append(
             {
                 "label": f"{label}{named}",
@@ -392,6 +399,7 @@ def approach(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
                 "phase": plain == "phase",
                 "approach": curve("approach"),
                 "retract": curve("retract"),
+                "coexisting": coexisting(),
                 "branches": branches("branch_", branch=1, period=1, stable=1),
                 "bifurcations": branches("bifurcation_", kind=1),
             }
@@ -424,6 +432,11 @@ def section(found: Lyapunov, *, axes: Any = None) -> "Figure":
         "errors": np.nan_to_num(found.errors).tolist(),
     }
     return _drawn("section", facts, axes)
+
+
+def fit(found: Fit, *, axes: Any = None) -> "Figure":
+    """Measured curves, the fit through them, and the residuals."""
+    return _drawn("fit", found.to_dict(), axes)
 
 
 def modes(found: Modes, *, axes: Any = None) -> "Figure":
@@ -461,6 +474,7 @@ _FIGURES: dict[type, Callable[..., "Figure"]] = {
     Lyapunov: section,
     Modes: modes,
     Convergence: convergence,
+    Fit: fit,
 }
 # The first one that a Dataset has says what it is.
 _FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {

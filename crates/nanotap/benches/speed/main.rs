@@ -11,6 +11,7 @@ mod jacobian;
 mod orbit;
 mod period;
 mod setup;
+mod simulate;
 mod sweep;
 mod switch;
 

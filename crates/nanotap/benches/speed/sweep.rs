@@ -4,12 +4,39 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
+use nanotap::model::cantilever::Cantilever;
 use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
 
 use crate::cases;
 use crate::folder::Folder;
 
-/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods thrown away and 100 recorded, by one
+/// The runs of [`runs_96`] without anything but the motion: what it should cost little more than.
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn bare(bencher: Bencher<'_, '_>) {
+    const VALUES: usize = 24;
+    const STARTS: usize = 4;
+    let flows: Vec<_> = (0..VALUES)
+        .map(|k| {
+            let omega = 2.0 + 2.0 * k as f64 / (VALUES - 1) as f64;
+            cases::at_rest(&cases::model(&Cantilever {
+                omega,
+                ..cases::paper(3)
+            }))
+        })
+        .collect();
+    bencher
+        .counter(ItemsCount::new(VALUES * STARTS))
+        .with_inputs(|| flows.clone())
+        .bench_local_refs(|flows| {
+            for flow in flows {
+                for _ in 0..STARTS {
+                    flow.run_periods(500).expect("a bounded motion");
+                }
+            }
+        });
+}
+
+/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods discarded and 100 recorded, by one
 /// thread or two. Items are runs.
 #[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
 fn runs_96(bencher: Bencher<'_, '_>, threads: usize) {

@@ -222,6 +222,22 @@ keys! {
     Tone2Phase = number(Parameter::Tone2Phase, "θ₂", "phase of the second tone in degrees")
         .also("second_tone_phase").or(0.0);
 
+    Mode2Frequency = number(
+        Parameter::Mode2Frequency, "Ω₂", "measured frequency of the second free mode, as omega (0: the beam's own)",
+    ).or(0.0);
+    Mode3Frequency = number(
+        Parameter::Mode3Frequency, "Ω₃", "measured frequency of the third free mode, as omega (0: the beam's own)",
+    ).or(0.0);
+    Mode2Quality = number(
+        Parameter::Mode2Quality, "Q₂", "measured quality factor of the second free mode (0: as beam_damping has it)",
+    ).or(0.0);
+    Mode3Quality = number(
+        Parameter::Mode3Quality, "Q₃", "measured quality factor of the third free mode (0: as beam_damping has it)",
+    ).or(0.0);
+    Mode2Stiffness = number(
+        Parameter::Mode2Stiffness, "k₂", "measured stiffness of the second free mode at the tip, k2·L³/(EI) (0: the beam's own)",
+    ).or(0.0);
+
     Mass = oscillator(Of::Mass, "m", OSCILLATORS, "mass").or(1.0);
     Stiffness = oscillator(Of::Stiffness, "k", OSCILLATORS, "spring");
     Damping = oscillator(Of::Damping, "c", OSCILLATORS, "damper").such_as(0.0);
@@ -257,11 +273,20 @@ keys! {
     };
 
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
-    LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip");
+    LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³");
     LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip");
-    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance, which tells the tip's mass");
+    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance; without a tip's mass it tells that mass")
+        .feeds(Parameter::Mode2Frequency);
+    LeverF3 = quantity(Cantilever, "f3", Frequency, R::POSITIVE, "third free resonance")
+        .feeds(Parameter::Mode3Frequency);
     LeverQ = quantity(Cantilever, "Q", Number, R::POSITIVE, "quality factor of the first free resonance")
         .feeds(Parameter::Alpha3);
+    LeverQ2 = quantity(Cantilever, "Q2", Number, R::POSITIVE, "quality factor of the second free resonance")
+        .feeds(Parameter::Mode2Quality);
+    LeverQ3 = quantity(Cantilever, "Q3", Number, R::POSITIVE, "quality factor of the third free resonance")
+        .feeds(Parameter::Mode3Quality);
+    LeverK2 = quantity(Cantilever, "k2", Stiffness, R::POSITIVE, "stiffness of the second mode at the tip")
+        .feeds(Parameter::Mode2Stiffness);
     LeverLength = quantity(Cantilever, "length", Length, R::POSITIVE, "length of the beam");
     LeverWidth = quantity(Cantilever, "width", Length, R::POSITIVE, "width of the beam");
     LeverThickness = quantity(Cantilever, "thickness", Length, R::POSITIVE, "thickness in the direction of bending");
@@ -391,12 +416,7 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
         reason: "each gives the damper C1",
     },
     Alternatives {
-        ways: &[
-            &[Key::LeverF2],
-            &[Key::TipMass],
-            &[Key::TipMassRatio],
-            &[Key::TipShape],
-        ],
+        ways: &[&[Key::TipMass], &[Key::TipMassRatio], &[Key::TipShape]],
         reason: "each gives the tip's mass; keep the one that is known best",
     },
     Alternatives {

@@ -526,6 +526,26 @@ impl Case {
         }
     }
 
+    /// The same with its distance left to the setpoint, if `original` leaves its distance so.
+    #[must_use]
+    pub(crate) fn leaving_distance_as(self, original: &Self) -> Self {
+        let (What::Quantities(quantities), Some(setpoint)) =
+            (&self.what, original.stated(Key::DriveSetpoint))
+        else {
+            return self;
+        };
+        if !original.leaves_distance_to_setpoint() {
+            return self;
+        }
+        let mut quantities = quantities.clone();
+        quantities.stated.remove(Key::GapTip);
+        quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
+        Self {
+            title: self.title,
+            what: What::Quantities(Box::new(quantities.mapped(true))),
+        }
+    }
+
     /// The same with the tip at `distance` (in m) from the sample, where its setpoint is
     /// reached, and a note that says so. The unit of length stays; the beam, which moves with
     /// the tip, is out of place by less than the free amplitude.

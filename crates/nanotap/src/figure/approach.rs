@@ -14,7 +14,7 @@ use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
 
 /// Amplitude, phase, dissipation and greatest force against the distance: what was met on the
-/// way there and back as marks in two colours, the branches as lines, dashed where unstable,
+/// way there and back as marks in two colours, what coexists in a third, the branches as lines, dashed where unstable,
 /// with their bifurcations.
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
@@ -63,6 +63,8 @@ pub struct ApproachPanel {
     pub approach: Vec<(f64, f64)>,
     /// What was met while it was retracted.
     pub retract: Vec<(f64, f64)>,
+    /// What neither way met, but coexists.
+    pub coexisting: Vec<(f64, f64)>,
     /// The branches.
     pub branches: Vec<BranchPoint>,
     /// Their bifurcations.
@@ -110,7 +112,8 @@ impl ApproachPanel {
         let place =
             |gap: f64, observables: &Observables| (x_factor * gap, factor * of(shown, observables));
         let way = |way: Way| {
-            let on = report.table.iter().filter(|p| p.way == way);
+            let met = report.table.iter().chain(&report.coexisting);
+            let on = met.filter(|p| p.way == way);
             on.filter_map(|p| Some(place(p.gap, p.observables.as_ref()?)))
                 .collect()
         };
@@ -121,6 +124,7 @@ impl ApproachPanel {
             phase: shown.is_phase(),
             approach: way(Way::Approach),
             retract: way(Way::Retract),
+            coexisting: way(Way::Neither),
             branches: points()
                 .map(|p| {
                     let (x, y) = place(p.parameter, &p.observables);
@@ -183,6 +187,11 @@ impl ApproachPanel {
         for (met, colour, size, way) in ways {
             let markers = Markers::new(met.clone()).colour(colour).size(size);
             panel = panel.with(markers.label(way.name()));
+        }
+        if !self.coexisting.is_empty() {
+            let markers = Markers::new(self.coexisting.clone());
+            let markers = markers.colour(Colour::GREEN).size(0.8);
+            panel = panel.with(markers.label("coexists"));
         }
         // Where there are many, each is to hide little.
         let size = if self.bifurcations.len() > 12 {

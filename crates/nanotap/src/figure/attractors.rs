@@ -26,7 +26,7 @@ pub fn attractors_figure(model: &Model, found: &Attractors, units: &Units) -> Fi
             .orbit
             .as_ref()
             .map(|o| &o.observables)
-            .or(a.wandering.as_ref().map(|w| &w.observables));
+            .or(a.non_periodic.as_ref().map(|w| &w.observables));
         o.map(|o| o.tip_max.abs().max(o.tip_min.abs()))
     });
     let (length, length_unit) = units.axis(Kind::Length, tips.fold(0.0, f64::max));
@@ -101,7 +101,7 @@ impl Curve {
                 strobe,
             });
         }
-        let start = &attractor.wandering.as_ref()?.state;
+        let start = &attractor.non_periodic.as_ref()?.state;
         let trajectory = Recording::of(model, start, WANDERING_PERIODS).ok()?;
         let section =
             crate::study::lyapunov::section(model, start, Section::Phase(0.0), STROBE_POINTS)

@@ -139,6 +139,7 @@ pub fn branch_figure(
                 .map(|curve| BifurcationCurve {
                     kind: curve.kind.to_owned(),
                     period: curve.period,
+                    meets: curve.meets.map(|what| what.unwrap_or_default().to_owned()),
                     x: curve.first.iter().map(|v| first.factor * v).collect(),
                     y: curve.second.iter().map(|v| second.factor * v).collect(),
                 })
@@ -233,6 +234,9 @@ pub struct BifurcationCurve {
     pub x: Vec<f64>,
     /// The second parameter along the curve.
     pub y: Vec<f64>,
+    /// What it meets at its first and last point; empty at the edge of the window.
+    #[serde(default)]
+    pub meets: [String; 2],
 }
 
 impl BranchCurves {
@@ -342,9 +346,35 @@ impl BifurcationCurves {
             }
             panel = panel.with(line);
         }
+        for (what, shape) in ENDS {
+            let mut marks: Vec<(f64, f64)> = Vec::new();
+            for curve in &self.curves {
+                let ends = [
+                    curve.x.first().zip(curve.y.first()),
+                    curve.x.last().zip(curve.y.last()),
+                ];
+                for (end, meets) in ends.into_iter().zip(&curve.meets) {
+                    marks.extend(end.filter(|_| meets == what).map(|(x, y)| (*x, *y)));
+                }
+            }
+            if !marks.is_empty() {
+                let markers = Markers::new(marks)
+                    .shape(shape)
+                    .colour(Colour::PURPLE)
+                    .size(1.6);
+                panel = panel.with(markers.label(format!("ends: {what}")));
+            }
+        }
         panel
     }
 }
+
+/// The marks of what curves end at.
+const ENDS: [(&str, Shape); 3] = [
+    ("grazing", Shape::Circle),
+    ("codimension two", Shape::Diamond),
+    ("cut", Shape::Cross),
+];
 
 /// Stretches of one stability, each beginning where the last one ended.
 pub(crate) fn runs<'a, P>(

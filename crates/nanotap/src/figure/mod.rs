@@ -6,6 +6,7 @@ pub mod basin;
 pub mod branch;
 pub mod contact;
 pub mod contact_laws;
+pub mod fit;
 pub mod motion;
 pub mod panels;
 pub mod shown;

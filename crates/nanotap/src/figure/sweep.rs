@@ -3,14 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nanotap_figures::{
-    Axis, CategoryMap, Colour, DOUBLE_COLUMN, Figure, Legend, Motion, ONE_AND_A_HALF_COLUMNS,
-    Panel, Points,
+    Axis, CategoryMap, Colour, DOUBLE_COLUMN, Figure, Heatmap, Legend, Motion,
+    ONE_AND_A_HALF_COLUMNS, Panel, Points,
 };
 use serde::Deserialize;
 
 use crate::case::physical::Kind;
 use crate::case::units::prefixed;
 use crate::dataset::{Coordinate, Store, StoreError, Values};
+use crate::figure::branch::{natural_of, scale_of};
+use crate::figure::shown::Shown;
+use crate::observe::table::shown_phase;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, Motions, class_of, from_neighbours};
 
@@ -130,7 +133,10 @@ impl SweepTable {
             && self.period_max.len().is_multiple_of(cells);
         match self.axes.as_slice() {
             [x] if fits => Some(self.diagram(&x.shown())),
-            [y, x] if fits => Some(self.map(&x.shown(), &y.shown())),
+            [y, x] if fits => {
+                let panel = self.map(&x.shown(), &y.shown()).legend(Legend::Right);
+                Some(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
+            }
             _ => None,
         }
     }
@@ -140,8 +146,8 @@ impl SweepTable {
         motion(self.classification[cell], self.period[cell])
     }
 
-    /// Per-period maxima of the tip deflection over one parameter, a colour a motion, a panel a
-    /// direction of following.
+    /// Per-period maxima of the tip deflection over one parameter, a colour a motion; where motions
+    /// were followed, both directions upon each other above that, a colour a direction.
     fn diagram(&self, x: &GridScale) -> Figure {
         let starts = self.directions.len();
         let cells = self.classification.len();
@@ -184,48 +190,54 @@ impl SweepTable {
             clouds.entry(key).or_default().push((at, orbit.tip_max));
         }
         let (factor, unit) = deflection(&self.units, clouds.values().flatten().map(|p| p.1));
-        let shown: BTreeSet<&str> = self.directions.iter().map(String::as_str).collect();
-        let mut figure = Figure::new(shown.len(), 1).width(DOUBLE_COLUMN).share_x();
-        // "up" before "down".
-        for direction in shown.into_iter().rev() {
-            let title = if direction.is_empty() {
-                String::new()
-            } else {
-                format!("following {direction}")
+        let empty = || {
+            let y = Axis::linear("max $W$ in a drive period").unit(&unit);
+            Panel::new(x.axis(), y).legend(Legend::Above)
+        };
+        let cloud = |points: &[(f64, f64)], part: f64| {
+            let diameter = match points.len() {
+                0..2_000 => 0.5,
+                2_000..20_000 => 0.3,
+                _ => 0.13,
             };
-            let mut panel = Panel::new(
-                x.axis(),
-                Axis::linear("max $W$ in a drive period").unit(&unit),
-            )
-            .title(title)
-            .legend(Legend::Above);
-            // Chaos is drawn first: it lies under what is periodic.
-            let own = clouds
-                .iter()
-                .filter(|((d, _), points)| *d == direction && !points.is_empty());
-            let mut layers: Vec<Points> = Vec::new();
-            for ((_, motion), points) in own {
-                let diameter = match points.len() {
-                    0..2_000 => 0.5,
-                    2_000..20_000 => 0.3,
-                    _ => 0.13,
-                };
-                let points = points.iter().map(|(at, y)| (*at, factor * y));
-                layers.push(
-                    Points::new(points)
-                        .diameter(diameter)
-                        .colour(motion.map_or(OTHERS, Motion::colour))
-                        .label(motion.map_or_else(|| "other".to_owned(), |m| m.to_string())),
-                );
-            }
-            panel = panel.with_all(layers.into_iter().rev());
-            figure = figure.with(panel);
+            Points::new(points.iter().map(|(at, y)| (*at, factor * y))).diameter(part * diameter)
+        };
+        let mut by_motion: BTreeMap<Option<Motion>, Vec<(f64, f64)>> = BTreeMap::new();
+        let mut by_direction: BTreeMap<&str, Vec<(f64, f64)>> = BTreeMap::new();
+        for ((direction, motion), points) in clouds {
+            by_direction.entry(direction).or_default().extend(&points);
+            by_motion.entry(motion).or_default().extend(points);
         }
-        figure
+        // Chaos is drawn first: it lies under what is periodic.
+        let motions = by_motion
+            .iter()
+            .rev()
+            .filter(|(_, points)| !points.is_empty());
+        let motions = motions.map(|(motion, points)| {
+            cloud(points, 1.0)
+                .colour(motion.map_or(OTHERS, Motion::colour))
+                .label(motion.map_or_else(|| "other".to_owned(), |m| m.to_string()))
+        });
+        let motions = empty().with_all(motions);
+        if drawn {
+            return Figure::new(1, 1).width(DOUBLE_COLUMN).with(motions);
+        }
+        // "up" before "down", whose smaller marks lie upon it.
+        let directions = by_direction.iter().rev().map(|(direction, points)| {
+            let (part, colour) = of_direction(direction);
+            cloud(points, part)
+                .colour(colour)
+                .label(format!("following {direction}"))
+        });
+        Figure::new(2, 1)
+            .width(DOUBLE_COLUMN)
+            .share_x()
+            .with(empty().with_all(directions))
+            .with(motions)
     }
 
     /// What motions there are over two parameters.
-    fn map(&self, x: &GridScale, y: &GridScale) -> Figure {
+    fn map(&self, x: &GridScale, y: &GridScale) -> Panel {
         let starts = self.directions.len();
         let mut found: Vec<BTreeSet<Option<Motion>>> = (0..x.values.len() * y.values.len())
             .map(|place| {
@@ -289,10 +301,7 @@ impl SweepTable {
         if others {
             layer = layer.category_in("other", OTHERS);
         }
-        let panel = Panel::new(x.axis(), y.axis())
-            .with(layer)
-            .legend(Legend::Right);
-        Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS)
+        Panel::new(x.axis(), y.axis()).with(layer)
     }
 }
 
@@ -314,6 +323,15 @@ pub(crate) fn motion(code: u8, period: i32) -> Option<Motion> {
     })
 }
 
+/// Size and colour of the marks of a direction: those of "down" lie upon those of "up".
+fn of_direction(direction: &str) -> (f64, Colour) {
+    if direction == "down" {
+        (1.0, Colour::VERMILLION)
+    } else {
+        (1.5, Colour::BLUE)
+    }
+}
+
 /// What deflections are multiplied with, and their unit (empty in the model's own units).
 fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
     if units != "m" {
@@ -327,7 +345,7 @@ fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
 }
 
 /// Amplitude and phase at the drive's frequency over one parameter, a colour a direction of
-/// following: resonance curves; over two parameters a map of motions.
+/// following: resonance curves; over two parameters maps of the motions and of what one measures.
 ///
 /// # Errors
 /// If chunks are missing or cannot be read.
@@ -335,7 +353,7 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
     store.require_all()?;
     let schema = store.schema();
     if schema.grid.axes.len() > 2 {
-        return Ok(SweepTable::of(store)?.figure().unwrap_or_default());
+        return maps(store);
     }
     let x = GridAxis::of(store, 0).shown();
     let directions: Vec<String> = match schema.coordinate("direction").map(|c| &c.values) {
@@ -377,16 +395,10 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         // "up" before "down", whose smaller marks lie upon it.
         for ((direction, _), mut curve) in curves.into_iter().rev() {
             curve.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let colour = if direction == "down" {
-                Colour::VERMILLION
-            } else {
-                Colour::BLUE
-            };
+            let (part, colour) = of_direction(&direction);
             // What was met is a list of motions: marks, so that a jump is not a line.
             let marks = curve.into_iter().map(|(at, y)| (at, factor * y));
-            let mut layer = Points::new(marks)
-                .diameter(if direction == "down" { 0.6 } else { 0.9 })
-                .colour(colour);
+            let mut layer = Points::new(marks).diameter(0.6 * part).colour(colour);
             if !direction.is_empty() && named.insert(direction.clone()) {
                 layer = layer.label(format!("following {direction}"));
             }
@@ -395,6 +407,81 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         figure = figure.with(panel);
     }
     Ok(figure)
+}
+
+/// Over two parameters a map of what motions there are, and what would be measured of the first
+/// start's: amplitude, phase, greatest force, dissipation and time in contact.
+fn maps(store: &Store) -> Result<Figure, StoreError> {
+    const SHOWN: [&str; 5] = [
+        "first_harmonic",
+        "phase",
+        "peak_force",
+        "dissipation",
+        "contact_fraction",
+    ];
+    let [y, x] = [0, 1].map(|axis| GridAxis::of(store, axis).shown());
+    let motions = SweepTable::of(store)?.map(&x, &y).legend(Legend::Above);
+    let mut figure = Figure::new(3, 2)
+        .width(DOUBLE_COLUMN)
+        .height(195.0)
+        .with(motions.title("what motions there are"));
+    let mut values = Vec::new();
+    for shown in SHOWN.into_iter().filter_map(Shown::named) {
+        values.push((shown, of_first_start(store, shown)?));
+    }
+    let size = |values: &[f64]| {
+        let known = values.iter().filter(|v| v.is_finite());
+        known.fold(0.0, |size: f64, v| size.max(v.abs()))
+    };
+    let largest = |wanted: Shown| {
+        let found = values.iter().find(|(shown, _)| *shown == wanted);
+        found.map_or(0.0, |(_, (of, _))| size(of))
+    };
+    for (shown, (of, in_si)) in &values {
+        let natural = natural_of(*shown, largest);
+        let si = |_| in_si.then_some(1.0);
+        let (label, factor) = shown.axis(true, si, scale_of(size(of), natural));
+        let scale = Axis {
+            natural: natural.map(|size| factor * size),
+            ..Axis::linear("")
+        };
+        let layer = GridScale::heatmap(&x, &y, of.iter().map(|v| factor * v), scale);
+        figure = figure.with(Panel::new(x.axis(), y.axis()).with(layer).title(label));
+    }
+    Ok(figure)
+}
+
+/// What is shown of the motions of the first start over two parameters, row by row, and whether
+/// it is in SI.
+fn of_first_start(store: &Store, shown: Shown) -> Result<(Vec<f64>, bool), StoreError> {
+    let schema = store.schema();
+    let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
+    let mut all = vec![f64::NAN; rows * columns];
+    let name = shown.observable().map_or("", |o| o.name);
+    let Some(index) = schema.index_of(name) else {
+        return Ok((all, false));
+    };
+    for chunk in 0..store.chunks() {
+        let block = schema.grid.block(chunk);
+        let Values::Real(values) = store.read_chunk(&block, index)? else {
+            continue;
+        };
+        for (value, entry) in values.iter().zip(block.entries()) {
+            if entry[2] == 0 {
+                let value = if shown.is_phase() {
+                    shown_phase(*value)
+                } else {
+                    *value
+                };
+                all[entry[0] * columns + entry[1]] = value;
+            }
+        }
+    }
+    let units = schema.variables[index].attributes.get("units");
+    let in_si = units
+        .and_then(|unit| unit.as_str())
+        .is_some_and(|u| !u.is_empty());
+    Ok((all, in_si))
 }
 
 impl GridAxis {
@@ -476,6 +563,26 @@ impl GridScale {
                 .map(move |column| points[row * width + column])
         });
         CategoryMap::new(columns.len(), rows.len(), cells, x.edges(), y.edges())
+    }
+
+    /// A map of a number at each point of a grid, row by row.
+    fn heatmap(x: &Self, y: &Self, points: impl Iterator<Item = f64>, scale: Axis) -> Heatmap {
+        let points: Vec<f64> = points.collect();
+        let (columns, rows) = (x.cells(), y.cells());
+        let width = x.values.len();
+        let values = rows
+            .iter()
+            .flat_map(|row| columns.iter().map(move |column| (row, column)));
+        let values = values.map(|(row, column)| points[row * width + column]);
+        let values: Vec<f64> = values.collect();
+        Heatmap::new(
+            columns.len(),
+            rows.len(),
+            values,
+            x.edges(),
+            y.edges(),
+            scale,
+        )
     }
 
     /// The value of each cell: they themselves, or the nearest one to each of many even cells

@@ -17,6 +17,7 @@ use crate::model::contact::dual::Dual;
 use crate::model::contact::law::{Answer, Combination, Law, Square};
 use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Forcing, Galerkin, Gap, Regime};
+use crate::model::higher_modes::Correction;
 use crate::model::parameter::Parameter;
 use crate::model::spectrum::Spectrum;
 use crate::model::{BeamOutputs, Forgetting, Powers, Product};
@@ -193,7 +194,11 @@ impl<'a> Beam<'a> {
         let modes = &self.galerkin.modes;
         let momentum = self.layout.row(&modes.integral, 1);
         let tip_speed = self.layout.row(&modes.tip, 1);
-        let momentum = momentum.plus(self.galerkin.case.alpha1, &tip_speed);
+        let mut momentum = momentum.plus(self.galerkin.case.alpha1, &tip_speed);
+        for each in &self.galerkin.corrections {
+            let speed = self.layout.row(&each.row, 1);
+            momentum = momentum.plus(each.mass.value * each.base.value, &speed);
+        }
         (&momentum.row * &self.kick)[0] - 1.0
     }
 
@@ -229,7 +234,7 @@ impl<'a> Beam<'a> {
             let rate = self.combined(&answer.memory_rate);
             add_force(&mut matrix, &mut forcing, &memory, &rate);
         }
-        if !known {
+        if !known || !self.galerkin.corrections.is_empty() {
             return nanotap_flow::Regime::new(r, matrix, forcing, self.drive);
         }
         let basis = if let Ok(s) = Spectrum::new(self.galerkin, regime) {
@@ -352,10 +357,18 @@ impl<'a> Beam<'a> {
         let integral = self.layout.row(&modes.integral, 1);
         let tip_speed = self.layout.row(&modes.tip, 1).plus(1.0, &base_rate);
         let mean_speed = integral.plus(1.0, &base_rate);
-        let momentum = mean_speed.plus(case.alpha1, &tip_speed);
-        let clamp = rate(&momentum)
-            .plus(case.alpha3, &mean_speed)
-            .plus(-1.0, &force);
+        let mut momentum = mean_speed.plus(case.alpha1, &tip_speed);
+        let mut drag = mean_speed.scaled(case.alpha3);
+        let corrections = &self.galerkin.corrections;
+        let speeds: Vec<Output> = corrections
+            .iter()
+            .map(|each| self.speed(each, &base_rate))
+            .collect();
+        for (each, speed) in corrections.iter().zip(&speeds) {
+            momentum = momentum.plus(each.mass.value * each.base.value, speed);
+            drag = drag.plus(each.damping.value * each.base.value, speed);
+        }
+        let clamp = rate(&momentum).plus(1.0, &drag).plus(-1.0, &force);
         let product = |weight, a: &Output, b: &Output| Product {
             weight,
             a: a.clone(),
@@ -402,12 +415,25 @@ impl<'a> Beam<'a> {
             (0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))),
         );
         stored.extend(self.squares(&answer.stored));
+        let mut beam: Vec<Product> = weighted(case.alpha3).collect();
+        for (each, speed) in corrections.iter().zip(&speeds) {
+            let bent = self.layout.row(&each.row, 0);
+            stored.push(product(0.5 * each.mass.value, speed, speed));
+            stored.push(product(0.5 * each.stiffness.value, &bent, &bent));
+            beam.push(product(each.damping.value, speed, speed));
+        }
         Powers {
             drive,
-            beam: weighted(case.alpha3).collect(),
+            beam,
             sample: self.squares(&answer.dissipated).collect(),
             stored,
         }
+    }
+
+    /// The rate of a measured mode, with what the base carries along.
+    fn speed(&self, of: &Correction, base_rate: &Output) -> Output {
+        let own = self.layout.row(&of.row, 1);
+        own.plus(of.base.value, base_rate)
     }
 
     fn squares<'b>(&'b self, squares: &'b [Square]) -> impl Iterator<Item = Product> + 'b {
@@ -519,7 +545,8 @@ impl BeamTangent {
     }
 
     /// The derivatives of the factors of what the beam's damping takes, as they stand in
-    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ.
+    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ; then those of
+    /// measured modes.
     pub(crate) fn beam_power(&self, beam: &Beam<'_>, parameter: Parameter) -> Vec<[Output; 2]> {
         let (layout, case) = (beam.layout, &beam.galerkin.case);
         let by = f64::from(u8::from(parameter == Parameter::Alpha3));
@@ -536,9 +563,20 @@ impl BeamTangent {
             layout.row(&unit, 1)
         };
         let zero = base_rate.scaled(0.0);
+        let mut of_measured = Vec::new();
         let mut factors: Vec<[Output; 2]> =
             (0..case.modes).map(|j| [unit(j), zero.clone()]).collect();
+        for each in Correction::all(case, &beam.galerkin.modes, Some(parameter)) {
+            let speed = beam.speed(&each, &moving);
+            let change = layout
+                .row(&each.row_change, 1)
+                .plus(each.base.derivative, &moving)
+                .plus(each.base.value, &base_rate);
+            let weighted = speed.scaled(each.damping.derivative);
+            of_measured.push([weighted.plus(each.damping.value, &change), change]);
+        }
         factors.push([moving.scaled(by).plus(case.alpha3, &base_rate), base_rate]);
+        factors.append(&mut of_measured);
         factors
     }
 

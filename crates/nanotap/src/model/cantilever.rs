@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::model::beam::{MAX_MODES, ModeCountError};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
+use crate::model::higher_modes::HigherModes;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
 
@@ -76,6 +77,9 @@ pub struct Cantilever {
     pub tone2_amplitude: f64,
     /// Its phase in degrees.
     pub tone2_phase: f64,
+    /// What was measured of the second and third mode, in place of the uniform beam's.
+    #[serde(flatten)]
+    pub higher_modes: HigherModes,
 }
 
 /// Largest size of α1 … α6. Beyond it a number is a slip (a value in SI units, say),
@@ -105,6 +109,7 @@ impl Cantilever {
             tone2_ratio: None,
             tone2_amplitude: 0.0,
             tone2_phase: 0.0,
+            higher_modes: HigherModes::NONE,
         }
     }
 
@@ -128,6 +133,7 @@ impl Cantilever {
             tone2_ratio: None,
             tone2_amplitude: 0.0,
             tone2_phase: 0.0,
+            higher_modes: HigherModes::NONE,
         }
     }
 
@@ -145,6 +151,11 @@ impl Cantilever {
             Parameter::RelaxationTime => self.relaxation_time,
             Parameter::Tone2Amplitude => self.tone2_amplitude,
             Parameter::Tone2Phase => self.tone2_phase,
+            Parameter::Mode2Frequency => self.higher_modes.frequency[0],
+            Parameter::Mode3Frequency => self.higher_modes.frequency[1],
+            Parameter::Mode2Quality => self.higher_modes.quality[0],
+            Parameter::Mode3Quality => self.higher_modes.quality[1],
+            Parameter::Mode2Stiffness => self.higher_modes.stiffness,
         }
     }
 
@@ -163,6 +174,11 @@ impl Cantilever {
             Parameter::RelaxationTime => &mut self.relaxation_time,
             Parameter::Tone2Amplitude => &mut self.tone2_amplitude,
             Parameter::Tone2Phase => &mut self.tone2_phase,
+            Parameter::Mode2Frequency => &mut self.higher_modes.frequency[0],
+            Parameter::Mode3Frequency => &mut self.higher_modes.frequency[1],
+            Parameter::Mode2Quality => &mut self.higher_modes.quality[0],
+            Parameter::Mode3Quality => &mut self.higher_modes.quality[1],
+            Parameter::Mode2Stiffness => &mut self.higher_modes.stiffness,
         } = value;
         self
     }
@@ -175,7 +191,7 @@ impl Cantilever {
     }
 
     /// The parameters that this case has: the paper's (without α6 where the damper is the
-    /// relaxing arm's) and those of its contact law and its second tone.
+    /// relaxing arm's) and those of its contact law, its second tone and its measured modes.
     pub fn parameters(&self) -> Vec<Parameter> {
         let of_solid = self.contact == ContactLaw::StandardLinearSolid;
         let of_law = self.law.is_some();
@@ -185,6 +201,11 @@ impl Cantilever {
                 Parameter::Alpha6 => !of_solid,
                 Parameter::RelaxationStiffness | Parameter::RelaxationTime => of_solid,
                 Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
+                Parameter::Mode2Frequency
+                | Parameter::Mode3Frequency
+                | Parameter::Mode2Quality
+                | Parameter::Mode3Quality
+                | Parameter::Mode2Stiffness => self.get(*parameter) != 0.0,
                 _ => true,
             })
             .collect()

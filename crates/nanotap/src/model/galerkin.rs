@@ -13,6 +13,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm};
 use crate::model::contact::dual::Dual;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
+use crate::model::higher_modes::Correction;
 use crate::model::parameter::Parameter;
 
 /// The two linear regimes of the tip.
@@ -80,6 +81,8 @@ pub struct Galerkin {
     pub forcing: [Forcing; 2],
     /// V_T: Eq. (8).
     pub gap: Gap,
+    /// What measured modes add, which is in the matrices.
+    pub(crate) corrections: Vec<Correction>,
 }
 
 /// The derivative of a [`Galerkin`] with respect to one parameter, in the same shape.
@@ -106,13 +109,16 @@ impl Galerkin {
     pub fn new(case: &Cantilever) -> Result<Self, CantileverError> {
         case.validate()?;
         let modes = Modes::shared(case.modes)?;
+        let corrections = Correction::all(case, &modes, None);
+        let mut equations = Coefficients::of(case).assemble(&modes);
+        equations.correct(case, &corrections, None);
         let GalerkinDerivative {
             mass,
             damping,
             stiffness,
             forcing,
             gap,
-        } = Coefficients::of(case).assemble(&modes);
+        } = equations;
         Ok(Self {
             case: case.clone(),
             modes,
@@ -121,12 +127,70 @@ impl Galerkin {
             stiffness,
             forcing,
             gap,
+            corrections,
         })
     }
 
     /// The exact derivative with respect to `parameter`.
     pub fn derivative(&self, parameter: Parameter) -> GalerkinDerivative {
-        Coefficients::derivative(&self.case, parameter).assemble(&self.modes)
+        let mut change = Coefficients::derivative(&self.case, parameter).assemble(&self.modes);
+        let corrections = Correction::all(&self.case, &self.modes, Some(parameter));
+        change.correct(&self.case, &corrections, Some(parameter));
+        change
+    }
+}
+
+impl GalerkinDerivative {
+    /// Adds what measured modes do, or the derivative of that by `parameter`: to the matrices,
+    /// and where the base moves by y the force −(mass ÿ + damping ẏ) along each.
+    fn correct(
+        &mut self,
+        case: &Cantilever,
+        corrections: &[Correction],
+        parameter: Option<Parameter>,
+    ) {
+        let derivative = parameter.is_some();
+        let dual = |p| Dual::new(case.get(p), f64::from(u8::from(Some(p) == parameter)));
+        for each in corrections {
+            self.mass += each.square(each.mass, derivative);
+            for r in Regime::ALL.map(Regime::index) {
+                self.damping[r] += each.square(each.damping, derivative);
+                self.stiffness[r] += each.square(each.stiffness, derivative);
+            }
+            let second = case.tone2_ratio.map(Which::Second);
+            for which in std::iter::once(Which::First).chain(second) {
+                let [sine, cosine] = Tone::new(case, &dual, which).gap;
+                let rate = which.rate(&dual);
+                let (mass, drag) = (
+                    each.mass * each.base * rate * rate,
+                    each.damping * each.base * rate,
+                );
+                let force = [
+                    each.vector(mass * sine + drag * cosine, derivative),
+                    each.vector(mass * cosine - drag * sine, derivative),
+                ];
+                for forcing in &mut self.forcing {
+                    forcing.add(which, &force);
+                }
+            }
+        }
+    }
+}
+
+impl Forcing {
+    /// Adds sine and cosine coefficients of a tone.
+    fn add(&mut self, which: Which, [sine, cosine]: &[DVector<f64>; 2]) {
+        match (which, &mut self.second) {
+            (Which::First, _) => {
+                self.sine += sine;
+                self.cosine += cosine;
+            }
+            (Which::Second(_), Some(second)) => {
+                second[0] += sine;
+                second[1] += cosine;
+            }
+            (Which::Second(_), None) => {}
+        }
     }
 }
 
@@ -148,14 +212,10 @@ impl Tone<Dual> {
     /// A α3 w I cos(wτ + θ), as Eqs. (14) and (6) have it.
     fn new(case: &Cantilever, dual: &impl Fn(Parameter) -> Dual, which: Which) -> Self {
         let zero = Dual::constant(0.0);
-        let omega = dual(Parameter::Omega);
-        let (amplitude, rate, phase) = match which {
-            Which::First => (dual(Parameter::Alpha2), omega, zero),
-            Which::Second(ratio) => (
-                dual(Parameter::Tone2Amplitude),
-                omega * Dual::constant(ratio.value()),
-                dual(Parameter::Tone2Phase),
-            ),
+        let rate = which.rate(dual);
+        let (amplitude, phase) = match which {
+            Which::First => (dual(Parameter::Alpha2), zero),
+            Which::Second(_) => (dual(Parameter::Tone2Amplitude), dual(Parameter::Tone2Phase)),
         };
         let (sin, cos) = phase.sin_cos_degrees();
         // s sin(wτ + θ) + c cos(wτ + θ)
@@ -204,6 +264,17 @@ impl Tone<Dual> {
 enum Which {
     First,
     Second(FrequencyRatio),
+}
+
+impl Which {
+    /// Its frequency.
+    fn rate(self, dual: &impl Fn(Parameter) -> Dual) -> Dual {
+        let omega = dual(Parameter::Omega);
+        match self {
+            Self::First => omega,
+            Self::Second(ratio) => omega * Dual::constant(ratio.value()),
+        }
+    }
 }
 
 /// Everything that depends on the parameters, as factors of 1, ppᵀ, diag(β⁴), p and I.

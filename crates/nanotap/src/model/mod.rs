@@ -16,6 +16,7 @@ pub mod contact;
 pub mod drive_form;
 pub mod exact_beam;
 pub mod galerkin;
+pub mod higher_modes;
 mod motion_error;
 pub mod nonlinear;
 pub mod oscillator;

@@ -32,6 +32,16 @@ pub enum Parameter {
     Tone2Amplitude,
     /// Phase θ of the second tone in degrees: it is sin(ρΩτ + θ), ρ the ratio of frequencies.
     Tone2Phase,
+    /// Measured frequency of the second free mode, as Ω.
+    Mode2Frequency,
+    /// Measured frequency of the third free mode, as Ω.
+    Mode3Frequency,
+    /// Measured quality factor of the second free mode.
+    Mode2Quality,
+    /// Measured quality factor of the third free mode.
+    Mode3Quality,
+    /// Measured stiffness k₂L³/(EI) of the second free mode at the tip.
+    Mode2Stiffness,
 }
 
 impl Parameter {
@@ -46,12 +56,17 @@ impl Parameter {
         Self::Omega,
     ];
 
-    /// Parameters that only some samples and drives have; 0 where they are not said.
-    pub const FURTHER: [Self; 4] = [
+    /// Parameters that only some samples, drives and levers have; 0 where they are not said.
+    pub const FURTHER: [Self; 9] = [
         Self::RelaxationStiffness,
         Self::RelaxationTime,
         Self::Tone2Amplitude,
         Self::Tone2Phase,
+        Self::Mode2Frequency,
+        Self::Mode3Frequency,
+        Self::Mode2Quality,
+        Self::Mode3Quality,
+        Self::Mode2Stiffness,
     ];
 
     /// Every parameter there is.
@@ -73,6 +88,11 @@ impl Parameter {
             Self::RelaxationTime => "relaxation_time",
             Self::Tone2Amplitude => "tone2_amplitude",
             Self::Tone2Phase => "tone2_phase",
+            Self::Mode2Frequency => "mode2_frequency",
+            Self::Mode3Frequency => "mode3_frequency",
+            Self::Mode2Quality => "mode2_quality",
+            Self::Mode3Quality => "mode3_quality",
+            Self::Mode2Stiffness => "mode2_stiffness",
         }
     }
 }

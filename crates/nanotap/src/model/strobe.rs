@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use nanotap_dynamics::{StroboscopicMap, Tangency};
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
+use nanotap_flow::jacobian::Jacobian;
 use nanotap_flow::search::sign_changes;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::signal::Signal;
@@ -128,10 +129,20 @@ impl StroboscopicMap for Strobe {
 
     /// From the trace of the equations and the time in each regime, and of a rigid stop
     /// from its impacts.
-    fn log_determinant(&mut self, state: &[f64]) -> Result<Option<f64>, MotionError> {
+    fn advance_with_jacobian_and_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<Option<f64>, MotionError> {
         match &mut self.0 {
-            Engine::Exact(map) => Ok(Some(map.log_determinant(state)?)),
-            Engine::Nonlinear(map) => Ok(map.log_determinant()),
+            Engine::Exact(map) => {
+                let determinant = map.advance_with_jacobian_and_determinant(state, jacobian)?;
+                Ok(Some(determinant))
+            }
+            Engine::Nonlinear(map) => {
+                map.advance_with_derivatives(state, jacobian, None)?;
+                Ok(map.log_determinant())
+            }
         }
     }
 
@@ -168,6 +179,8 @@ struct ExactStrobe {
     flow: Flow,
     /// The state that the flow was last left in: whoever goes on from it need not start anew.
     last: Vec<f64>,
+    /// Work space of a Jacobian.
+    carried: Jacobian,
     gap: Arc<Output>,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
@@ -178,6 +191,7 @@ impl ExactStrobe {
         Self {
             flow: Flow::new(Arc::clone(&model.system)),
             last: Vec::new(),
+            carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
             tangents: tangents.into(),
         }
@@ -208,6 +222,20 @@ impl ExactStrobe {
         }
     }
 
+    /// Runs a period with `observer` and writes its Jacobian.
+    fn run_with_jacobian<O: Observer>(
+        &mut self,
+        observer: &mut O,
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), FlowError> {
+        let system = Arc::clone(self.flow.system());
+        self.carried.begin(&system.regimes()[self.flow.regime()]);
+        self.flow.run_period(&mut (&mut self.carried, observer))?;
+        self.carried
+            .to_state(&system.regimes()[self.flow.regime()], jacobian);
+        Ok(())
+    }
+
     /// Reads where the flow has come to.
     fn end(&mut self, state: &mut [f64]) {
         self.flow.state(state);
@@ -234,15 +262,22 @@ impl ExactStrobe {
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), FlowError> {
         self.begin(state)?;
-        self.flow.run_period_with_jacobian(jacobian)?;
+        self.run_with_jacobian(&mut (), jacobian)?;
         self.end(state);
         Ok(())
     }
 
-    fn log_determinant(&mut self, state: &[f64]) -> Result<f64, FlowError> {
+    /// The determinant is from the trace of the equations and the time in each regime, and of
+    /// a rigid stop from its impacts.
+    fn advance_with_jacobian_and_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<f64, FlowError> {
         self.begin(state)?;
         let mut sum = LogDeterminant(0.0);
-        self.flow.run_period(&mut sum)?;
+        self.run_with_jacobian(&mut sum, jacobian)?;
+        self.end(state);
         Ok(sum.0)
     }
 

@@ -155,6 +155,7 @@ const MOST_PERIODS: usize = 64;
 const SAME: f64 = 1e-10;
 
 /// Looks for the clearance while a motion runs.
+#[derive(Clone)]
 pub(super) struct ClearanceSearch {
     /// What is added to the height of the tip for that of the beam's end.
     above_tip: f64,
@@ -171,6 +172,7 @@ pub(super) struct ClearanceSearch {
 }
 
 /// Bounds Σ_{j≥2} c_j |a_j| in one regime.
+#[derive(Clone)]
 struct RegimeBound {
     /// By modal coordinate.
     weights: Vec<f64>,
@@ -186,6 +188,7 @@ struct Start {
     modal: Vec<Complex>,
 }
 
+#[derive(Clone)]
 struct Candidate {
     /// No point of the beam was lower.
     bound: f64,

@@ -5,6 +5,9 @@
 //! and a [`Variation`] has of every integral, Fourier coefficient and extremum that observables
 //! are read from its derivative; the observables are then read once more, each number with its
 //! derivative beside it. Where the period varies, derivatives are at constant drive phase.
+//!
+//! Under a nonlinear force the orbit's derivative is as exact; what is observed is differenced
+//! along it, good to some six digits.
 
 use std::borrow::Cow;
 
@@ -22,10 +25,11 @@ use super::measure::{
 use super::number::Phasor;
 use super::table::{OBSERVABLES, Observable, Observables, Set};
 use super::value::Value;
+use super::watch::measure;
 use crate::case::{Case, CaseError, Key};
 use crate::model::contact::dual::Dual;
 use crate::model::strobe::Strobe;
-use crate::model::{Model, ModelTangent, MotionError};
+use crate::model::{Model, ModelTangent, MotionError, Tangent};
 
 /// Why an orbit has no derivative.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -36,9 +40,6 @@ pub enum DerivativeError {
     /// The flow failed.
     #[error(transparent)]
     Flow(#[from] MotionError),
-    /// The force law is nonlinear.
-    #[error("derivatives of observables are known of piecewise-linear contacts only")]
-    Nonlinear,
     /// A multiplier is 1: at a fold the orbit has no derivative.
     #[error("the orbit has no derivative: a multiplier is 1 within rounding")]
     NotIsolated,
@@ -73,10 +74,10 @@ impl Derivative {
         set: Set,
     ) -> Result<Self, DerivativeError> {
         if model.nonlinear.is_some() {
-            return Err(DerivativeError::Nonlinear);
+            return Self::of_nonlinear(case, model, key, (state, period), set);
         }
         let tangent = case.model_tangent(model, key)?;
-        let start = orbit_derivative(model, &tangent, state, period)?;
+        let start = orbit_derivative(model, tangent.system.clone().into(), state, period)?;
         let clearance = observed.beam_clearance_xi;
         let mut followed = Followed::new(model, &tangent, set, clearance);
         followed
@@ -105,6 +106,53 @@ impl Derivative {
             state: start,
             observables,
             physical,
+        })
+    }
+
+    /// The same under a nonlinear force: the orbit's derivative is exact, what is observed of it
+    /// is differenced along it, centrally.
+    fn of_nonlinear(
+        case: &Case,
+        model: &Model,
+        key: Key,
+        (state, period): (&[f64], usize),
+        set: Set,
+    ) -> Result<Self, DerivativeError> {
+        let tangent = case.tangent(model, key)?;
+        let start = orbit_derivative(model, tangent, state, period)?;
+        let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let value = case.get(key);
+        // What balances the engine's error with the third derivative: the orbit changes by this
+        // part of itself, or the key does where the orbit does not follow it.
+        let by_orbit = STEP * size(state) / size(&start);
+        let by_key = STEP * if value == 0.0 { 1.0 } else { value.abs() };
+        let step = if by_orbit.is_finite() {
+            by_orbit.min(by_key)
+        } else {
+            by_key
+        };
+        let observed = |side: f64| -> Result<(Observables, Option<Observables>), DerivativeError> {
+            let beside = case.with(key, value + side * step);
+            let change = state.iter().zip(&start);
+            let from: Vec<f64> = change.map(|(x, by)| x + side * step * by).collect();
+            let seen = measure(&beside.model()?, &from, period, set)?;
+            let si = beside.physical().map(|view| seen.in_si(&view.scales));
+            Ok((seen, si))
+        };
+        let (low, high) = (observed(-1.0)?, observed(1.0)?);
+        let slope = 0.5 / step;
+        let difference = |low: &Observables, high: &Observables| {
+            let one = |o: &'static Observable| {
+                let change = (o.of)(high).in_unit(slope, (o.of)(low), -slope);
+                (change != Value::Absent).then_some((o, change))
+            };
+            set.iter().filter_map(one).collect::<Vec<_>>()
+        };
+        Ok(Self {
+            unit: key.is_physical().then(|| key.kind().si_unit()),
+            state: start,
+            observables: difference(&low.0, &high.0),
+            physical: low.1.zip(high.1).map(|(low, high)| difference(&low, &high)),
         })
     }
 
@@ -178,15 +226,18 @@ impl JsonSchema for Derivative {
     }
 }
 
+/// Part of an orbit by which it changes where what is observed is differenced.
+const STEP: f64 = 2e-4;
+
 /// dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ.
 fn orbit_derivative(
     model: &Model,
-    tangent: &ModelTangent,
+    tangent: Tangent,
     state: &[f64],
     period: usize,
 ) -> Result<Vec<f64>, DerivativeError> {
     let n = state.len();
-    let mut map = Strobe::with_tangents(model, vec![tangent.system.clone().into()]);
+    let mut map = Strobe::with_tangents(model, vec![tangent]);
     let mut x = state.to_vec();
     let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
     let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));

@@ -182,7 +182,7 @@ pub(super) fn stored_by_lever(model: &Model, state: &[f64]) -> f64 {
 }
 
 /// Where a motion began and where it is: the stretch it began with, and the last one.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Ends {
     first: Option<Stretch>,
     last: Stretch,

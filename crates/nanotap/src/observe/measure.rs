@@ -171,6 +171,7 @@ impl Key {
 }
 
 /// What a choice of observables needs, made ready for one model.
+#[derive(Debug)]
 struct Needs {
     plan: Arc<Plan>,
     keys: Vec<(Need, Key)>,
@@ -243,11 +244,13 @@ pub(super) fn frequency(model: &Model, tone: Tone) -> f64 {
     }
 }
 
-/// Measures a motion of a model: an observer of its flow.
+/// Measures a motion of a model: an observer of its flow. A clone that was made before the run
+/// measures another motion, for much less than a new one.
+#[derive(Clone)]
 pub struct Measurement<'a> {
     model: &'a Model,
     set: Set,
-    needs: Needs,
+    needs: Arc<Needs>,
     accumulator: Accumulator,
     ends: Option<Ends>,
     clearance: Option<ClearanceSearch>,
@@ -255,6 +258,7 @@ pub struct Measurement<'a> {
 }
 
 /// An extremum that begins anew with every drive period.
+#[derive(Clone)]
 struct Taken {
     need: Need,
     key: ExtremumKey,
@@ -302,7 +306,7 @@ impl<'a> Measurement<'a> {
     /// # Errors
     /// When a number of the model is not finite.
     pub fn new(model: &'a Model, set: Set) -> Result<Self, FlowError> {
-        let needs = Needs::of(model, set)?;
+        let needs = Arc::new(Needs::of(model, set)?);
         let clearance = needs
             .clearance
             .then(|| ClearanceSearch::new(model))

@@ -33,7 +33,7 @@ pub use physical_motion::{PhysicalHarmonic, PhysicalMotion, Setting};
 pub use table::{OBSERVABLES, Observable, Observables, Set};
 pub use validity::OutOfRange;
 pub use value::Value;
-pub use watch::{Kept, Watched, measure, watch};
+pub use watch::{Kept, Watched, Watcher, measure, watch};
 
 use crate::model::Model;
 

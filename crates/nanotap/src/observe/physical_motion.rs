@@ -11,6 +11,7 @@ use super::table::{OBSERVABLES, Observables};
 use super::value::Value;
 use super::{Dimension, Harmonic, Spectrum};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use crate::case::physical::sample::{Hertz, HertzMismatch};
 use crate::case::physical::{Physical, Scales};
 
 /// What an experimenter would measure of a motion; SI units, angles in degrees. Written out
@@ -32,6 +33,9 @@ pub struct Setting {
     pub phase_reference: &'static str,
     /// Drive frequency, Hz.
     pub frequency: f64,
+    /// Where Hertz's stiffness was taken at an indentation that this motion does not have.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hertz_mismatch: Option<HertzMismatch>,
     /// Harmonics of the drive's frequency; of a periodic motion.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<PhysicalHarmonic>,
@@ -73,8 +77,13 @@ impl PhysicalMotion {
         let scales = &view.scales;
         let omega = view.cantilever.omega;
         let harmonics = spectrum.map_or(&[][..], |spectrum| &spectrum.harmonics);
+        // A stiffness given as a number since is not Hertz's.
+        let own = |h: &Hertz| h.stiffness() == view.parameters.contact_stiffness;
+        let hertz = view.sample.hertz.filter(own);
         Self {
             setting: Some(Setting {
+                hertz_mismatch: hertz
+                    .and_then(|h| h.mismatch(observables.indentation * scales.length)),
                 phase_reference: view.phase_reference(),
                 frequency: omega * scales.frequency,
                 harmonics: harmonics
@@ -107,6 +116,9 @@ impl Serialize for PhysicalMotion {
         if let Some(setting) = &self.setting {
             map.serialize_entry("phase_reference", setting.phase_reference)?;
             map.serialize_entry("frequency", &setting.frequency)?;
+            if let Some(mismatch) = &setting.hertz_mismatch {
+                map.serialize_entry("hertz_mismatch", mismatch)?;
+            }
             if !setting.harmonics.is_empty() {
                 map.serialize_entry("harmonics", &setting.harmonics)?;
             }

@@ -9,6 +9,7 @@ use super::contact_event::{ContactEvent, Contacts};
 use super::gather::Gatherer;
 use super::measure::Measurement;
 use super::table::{Observables, Set};
+use crate::model::nonlinear::Nonlinear;
 use crate::model::recording::{Recording, each_period};
 use crate::model::{Model, MotionError};
 
@@ -44,6 +45,49 @@ pub struct Watched {
     pub highs: Vec<f64>,
 }
 
+/// Watches motions of one model: what its observables need is worked out once.
+pub struct Watcher<'a> {
+    model: &'a Model,
+    set: Set,
+    engine: Engine<'a>,
+}
+
+enum Engine<'a> {
+    /// With the measurement before any motion ran.
+    Exact(Box<Measurement<'a>>),
+    Nonlinear(&'a Arc<Nonlinear>),
+}
+
+impl<'a> Watcher<'a> {
+    /// For the observables `set` of `model`.
+    ///
+    /// # Errors
+    /// When a number of the model is not finite.
+    pub fn new(model: &'a Model, set: Set) -> Result<Self, MotionError> {
+        let engine = match &model.nonlinear {
+            Some(nonlinear) => Engine::Nonlinear(nonlinear),
+            None => Engine::Exact(Box::new(Measurement::new(model, set)?)),
+        };
+        Ok(Self { model, set, engine })
+    }
+
+    /// Watches `periods` drive periods from `start` at drive phase 0.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub fn watch(&self, start: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {
+        match &self.engine {
+            Engine::Exact(measurement) => {
+                exact(self.model, (**measurement).clone(), start, periods, kept)
+            }
+            Engine::Nonlinear(nonlinear) => {
+                let gatherer = Gatherer::new(self.model, nonlinear, self.set, start);
+                under_a_law(nonlinear, gatherer, start, periods, kept)
+            }
+        }
+    }
+}
+
 /// Watches `periods` drive periods of `model` from `start` at drive phase 0.
 ///
 /// # Errors
@@ -55,32 +99,47 @@ pub fn watch(
     set: Set,
     kept: Kept,
 ) -> Result<Watched, MotionError> {
-    if let Some(nonlinear) = &model.nonlinear {
-        let mut gatherer = Gatherer::new(model, nonlinear, set, start);
-        let mut end = start.to_vec();
-        let (mut states, mut recorded) = (Vec::new(), Vec::new());
-        let mut count = 0;
-        each_period(nonlinear, &mut end, periods, |state, period| {
-            gatherer.take(state, &period);
-            count += 1;
-            if count + kept.states > periods {
-                states.push(state.to_vec());
-            }
-            if count <= kept.recorded {
-                recorded.push(period);
-            }
-        })?;
-        return Ok(Watched {
-            lows: gatherer.lows(),
-            highs: gatherer.highs(),
-            events: gatherer.events(),
-            recording: Recording::of_periods(nonlinear, recorded),
-            observables: gatherer.observables(),
-            states,
-            end,
-        });
-    }
-    let mut measurement = Measurement::new(model, set)?;
+    Watcher::new(model, set)?.watch(start, periods, kept)
+}
+
+fn under_a_law(
+    nonlinear: &Arc<Nonlinear>,
+    mut gatherer: Gatherer<'_>,
+    start: &[f64],
+    periods: usize,
+    kept: Kept,
+) -> Result<Watched, MotionError> {
+    let mut end = start.to_vec();
+    let (mut states, mut recorded) = (Vec::new(), Vec::new());
+    let mut count = 0;
+    each_period(nonlinear, &mut end, periods, |state, period| {
+        gatherer.take(state, &period);
+        count += 1;
+        if count + kept.states > periods {
+            states.push(state.to_vec());
+        }
+        if count <= kept.recorded {
+            recorded.push(period);
+        }
+    })?;
+    Ok(Watched {
+        lows: gatherer.lows(),
+        highs: gatherer.highs(),
+        events: gatherer.events(),
+        recording: Recording::of_periods(nonlinear, recorded),
+        observables: gatherer.observables(),
+        states,
+        end,
+    })
+}
+
+fn exact(
+    model: &Model,
+    mut measurement: Measurement<'_>,
+    start: &[f64],
+    periods: usize,
+    kept: Kept,
+) -> Result<Watched, MotionError> {
     if kept.each_period {
         measurement = measurement.of_each_period();
     }

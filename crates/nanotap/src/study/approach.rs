@@ -3,9 +3,11 @@
 //! shows. Through every periodic motion found, branches are continued in the distance, stable
 //! and unstable, with their folds, flips and grazings located.
 //!
-//! A motion counts only if [`settle()`] could name it: a periodic one is the orbit itself,
+//! A motion counts only if [`classify()`] could name it: a periodic one is the orbit itself,
 //! closed by Newton and seen to be approached; a chaotic or quasi-periodic one is described
-//! by a recording; of what is undecided no numbers are given.
+//! by a recording; of what is undecided no numbers are given. Attractors met at one distance
+//! are then tried at the distances beside it, until none gains one: what coexists with both
+//! ways is part of the report.
 //!
 //! The distance is the gap between tip and sample at rest, `alpha5` of the cantilever (zc of
 //! AFM people, with which the piezo moves) and `gap` of an oscillator. The model's unit of
@@ -15,13 +17,17 @@
 //! Fails: a jump is located to a step of the distance only (the fold behind it exactly, where
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
 
-use nanotap_dynamics::{Control, PeriodicOrbit, SettleOptions, settle};
+use nanotap_dynamics::{
+    Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, classify, grid_neighbours,
+    orbits_shared,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::FreeMotion;
 use crate::Error;
 use crate::case::{Case, CaseError, Key, ParameterUnit};
+use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
@@ -109,13 +115,15 @@ pub enum ApproachError {
 }
 
 /// Which way the sample moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
     /// Towards the tip.
     Approach,
     /// Away from it.
     Retract,
+    /// Neither way: an attractor of a neighbouring distance that is one here too.
+    Neither,
 }
 
 impl Way {
@@ -124,6 +132,7 @@ impl Way {
         match self {
             Self::Approach => "approach",
             Self::Retract => "retract",
+            Self::Neither => "neither",
         }
     }
 }
@@ -186,6 +195,9 @@ pub struct ApproachReport {
     pub free_reach: f64,
     /// The motions in the order in which they were met: there, then back.
     pub table: Vec<ApproachPoint>,
+    /// Attractors that neither way met at a distance, but that those of the distances beside it
+    /// lead to, by descending distance.
+    pub coexisting: Vec<ApproachPoint>,
     /// Least height of the beam above the sample in the motion at the nearest distance, in the
     /// model's unit of length: where it is not above zero, another part than the tip touches.
     pub beam_clearance: Option<f64>,
@@ -221,7 +233,7 @@ pub fn approach(
     let mut walk = Walk {
         case,
         options,
-        settle: budgets(options),
+        classify: budgets(options),
         state: None,
     };
     let there = distances.iter().map(|gap| (Way::Approach, *gap));
@@ -236,12 +248,14 @@ pub fn approach(
             report(k + 1, total);
         }
     }
+    let quiet = Control {
+        progress: None,
+        ..*control
+    };
+    let coexisting = walk.coexisting(&distances, &table, &quiet)?;
     let branches = if options.branches && !control.is_cancelled() {
-        let quiet = Control {
-            progress: None,
-            ..*control
-        };
-        branches(case, key, &table, (from, to), options, &quiet)?
+        let met = table.iter().chain(&coexisting);
+        branches(case, key, met, (from, to), options, &quiet)?
     } else {
         None
     };
@@ -256,6 +270,7 @@ pub fn approach(
         hysteresis: hysteresis(&table, free.amplitude),
         returned: returned(&table, free.amplitude),
         table,
+        coexisting,
         branches,
         cancelled: control.is_cancelled(),
         parameter_unit: case.parameter_unit(key),
@@ -295,14 +310,14 @@ fn distances(free: &FreeMotion, options: &ApproachOptions) -> Result<Vec<f64>, A
 
 /// Each motion is one of many: a sweep's budgets, but for the patience that a lever of high
 /// quality factor needs.
-fn budgets(options: &ApproachOptions) -> SettleOptions {
+fn budgets(options: &ApproachOptions) -> ClassifyOptions {
     let sweep = SweepOptions {
         max_period: options.max_period,
         ..SweepOptions::new(Vec::new())
     };
-    SettleOptions {
+    ClassifyOptions {
         max_transient: 2048,
-        ..sweep.settle()
+        ..sweep.classify()
     }
 }
 
@@ -310,7 +325,7 @@ fn budgets(options: &ApproachOptions) -> SettleOptions {
 struct Walk<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
-    settle: SettleOptions,
+    classify: ClassifyOptions,
     /// Where the last motion ended.
     state: Option<Vec<f64>>,
 }
@@ -323,59 +338,131 @@ impl Walk<'_> {
             .state
             .take()
             .unwrap_or_else(|| vec![0.0; model.dimension()]);
-        let settled = settle(&mut Strobe::new(&model), &start, &self.settle);
-        let named = Named::of(&settled.verdict);
-        let seen = match (&named.orbit, named.classification) {
-            (Some(orbit), _) => {
-                let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-                measure(&model, start, orbit.period, Set::COMMON).map(Some)
-            }
-            (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
-            (None, _) => {
-                measure(&model, &settled.state, self.options.periods, Set::COMMON).map(Some)
-            }
-        };
-        let (classification, observables, reason) = match seen {
-            Ok(Some(seen)) => (named.classification, Some(seen), None),
-            Ok(None) => (named.classification, None, Some(named.evidence)),
-            Err(error) => (Classification::Undecided, None, Some(error.to_string())),
+        let classified = classify(&mut Strobe::new(&model), &start, &self.classify);
+        let named = Named::of(&classified.kind);
+        let met = Met {
+            classification: named.classification,
+            evidence: named.evidence,
+            orbit: named.orbit,
+            state: classified.state,
         };
         // The next motion starts on this one's orbit, not where its decay was when Newton
         // saw the end of it. A motion that ran off is not followed: the next starts from rest.
-        self.state = match &named.orbit {
-            Some(orbit) => Some(nearest(orbit, &settled.state).to_vec()),
-            None => (classification != Classification::Unbounded).then_some(settled.state),
+        self.state = match &met.orbit {
+            Some(orbit) => Some(nearest(orbit, &met.state).to_vec()),
+            None => (met.classification != Classification::Unbounded).then(|| met.state.clone()),
+        };
+        Ok(self.observed(way, gap, &model, met))
+    }
+
+    /// What neither way met at a distance, but the attractors of the distances beside it lead to.
+    fn coexisting(
+        &self,
+        distances: &[f64],
+        table: &[ApproachPoint],
+        control: &Control<'_>,
+    ) -> Result<Vec<ApproachPoint>, CaseError> {
+        let case = self.case;
+        let model = |k: usize| case.with(case.gap_key(), distances[k]).model();
+        let mut known: Vec<Vec<PeriodicOrbit>> = vec![Vec::new(); distances.len()];
+        for (step, orbit) in table.iter().enumerate() {
+            let there = step.min(2 * distances.len() - 1 - step);
+            let orbits = &mut known[there];
+            if let Some(orbit) = &orbit.orbit
+                && !orbits.iter().any(|other| other.is_same_as(orbit))
+            {
+                orbits.push(orbit.clone());
+            }
+        }
+        let at = |k: usize| model(k).map_or_else(|e| Err(e.to_string()), |m| Ok(Strobe::new(&m)));
+        let neighbours = grid_neighbours(&[distances.len()]);
+        let shared = orbits_shared(known, at, neighbours, &self.classify, control);
+        let mut found = Vec::new();
+        for (k, value) in shared.into_iter().enumerate() {
+            let gained = value
+                .attractors
+                .into_iter()
+                .filter(|a| a.shown_by.is_some());
+            for Attractor { kind, state, .. } in gained.map(|a| a.attractor) {
+                let (classification, orbit) = match kind {
+                    AttractorKind::Periodic(orbit) => (Classification::Periodic, Some(orbit)),
+                    AttractorKind::QuasiPeriodic(_) => (Classification::QuasiPeriodic, None),
+                    AttractorKind::Chaotic { .. } => (Classification::Chaotic, None),
+                };
+                let met = Met {
+                    classification,
+                    evidence: String::new(),
+                    orbit,
+                    state,
+                };
+                let point = self.observed(Way::Neither, distances[k], &model(k)?, met);
+                // Chaos that one of the ways met is the same chaos as far as is known.
+                let here = table
+                    .iter()
+                    .filter(|p| p.gap.to_bits() == point.gap.to_bits());
+                if here
+                    .into_iter()
+                    .all(|p| difference(p, &point, 0.0).is_some())
+                {
+                    found.push(point);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// A motion as a line of the table.
+    fn observed(&self, way: Way, gap: f64, model: &Model, met: Met) -> ApproachPoint {
+        let seen = match (&met.orbit, met.classification) {
+            (Some(orbit), _) => {
+                let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+                measure(model, start, orbit.period, Set::COMMON).map(Some)
+            }
+            (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
+            (None, _) => measure(model, &met.state, self.options.periods, Set::COMMON).map(Some),
+        };
+        let (classification, observables, reason) = match seen {
+            Ok(Some(seen)) => (met.classification, Some(seen), None),
+            Ok(None) => (met.classification, None, Some(met.evidence)),
+            Err(error) => (Classification::Undecided, None, Some(error.to_string())),
         };
         let view = self.case.physical();
-        Ok(ApproachPoint {
+        ApproachPoint {
             way,
             gap,
             zc: view.map(|view| gap * view.scales.length),
             classification,
-            period: named.orbit.as_ref().map(|orbit| orbit.period),
-            spectral_radius: named.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
+            period: met.orbit.as_ref().map(|orbit| orbit.period),
+            spectral_radius: met.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
             physical: observables
                 .as_ref()
                 .zip(view)
                 .map(|(seen, view)| PhysicalMotion::of(seen, view)),
             observables,
             reason,
-            orbit: named.orbit,
-        })
+            orbit: met.orbit,
+        }
     }
 }
 
-/// Branches through all periodic motions of the table.
-fn branches(
+/// A motion as it was found.
+struct Met {
+    classification: Classification,
+    evidence: String,
+    orbit: Option<PeriodicOrbit>,
+    state: Vec<f64>,
+}
+
+/// Branches through all periodic motions.
+fn branches<'a>(
     case: &Case,
     key: Key,
-    table: &[ApproachPoint],
+    met: impl Iterator<Item = &'a ApproachPoint>,
     (from, to): (f64, f64),
     options: &ApproachOptions,
     control: &Control<'_>,
 ) -> Result<Option<BranchReport>, BranchError> {
-    let seeds: Vec<(f64, PeriodicOrbit)> = table
-        .iter()
+    let seeds: Vec<(f64, PeriodicOrbit)> = met
         .filter_map(|point| Some((point.gap, point.orbit.clone()?)))
         .collect();
     if seeds.is_empty() {

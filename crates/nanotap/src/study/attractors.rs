@@ -2,8 +2,8 @@
 //! can be read off it.
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, Control, Fraction, OrbitSearch, PeriodicOrbit,
-    SettleOptions, StartBox, StartBoxError, StartSet, census_of, find_orbits,
+    AttractorKind, Census, CensusOptions, ClassifyOptions, Control, Fraction, OrbitSearch,
+    PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,7 @@ pub struct AttractorsOptions {
     /// Where a given number of starts lies; `None`: [`default_box`].
     pub start_box: Option<StartBox>,
     /// Budgets of each start.
-    pub settle: SettleOptions,
+    pub classify: ClassifyOptions,
     /// Starts settled before any attractor is known.
     pub pilots: usize,
     /// Longest period of unstable orbits to list; 0: none.
@@ -50,7 +50,7 @@ impl Default for AttractorsOptions {
             starts: None,
             seed: 1,
             start_box: None,
-            settle: census.settle,
+            classify: census.classify,
             pilots: census.pilots,
             unstable: 0,
             harmonics: 20,
@@ -107,9 +107,9 @@ pub struct Attractors {
     /// How much may have been missed, where starts were drawn until that was small.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen: Option<UnseenReport>,
-    /// Starts without a verdict.
+    /// Starts left undecided.
     pub undecided: Vec<UndecidedStart>,
-    /// Part of the starts without a verdict.
+    /// Part of the starts left undecided.
     pub undecided_fraction: Share,
     /// Part of the starts that left every bound.
     pub unbounded: Share,
@@ -196,7 +196,7 @@ pub struct AttractorReport {
     pub orbit: Option<OrbitReport>,
     /// What was seen of it, if it is not.
     #[serde(flatten)]
-    pub wandering: Option<Wandering>,
+    pub non_periodic: Option<NonPeriodic>,
     /// The same in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
@@ -207,7 +207,7 @@ impl Attractors {
     #[must_use]
     pub fn in_si(mut self, view: &Physical) -> Self {
         for attractor in &mut self.attractors {
-            attractor.physical = match (&attractor.orbit, &attractor.wandering) {
+            attractor.physical = match (&attractor.orbit, &attractor.non_periodic) {
                 (Some(orbit), _) => Some(PhysicalMotion::alone(
                     &orbit.observables,
                     Some(&orbit.spectrum),
@@ -223,7 +223,7 @@ impl Attractors {
 
 /// A motion that does not repeat.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct Wandering {
+pub struct NonPeriodic {
     /// None.
     pub period: Option<usize>,
     /// A state on it, at drive phase 0.
@@ -233,7 +233,7 @@ pub struct Wandering {
     pub observables: Observables,
 }
 
-/// A start without a verdict.
+/// A start left undecided.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UndecidedStart {
     /// Its number.
@@ -257,8 +257,9 @@ pub struct TransientChaosReport {
     pub lifetime_interval: [f64; 2],
     /// Escapes that it rests on.
     pub escapes: usize,
-    /// Part of the starts still wandering at the end.
-    pub wandering: Share,
+    /// Part of the starts still on transient chaos at the end.
+    #[serde(rename = "wandering")]
+    pub unescaped: Share,
     /// Where the escaped ones went: index of the attractor and how many.
     pub destinations: Vec<(usize, usize)>,
 }
@@ -301,18 +302,20 @@ pub fn attractors(
         None => default_starts(model, options.seed)?,
     };
     let map = Strobe::new(model);
-    let settle = bounded(&options.settle, &start_box);
+    let classify = bounded(&options.classify, &start_box);
     let found = census_of(
         &map,
         &set,
         &CensusOptions {
             pilots: options.pilots,
-            settle,
+            classify,
             ..CensusOptions::default()
         },
         control,
     );
-    let starts: Vec<Vec<f64>> = (0..found.fates.len()).map_while(|k| set.start(k)).collect();
+    let starts: Vec<Vec<f64>> = (0..found.outcomes_by_start.len())
+        .map_while(|k| set.start(k))
+        .collect();
     let unstable = if options.unstable > 0 {
         Some(unstable_orbits(model, &map, &starts, options, control)?)
     } else {
@@ -331,7 +334,7 @@ pub fn attractors(
 }
 
 /// The budgets with a bound on the states that fits the box.
-fn bounded(settle: &SettleOptions, start_box: &StartBox) -> SettleOptions {
+fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions {
     let widest = start_box
         .lower()
         .iter()
@@ -340,11 +343,11 @@ fn bounded(settle: &SettleOptions, start_box: &StartBox) -> SettleOptions {
     let bound = if widest > 0.0 {
         OUT_OF_BOUNDS * widest
     } else {
-        settle.bound
+        classify.bound
     };
-    SettleOptions {
+    ClassifyOptions {
         bound,
-        ..settle.clone()
+        ..classify.clone()
     }
 }
 
@@ -370,7 +373,7 @@ fn described(
             lifetime: t.lifetime.mean,
             lifetime_interval: [t.lifetime.low, t.lifetime.high],
             escapes: t.lifetime.escapes,
-            wandering: t.wandering.into(),
+            unescaped: t.unescaped.into(),
             destinations: t.destinations.clone(),
         });
     Ok(Attractors {
@@ -416,16 +419,16 @@ fn one(
     fraction: Fraction,
     harmonics: usize,
 ) -> Result<AttractorReport, AttractorsError> {
-    let wandering = || -> Result<Option<Wandering>, AttractorsError> {
+    let non_periodic = || -> Result<Option<NonPeriodic>, AttractorsError> {
         let observables =
             measure(model, state, OBSERVED_PERIODS, Set::ALL).map_err(SimulateError::from)?;
-        Ok(Some(Wandering {
+        Ok(Some(NonPeriodic {
             period: None,
             state: state.to_vec(),
             observables,
         }))
     };
-    let (classification, spectrum, evidence, orbit, wandering) = match kind {
+    let (classification, spectrum, evidence, orbit, non_periodic) = match kind {
         AttractorKind::Periodic(orbit) => {
             let evidence = format!(
                 "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
@@ -447,7 +450,7 @@ fn one(
                 Some(&torus.spectrum),
                 evidence,
                 None,
-                wandering()?,
+                non_periodic()?,
             )
         }
         AttractorKind::Chaotic { spectrum, lifetime } => {
@@ -463,7 +466,7 @@ fn one(
                 Some(spectrum),
                 evidence,
                 None,
-                wandering()?,
+                non_periodic()?,
             )
         }
     };
@@ -477,7 +480,7 @@ fn one(
         lyapunov_errors: spectrum.map(|s| s.errors.clone()),
         evidence,
         orbit: orbit.map(|o| report(model, o, harmonics)).transpose()?,
-        wandering,
+        non_periodic,
         physical: None,
     })
 }
@@ -545,7 +548,7 @@ impl Default for AttractorsRequest {
             starts: options.starts,
             seed: options.seed,
             sides: Intervals::default(),
-            max_period: options.settle.max_period,
+            max_period: options.classify.max_period,
             unstable: options.unstable,
         }
     }
@@ -564,9 +567,9 @@ impl AttractorsRequest {
                 .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
             seed: self.seed,
             start_box: Some(box_with(model, &self.sides.numbers()?)?),
-            settle: SettleOptions {
+            classify: ClassifyOptions {
                 max_period: self.max_period,
-                ..default.settle.clone()
+                ..default.classify.clone()
             },
             unstable: self.unstable,
             ..default

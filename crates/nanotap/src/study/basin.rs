@@ -10,8 +10,8 @@
 //! grid is left. Motions whose basin in the slice is smaller still show as "unsettled".
 
 use nanotap_dynamics::{
-    Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, Control, Label,
-    LyapunovOptions, SettleOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
+    Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, ClassifyOptions,
+    Control, Label, LyapunovOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
 };
 use nanotap_figures::Figure;
 use rayon::prelude::*;
@@ -169,14 +169,14 @@ impl BasinOptions {
         }
     }
 
-    fn settle(&self) -> SettleOptions {
-        SettleOptions {
+    fn classify(&self) -> ClassifyOptions {
+        ClassifyOptions {
             max_period: self.max_period,
             lyapunov: LyapunovOptions {
                 max_periods: 5000,
                 ..LyapunovOptions::default()
             },
-            ..SettleOptions::default()
+            ..ClassifyOptions::default()
         }
     }
 }
@@ -316,7 +316,7 @@ impl Basin {
         };
         let map = Strobe::new(&model);
         let how = CensusOptions {
-            settle: options.settle(),
+            classify: options.classify(),
             ..CensusOptions::default()
         };
         let found = census(&map, &starts, &how, control);

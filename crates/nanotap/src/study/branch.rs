@@ -3,10 +3,10 @@
 
 use nanotap_dynamics::{
     AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions,
-    Complex, ContinuationError, ContinuationOptions, Control, Diagram, DiagramBranch,
-    DiagramOptions, Direction, GlobalOptions, LocusOptions, LyapunovOptions, PeriodicOrbit,
-    SettleOptions, StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit,
-    trace_locus,
+    ClassifyOptions, Complex, ContinuationError, ContinuationOptions, Control, CurveOptions,
+    Diagram, DiagramBranch, DiagramOptions, Direction, GlobalOptions, LyapunovOptions,
+    PeriodicOrbit, StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit,
+    trace_curve,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -294,7 +294,7 @@ pub struct Loci {
     /// Its range.
     pub range: [f64; 2],
     /// The curves.
-    pub curves: Vec<LocusReport>,
+    pub curves: Vec<CurveReport>,
     /// The second parameter, for figures.
     #[serde(skip)]
     pub key: Key,
@@ -302,7 +302,7 @@ pub struct Loci {
 
 /// One locus.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct LocusReport {
+pub struct CurveReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
     pub kind: &'static str,
     /// Period of the orbits on it.
@@ -313,6 +313,9 @@ pub struct LocusReport {
     pub second: Vec<f64>,
     /// Why it ends, at its first and last point.
     pub ends: [String; 2],
+    /// What it meets at its first and last point: grazing, codimension two, or cut where it could
+    /// not be followed; nothing at the edge of the window.
+    pub meets: [Option<&'static str>; 2],
 }
 
 /// Something that could not be followed.
@@ -487,19 +490,19 @@ fn census_seeds(
         let drawn = model.and_then(|model| default_starts(&model, seeds.seed).ok());
         drawn.unwrap_or_else(|| StartSet::given(Vec::new()))
     };
-    let settle = SettleOptions::default();
+    let classify = ClassifyOptions::default();
     let how = GlobalOptions {
         census: CensusOptions {
             pilots: seeds.starts,
             max_starts: seeds.starts,
             max_periods: SEED_PERIODS * seeds.starts,
-            settle: SettleOptions {
+            classify: ClassifyOptions {
                 max_period: seeds.max_period,
                 lyapunov: LyapunovOptions {
                     max_periods: SEED_PERIODS,
-                    ..settle.lyapunov
+                    ..classify.lyapunov
                 },
-                ..settle
+                ..classify
             },
             ..CensusOptions::default()
         },
@@ -720,18 +723,18 @@ fn loci(
         .fold((low.min(high), low.max(high)), |(low, high), here| {
             (low.min(here), high.max(here))
         });
-    let limits = LocusOptions {
+    let limits = CurveOptions {
         max_points: LOCUS_POINTS,
-        ..LocusOptions::over(first, second)
+        ..CurveOptions::over(first, second)
     };
-    let mut curves: Vec<LocusReport> = Vec::new();
+    let mut curves: Vec<CurveReport> = Vec::new();
     for b in bifurcations() {
         if control.is_cancelled() {
             break;
         }
         let here = at(b);
         let near = 1e-6 * (first.1 - first.0);
-        let known = |c: &LocusReport| {
+        let known = |c: &CurveReport| {
             c.kind == kind_name(b.kind)
                 && c.period == b.orbit.period
                 && crossings(c, here).any(|at| (at - b.parameter).abs() <= near)
@@ -739,12 +742,13 @@ fn loci(
         if curves.iter().any(known) {
             continue;
         }
-        match trace_locus(&family, b, here, &limits, control) {
-            Ok(locus) => curves.push(LocusReport {
+        match trace_curve(&family, b, here, &limits, control) {
+            Ok(locus) => curves.push(CurveReport {
                 kind: kind_name(locus.kind),
                 period: b.orbit.period,
                 first: locus.points.iter().map(|p| p.first).collect(),
                 second: locus.points.iter().map(|p| p.second).collect(),
+                meets: [0, 1].map(|k| locus.ends[k].meets()),
                 ends: locus.ends.map(|end| end.to_string()),
             }),
             Err(error) => failures.push(FailureReport {
@@ -762,7 +766,7 @@ fn loci(
 }
 
 /// Where a locus crosses a value of the second parameter.
-fn crossings(curve: &LocusReport, second: f64) -> impl Iterator<Item = f64> {
+fn crossings(curve: &CurveReport, second: f64) -> impl Iterator<Item = f64> {
     curve
         .first
         .windows(2)

@@ -5,7 +5,7 @@
 //! Kelvin–Voigt surface. Compared are the periodic orbit of one period on each, stable or
 //! not, and how it goes on with the drive frequency.
 
-use nanotap_dynamics::{Control, SettleOptions, ShootingOptions, close_orbit, settle};
+use nanotap_dynamics::{ClassifyOptions, Control, ShootingOptions, classify, close_orbit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -246,7 +246,7 @@ fn motion(
     let model = Model::cantilever(&case).map_err(CaseError::from)?;
     let rest = vec![0.0; model.dimension()];
     let mut map = Strobe::new(&model);
-    let named = Named::of(&settle(&mut map, &rest, &SettleOptions::default()).verdict);
+    let named = Named::of(&classify(&mut map, &rest, &ClassifyOptions::default()).kind);
     let asked = OrbitOptions {
         period: Some(options.period),
         harmonics: 0,

@@ -9,7 +9,7 @@
 
 use std::time::Instant;
 
-use nanotap_dynamics::{SettleOptions, settle};
+use nanotap_dynamics::{ClassifyOptions, classify};
 use nanotap_flow::fixed_step::FixedStep;
 pub use nanotap_flow::fixed_step::Switching;
 use schemars::JsonSchema;
@@ -35,7 +35,7 @@ pub struct FixedStepOptions {
     /// Where within a step the regime is looked at.
     pub switching: Switching,
     /// Budgets for naming what the exact flow does.
-    pub settle: SettleOptions,
+    pub classify: ClassifyOptions,
 }
 
 impl Default for FixedStepOptions {
@@ -47,7 +47,7 @@ impl Default for FixedStepOptions {
             strobe: 1,
             steps: [200, 200],
             switching: Switching::EveryStep,
-            settle: SettleOptions::default(),
+            classify: ClassifyOptions::default(),
         }
     }
 }
@@ -194,7 +194,7 @@ pub fn fixed_step_run(
     let seconds = clock.elapsed().as_secs_f64().max(1e-9);
     let (apparent_period, closure) = apparent_period(&strobes);
     let last = strobes.last().cloned().unwrap_or_default();
-    let named = Named::of(&settle(&mut Strobe::new(model), &last, &options.settle).verdict);
+    let named = Named::of(&classify(&mut Strobe::new(model), &last, &options.classify).kind);
     let rate = model.tip_rate();
     let at = |o: &nanotap_flow::Output, x: &[f64]| o.at(model.system.drive(), x, 0.0);
     Ok(FixedStepRun {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::RowDVector;
-use nanotap_dynamics::{SettleOptions, StroboscopicMap, lyapunov_spectrum, settle};
+use nanotap_dynamics::{ClassifyOptions, StroboscopicMap, classify, lyapunov_spectrum};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Output, Trajectory};
 use schemars::JsonSchema;
@@ -36,7 +36,7 @@ pub struct LyapunovOptions {
     /// Points of the section.
     pub points: usize,
     /// Budgets for naming the motion.
-    pub settle: SettleOptions,
+    pub classify: ClassifyOptions,
 }
 
 impl Default for LyapunovOptions {
@@ -47,7 +47,7 @@ impl Default for LyapunovOptions {
             periods: 20_000,
             section: Section::Phase(0.0),
             points: 5000,
-            settle: SettleOptions::default(),
+            classify: ClassifyOptions::default(),
         }
     }
 }
@@ -141,7 +141,7 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
             what: "the tangent vectors of the motion",
         }))
     })?;
-    let named = Named::of(&settle(&mut map, &start, &options.settle).verdict);
+    let named = Named::of(&classify(&mut map, &start, &options.classify).kind);
     Ok(LyapunovReport {
         classification: named.classification,
         period: named.orbit.map(|o| o.period),

@@ -6,6 +6,7 @@ pub mod basin;
 pub mod branch;
 pub mod contact_laws;
 pub mod convergence;
+pub mod fit;
 pub mod fixed_step;
 mod free_motion;
 pub mod in_si;

@@ -12,7 +12,7 @@ use crate::control::Control;
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
-use crate::model::galerkin::Regime;
+use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::spectrum::{self, Spectrum, SpectrumError, TipLoad};
 use crate::study::limits::MOST_POINTS;
 use crate::study::registry::{Study, cantilever};
@@ -22,6 +22,9 @@ use crate::study::registry::{Study, cantilever};
 pub struct ModeTable {
     /// N.
     pub modes: usize,
+    /// By how much these modes together are stiffer than the beam against a constant force at
+    /// the tip, as a part of its static stiffness k = 3EI/L³.
+    pub static_excess: f64,
     /// Free flight, Galerkin.
     pub free: Vec<f64>,
     /// Contact, Galerkin.
@@ -30,6 +33,9 @@ pub struct ModeTable {
     pub exact_free: Vec<f64>,
     /// Contact, the exact beam.
     pub exact_contact: Vec<f64>,
+    /// Quality factors of the free modes, |λ|/(2 |Re λ|); infinite (`null`) without damping,
+    /// `None` where not every mode oscillates.
+    pub quality: Option<Vec<f64>>,
     /// Eigenvalues [Re, Im ≥ 0] of the damped Galerkin equations in free flight, by
     /// ascending size; `None` where they are too nearly defective to be told apart.
     pub free_eigenvalues: Option<Vec<[f64; 2]>>,
@@ -56,20 +62,41 @@ impl ModeTable {
     pub fn new(case: &Cantilever) -> Result<Self, ModeTableError> {
         case.validate()?;
         let beam = Modes::new(case.modes).map_err(CantileverError::from)?;
-        let galerkin = |regime| spectrum::frequencies(&beam, TipLoad::of(case, regime));
-        let eigenvalues = |regime| {
-            let spectrum = Spectrum::of_beam(&beam, case.alpha3, TipLoad::of(case, regime));
-            spectrum
-                .ok()
-                .map(|spectrum| spectrum.eigenvalues.into_iter().map(pair).collect())
+        // Measured modes fill the matrices.
+        let dense = if case.higher_modes.is_empty() {
+            None
+        } else {
+            Some(Galerkin::new(case)?)
         };
+        let galerkin = |regime| match &dense {
+            Some(equations) => Ok(spectrum::dense_frequencies(equations, regime)),
+            None => spectrum::frequencies(&beam, TipLoad::of(case, regime)),
+        };
+        let eigenvalues = |regime| -> Option<Vec<[f64; 2]>> {
+            let values = if let Some(equations) = &dense {
+                spectrum::dense_eigenvalues(equations, regime)
+            } else {
+                let load = TipLoad::of(case, regime);
+                Spectrum::of_beam(&beam, case.alpha3, load)
+                    .ok()?
+                    .eigenvalues
+            };
+            Some(values.into_iter().map(pair).collect())
+        };
+        let free_eigenvalues = eigenvalues(Regime::Free);
+        let quality = free_eigenvalues.as_ref().and_then(|values| {
+            let quality = |value: &[f64; 2]| 0.5 / damping_ratio(*value);
+            (values.len() == case.modes).then(|| values.iter().map(quality).collect())
+        });
         Ok(Self {
             modes: case.modes,
+            static_excess: beam.static_excess(),
+            quality,
             free: galerkin(Regime::Free)?,
             contact: galerkin(Regime::Contact)?,
             exact_free: exact_beam::frequencies(case.alpha1, 0.0, case.modes)?,
             exact_contact: exact_beam::frequencies(case.alpha1, case.alpha4, case.modes)?,
-            free_eigenvalues: eigenvalues(Regime::Free),
+            free_eigenvalues,
             contact_eigenvalues: eigenvalues(Regime::Contact),
         })
     }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 use nanotap_dynamics::{
-    Complex, Control, OrbitSearch, PeriodicOrbit, SettleOptions, ShootingError, ShootingOptions,
-    Verdict, close_orbit, close_orbit_from_points, find_orbits, settle,
+    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingError,
+    ShootingOptions, classify, close_orbit, close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
@@ -36,7 +36,7 @@ pub struct OrbitOptions {
     /// Harmonics of the drive frequency reported.
     pub harmonics: usize,
     /// Budgets of the run from rest.
-    pub settle: SettleOptions,
+    pub classify: ClassifyOptions,
     /// Newton's budgets.
     pub shooting: ShootingOptions,
 }
@@ -47,7 +47,7 @@ impl Default for OrbitOptions {
             period: None,
             state: None,
             harmonics: 20,
-            settle: SettleOptions::default(),
+            classify: ClassifyOptions::default(),
             shooting: ShootingOptions::default(),
         }
     }
@@ -167,15 +167,15 @@ fn settled(
     period: Option<usize>,
     options: &OrbitOptions,
 ) -> Result<PeriodicOrbit, OrbitError> {
-    let end = settle(map, start, &options.settle);
-    if let Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. } = &end.verdict
+    let end = classify(map, start, &options.classify);
+    if let MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } = &end.kind
         && period.is_none_or(|p| p % orbit.period == 0)
     {
         return Ok(orbit.clone());
     }
     match period {
         None => Err(OrbitError::NotPeriodic {
-            evidence: Named::of(&end.verdict).evidence,
+            evidence: Named::of(&end.kind).evidence,
         }),
         Some(period) => near_recurrence(map, &end.state, period, &options.shooting)
             .ok()
@@ -218,7 +218,7 @@ const RECURRENCE_PERIODS: usize = 2000;
 /// Near returns given to Newton.
 const RECURRENCE_TRIES: usize = 12;
 
-/// Closes an orbit of the given period from the nearest returns of a wandering motion.
+/// Closes an orbit of the given period from the nearest returns of a motion that does not repeat.
 fn near_recurrence(
     map: &mut Strobe,
     state: &[f64],

@@ -240,6 +240,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<super::attractors::AttractorsStudy>(),
     StudyEntry::of::<super::branch::BranchStudy>(),
     StudyEntry::of::<super::approach::ApproachStudy>(),
+    StudyEntry::of::<super::fit::FitStudy>(),
     StudyEntry::dataset::<super::sweep::SweepStudy>(),
     StudyEntry::dataset::<super::window::WindowStudy>(),
     StudyEntry::dataset::<super::basin::BasinStudy>(),

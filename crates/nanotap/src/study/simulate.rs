@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-pub use nanotap_dynamics::SettleOptions;
-use nanotap_dynamics::{LyapunovSpectrum, PeriodicOrbit, StroboscopicMap, Verdict, settle};
+pub use nanotap_dynamics::ClassifyOptions;
+use nanotap_dynamics::{LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, classify};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +35,7 @@ pub struct SimulateOptions {
     /// What is measured.
     pub observables: Set,
     /// Budgets for naming the motion.
-    pub settle: SettleOptions,
+    pub classify: ClassifyOptions,
 }
 
 impl Default for SimulateOptions {
@@ -46,7 +46,7 @@ impl Default for SimulateOptions {
             state: None,
             strobe: 1,
             observables: Set::ALL,
-            settle: SettleOptions::default(),
+            classify: ClassifyOptions::default(),
         }
     }
 }
@@ -172,7 +172,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         map.advance_by(&mut state, transient)?;
         transient
     } else {
-        measured_transient(&mut map, &mut state, &options.settle)
+        measured_transient(&mut map, &mut state, &options.classify)
     };
     let (periods_per_second, evaluations_per_period) = speed(model, &state, options.periods)?;
     let kept = Kept {
@@ -182,7 +182,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         each_period: false,
     };
     let record = watch(model, &state, options.periods, options.observables, kept)?;
-    let named = Named::of(&settle(&mut map, &state, &options.settle).verdict);
+    let named = Named::of(&classify(&mut map, &state, &options.classify).kind);
     Ok(Simulation {
         periods: options.periods,
         transient,
@@ -246,21 +246,21 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
 /// for: near a multiplier of modulus one it takes longer than anyone would run.
-fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &SettleOptions) -> usize {
-    let settled = settle(map, state, options);
-    state.copy_from_slice(&settled.state);
-    let (Verdict::Periodic(orbit) | Verdict::TransientChaos { orbit, .. }) = &settled.verdict
+fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOptions) -> usize {
+    let classified = classify(map, state, options);
+    state.copy_from_slice(&classified.state);
+    let (MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. }) = &classified.kind
     else {
-        return settled.periods;
+        return classified.periods;
     };
-    let (nearest, distance) = nearest_phase(orbit, &settled.state);
+    let (nearest, distance) = nearest_phase(orbit, &classified.state);
     let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
     let decay = -orbit.spectral_radius().ln();
     let rest = ((distance / near).ln() / decay).ceil().max(0.0) as usize;
     if !nearest.is_empty() {
         state.copy_from_slice(nearest);
     }
-    settled.periods + rest.next_multiple_of(orbit.period)
+    classified.periods + rest.next_multiple_of(orbit.period)
 }
 
 /// The state of an orbit at drive phase 0 that is nearest to `state`, and how near it is.
@@ -279,14 +279,14 @@ fn nearest_phase<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> (&'a [f64], f64
         .unwrap_or((&[], f64::NAN))
 }
 
-/// Speed of the bare propagation and evaluations of gap or force a period.
+/// Speed of the bare propagation and evaluations of gap or force a period, of the first
+/// periods: a long run is not made longer by them.
 fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), MotionError> {
+    let periods = periods.min(SHOWN);
     let mut map = Strobe::new(model);
     let mut state = state.to_vec();
     let clock = Instant::now();
-    for _ in 0..periods {
-        map.advance(&mut state)?;
-    }
+    map.advance_by(&mut state, periods)?;
     let seconds = clock.elapsed().as_secs_f64().max(1e-9);
     let evaluations = map.evaluations() as f64;
     Ok((periods as f64 / seconds, evaluations / periods as f64))
@@ -322,7 +322,7 @@ pub struct Named {
 
 impl Named {
     /// Names a verdict.
-    pub fn of(verdict: &Verdict) -> Self {
+    pub fn of(verdict: &MotionKind) -> Self {
         let exponent = largest_exponent;
         let periodic = |orbit: &PeriodicOrbit| {
             format!(
@@ -333,10 +333,10 @@ impl Named {
             )
         };
         let (classification, orbit, spectrum, evidence) = match verdict {
-            Verdict::Periodic(orbit) => {
+            MotionKind::Periodic(orbit) => {
                 (Classification::Periodic, Some(orbit), None, periodic(orbit))
             }
-            Verdict::TransientChaos {
+            MotionKind::TransientChaos {
                 orbit,
                 spectrum,
                 lasted,
@@ -350,7 +350,7 @@ impl Named {
                     periodic(orbit)
                 ),
             ),
-            Verdict::QuasiPeriodic(torus) => (
+            MotionKind::QuasiPeriodic(torus) => (
                 Classification::QuasiPeriodic,
                 None,
                 Some(&torus.spectrum),
@@ -361,7 +361,7 @@ impl Named {
                     torus.nearest_return
                 ),
             ),
-            Verdict::Chaotic(chaos) => (
+            MotionKind::Chaotic(chaos) => (
                 Classification::Chaotic,
                 None,
                 Some(&chaos.spectrum),
@@ -372,13 +372,13 @@ impl Named {
                     chaos.lifetime_above
                 ),
             ),
-            Verdict::Unbounded => (
+            MotionKind::Unbounded => (
                 Classification::Unbounded,
                 None,
                 None,
                 "the motion left every bound".to_owned(),
             ),
-            Verdict::Undecided { reason, spectrum } => (
+            MotionKind::Undecided { reason, spectrum } => (
                 Classification::Undecided,
                 None,
                 spectrum.as_ref(),
@@ -459,7 +459,7 @@ impl Default for SimulateRequest {
             transient: options.transient,
             state: options.state,
             strobe: options.strobe,
-            max_period: options.settle.max_period,
+            max_period: options.classify.max_period,
             resolution: 200,
             method: Method::default(),
             steps: Steps::default(),
@@ -476,7 +476,7 @@ impl SimulateRequest {
             transient: self.transient,
             state: self.state.clone(),
             strobe: self.strobe,
-            settle: self.settle(),
+            classify: self.classify(),
             ..SimulateOptions::default()
         }
     }
@@ -494,14 +494,14 @@ impl SimulateRequest {
                 Grid::Step => Switching::EveryStep,
                 Grid::Stage => Switching::EveryStage,
             },
-            settle: self.settle(),
+            classify: self.classify(),
         }
     }
 
-    fn settle(&self) -> SettleOptions {
-        SettleOptions {
+    fn classify(&self) -> ClassifyOptions {
+        ClassifyOptions {
             max_period: self.max_period,
-            ..SettleOptions::default()
+            ..ClassifyOptions::default()
         }
     }
 }

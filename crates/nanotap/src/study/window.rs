@@ -107,6 +107,9 @@ impl JsonSchema for Condition {
     }
 }
 
+/// The file of a window's dataset that says what there is at each point.
+const FILE: &str = "window.json";
+
 /// The operating window over two parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Window {
@@ -226,6 +229,17 @@ impl Window {
             conditions,
             shares,
         })
+    }
+
+    /// The same, kept beside the dataset in `window.json`.
+    ///
+    /// # Errors
+    /// As [`Window::of`], and when the file system refuses.
+    pub fn kept(store: &Store) -> Result<Self, StoreError> {
+        let window = Self::of(store)?;
+        let text = serde_json::to_string(&window).unwrap_or_default();
+        store.write_beside(FILE, text.as_bytes())?;
+        Ok(window)
     }
 
     /// The map, with the share of each condition in its legend.
@@ -377,7 +391,7 @@ impl DatasetStudy for WindowStudy {
     }
 
     fn report(store: &Store) -> Result<Window, StoreError> {
-        Window::of(store)
+        Window::kept(store)
     }
 }
 

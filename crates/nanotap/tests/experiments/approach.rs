@@ -5,7 +5,7 @@ use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::approach::{ApproachOptions, ApproachReport, Way, approach};
-use nanotap::study::simulate::Classification;
+use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 
 /// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
 pub(crate) const STIFF: &str = "\
@@ -61,7 +61,7 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
         let taps = sight.contact_fraction > 0.0;
         let expected = match p.way {
             Way::Approach => p.gap < report.free_reach,
-            Way::Retract => p.gap < fold,
+            Way::Retract | Way::Neither => p.gap < fold,
         };
         assert_eq!(taps, expected, "{:?} at {}", p.way, p.gap);
         if !taps {
@@ -85,6 +85,45 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
     for p in &report.table {
         let amplitude = p.observables.as_ref().unwrap().first_harmonic;
         assert!(stable(p.gap, amplitude), "{:?} {}", p.way, p.gap);
+    }
+}
+
+/// On the way back a period 3 is met at a few distances and lost again; it attracts all the same
+/// at those farther out, where neither way has it.
+#[test]
+fn what_is_met_at_one_distance_is_known_at_the_others() {
+    let case = Cantilever {
+        modes: 1,
+        alpha1: 0.018,
+        alpha3: 0.0236,
+        alpha4: 53.55,
+        alpha5: 0.2,
+        alpha6: 0.0969,
+        omega: 6.03,
+        ..Cantilever::paper()
+    };
+    let case = Case::from(case);
+    let options = ApproachOptions {
+        points: 40,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let report = curve(&case, &options);
+    let met = |way: Way| report.table.iter().filter(move |p| p.way == way);
+    assert!(met(Way::Retract).any(|p| p.period == Some(3)));
+    assert!(met(Way::Approach).all(|p| p.period == Some(1)));
+    let farthest = &report.coexisting[0];
+    assert_eq!(farthest.gap, report.from);
+    for p in &report.coexisting {
+        assert_eq!((p.way, p.period), (Way::Neither, Some(3)));
+        // A run from beside it comes back to it.
+        let model = case.with(case.gap_key(), p.gap).model().unwrap();
+        let beside = p.orbit.as_ref().unwrap().states[0].iter();
+        let run = SimulateOptions {
+            state: Some(beside.map(|x| x * (1.0 + 1e-4)).collect()),
+            ..SimulateOptions::default()
+        };
+        assert_eq!(simulate(&model, &run).unwrap().period, Some(3));
     }
 }
 

@@ -4,6 +4,7 @@ use nanotap::case::{Case, Key, PlaneFamily};
 use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::contact::ContactLaw;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
@@ -212,6 +213,64 @@ fn exponents_sum_to_the_trace() {
         "{} {}",
         report.sum,
         report.sum_by_trace
+    );
+}
+
+/// The memory of a standard linear solid fades by e^{−t/τ} with τ far below a drive period: its
+/// exponent is what the trace leaves, however far below rounding the multiplier is.
+#[test]
+fn the_last_exponent_of_a_standard_linear_solid_is_what_the_trace_leaves() {
+    for time in [0.02, 0.005, 0.001] {
+        let case = Cantilever {
+            modes: 2,
+            alpha6: 0.0,
+            contact: ContactLaw::StandardLinearSolid,
+            relaxation_stiffness: 20.0,
+            relaxation_time: time,
+            ..at(2.6)
+        };
+        let options = LyapunovOptions {
+            periods: 200,
+            points: 0,
+            ..LyapunovOptions::default()
+        };
+        let report = lyapunov(&Model::cantilever(&case).unwrap(), &options).unwrap();
+        assert!((report.sum / report.sum_by_trace - 1.0).abs() < 1e-9);
+        // In contact it relaxes, in flight it recovers at half that rate (both springs alike).
+        let last = report.exponents.last().unwrap();
+        let fastest = -case.period() / time;
+        assert!(
+            *last > 1.001 * fastest && *last < 0.499 * fastest,
+            "{time}: {last}"
+        );
+    }
+}
+
+/// One mode contracts area, so that no torus can be: what looked like one is an orbit of
+/// period 336, stable by its multipliers.
+#[test]
+fn a_long_period_of_one_mode_is_no_torus() {
+    let case = Cantilever {
+        modes: 1,
+        alpha1: 0.099,
+        alpha3: 0.012,
+        alpha4: 35.06,
+        alpha5: 0.295,
+        alpha6: 0.0196,
+        ..at(8.9)
+    };
+    let model = Model::cantilever(&case).unwrap();
+    // Beside a point of it.
+    let options = SimulateOptions {
+        state: Some(vec![-0.19771, -0.124605]),
+        ..SimulateOptions::default()
+    };
+    let found = simulate(&model, &options).unwrap();
+    assert_eq!(
+        (found.classification, found.period),
+        (Classification::Periodic, Some(336)),
+        "{}",
+        found.evidence
     );
 }
 

@@ -5,7 +5,7 @@ use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, figure, shares};
-use nanotap_dynamics::{Control, SettleOptions, Verdict, settle};
+use nanotap_dynamics::{ClassifyOptions, Control, MotionKind, classify};
 use std::sync::atomic::AtomicBool;
 
 use crate::folder::{Folder, assert_same};
@@ -96,12 +96,12 @@ fn labels_are_where_runs_settle() {
                 -4.0 + 8.0 * entry[0] as f64 / 11.0,
                 -1.0 + 2.0 * entry[1] as f64 / 13.0,
             );
-            let settled = settle(
+            let classified = classify(
                 &mut map,
                 &[a1, 0.0, 0.0, v1, 0.0, 0.0],
-                &SettleOptions::default(),
+                &ClassifyOptions::default(),
             );
-            let Verdict::Periodic(orbit) = settled.verdict else {
+            let MotionKind::Periodic(orbit) = classified.kind else {
                 continue;
             };
             let Ok(index) = usize::try_from(label) else {

@@ -5,6 +5,7 @@ use nalgebra::Complex;
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm, Reason};
 use crate::model::drive_form::Actuation;
+use crate::model::galerkin::{Galerkin, Regime};
 
 /// Complex amplitude of the tip's deflection per amplitude of the drive at its frequency Ω:
 /// see [`response_at`].
@@ -39,6 +40,9 @@ pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, Ca
         value: error.given as f64,
         reason: Reason::Modes,
     })?;
+    if !case.higher_modes.is_empty() {
+        return response_with_measured_modes(case, frequency);
+    }
     let square = frequency * frequency;
     let mut tip = Complex::new(0.0, 0.0);
     let mut load = Complex::new(0.0, 0.0);
@@ -58,4 +62,31 @@ pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, Ca
         Actuation::Distributed => load,
     };
     Ok(driven / (1.0 - inertia * tip))
+}
+
+/// The same where modes were measured, whose terms fill the matrices: one linear system.
+fn response_with_measured_modes(
+    case: &Cantilever,
+    frequency: f64,
+) -> Result<Complex<f64>, CantileverError> {
+    let free = Galerkin::new(&Cantilever {
+        alpha2: 1.0,
+        omega: frequency,
+        tone2_ratio: None,
+        tone2_amplitude: 0.0,
+        tone2_phase: 0.0,
+        ..case.clone()
+    })?;
+    let r = Regime::Free.index();
+    let impedance = free.stiffness[r].map(Complex::from)
+        - free.mass.map(|m| Complex::from(m * frequency * frequency))
+        + free.damping[r].map(|c| Complex::new(0.0, c * frequency));
+    let forcing = &free.forcing[r];
+    let force = forcing.sine.zip_map(&forcing.cosine, Complex::new);
+    let answer = impedance.lu().solve(&force);
+    // An undamped resonance answers without bound.
+    let infinite = Complex::from(f64::INFINITY);
+    Ok(answer.map_or(infinite, |x| {
+        x.iter().zip(free.gap.tip.iter()).map(|(x, p)| x * *p).sum()
+    }))
 }

@@ -333,7 +333,8 @@ fn ratio_from_second_mode(f2: f64, f0: f64) -> Result<f64, PhysicalError> {
         return Err(refused(format!(
             "a uniform beam with a tip has f2/f1 of at least {bare:.4}, reached without tip \
              mass; a smaller ratio would need a negative one (a tapered lever, or a torsional mode \
-             taken for the second?); leave f2 out if the difference is within its error"
+             taken for the second?); leave f2 out if the difference is within its error, or give \
+             the tip's mass too (tip.mass_ratio): the second mode then has this frequency"
         )));
     }
     ratio_where(|ratio| Ok(frequency_ratio(ratio)? >= measured))?.ok_or_else(|| {
@@ -427,7 +428,7 @@ impl LeverData {
             geometry: read_geometry(reader)?.or_else(|| lever.and_then(|lever| lever.geometry)),
             modulus: reader.number(Key::LeverModulus)?,
             density: reader.number(Key::LeverDensity)?,
-            tip_mass: f2.or(tip_mass).unwrap_or(TipMass::Absolute(0.0)),
+            tip_mass: tip_mass.or(f2).unwrap_or(TipMass::Absolute(0.0)),
         })
     }
 }

@@ -10,6 +10,7 @@ use super::lever::Lever;
 use crate::case::quantity::Kind;
 use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
+use crate::model::higher_modes::HigherModes;
 use crate::model::parameter::Parameter;
 
 /// The SI value of the model's unit of each kind.
@@ -72,9 +73,14 @@ impl Scales {
             },
             Parameter::Alpha5 => self.length,
             Parameter::Tone2Phase => 1_f64.to_radians(),
+            Parameter::Mode2Quality | Parameter::Mode3Quality => 1.0,
             Parameter::Alpha3 | Parameter::Alpha6 => self.damping,
-            Parameter::Alpha4 | Parameter::RelaxationStiffness => self.stiffness,
-            Parameter::Omega => self.frequency,
+            Parameter::Alpha4 | Parameter::RelaxationStiffness | Parameter::Mode2Stiffness => {
+                self.stiffness
+            }
+            Parameter::Omega | Parameter::Mode2Frequency | Parameter::Mode3Frequency => {
+                self.frequency
+            }
             Parameter::RelaxationTime => self.time,
         }
     }
@@ -105,6 +111,9 @@ pub struct PhysicalParameters {
     pub tone2_amplitude: f64,
     /// Its phase in rad.
     pub tone2_phase: f64,
+    /// What was measured of the second and third mode, in Hz and N/m; 0 where nothing was.
+    #[serde(flatten)]
+    pub higher_modes: HigherModes,
 }
 
 impl PhysicalParameters {
@@ -123,6 +132,11 @@ impl PhysicalParameters {
             relaxation_time: value(Parameter::RelaxationTime),
             tone2_amplitude: value(Parameter::Tone2Amplitude),
             tone2_phase: value(Parameter::Tone2Phase),
+            higher_modes: HigherModes {
+                frequency: [Parameter::Mode2Frequency, Parameter::Mode3Frequency].map(value),
+                quality: [Parameter::Mode2Quality, Parameter::Mode3Quality].map(value),
+                stiffness: value(Parameter::Mode2Stiffness),
+            },
         }
     }
 
@@ -149,6 +163,11 @@ impl PhysicalParameters {
             Parameter::RelaxationTime => self.relaxation_time,
             Parameter::Tone2Amplitude => self.tone2_amplitude,
             Parameter::Tone2Phase => self.tone2_phase,
+            Parameter::Mode2Frequency => self.higher_modes.frequency[0],
+            Parameter::Mode3Frequency => self.higher_modes.frequency[1],
+            Parameter::Mode2Quality => self.higher_modes.quality[0],
+            Parameter::Mode3Quality => self.higher_modes.quality[1],
+            Parameter::Mode2Stiffness => self.higher_modes.stiffness,
         }
     }
 }
@@ -236,5 +255,14 @@ const fn description(
             Kind::Stiffness,
         ),
         Parameter::RelaxationTime => ("time/T", "relaxation time of the arm", Kind::Time),
+        Parameter::Mode2Frequency => ("2 pi f2 T", "frequency of the second mode", Kind::Frequency),
+        Parameter::Mode3Frequency => ("2 pi f3 T", "frequency of the third mode", Kind::Frequency),
+        Parameter::Mode2Quality => ("Q2", "quality factor of the second mode", Kind::Number),
+        Parameter::Mode3Quality => ("Q3", "quality factor of the third mode", Kind::Number),
+        Parameter::Mode2Stiffness => (
+            "k2 L^3/(EI) = 3 k2/k",
+            "stiffness of the second mode",
+            Kind::Stiffness,
+        ),
     }
 }

@@ -26,6 +26,16 @@ impl Physical {
                  or tip.shape would tell it)",
             ));
         }
+        if self.tip.mass.is_some()
+            && let Ok(Some(f2)) = reader.number(Key::LeverF2)
+            && let Ok(beam) = exact_beam::frequencies(self.cantilever.alpha1, 0.0, 2)
+        {
+            remarks.push(Remark::note(format!(
+                "f2 stands beside the tip's mass: the second mode has this frequency, {} of the \
+                 uniform beam's",
+                Kind::Number.format_digits(f2 * beam[0] / (self.lever.f0 * beam[1]), 4)
+            )));
+        }
         remarks.extend(self.lever.remarks(&self.data));
         remarks.extend(self.sample.remarks(reader, &self.tip));
         if !reader.has(Key::GapTip) {

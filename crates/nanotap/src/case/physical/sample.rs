@@ -1,6 +1,7 @@
 //! The sample under the tip: a spring and a damper, given or from Hertz's contact, or a
 //! nonlinear force law.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::catalogue::Material;
@@ -85,6 +86,39 @@ impl Hertz {
     /// The force at the indentation Δ, (4/3) E* √R Δ^(3/2) in N.
     pub fn force(self) -> f64 {
         4.0 / 3.0 * self.reduced_modulus * self.radius.sqrt() * self.indentation.powf(1.5)
+    }
+}
+
+/// Part of Hertz's stiffness by which it may differ where the tip in fact gets to.
+const STIFFNESS_IN_DOUBT: f64 = 0.25;
+
+/// A stiffness that was taken at another indentation than the motion's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct HertzMismatch {
+    /// Indentation at which the stiffness was taken, m.
+    pub assumed_indentation: f64,
+    /// That stiffness, N/m.
+    pub assumed_stiffness: f64,
+    /// Stiffness at the greatest depth of the motion, N/m.
+    pub stiffness: f64,
+}
+
+impl Hertz {
+    /// The mismatch at the greatest depth of a motion in m, where the stiffness there differs
+    /// by more than a quarter from the one taken.
+    pub fn mismatch(self, depth: f64) -> Option<HertzMismatch> {
+        let there = Self {
+            indentation: depth,
+            ..self
+        };
+        let (assumed, stiffness) = (self.stiffness(), there.stiffness());
+        (depth > 0.0 && (stiffness / assumed - 1.0).abs() > STIFFNESS_IN_DOUBT).then_some(
+            HertzMismatch {
+                assumed_indentation: self.indentation,
+                assumed_stiffness: assumed,
+                stiffness,
+            },
+        )
     }
 }
 

@@ -14,6 +14,7 @@ use crate::case::key::{Key, Section};
 use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::exact_beam;
+use crate::model::higher_modes::HigherModes;
 
 /// A case that was read, with what was remarked.
 #[derive(Debug)]
@@ -363,6 +364,7 @@ fn units_are_those_of_the_beam_equation() {
         relaxation_time: 0.0,
         tone2_amplitude: 0.0,
         tone2_phase: 0.0,
+        higher_modes: HigherModes::NONE,
     };
     let case = physical.to_case(&scales, &Cantilever::paper());
     // Eqs. (5) and (7) of the paper, with the mass per length put back under the root.
@@ -771,9 +773,9 @@ fn errors_name_the_key_and_what_would_be_right() {
         (&[("cantilever", "K", "2 N/m")], "cantilever.K", "`k`"),
         (&[("cantilever", "f0", "")], "cantilever.f0", "density"),
         (
-            &[("cantilever", "f2", "470 kHz")],
+            &[("cantilever", "f2", "200 kHz")],
             "cantilever.f2",
-            "tip.mass",
+            "factor of two",
         ),
         (
             &[("cantilever", "lever", "PPP-NCHX")],

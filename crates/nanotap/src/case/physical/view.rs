@@ -18,6 +18,8 @@ use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
 use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
+use crate::model::exact_beam;
+use crate::model::higher_modes::HigherModes;
 use crate::model::parameter::Parameter;
 
 /// Height of the tip where nothing tells it; tips of silicon levers are 10 to 15 µm high.
@@ -232,7 +234,17 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     };
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
     // in which a force is measured in k/3.
-    let free = free_case(&lever, frequency, &like);
+    let measured = measured_modes(reader, &tip, &lever)?;
+    let time = lever.time_unit();
+    let higher_modes = HigherModes {
+        frequency: measured.frequency.map(|frequency| TAU * frequency * time),
+        stiffness: 3.0 * measured.stiffness / lever.k,
+        ..measured
+    };
+    let free = Cantilever {
+        higher_modes,
+        ..free_case(&lever, frequency, &like)
+    };
     let unit = Scales::new(&lever, 1.0).of(Parameter::Alpha2, like.actuation);
     let response = free_response(&free)?;
     let strength =
@@ -284,6 +296,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         relaxation_time: sample.relaxation_time,
         tone2_amplitude: second.map_or(0.0, |(_, (applied, _))| applied),
         tone2_phase: second.map_or(0.0, |(phase, _)| phase),
+        higher_modes: measured,
     };
     let mut cantilever = parameters.to_case(&scales, &like);
     cantilever.validate()?;
@@ -303,6 +316,40 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         tip_height: beam_gap - tip_gap,
         data,
         tip,
+    })
+}
+
+/// What was measured of the second and third mode. A second resonance without a tip's mass
+/// tells that mass, and is the beam's own with it.
+fn measured_modes(
+    reader: Reader<'_>,
+    tip: &Tip,
+    lever: &Lever,
+) -> Result<HigherModes, PhysicalError> {
+    let number = |key| reader.number(key).map(Option::unwrap_or_default);
+    let beam = exact_beam::frequencies(lever.tip_mass_ratio, 0.0, 3)?;
+    let frequency = |key, k: usize| {
+        let given = number(key)?;
+        let own = lever.f0 * beam[k] / beam[0];
+        if given != 0.0 && !(0.5 * own..2.0 * own).contains(&given) {
+            return Err(reader.impossible(
+                key,
+                format!(
+                    "no lever is so far from a uniform beam, whose frequency is {}: it must lie \
+                     within a factor of two of that",
+                    Kind::Frequency.format_digits(own, 4)
+                ),
+            ));
+        }
+        Ok(given)
+    };
+    Ok(HigherModes {
+        frequency: [
+            tip.mass.map_or(Ok(0.0), |_| frequency(Key::LeverF2, 1))?,
+            frequency(Key::LeverF3, 2)?,
+        ],
+        quality: [number(Key::LeverQ2)?, number(Key::LeverQ3)?],
+        stiffness: number(Key::LeverK2)?,
     })
 }
 

@@ -196,6 +196,43 @@ impl Spectrum {
     }
 }
 
+/// The N natural frequencies of undamped equations of any shape, ascending.
+pub(crate) fn dense_frequencies(galerkin: &Galerkin, regime: Regime) -> Vec<f64> {
+    let stiffness = &galerkin.stiffness[regime.index()];
+    let Some(factor) = galerkin.mass.clone().cholesky() else {
+        return vec![f64::NAN; galerkin.modes.count()];
+    };
+    let lower = factor.l();
+    let half = lower.solve_lower_triangular(stiffness);
+    let whole = half.and_then(|half| lower.solve_lower_triangular(&half.transpose()));
+    let squares = whole.map(|whole| whole.symmetric_eigenvalues());
+    let squares = squares.map_or_else(Vec::new, |values| values.iter().copied().collect());
+    let mut frequencies: Vec<f64> = squares
+        .into_iter()
+        .map(|x: f64| x.max(0.0).sqrt())
+        .collect();
+    frequencies.sort_by(f64::total_cmp);
+    frequencies
+}
+
+/// The eigenvalues, Im ≥ 0, of damped equations of any shape, by ascending size.
+pub(crate) fn dense_eigenvalues(galerkin: &Galerkin, regime: Regime) -> Vec<Complex<f64>> {
+    let (n, r) = (galerkin.modes.count(), regime.index());
+    let Some(mass) = galerkin.mass.clone().cholesky() else {
+        return Vec::new();
+    };
+    let mut companion = DMatrix::zeros(2 * n, 2 * n);
+    companion.view_mut((0, n), (n, n)).fill_with_identity();
+    let stiffness = -mass.solve(&galerkin.stiffness[r]);
+    let damping = -mass.solve(&galerkin.damping[r]);
+    companion.view_mut((n, 0), (n, n)).copy_from(&stiffness);
+    companion.view_mut((n, n), (n, n)).copy_from(&damping);
+    let all = companion.complex_eigenvalues();
+    let mut upper: Vec<Complex<f64>> = all.iter().copied().filter(|z| z.im >= 0.0).collect();
+    upper.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    upper
+}
+
 /// The N natural frequencies of the undamped Galerkin equations with tip mass and
 /// spring, ascending: √μ with 1 + (α4 − α1μ) Σ p_j²/(κ_j − μ) = 0. Damping in `load` is
 /// left out.

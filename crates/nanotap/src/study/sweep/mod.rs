@@ -1,7 +1,7 @@
 //! Sweeps: how the motion changes with one or two parameters, from any number of starts.
 //!
 //! Every value of the parameters is a case of its own. From each start the motion is
-//! [settled](nanotap_dynamics::settle()), named, and recorded: per-period extrema of the
+//! [classified](nanotap_dynamics::classify()), named, and recorded: per-period extrema of the
 //! tip deflection, stroboscopic states, observables, multipliers or exponents. Nothing
 //! depends on the order of work or the number of threads.
 //!
@@ -9,7 +9,7 @@
 //! or the one that fits the case at each value ([`crate::study::start_box`]). The k-th start is the same
 //! point of the box at every value.
 //!
-//! **Transients.** Sized by what is measured: [`settle`](nanotap_dynamics::settle()) runs
+//! **Transients.** Sized by what is measured: [`classify`](nanotap_dynamics::classify()) runs
 //! until it can name the motion. If that is a stable orbit, closed by Newton and seen to
 //! be approached, the recording is of the orbit itself, as if the rest of the decay had
 //! been waited for. A number of periods may be asked for instead; then exactly that many
@@ -20,7 +20,7 @@
 //! of values is one piece of work, which is lost when it is interrupted; there are as many
 //! pieces as directions × starts × values of the second parameter.
 //!
-//! Fails: budgets are those of one of very many runs ([`SweepOptions::settle`]): chaos that
+//! Fails: budgets are those of one of very many runs ([`SweepOptions::classify`]): chaos that
 //! lasts for a couple of thousand periods is called chaotic, and a torus that needs more
 //! to show itself undecided. A census decides more carefully.
 
@@ -43,7 +43,7 @@ pub(crate) use run::nearest;
 pub use summary::Summary;
 pub(crate) use summary::{Motions, class_of};
 
-use nanotap_dynamics::{Control, LyapunovOptions, SettleOptions};
+use nanotap_dynamics::{ClassifyOptions, Control, LyapunovOptions};
 use nanotap_figures::Figure;
 
 use crate::case::Case;
@@ -86,8 +86,8 @@ impl SweepOptions {
     }
 
     /// The budgets of each run: a tenth of what one run alone would be given.
-    pub fn settle(&self) -> SettleOptions {
-        SettleOptions {
+    pub fn classify(&self) -> ClassifyOptions {
+        ClassifyOptions {
             max_period: self.max_period,
             max_transient: 512,
             lyapunov: LyapunovOptions {
@@ -99,7 +99,7 @@ impl SweepOptions {
             },
             birkhoff_periods: 2048,
             torus_digits: 6.0,
-            ..SettleOptions::default()
+            ..ClassifyOptions::default()
         }
     }
 }

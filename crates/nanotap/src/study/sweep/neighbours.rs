@@ -11,7 +11,8 @@
 //! an orbit that no run at any value ended on is not found.
 
 use nanotap_dynamics::{
-    AttractorKind, Control, PeriodicOrbit, ShootingOptions, close_orbit, orbits_shared,
+    AttractorKind, Control, PeriodicOrbit, ShootingOptions, close_orbit, grid_neighbours,
+    orbits_shared,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -84,19 +85,7 @@ impl Sweep {
         };
         let model_at = |k: usize| case_at(k).model();
         let map_at = |k: usize| model_at(k).map(|m| Strobe::new(&m));
-        let neighbours = |k: usize| {
-            let [x, y] = place(k);
-            let rows = shape.get(1).copied().unwrap_or(1);
-            [
-                (x > 0).then(|| k - 1),
-                (x + 1 < shape[0]).then_some(k + 1),
-                (y > 0).then(|| k - shape[0]),
-                (y + 1 < rows).then_some(k + shape[0]),
-            ]
-            .into_iter()
-            .flatten()
-            .collect()
-        };
+        let neighbours = grid_neighbours(&shape);
         let states = self.orbit_states(store, strobe, count)?;
         let known: Vec<Vec<PeriodicOrbit>> = states
             .par_iter()
@@ -104,8 +93,8 @@ impl Sweep {
             .map(|(k, states)| map_at(k).map_or_else(|_| Vec::new(), |map| closed(map, states)))
             .collect();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
-        let settle = self.options.settle();
-        let values = orbits_shared(known, at, neighbours, &settle, control);
+        let classify = self.options.classify();
+        let values = orbits_shared(known, at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {
             let gained = value

@@ -1,6 +1,6 @@
 //! One run of a sweep, and the runs of one piece of work.
 
-use nanotap_dynamics::{PeriodicOrbit, SettleOptions, StroboscopicMap, settle};
+use nanotap_dynamics::{ClassifyOptions, MotionKind, PeriodicOrbit, StroboscopicMap, classify};
 
 use super::{Sweep, SweepOptions};
 use crate::case::Case;
@@ -9,7 +9,7 @@ use crate::dataset::Block;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
-use crate::observe::{Kept, Observables, Set, Watched, watch};
+use crate::observe::{Kept, Observables, Set, Watched, Watcher};
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::{box_with, default_starts};
 
@@ -209,10 +209,13 @@ impl SweepOptions {
 
 /// Runs one model again and again.
 struct Runner<'a> {
-    model: &'a Model,
     options: &'a SweepOptions,
-    settle: SettleOptions,
+    classify: ClassifyOptions,
     map: Strobe,
+    /// Stable orbits that starts went to.
+    known: Vec<PeriodicOrbit>,
+    /// What every motion is measured with.
+    watcher: Result<Watcher<'a>, MotionError>,
     /// Units to tell observables in, where physical quantities vary.
     scales: Option<Scales>,
 }
@@ -221,33 +224,34 @@ impl<'a> Runner<'a> {
     fn new(case: &Case, model: &'a Model, options: &'a SweepOptions) -> Self {
         Self {
             scales: case.physical().map(|view| view.scales),
-            model,
             options,
-            settle: options.settle(),
+            classify: options.classify(),
             map: Strobe::new(model),
+            known: Vec::new(),
+            watcher: Watcher::new(model, Set::COMMON),
         }
     }
 
     /// Runs from `start`; the state at the end, unless the motion ran off.
     fn run(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
         match self.options.transient {
-            None => self.settled(start),
+            None => self.classified(start),
             Some(transient) => self.after(start, transient),
         }
     }
 
     /// The motion that the run was found to go to.
-    fn settled(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
-        let settled = settle(&mut self.map, start, &self.settle);
-        let named = Named::of(&settled.verdict);
-        let outcome = Outcome::named(&named, settled.periods);
+    fn classified(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
+        let classified = classify(&mut self.map, start, &self.classify);
+        let named = Named::of(&classified.kind);
+        let outcome = Outcome::named(&named, classified.periods);
         match &named.orbit {
             Some(orbit) => {
-                let from = nearest(orbit, &settled.state);
+                let from = nearest(orbit, &classified.state);
                 self.recorded(outcome, from, Some(orbit.period))
             }
             None if named.classification == Classification::Unbounded => (outcome, None),
-            None => self.recorded(outcome, &settled.state, None),
+            None => self.recorded(outcome, &classified.state, None),
         }
     }
 
@@ -257,7 +261,7 @@ impl<'a> Runner<'a> {
         if let Err(error) = self.map.advance_by(&mut state, transient) {
             return (Outcome::unknown(class_of(&error), transient), None);
         }
-        let named = Named::of(&settle(&mut self.map, &state, &self.settle).verdict);
+        let named = self.kind_of(&state);
         let outcome = Outcome::named(&named, transient);
         match &named.orbit {
             // What repeats is recorded once.
@@ -267,6 +271,22 @@ impl<'a> Runner<'a> {
             }
             _ => self.recorded(outcome, &state, None),
         }
+    }
+
+    /// What the motion from `state` is: one that has come to an orbit which an earlier start
+    /// went to, that orbit.
+    fn kind_of(&mut self, state: &[f64]) -> Named {
+        if let Some(orbit) = self.known.iter().find(|orbit| is_on(orbit, state)) {
+            return Named::of(&MotionKind::Periodic(orbit.clone()));
+        }
+        let named = Named::of(&classify(&mut self.map, state, &self.classify).kind);
+        self.known.extend(named.orbit.clone());
+        named
+    }
+
+    fn watch(&self, from: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {
+        let watcher = self.watcher.as_ref().map_err(Clone::clone)?;
+        watcher.watch(from, periods, kept)
     }
 
     /// Records the motion from `from`; with `period`, one turn of that orbit stands for
@@ -290,7 +310,7 @@ impl<'a> Runner<'a> {
             lows,
             highs,
             ..
-        } = match watch(self.model, from, turn, Set::COMMON, kept) {
+        } = match self.watch(from, turn, kept) {
             Ok(watched) => watched,
             Err(error) => return (Outcome::unknown(class_of(&error), outcome.transient), None),
         };

@@ -5,8 +5,8 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, Control, Fraction, Lifetime, LyapunovOptions,
-    LyapunovSpectrum, OrbitSearch, PeriodicOrbit, SettleOptions, StartBox, census, find_orbits,
+    AttractorKind, Census, CensusOptions, ClassifyOptions, Control, Fraction, Lifetime,
+    LyapunovOptions, LyapunovSpectrum, OrbitSearch, PeriodicOrbit, StartBox, census, find_orbits,
 };
 
 use super::check::digits;
@@ -25,25 +25,25 @@ const HARMONICS: usize = 1;
 /// Drive periods over which a motion that never repeats is observed.
 const WATCHED: usize = 400;
 
-/// The place where the paper's cases are computed.
-pub(super) struct Laboratory<'a> {
+/// What the sections share: every census and scan of grids is computed once.
+pub(super) struct Runs<'a> {
     quick: bool,
     control: &'a Control<'a>,
     /// Part of the whole work done before this section, and this section's own part.
     share: Cell<(f64, f64)>,
-    /// Percent told so far: progress never goes back.
-    told: AtomicUsize,
+    /// Percent reported so far: progress never goes back.
+    reported: AtomicUsize,
     counts: RefCell<Vec<Rc<Counted>>>,
     spurious: RefCell<Option<Rc<super::time_step::Scan>>>,
 }
 
-impl<'a> Laboratory<'a> {
+impl<'a> Runs<'a> {
     pub(super) fn new(quick: bool, control: &'a Control<'a>) -> Self {
         Self {
             quick,
             control,
             share: Cell::new((0.0, 1.0)),
-            told: AtomicUsize::new(0),
+            reported: AtomicUsize::new(0),
             counts: RefCell::default(),
             spurious: RefCell::default(),
         }
@@ -52,7 +52,7 @@ impl<'a> Laboratory<'a> {
     /// A section begins: what is done before it and its own part of the whole.
     pub(super) fn begin(&self, before: f64, own: f64) {
         self.share.set((before, own));
-        tell(self.control, &self.told, before);
+        report_percent(self.control, &self.reported, before);
     }
 
     pub(super) fn quick(&self) -> bool {
@@ -67,11 +67,11 @@ impl<'a> Laboratory<'a> {
     /// Runs `work` with a control that tells how far the whole is.
     pub(super) fn controlled<T>(&self, work: impl FnOnce(&Control<'_>) -> T) -> T {
         let (before, own) = self.share.get();
-        let (control, told) = (self.control, &self.told);
+        let (control, reported) = (self.control, &self.reported);
         let hear = |done: usize, total: usize| {
-            tell(
+            report_percent(
                 control,
-                told,
+                reported,
                 before + own * done as f64 / total.max(1) as f64,
             );
         };
@@ -90,13 +90,13 @@ impl<'a> Laboratory<'a> {
         let starts = start_box(&model)?;
         let count = self.either(256, 24);
         let options = CensusOptions {
-            settle: SettleOptions {
+            classify: ClassifyOptions {
                 lyapunov: LyapunovOptions {
                     max_periods: self.either(4000, 1500),
                     relative_error: 0.05,
                     ..LyapunovOptions::default()
                 },
-                ..SettleOptions::default()
+                ..ClassifyOptions::default()
             },
             ..CensusOptions::default()
         };
@@ -153,12 +153,12 @@ impl<'a> Laboratory<'a> {
     }
 }
 
-/// Tells what part of the whole is done, unless more was told before: a section may have
+/// Tells what part of the whole is done, unless more was reported before: a section may have
 /// several tasks.
-fn tell(control: &Control<'_>, told: &AtomicUsize, part: f64) {
+fn report_percent(control: &Control<'_>, reported: &AtomicUsize, part: f64) {
     let percent = (100.0 * part) as usize;
     if let Some(progress) = control.progress
-        && told.fetch_max(percent, Ordering::Relaxed) <= percent
+        && reported.fetch_max(percent, Ordering::Relaxed) <= percent
     {
         progress(percent, 100);
     }
@@ -289,7 +289,7 @@ impl Counted {
         if let Some(chaos) = &self.census.transient_chaos {
             parts.push(format!(
                 "transient chaos ({} starts still on it)",
-                chaos.wandering.count
+                chaos.unescaped.count
             ));
         }
         if !self.census.undecided.is_empty() {

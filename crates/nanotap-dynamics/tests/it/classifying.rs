@@ -1,12 +1,12 @@
 //! The verdict on one start.
 
-use nanotap_dynamics::{LyapunovOptions, SettleOptions, UndecidedReason, Verdict, settle};
+use nanotap_dynamics::{ClassifyOptions, LyapunovOptions, MotionKind, UndecidedReason, classify};
 
 use crate::systems::{DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning};
 
-fn period_of(verdict: &Verdict) -> usize {
+fn period_of(verdict: &MotionKind) -> usize {
     match verdict {
-        Verdict::Periodic(orbit) => {
+        MotionKind::Periodic(orbit) => {
             assert!(orbit.is_stable());
             orbit.period
         }
@@ -18,7 +18,7 @@ fn period_of(verdict: &Verdict) -> usize {
 /// before its doubling, where 1 − |μ| = 1e-5: no long period, no chaos.
 #[test]
 fn known_periods_are_found() {
-    let options = SettleOptions::default();
+    let options = ClassifyOptions::default();
     for (r, period) in [
         (2.9, 1),
         (3.2, 2),
@@ -27,8 +27,8 @@ fn known_periods_are_found() {
         (2.99999, 1),
         (3.55, 8),
     ] {
-        let settled = settle(&mut System(Logistic(r)), &[0.3], &options);
-        assert_eq!(period_of(&settled.verdict), period, "r = {r}");
+        let classified = classify(&mut System(Logistic(r)), &[0.3], &options);
+        assert_eq!(period_of(&classified.kind), period, "r = {r}");
     }
 }
 
@@ -40,20 +40,20 @@ fn slow_decay_does_not_pass_for_a_long_period() {
         radius: 0.9999,
         angle: 2.0 * std::f64::consts::PI / 5.0 + 1e-4,
     });
-    let settled = settle(&mut map, &[40.0, 0.0], &SettleOptions::default());
-    assert_eq!(period_of(&settled.verdict), 1);
-    assert!(settled.periods <= 64, "{}", settled.periods);
+    let classified = classify(&mut map, &[40.0, 0.0], &ClassifyOptions::default());
+    assert_eq!(period_of(&classified.kind), 1);
+    assert!(classified.periods <= 64, "{}", classified.periods);
 }
 
 #[test]
 fn the_henon_attractor_is_chaotic_with_a_bound() {
-    let settled = settle(
+    let classified = classify(
         &mut System(Henon { a: 1.4, b: 0.3 }),
         &[0.1, 0.1],
-        &SettleOptions::default(),
+        &ClassifyOptions::default(),
     );
-    let Verdict::Chaotic(chaos) = settled.verdict else {
-        panic!("{:?}", settled.verdict)
+    let MotionKind::Chaotic(chaos) = classified.kind else {
+        panic!("{:?}", classified.kind)
     };
     let (largest, error) = chaos.spectrum.largest();
     assert!((largest - 0.41922).abs() < 5.0 * error);
@@ -65,13 +65,13 @@ fn the_henon_attractor_is_chaotic_with_a_bound() {
 #[test]
 fn tori_are_named_with_their_evidence() {
     for start in [[0.6, 0.5], [0.45, 0.5]] {
-        let settled = settle(
+        let classified = classify(
             &mut System(DelayedLogistic(2.05)),
             &start,
-            &SettleOptions::default(),
+            &ClassifyOptions::default(),
         );
-        let Verdict::QuasiPeriodic(torus) = settled.verdict else {
-            panic!("{:?}", settled.verdict)
+        let MotionKind::QuasiPeriodic(torus) = classified.kind else {
+            panic!("{:?}", classified.kind)
         };
         assert!(torus.birkhoff_digits > 7.0);
         assert!(torus.spectrum.largest().0.abs() < 1e-3);
@@ -88,9 +88,9 @@ fn a_resonant_turn_is_left_undecided_with_its_reason() {
         angle: 2.0 * std::f64::consts::PI * 3.0 / 7.0,
         gain: 0.2,
     });
-    let settled = settle(&mut map, &[0.3, 0.4], &SettleOptions::default());
-    let Verdict::Undecided { reason, .. } = settled.verdict else {
-        panic!("{:?}", settled.verdict)
+    let classified = classify(&mut map, &[0.3, 0.4], &ClassifyOptions::default());
+    let MotionKind::Undecided { reason, .. } = classified.kind else {
+        panic!("{:?}", classified.kind)
     };
     assert!(
         matches!(
@@ -105,7 +105,7 @@ fn a_resonant_turn_is_left_undecided_with_its_reason() {
 /// Survival 2/s per period with s = 2.002: thousands of chaotic periods, then the sink.
 #[test]
 fn transient_chaos_is_not_taken_for_an_attractor() {
-    let options = SettleOptions {
+    let options = ClassifyOptions {
         max_transient: 64,
         lyapunov: LyapunovOptions {
             min_periods: 256,
@@ -114,21 +114,21 @@ fn transient_chaos_is_not_taken_for_an_attractor() {
             relative_error: 0.0,
             ..LyapunovOptions::default()
         },
-        ..SettleOptions::default()
+        ..ClassifyOptions::default()
     };
     let mut seen = 0;
     for k in 0..12 {
         let start = [0.05 + 0.07 * f64::from(k)];
-        let settled = settle(&mut System(OpenTent(2.002)), &start, &options);
-        match settled.verdict {
-            Verdict::TransientChaos {
+        let classified = classify(&mut System(OpenTent(2.002)), &start, &options);
+        match classified.kind {
+            MotionKind::TransientChaos {
                 orbit, spectrum, ..
             } => {
                 seen += 1;
                 assert_eq!(orbit.states[0], vec![2.0]);
                 assert!((spectrum.largest().0 - 2.002f64.ln()).abs() < 1e-12);
             }
-            Verdict::Periodic(orbit) => assert_eq!(orbit.states[0], vec![2.0]),
+            MotionKind::Periodic(orbit) => assert_eq!(orbit.states[0], vec![2.0]),
             other => panic!("{other:?}"),
         }
     }
@@ -137,27 +137,27 @@ fn transient_chaos_is_not_taken_for_an_attractor() {
 
 #[test]
 fn a_motion_that_runs_off_is_unbounded() {
-    let settled = settle(
+    let classified = classify(
         &mut System(Henon { a: 1.4, b: 0.3 }),
         &[3.0, 3.0],
-        &SettleOptions::default(),
+        &ClassifyOptions::default(),
     );
-    assert!(matches!(settled.verdict, Verdict::Unbounded));
-    assert!(settled.periods < 20);
+    assert!(matches!(classified.kind, MotionKind::Unbounded));
+    assert!(classified.periods < 20);
 }
 
 /// Started exactly on an unstable fixed point, the run never leaves it; that is no
 /// attractor.
 #[test]
 fn a_run_on_an_unstable_orbit_is_not_called_an_attractor() {
-    let settled = settle(
+    let classified = classify(
         &mut System(Logistic(3.5)),
         &[0.0],
-        &SettleOptions::default(),
+        &ClassifyOptions::default(),
     );
     assert!(matches!(
-        settled.verdict,
-        Verdict::Undecided {
+        classified.kind,
+        MotionKind::Undecided {
             reason: UndecidedReason::OnOrbitThatDoesNotAttract(_),
             ..
         }
@@ -171,25 +171,25 @@ fn an_undamped_beat_is_a_torus() {
         radius: 1.0,
         angle: 1.0,
     });
-    let settled = settle(&mut map, &[0.0, 0.0], &SettleOptions::default());
+    let classified = classify(&mut map, &[0.0, 0.0], &ClassifyOptions::default());
     assert!(
-        matches!(settled.verdict, Verdict::QuasiPeriodic(_)),
+        matches!(classified.kind, MotionKind::QuasiPeriodic(_)),
         "{:?}",
-        settled.verdict
+        classified.kind
     );
 }
 
 #[test]
 fn bad_starts_are_refused() {
     for start in [vec![], vec![0.1, 0.2], vec![f64::INFINITY]] {
-        let settled = settle(
+        let classified = classify(
             &mut System(Logistic(3.5)),
             &start,
-            &SettleOptions::default(),
+            &ClassifyOptions::default(),
         );
         assert!(matches!(
-            settled.verdict,
-            Verdict::Undecided {
+            classified.kind,
+            MotionKind::Undecided {
                 reason: UndecidedReason::BadStart(_),
                 ..
             }

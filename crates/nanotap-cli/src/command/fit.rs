@@ -1,0 +1,247 @@
+//! `nanotap fit`: parameters of lever and sample from measured curves.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use nanotap::case::Key;
+use nanotap::dataset::table::shortest;
+use nanotap::figure::fit::fit_figure;
+use nanotap::study::fit::{FitReport, FitRequest, FitStudy, FittedParameter, Table as Data};
+use nanotap::study::registry::Study as _;
+use serde::Serialize;
+
+use crate::arguments::{CaseArguments, PlotArgument};
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::request::Request;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{file, motion, number, progress, style};
+
+/// Parameters of lever and sample from measured curves.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// The measured curve (CSV), its columns named as in `distance (nm)`, `amplitude (nm)`,
+    /// `phase (deg)`
+    #[arg(value_name = "DATA")]
+    data: PathBuf,
+
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// A further measured curve, fitted together with the first; may be repeated
+    #[arg(long, value_name = "DATA")]
+    also: Vec<PathBuf>,
+
+    #[command(flatten)]
+    request: Request<FitRequest>,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+
+    /// Write the case of the best fit (.toml), or the rows with model and residuals (.csv)
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
+
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+/// The report, and where it went.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    path: Option<&'a PathBuf>,
+    #[serde(flatten)]
+    report: &'a FitReport,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let mut request = arguments.request.read()?;
+    let ending = match &arguments.out {
+        Some(path) => Some(file::ending(path, &["toml", "csv"])?),
+        None => None,
+    };
+    if let Some(path) = &arguments.plot.plot {
+        file::ending(path, &["svg", "png", "pdf"])?;
+    }
+    for path in std::iter::once(&arguments.data).chain(&arguments.also) {
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            return Err(Failure::input(
+                format!(
+                    "{}: a case file stands where the data are named",
+                    path.display()
+                ),
+                "name the data first, then the case: nanotap fit DATA CASE",
+            ));
+        }
+        request.data.push(Data::read(path)?);
+    }
+    let case = GivenCase::with_any_distance(&arguments.case, output)?;
+    let report = progress::watched(output, FitStudy::COUNTED, |control| {
+        arguments
+            .threads
+            .install(|| FitStudy::run(&case, &request, control))
+    })???;
+    if let (Some(path), Some(ending)) = (&arguments.out, ending) {
+        let text = match ending {
+            "toml" => report.case_file.clone(),
+            _ => csv(&report),
+        };
+        file::write(path, text.as_bytes())?;
+    }
+    if let Some(path) = &arguments.plot.plot {
+        fit_figure(&report).write(path)?;
+    }
+    if report.cancelled {
+        output.warning("stopped before it was done");
+    }
+    for remark in &report.remarks {
+        output.warning(remark);
+    }
+    let written = Written {
+        path: arguments.out.as_ref(),
+        report: &report,
+    };
+    output.study(&case, &written, |_| text(&case, &report))?;
+    match &report.reason {
+        None => Ok(()),
+        Some(reason) => Err(Failure::numerics(format!("nothing fits: {reason}"))),
+    }
+}
+
+/// A row a row of the data.
+fn csv(report: &FitReport) -> String {
+    let mut header = vec!["curve".to_owned(), "line".to_owned()];
+    let unit = |unit: &str| match unit {
+        "1" => String::new(),
+        unit => format!(" ({unit})"),
+    };
+    header.push(format!("{}{}", report.swept, unit(&report.swept_unit)));
+    header.push("branch".to_owned());
+    for column in &report.columns {
+        let (name, unit) = (&column.name, unit(&column.unit));
+        header.push(format!("{name}{unit}"));
+        header.push(format!("{name} model{unit}"));
+        header.push(format!("{name} residual"));
+    }
+    let mut csv = header.join(",") + "\n";
+    let cell = |value: Option<f64>| value.map_or_else(String::new, shortest);
+    for row in &report.rows {
+        let branch = row.branch.map_or_else(String::new, |b| b.to_string());
+        let curve = row.curve.replace([',', '"', '\n'], " ");
+        let _ = write!(csv, "{curve},{},{},{branch}", row.line, shortest(row.at));
+        for column in &report.columns {
+            let reading = row.readings.get(&column.name);
+            let _ = write!(
+                csv,
+                ",{},{},{}",
+                cell(reading.and_then(|r| r.measured)),
+                cell(reading.and_then(|r| r.model)),
+                cell(reading.and_then(|r| r.residual))
+            );
+        }
+        csv.push('\n');
+    }
+    csv
+}
+
+/// A value of a parameter with its unit.
+fn quantity(parameter: &FittedParameter, value: f64) -> String {
+    let key = Key::find(&parameter.key);
+    let offset = parameter.unit.as_str();
+    match key {
+        Some(key) => key.kind().format_digits(value, 5),
+        None => match offset {
+            "m" => nanotap::case::physical::Kind::Length.format_digits(value, 5),
+            "Hz" => nanotap::case::physical::Kind::Frequency.format_digits(value, 5),
+            "1" => number::significant(value, 5),
+            unit => format!("{} {unit}", number::significant(value, 5)),
+        },
+    }
+}
+
+fn text(case: &GivenCase, report: &FitReport) -> String {
+    let curves: std::collections::BTreeSet<&str> =
+        report.rows.iter().map(|row| row.curve.as_str()).collect();
+    let heading = format!(
+        "{}: {} of {} fitted to {}",
+        case.title(),
+        number::counted(report.parameters.len(), "parameter", "parameters"),
+        number::counted(report.rows.len(), "row", "rows"),
+        number::counted(curves.len(), "curve", "curves"),
+    );
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    let mut table = Table::new([
+        ("parameter", Align::Left),
+        ("value", Align::Right),
+        ("standard error", Align::Right),
+        ("95 % interval", Align::Left),
+        ("began at", Align::Right),
+    ]);
+    for p in &report.parameters {
+        let name = match &p.curve {
+            Some(curve) => format!("{} of {curve}", p.key),
+            None => p.key.clone(),
+        };
+        let end = |end: Option<f64>| end.map_or_else(|| "?".to_owned(), |v| quantity(p, v));
+        let interval = match p.interval {
+            [None, None] => "not determined".to_owned(),
+            [low, high] => format!("{} to {}", end(low), end(high)),
+        };
+        let error = p
+            .standard_error
+            .map_or_else(|| "?".to_owned(), |v| quantity(p, v));
+        table.row([
+            name,
+            quantity(p, p.value),
+            error,
+            interval,
+            quantity(p, p.start),
+        ]);
+    }
+    text.push_str(&table.render());
+    text.push('\n');
+    let chance = report.p_value.map_or_else(String::new, |p| {
+        format!(
+            ", exceeded by chance with probability {}",
+            number::significant(p, 2)
+        )
+    });
+    text.push_str(&motion::paragraph(&format!(
+        "chi2 = {} with {} degrees of freedom{chance}",
+        number::significant(report.chi2, 5),
+        report.degrees_of_freedom
+    )));
+    for column in &report.columns {
+        let error = if column.estimated {
+            "standard error, estimated from them"
+        } else {
+            "root mean square"
+        };
+        let unit = if column.unit == "1" { "" } else { &column.unit };
+        text.push_str(&motion::paragraph(&format!(
+            "residuals of {}: {error} {} {unit}",
+            column.name,
+            number::significant(column.residual, 3)
+        )));
+    }
+    let strong: Vec<String> = (0..report.parameters.len())
+        .flat_map(|i| (0..i).map(move |j| (j, i)))
+        .filter(|&(j, i)| report.correlations[j][i].abs() > 0.9)
+        .map(|(j, i)| {
+            let [a, b] = [j, i].map(|k| &report.parameters[k].key);
+            format!("{a} and {b} ({:+.3})", report.correlations[j][i])
+        })
+        .collect();
+    if !strong.is_empty() {
+        let words = format!("strongly correlated: {}", strong.join(", "));
+        text.push_str(&motion::paragraph(&words));
+    }
+    for undetermined in &report.undetermined {
+        text.push_str(&motion::paragraph(&undetermined.words));
+    }
+    text
+}

@@ -1,0 +1,311 @@
+//! What a click on the figure of a study means: a key that is set to where it went, and the state
+//! of the motion that is drawn there; and the branches that are drawn over it.
+
+use nanotap::case::Key;
+use nanotap::case::quantity::{JOULES_PER_ELECTRONVOLT, Kind};
+use nanotap::case::units::{Units, prefixed};
+use nanotap::dataset::{Store, StoreError, Values};
+use nanotap::observe::table::shown_phase;
+use nanotap::observe::{Dimension, Observable, Observables};
+use nanotap::study::approach::ApproachReport;
+use nanotap::study::branch::{BranchReport, PointReport};
+use nanotap::study::sweep::Over;
+use nanotap_figures::{Colour, Dash, Figure, Line, Panel};
+use serde_json::{Value, json};
+
+use crate::motion::Start;
+
+/// An axis of a figure on which a click sets a key.
+#[derive(Clone, Copy)]
+pub(crate) struct Axis {
+    pub(crate) key: Key,
+    /// What values of the key, in SI, are multiplied with to be drawn.
+    pub(crate) factor: f64,
+}
+
+impl Axis {
+    pub(crate) fn of(over: &Over) -> Self {
+        let kind = over.key.kind();
+        let (from, to) = (over.from, over.to);
+        let factor = if over.key.is_physical() && kind != Kind::Number {
+            prefixed(kind, 1.0, from.abs().max(to.abs())).0
+        } else {
+            1.0
+        };
+        Self {
+            key: over.key,
+            factor,
+        }
+    }
+
+    pub(crate) fn json(&self) -> Value {
+        let physical = self.key.is_physical() && self.key.kind() != Kind::Number;
+        let unit = if physical {
+            self.key.kind().si_unit()
+        } else {
+            ""
+        };
+        json!({ "name": self.key.path(), "factor": self.factor, "unit": unit })
+    }
+}
+
+/// An observable as a panel shows it.
+pub(crate) struct Height {
+    observable: &'static Observable,
+    unit: String,
+}
+
+impl Height {
+    /// The observables of these names, each in the unit of its panel.
+    pub(crate) fn of(figure: &Figure, names: &[&str]) -> Vec<Self> {
+        let named = names.iter().zip(&figure.panels);
+        named
+            .filter_map(|(name, panel)| {
+                Some(Self {
+                    observable: Observable::named(name)?,
+                    unit: unit_of(panel),
+                })
+            })
+            .collect()
+    }
+
+    /// A value in SI (`si` is 1) or in a unit that is `si` in SI, as it is drawn.
+    fn drawn(&self, value: f64, si: Option<f64>) -> f64 {
+        let dimension = self.observable.dimension;
+        if dimension == Dimension::Angle {
+            return shown_phase(value);
+        }
+        match (dimension.kind(), si) {
+            (Some(kind), Some(si)) => value * factor(kind, si, &self.unit),
+            _ => value,
+        }
+    }
+
+    fn of_motion(&self, observables: &Observables, units: &Units) -> f64 {
+        let value = (self.observable.of)(observables);
+        let kind = self.observable.dimension.kind();
+        let si = kind.and_then(|kind| units.si(kind));
+        value
+            .number()
+            .map_or(f64::NAN, |value| self.drawn(value, si))
+    }
+
+    fn of_point(&self, point: &PointReport, units: &Units) -> f64 {
+        match &point.physical {
+            Some(motion) => {
+                let value = (self.observable.of)(&motion.observables).number();
+                value.map_or(f64::NAN, |value| self.drawn(value, Some(1.0)))
+            }
+            None => self.of_motion(&point.observables, units),
+        }
+    }
+}
+
+/// The unit of a panel's vertical axis, which may stand in its label.
+fn unit_of(panel: &Panel) -> String {
+    if !panel.y.unit.is_empty() {
+        return panel.y.unit.clone();
+    }
+    let label = panel.y.label.strip_suffix(')');
+    let unit = label.and_then(|label| label.rsplit_once('('));
+    unit.map_or_else(String::new, |(_, unit)| unit.to_owned())
+}
+
+/// What values are multiplied with, whose 1 is `si` in SI, to be shown in `unit`.
+fn factor(kind: Kind, si: f64, unit: &str) -> f64 {
+    let (si, unit) = match unit.strip_suffix("eV") {
+        Some(prefix) => (si / JOULES_PER_ELECTRONVOLT, format!("{prefix}J")),
+        None => (si, unit.to_owned()),
+    };
+    (-18..=12)
+        .step_by(3)
+        .map(|power| prefixed(kind, si, 2.0 * 10f64.powi(power) / si))
+        .find(|(_, name)| *name == unit)
+        .map_or(1.0, |(factor, _)| factor)
+}
+
+/// A motion that is drawn: where along x, its heights in each panel, and what starts it.
+fn place(x: f64, heights: &[Vec<f64>], start: &str) -> Value {
+    json!([x, heights, start])
+}
+
+/// The orbits of branches, as drawn.
+pub(crate) fn on_branches(
+    report: &BranchReport,
+    x: Axis,
+    heights: &[Height],
+    units: &Units,
+) -> Vec<Value> {
+    let of = |point: &PointReport| {
+        let drawn: Vec<Vec<f64>> = heights
+            .iter()
+            .map(|height| vec![height.of_point(point, units)])
+            .collect();
+        let start = Start::text(Some(point.period), &point.state);
+        place(x.factor * point.parameter, &drawn, &start)
+    };
+    report.points.iter().map(of).collect()
+}
+
+/// The motions that an approach met, and the orbits of its branches. `factor` is that of
+/// distances in the model's unit.
+pub(crate) fn of_approach(
+    report: &ApproachReport,
+    factor: f64,
+    heights: &[Height],
+    units: &Units,
+) -> Vec<Value> {
+    let met = report.table.iter().filter_map(|point| {
+        let state = point.orbit.as_ref()?.states.first()?;
+        let observables = point.observables.as_ref()?;
+        Some((factor * point.gap, observables, Start::text(None, state)))
+    });
+    let followed = report.branches.iter().flat_map(|branches| &branches.points);
+    let followed = followed.map(|point| {
+        let start = Start::text(Some(point.period), &point.state);
+        (factor * point.parameter, &point.observables, start)
+    });
+    met.chain(followed)
+        .map(|(x, observables, start)| {
+            let drawn: Vec<Vec<f64>> = heights
+                .iter()
+                .map(|height| vec![height.of_motion(observables, units)])
+                .collect();
+            place(x, &drawn, &start)
+        })
+        .collect()
+}
+
+/// The motions of a sweep over one parameter, with the state in which each was left. A diagram
+/// shows the maxima of the drive periods (`heights` is one that stands for them), a resonance
+/// curve the observables.
+pub(crate) fn in_sweep(
+    store: &Store,
+    x: Axis,
+    heights: &[Height],
+    response: bool,
+) -> Result<Vec<Value>, StoreError> {
+    let schema = store.schema();
+    let Some(Values::Real(along)) = schema
+        .coordinate(&schema.grid.axes[0].name)
+        .map(|c| &c.values)
+    else {
+        return Ok(Vec::new());
+    };
+    let names: Vec<&str> = if response {
+        heights
+            .iter()
+            .map(|height| height.observable.name)
+            .collect()
+    } else {
+        vec!["period_max"]
+    };
+    let Some(strobe) = schema.index_of("strobe") else {
+        return Ok(Vec::new());
+    };
+    let columns: Vec<usize> = names.iter().filter_map(|n| schema.index_of(n)).collect();
+    let mut places = Vec::new();
+    for chunk in 0..store.chunks() {
+        let block = schema.grid.block(chunk);
+        let real = |variable: usize| -> Result<Vec<f64>, StoreError> {
+            Ok(match store.read_chunk(&block, variable)? {
+                Values::Real(values) => values,
+                _ => Vec::new(),
+            })
+        };
+        let states = real(strobe)?;
+        let values: Vec<Vec<f64>> = columns.iter().map(|c| real(*c)).collect::<Result<_, _>>()?;
+        let width = schema.variables[strobe].stride();
+        for (cell, entry) in block.entries().enumerate() {
+            let Some(state) = states.get(cell * width..(cell + 1) * width) else {
+                continue;
+            };
+            if state.iter().any(|number| !number.is_finite()) {
+                continue;
+            }
+            let drawn: Vec<Vec<f64>> = heights
+                .iter()
+                .zip(columns.iter().zip(&values))
+                .map(|(height, (&column, values))| {
+                    let variable = &schema.variables[column];
+                    let units = variable.attributes.get("units").and_then(Value::as_str);
+                    let kind = height.observable.dimension.kind();
+                    let si = kind
+                        .filter(|kind| units == Some(kind.si_unit()))
+                        .map(|_| 1.0);
+                    let own = cell * variable.stride()..(cell + 1) * variable.stride();
+                    let row = values.get(own).unwrap_or_default().iter();
+                    row.map(|value| height.drawn(*value, si)).collect()
+                })
+                .collect();
+            let start = Start::text(None, state);
+            places.push(place(x.factor * along[entry[0]], &drawn, &start));
+        }
+    }
+    Ok(places)
+}
+
+/// Draws the branches of a case over the figure of a sweep: stable ones as lines, unstable ones
+/// dashed.
+pub(crate) fn drawn_over(
+    figure: &mut Figure,
+    report: &BranchReport,
+    x: Axis,
+    heights: &[Height],
+    units: &Units,
+) {
+    for (height, panel) in heights.iter().zip(&mut figure.panels) {
+        let mut lines: Vec<(bool, Vec<(f64, f64)>)> = Vec::new();
+        let mut before: Option<&PointReport> = None;
+        for point in &report.points {
+            let at = (x.factor * point.parameter, height.of_point(point, units));
+            match (before, lines.last_mut()) {
+                (Some(last), Some((stable, line)))
+                    if last.branch == point.branch && *stable == point.stable =>
+                {
+                    line.push(at);
+                }
+                (Some(last), Some((_, line))) if last.branch == point.branch => {
+                    let joint = line.last().copied();
+                    lines.push((point.stable, joint.into_iter().chain([at]).collect()));
+                }
+                _ => lines.push((point.stable, vec![at])),
+            }
+            before = Some(point);
+        }
+        let mut named = [false; 2];
+        for (stable, points) in lines {
+            let (words, dash) = if stable {
+                ("stable", Dash::Solid)
+            } else {
+                ("unstable", Dash::Dashed)
+            };
+            let first = !std::mem::replace(&mut named[usize::from(stable)], true);
+            let line = Line::new(points)
+                .colour(Colour::BLACK)
+                .dash(dash)
+                .width(0.5)
+                .label(if first { words } else { "" });
+            panel.layers.push(line.into());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_says_its_factor() {
+        assert!((factor(Kind::Length, 1.0, "nm") - 1e9).abs() < 1.0);
+        // 2 model units of 5 nm each are 10 nm.
+        assert!((2.0 * factor(Kind::Length, 5e-9, "nm") - 10.0).abs() < 1e-12);
+        let [joules, volts] = ["aJ", "eV"].map(|unit| factor(Kind::Energy, 1.0, unit));
+        assert!((joules / volts - 1e18 * JOULES_PER_ELECTRONVOLT).abs() < 1e-12);
+        let panel = Panel::new(
+            nanotap_figures::Axis::default(),
+            nanotap_figures::Axis::linear("force (pN)"),
+        );
+        assert_eq!(unit_of(&panel), "pN");
+    }
+}

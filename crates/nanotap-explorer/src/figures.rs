@@ -1,0 +1,261 @@
+//! Figures as the page gets them: drawn, with the map of their axes, in the part that it zooms to;
+//! and as files.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use nanotap_figures::{DPI, Figure, Layer, Range};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::App;
+use crate::answer::Refusal;
+
+/// Figures of studies that are kept to be drawn again.
+const KEPT: usize = 8;
+
+/// The part of a panel that is to be seen, in the units of its axes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct View {
+    panel: usize,
+    x: [f64; 2],
+    y: [f64; 2],
+}
+
+/// Views of figures by the name of their place on the page.
+pub(crate) type Views = BTreeMap<String, Vec<View>>;
+
+/// The figure with the ranges of its axes as said. Panels that share their horizontal axis are
+/// moved together.
+pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
+    for View { panel, x, y } in views {
+        let column = panel % figure.cols.max(1);
+        for (k, one) in figure.panels.iter_mut().enumerate() {
+            let shares = figure.share_x && k % figure.cols.max(1) == column;
+            if k == *panel || shares {
+                one.x.range = Range::Fixed(x[0], x[1]);
+            }
+            if k == *panel {
+                one.y.range = Range::Fixed(y[0], y[1]);
+            }
+        }
+    }
+    figure
+}
+
+/// A figure as the page takes it.
+pub(crate) fn drawn(figure: &Figure) -> Result<Value, Refusal> {
+    let (svg, map) = figure.to_svg_with_map().map_err(Refusal::of)?;
+    Ok(json!({ "svg": svg, "map": map }))
+}
+
+/// A figure in a format by its ending.
+pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Vec<u8>), Refusal> {
+    Ok(match format {
+        "svg" => (
+            "image/svg+xml",
+            figure.to_svg().map_err(Refusal::of)?.into_bytes(),
+        ),
+        "png" => ("image/png", figure.to_png(DPI).map_err(Refusal::of)?),
+        "pdf" => ("application/pdf", figure.to_pdf().map_err(Refusal::of)?),
+        "csv" => ("text/csv", csv(figure).into_bytes()),
+        other => {
+            return Err(Refusal::input(
+                format!("there is no format `{other}`"),
+                "there are svg, png, pdf and csv",
+            ));
+        }
+    })
+}
+
+/// What is drawn, point by point, in the units of the axes. The axes' names stand in the first
+/// lines; of a map, the last column is what is at the middle of each cell.
+fn csv(figure: &Figure) -> String {
+    let mut text = String::new();
+    for (k, panel) in figure.panels.iter().enumerate() {
+        for (name, axis) in [("x", &panel.x), ("y", &panel.y)] {
+            let words = format!("{} {}", axis.label, axis.unit);
+            let _ = writeln!(
+                text,
+                "# panel {k}, {name}: {}",
+                words.trim().replace('$', "")
+            );
+        }
+    }
+    text.push_str("panel,series,x,y,value\n");
+    for (k, panel) in figure.panels.iter().enumerate() {
+        for layer in &panel.layers {
+            match layer {
+                Layer::Line(l) => series(&mut text, k, &l.label, &l.points),
+                Layer::Points(l) => series(&mut text, k, &l.label, &l.points),
+                Layer::Markers(l) => series(&mut text, k, &l.label, &l.points),
+                Layer::Stems(l) => series(&mut text, k, &l.label, &l.points),
+                Layer::Bars(l) => series(&mut text, k, &l.label, &l.points),
+                Layer::Heatmap(l) => {
+                    let values = l.values.iter().map(|v| (*v).to_string());
+                    grid(
+                        &mut text,
+                        k,
+                        &l.scale.label,
+                        (l.columns, l.x, l.rows, l.y),
+                        values,
+                    );
+                }
+                Layer::CategoryMap(l) => {
+                    let name = |cell: &Option<usize>| {
+                        let category = cell.and_then(|c| l.categories.get(c));
+                        category.map_or_else(String::new, |c| field(&c.label))
+                    };
+                    let values = l.cells.iter().map(name);
+                    grid(&mut text, k, "map", (l.columns, l.x, l.rows, l.y), values);
+                }
+                _ => {}
+            }
+        }
+    }
+    text
+}
+
+fn series(text: &mut String, panel: usize, label: &str, points: &[(f64, f64)]) {
+    for (x, y) in points
+        .iter()
+        .filter(|(x, y)| x.is_finite() && y.is_finite())
+    {
+        let _ = writeln!(text, "{panel},{},{x},{y},", field(label));
+    }
+}
+
+fn grid(
+    text: &mut String,
+    panel: usize,
+    label: &str,
+    (columns, x, rows, y): (usize, (f64, f64), usize, (f64, f64)),
+    values: impl Iterator<Item = String>,
+) {
+    let middle = |(from, to): (f64, f64), count: usize, k: usize| {
+        from + (to - from) * (k as f64 + 0.5) / count as f64
+    };
+    for (cell, value) in values.enumerate() {
+        let [x, y] = [
+            middle(x, columns, cell % columns),
+            middle(y, rows, cell / columns),
+        ];
+        let _ = writeln!(text, "{panel},{},{x},{y},{value}", field(label));
+    }
+}
+
+/// A word as a field of CSV.
+fn field(word: &str) -> String {
+    let word = word.replace('$', "");
+    if word.contains([',', '"', '\n']) {
+        format!("\"{}\"", word.replace('"', "\"\""))
+    } else {
+        word
+    }
+}
+
+/// The newest figures of studies.
+#[derive(Default)]
+pub(crate) struct Shelf(Mutex<Kept>);
+
+#[derive(Default)]
+struct Kept {
+    /// Number of the last one.
+    last: u64,
+    figures: VecDeque<(u64, Arc<Figure>)>,
+}
+
+impl Shelf {
+    /// Keeps a figure; the number under which it is found, while it is among the newest.
+    pub(crate) fn put(&self, figure: Figure) -> u64 {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.last += 1;
+        let number = kept.last;
+        kept.figures.push_back((number, Arc::new(figure)));
+        if kept.figures.len() > KEPT {
+            kept.figures.pop_front();
+        }
+        number
+    }
+
+    fn get(&self, number: u64) -> Result<Arc<Figure>, Refusal> {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = kept.figures.iter().find(|(own, _)| *own == number);
+        found.map(|(_, figure)| Arc::clone(figure)).ok_or_else(|| {
+            Refusal::input("this figure is no longer kept", "compute the study again")
+        })
+    }
+}
+
+/// A figure that was drawn before, asked for in another part or as a file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Wish {
+    number: u64,
+    #[serde(default)]
+    views: Vec<View>,
+    /// Empty: for the page.
+    #[serde(default)]
+    format: String,
+}
+
+pub(crate) async fn figure(
+    State(app): State<Arc<App>>,
+    Json(wish): Json<Wish>,
+) -> Result<Response, Refusal> {
+    let figure = app.figures.get(wish.number)?;
+    app.workers
+        .run(move |_| {
+            let figure = viewed(Figure::clone(&figure), &wish.views);
+            if wish.format.is_empty() {
+                return Ok(Json(drawn(&figure)?).into_response());
+            }
+            let (kind, bytes) = picture(&figure, &wish.format)?;
+            Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
+        })
+        .await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nanotap_figures::{Axis, CategoryMap, Line, Panel};
+
+    #[test]
+    fn the_table_of_a_figure_has_its_points_and_the_middles_of_its_cells() {
+        let lines = Panel::new(Axis::linear("$x$").unit("nm"), Axis::linear("y"))
+            .with(Line::new([(1.0, 2.0), (f64::NAN, 0.0)]).label("a, b"));
+        let cells = CategoryMap::new(2, 1, [Some(0), None], (0.0, 2.0), (0.0, 1.0));
+        let map = Panel::new(Axis::linear("x"), Axis::linear("y"))
+            .with(cells.category_in("chaotic", nanotap_figures::Colour::BLACK));
+        let text = csv(&Figure::new(1, 2).with(lines).with(map));
+        let rows: Vec<&str> = text.lines().skip_while(|l| l.starts_with('#')).collect();
+        assert_eq!(
+            rows,
+            [
+                "panel,series,x,y,value",
+                "0,\"a, b\",1,2,",
+                "1,map,0.5,0.5,chaotic",
+                "1,map,1.5,0.5,",
+            ]
+        );
+        assert!(text.starts_with("# panel 0, x: x nm\n"));
+    }
+
+    #[test]
+    fn only_the_newest_figures_are_kept() {
+        let shelf = Shelf::default();
+        let first = shelf.put(Figure::new(1, 1));
+        assert!(shelf.get(first).is_ok());
+        for _ in 0..KEPT {
+            shelf.put(Figure::new(1, 1));
+        }
+        assert!(shelf.get(first).is_err());
+    }
+}

@@ -1,0 +1,100 @@
+//! The forms of the studies: their fields and first values.
+
+use nanotap::case::quantity::Kind;
+use nanotap::case::{Case, Key};
+use nanotap::model::Model;
+use nanotap::observe::time_series::state_names;
+use nanotap::study::start_box::default_box;
+use serde_json::{Value, json};
+
+use crate::knobs;
+use crate::maps::Shows;
+
+/// The fields of the forms with their first values.
+pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
+    let keys: Vec<Key> = knobs::keys(case)
+        .filter(|key| key.cannot_vary().is_none() && case.get(*key).is_finite())
+        .filter(|key| !case.is_physical() || key.is_physical())
+        .collect();
+    let choices: Vec<Value> = keys.iter().map(|key| json!(key.path())).collect();
+    let named = |names: &[Key]| {
+        let of_names = names.iter().copied().find(|key| keys.contains(key));
+        of_names.or_else(|| keys.first().copied())
+    };
+    let frequency = named(&[
+        Key::Omega,
+        Key::OscillatorOmega,
+        Key::DriveFrequency,
+        Key::DriveFrequencyRatio,
+    ]);
+    let second = named(&[
+        Key::Alpha4,
+        Key::GapTip,
+        Key::DriveFreeAmplitude,
+        Key::Restitution,
+        Key::StopStiffness,
+    ]);
+    let parameter = |which: &str, key: Option<Key>, reach: f64| {
+        let [from, to] = key.map_or_else(Default::default, |key| ends(base, key, reach));
+        vec![
+            json!({ "name": format!("key{which}"), "words": "parameter", "choices": choices, "value": key.map_or("", Key::path) }),
+            json!({ "name": format!("from{which}"), "words": "from", "value": from }),
+            json!({ "name": format!("to{which}"), "words": "to", "value": to }),
+        ]
+    };
+    let names = state_names(model);
+    let sides = default_box(model).ok();
+    let entry = |which: &str, k: usize| {
+        let side = sides
+            .as_ref()
+            .and_then(|sides| Some((*sides.lower().get(k)?, *sides.upper().get(k)?)))
+            .unwrap_or((-1.0, 1.0));
+        let short = |v: f64| Kind::Number.format_digits(v, 3);
+        vec![
+            json!({ "name": format!("entry{which}"), "words": "coordinate", "choices": names, "value": names.get(k) }),
+            json!({ "name": format!("from{which}"), "words": "from", "value": short(side.0) }),
+            json!({ "name": format!("to{which}"), "words": "to", "value": short(side.1) }),
+        ]
+    };
+    let velocity = (names.len() - model.memory) / 2;
+    // A lever of high Q answers in a narrow band.
+    let band = case.physical().map_or(0.25, |view| {
+        (4.0 / view.lever.quality_factor).clamp(1e-3, 0.25)
+    });
+    let shows: Vec<&str> = Shows::ALL.iter().map(|shows| shows.words()).collect();
+    let shown = json!({ "name": "show", "words": "show", "choices": shows, "value": shows[0] });
+    let plane = [
+        parameter("1", second, 0.5),
+        parameter("2", frequency, band),
+        vec![shown],
+    ]
+    .concat();
+    let slice = [entry("x", 0), entry("y", velocity)].concat();
+    json!({
+        "diagram": parameter("", frequency, band),
+        "branches": parameter("", frequency, band),
+        "resonance": parameter("", frequency, band),
+        "approach": [
+            json!({ "name": "from", "words": "from", "value": "", "hint": "clear of the sample" }),
+            json!({ "name": "to", "words": "to", "value": "", "hint": "0" }),
+        ],
+        "map": plane,
+        "basin": slice,
+    })
+}
+
+/// A range around the value of a key, as it is typed.
+fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {
+    let value = base.get(key);
+    let value = if value.is_finite() {
+        value
+    } else {
+        key.entry().example
+    };
+    let reach = if value == 0.0 {
+        1.0
+    } else {
+        reach * value.abs()
+    };
+    [value - reach, value + reach].map(|value| key.kind().format_digits(value, 5))
+}

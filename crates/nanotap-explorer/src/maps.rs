@@ -1,0 +1,185 @@
+//! Maps over two parameters: which motions there are, how hard the sample is hit, how many motions
+//! coexist.
+
+use nanotap::dataset::{Store, StoreError, Values};
+use nanotap::study::sweep::{figure as sweep_figure, from_neighbours};
+use nanotap_figures::{Axis, CategoryMap, Colour, Figure, Heatmap, Layer, Legend};
+use serde_json::Value;
+
+use nanotap::case::quantity::Kind;
+use nanotap::case::units::prefixed;
+
+/// What a map shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Shows {
+    /// Which motions were found.
+    #[default]
+    Motions,
+    /// The greatest force of any of them on the tip.
+    Force,
+    /// How many there are.
+    States,
+}
+
+/// What numbers of motions are called and coloured.
+const COLOURS: [(&str, Colour); 4] = [
+    ("one", Colour::rgb(222, 235, 247)),
+    ("two", Colour::ORANGE),
+    ("three", Colour::VERMILLION),
+    ("more", Colour::BLACK),
+];
+
+/// Amplitudes that differ by less than this part are those of one motion.
+const SAME: f64 = 1e-6;
+
+impl Shows {
+    pub(crate) const ALL: [Self; 3] = [Self::Motions, Self::Force, Self::States];
+
+    pub(crate) const fn words(self) -> &'static str {
+        match self {
+            Self::Motions => "kinds of motion",
+            Self::Force => "greatest force",
+            Self::States => "number of motions",
+        }
+    }
+
+    pub(crate) fn named(words: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|shows| shows.words() == words)
+    }
+}
+
+/// A motion as far as it matters which it is: its class, its period, its amplitude.
+type Met = (u8, i32, f64);
+
+/// The map of a sweep over two parameters.
+pub(crate) fn figure(store: &Store, shows: Shows) -> Result<Figure, StoreError> {
+    let mut figure = sweep_figure(store)?;
+    if shows == Shows::Motions {
+        return Ok(figure);
+    }
+    let Some(panel) = figure.panels.first_mut() else {
+        return Ok(figure);
+    };
+    let Some(Layer::CategoryMap(grid)) = panel.layers.pop() else {
+        return Ok(figure);
+    };
+    panel.layers.push(match shows {
+        Shows::Force => force(store, &grid)?.into(),
+        _ => states(store, &grid)?.into(),
+    });
+    panel.legend = Legend::Right;
+    Ok(figure)
+}
+
+/// Hands over each motion: the index of its place on the map, and its values of the variables.
+fn each(
+    store: &Store,
+    variables: &[&str],
+    mut take: impl FnMut(usize, &[f64]),
+) -> Result<(), StoreError> {
+    let schema = store.schema();
+    let width = schema.grid.axes[1].length;
+    let columns: Vec<usize> = variables
+        .iter()
+        .filter_map(|name| schema.index_of(name))
+        .collect();
+    for chunk in 0..store.chunks() {
+        let block = schema.grid.block(chunk);
+        let read: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|column| Ok(numbers(store.read_chunk(&block, *column)?)))
+            .collect::<Result<_, StoreError>>()?;
+        for (cell, entry) in block.entries().enumerate() {
+            let row: Vec<f64> = read.iter().filter_map(|r| r.get(cell).copied()).collect();
+            take(entry[0] * width + entry[1], &row);
+        }
+    }
+    Ok(())
+}
+
+fn numbers(values: Values) -> Vec<f64> {
+    match values {
+        Values::Real(values) => values,
+        Values::Code(values) => values.into_iter().map(f64::from).collect(),
+        Values::Whole(values) => values.into_iter().map(f64::from).collect(),
+        Values::Text(_) => Vec::new(),
+    }
+}
+
+fn force(store: &Store, grid: &CategoryMap) -> Result<Heatmap, StoreError> {
+    let mut greatest = vec![f64::NAN; grid.columns * grid.rows];
+    each(store, &["peak_force"], |at, row| {
+        if let (Some(most), [force]) = (greatest.get_mut(at), row) {
+            *most = most.max(*force);
+        }
+    })?;
+    let schema = store.schema();
+    let variable = schema.index_of("peak_force").map(|k| &schema.variables[k]);
+    let units = variable.and_then(|v| v.attributes.get("units").and_then(Value::as_str));
+    let size = greatest.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let (factor, unit) = if units == Some(Kind::Force.si_unit()) {
+        prefixed(Kind::Force, 1.0, size)
+    } else {
+        (1.0, String::new())
+    };
+    let values: Vec<f64> = greatest.iter().map(|force| factor * force).collect();
+    let scale = Axis::linear("greatest force on the tip").unit(unit);
+    Ok(Heatmap::new(
+        grid.columns,
+        grid.rows,
+        values,
+        grid.x,
+        grid.y,
+        scale,
+    ))
+}
+
+/// How many different motions were found at each place; those that the orbits of neighbouring
+/// places lead to are among them.
+fn states(store: &Store, grid: &CategoryMap) -> Result<CategoryMap, StoreError> {
+    let mut found: Vec<Vec<Met>> = vec![Vec::new(); grid.columns * grid.rows];
+    let mut meet = |at: usize, (code, period, amplitude): Met| {
+        let Some(motions) = found.get_mut(at) else {
+            return;
+        };
+        let same = |met: &Met| {
+            let near = (met.2 - amplitude).abs() <= SAME * amplitude.abs();
+            // What does not repeat has no amplitude that is always the same.
+            met.0 == code && met.1 == period && (period == 0 || near)
+        };
+        if !motions.iter().any(same) {
+            motions.push((code, period, amplitude));
+        }
+    };
+    let names = ["classification", "period", "first_harmonic"];
+    let mut periodic = None;
+    each(store, &names, |at, row| {
+        if let [code, period, amplitude] = *row {
+            let (code, period) = (code as u8, period as i32);
+            if code == 0 {
+                return;
+            }
+            if period > 0 {
+                periodic = Some(code);
+            }
+            meet(at, (code, period, amplitude));
+        }
+    })?;
+    for orbit in from_neighbours(store)? {
+        let at = orbit.at[1] * grid.columns + orbit.at[0];
+        let period = i32::try_from(orbit.period).unwrap_or(0);
+        if let Some(code) = periodic.filter(|_| period > 0) {
+            meet(at, (code, period, orbit.first_harmonic));
+        }
+    }
+    let cells: Vec<Option<usize>> = found
+        .iter()
+        .map(|motions| motions.len().min(COLOURS.len()).checked_sub(1))
+        .collect();
+    let most = cells.iter().flatten().max().map_or(1, |most| most + 1);
+    let mut map = CategoryMap::new(grid.columns, grid.rows, cells, grid.x, grid.y);
+    for (words, colour) in &COLOURS[..most] {
+        map = map.category_in(*words, *colour);
+    }
+    Ok(map)
+}

@@ -1,0 +1,46 @@
+"""Values of a case's keys: numbers in SI, texts with a unit, quantities of a package of units."""
+
+from typing import Any
+
+import numpy as np
+
+from . import _nanotap
+
+_UNITS = {
+    f"{table}.{name}": unit
+    for table, keys in _nanotap.case_keys()
+    for name, _, unit in keys
+}
+
+
+def si_unit(key: str) -> str:
+    """The SI unit of a key by its path, `gap.tip`; empty of a number."""
+    return _UNITS.get(key, "")
+
+
+def in_si(key: str, value: Any) -> Any:
+    """A quantity of pint, astropy or unyt as numbers in the key's SI unit; else the value."""
+    if isinstance(value, str | int | float | list | tuple) or not hasattr(value, "to"):
+        return value
+    unit = si_unit(key)
+    try:
+        if hasattr(value, "to_value"):
+            return value.to_value(unit)
+        if hasattr(value, "magnitude"):
+            return value.to(unit).magnitude
+    except Exception as error:  # each package has errors of its own
+        message = f"{key}: {value!r} has no value in {unit or 'plain numbers'}: {error}"
+        raise ValueError(message) from error
+    return value
+
+
+def text(key: str, value: float) -> str:
+    """A number as the case reads it: with the SI unit that the key has."""
+    return f"{value!r} {si_unit(key)}".rstrip()
+
+
+def many(key: str, value: Any) -> Any:
+    """Values of a key, one a place: numbers in SI, or texts."""
+    if isinstance(value, list | tuple) and any(hasattr(one, "to") for one in value):
+        value = [in_si(key, one) for one in value]
+    return np.asarray(in_si(key, value))

@@ -1,0 +1,46 @@
+//! One run, as the command does it, beside its bare propagation.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use nanotap::observe::Set;
+use nanotap::study::simulate::{SimulateOptions, simulate};
+
+use crate::cases;
+
+/// Periods recorded: long enough that classifying the motion does not count.
+const PERIODS: usize = 100_000;
+
+/// The paper's case from rest, without anything that looks on. Items are periods.
+#[divan::bench(args = [3], sample_count = 3, sample_size = 1)]
+fn bare(bencher: Bencher<'_, '_>, modes: usize) {
+    let flow = cases::at_rest(&cases::model(&cases::paper(modes)));
+    bencher
+        .counter(ItemsCount::new(PERIODS))
+        .with_inputs(|| flow.clone())
+        .bench_local_refs(|flow| cases::run(flow, PERIODS));
+}
+
+/// The same as a run with its last state alone.
+#[divan::bench(args = [3], sample_count = 3, sample_size = 1)]
+fn strobe_only(bencher: Bencher<'_, '_>, modes: usize) {
+    run(bencher, modes, Set::NONE);
+}
+
+/// The same with everything that is known of a motion.
+#[divan::bench(args = [3], sample_count = 3, sample_size = 1)]
+fn everything(bencher: Bencher<'_, '_>, modes: usize) {
+    run(bencher, modes, Set::ALL);
+}
+
+fn run(bencher: Bencher<'_, '_>, modes: usize, observables: Set) {
+    let model = cases::model(&cases::paper(modes));
+    let options = SimulateOptions {
+        periods: PERIODS,
+        transient: Some(0),
+        observables,
+        ..SimulateOptions::default()
+    };
+    bencher
+        .counter(ItemsCount::new(PERIODS))
+        .bench_local(|| simulate(&model, &options).expect("a bounded motion"));
+}

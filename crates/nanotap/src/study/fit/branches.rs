@@ -1,0 +1,220 @@
+//! The orbits at the places of a curve, branch by branch, and which branch the data are on.
+//!
+//! A motion is followed along the curve as the instrument saw it: from each row's orbit Newton
+//! closes the next one's, in halves of the way where it must; where that fails the branch has
+//! ended, and the motion goes on from where it is to the next attractor. The same is done from
+//! the curve's end to its beginning, which finds the other side of a hysteresis. Orbits of one
+//! period that continue each other are one branch. Of the branches, each row gets one by the
+//! least sum of squared residuals and of a price for every change of branch (the shortest path
+//! through the table of rows and branches, found row by row).
+//!
+//! Fails by omission: branches that neither way meets.
+
+use nanotap_dynamics::{
+    ClassifyOptions, MotionKind, PeriodicOrbit, ShootingOptions, StroboscopicMap as _, classify,
+    close_orbit_from_points,
+};
+
+use crate::case::Case;
+use crate::model::strobe::Strobe;
+
+/// An orbit at a row.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) branch: usize,
+    pub(super) orbit: PeriodicOrbit,
+}
+
+/// The orbits at each row.
+pub(super) type Rows = Vec<Vec<Candidate>>;
+
+/// A curve whose rows' cases are known.
+pub(super) struct Along<'a> {
+    /// The case at each row, and at places between.
+    pub(super) at: &'a dyn Fn(&[f64]) -> Option<Case>,
+    /// Where the rows are.
+    pub(super) places: &'a [Vec<f64>],
+    /// Longest period looked for.
+    pub(super) max_period: usize,
+}
+
+/// Halvings of the way from one row to the next.
+const HALVINGS: usize = 4;
+
+impl Along<'_> {
+    /// The orbits at every row.
+    pub(super) fn discover(&self) -> Rows {
+        let mut rows: Rows = vec![Vec::new(); self.places.len()];
+        let mut branches = 0;
+        let count = self.places.len();
+        self.pass(&mut rows, &mut branches, (0..count).collect(), None);
+        let last = rows.last().and_then(|row| row.first()).cloned();
+        self.pass(
+            &mut rows,
+            &mut branches,
+            (0..count).rev().collect(),
+            last.as_ref(),
+        );
+        rows
+    }
+
+    /// Follows the motion over the rows in this order.
+    fn pass(
+        &self,
+        rows: &mut Rows,
+        branches: &mut usize,
+        order: Vec<usize>,
+        from: Option<&Candidate>,
+    ) {
+        let mut last: Option<(usize, Candidate)> = None;
+        let mut state: Option<Vec<f64>> =
+            from.and_then(|candidate| candidate.orbit.states.first().cloned());
+        for row in order {
+            let continued = last.as_ref().and_then(|(before, candidate)| {
+                let [a, b] = [*before, row].map(|k| self.places[k].as_slice());
+                let orbit = self.follow(a, b, &candidate.orbit, HALVINGS)?;
+                Some((orbit, Some(candidate.branch)))
+            });
+            let found = continued.or_else(|| {
+                let orbit = self.settled(row, state.as_deref())?;
+                Some((orbit, None))
+            });
+            let Some((orbit, branch)) = found else {
+                last = None;
+                continue;
+            };
+            state = orbit.states.first().cloned();
+            let known = rows[row].iter().find(|known| same(&known.orbit, &orbit));
+            let candidate = if let Some(known) = known {
+                known.clone()
+            } else {
+                let branch = branch.or_else(|| self.known(rows, row, &orbit));
+                let branch = branch.unwrap_or_else(|| {
+                    *branches += 1;
+                    *branches - 1
+                });
+                let candidate = Candidate { branch, orbit };
+                rows[row].push(candidate.clone());
+                candidate
+            };
+            last = Some((row, candidate));
+        }
+    }
+
+    /// The branch of an orbit that was found anew: that of an orbit at the nearest row with any,
+    /// if that continues to this one.
+    fn known(&self, rows: &Rows, row: usize, orbit: &PeriodicOrbit) -> Option<usize> {
+        let here = &self.places[row];
+        let away = |k: &usize| {
+            let place = self.places[*k].iter().zip(here);
+            place.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        let others = (0..rows.len()).filter(|k| *k != row && !rows[*k].is_empty());
+        let near = others.min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let mut there = rows[near].iter();
+        let continues = there.find(|candidate| {
+            let found = self.follow(&self.places[near], here, &candidate.orbit, HALVINGS);
+            found.is_some_and(|found| same(&found, orbit))
+        });
+        continues.map(|candidate| candidate.branch)
+    }
+
+    /// The orbit at `to` that continues the one at `from`, if it attracts.
+    fn follow(
+        &self,
+        from: &[f64],
+        to: &[f64],
+        orbit: &PeriodicOrbit,
+        halvings: usize,
+    ) -> Option<PeriodicOrbit> {
+        let closed = (self.at)(to).and_then(|case| {
+            let model = case.model().ok()?;
+            continued(&mut Strobe::new(&model), orbit)
+        });
+        if closed.as_ref().is_some_and(PeriodicOrbit::is_stable) || halvings == 0 {
+            return closed.filter(PeriodicOrbit::is_stable);
+        }
+        let middle: Vec<f64> = from.iter().zip(to).map(|(a, b)| 0.5 * (a + b)).collect();
+        let half = self.follow(from, &middle, orbit, halvings - 1)?;
+        self.follow(&middle, to, &half, halvings - 1)
+    }
+
+    /// Where the motion at a row goes from a state, or from rest.
+    fn settled(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
+        let model = (self.at)(&self.places[row])?.model().ok()?;
+        let rest = vec![0.0; model.dimension()];
+        let options = ClassifyOptions {
+            max_period: self.max_period,
+            long_period: self.max_period,
+            ..ClassifyOptions::default()
+        };
+        let end = classify(&mut Strobe::new(&model), state.unwrap_or(&rest), &options);
+        match end.kind {
+            MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => Some(orbit),
+            _ => None,
+        }
+    }
+}
+
+/// The orbit of this map that Newton finds from another's, of the same period.
+pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<PeriodicOrbit> {
+    if orbit.dimension() != map.dimension() {
+        return None;
+    }
+    let points = orbit.states.concat();
+    close_orbit_from_points(map, &points, orbit.period, &ShootingOptions::default())
+        .ok()
+        .filter(|found| found.period == orbit.period)
+}
+
+/// Whether two orbits are one: rounding is far below, and two branches far above.
+fn same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
+    a.is_same_as(b) || a.distance_to(b).1 <= 1e-7 * a.scale()
+}
+
+/// Least cost up to a candidate, and the row and candidate before it.
+type Reached = (f64, Option<(usize, usize)>);
+
+/// The branch of each row: the path of least cost, each change of branch at `price`; `costs`
+/// has one a candidate. `None` where a row has no orbit.
+pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<usize>> {
+    let mut best: Vec<Vec<Reached>> = Vec::new();
+    let mut last: Option<usize> = None;
+    for (row, candidates) in rows.iter().enumerate() {
+        let here = candidates.iter().zip(&costs[row]).map(|(candidate, own)| {
+            let Some(before) = last else {
+                return (*own, None);
+            };
+            let steps = rows[before].iter().zip(&best[before]).enumerate();
+            let (cost, from) = steps
+                .map(|(k, (other, (sum, _)))| {
+                    let change = if other.branch == candidate.branch {
+                        0.0
+                    } else {
+                        price
+                    };
+                    (sum + change, k)
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((0.0, 0));
+            (cost + own, Some((before, from)))
+        });
+        best.push(here.collect());
+        if !candidates.is_empty() {
+            last = Some(row);
+        }
+    }
+    let mut chosen = vec![None; rows.len()];
+    let cheapest = |row: usize| {
+        let costs = best[row].iter().enumerate();
+        costs
+            .min_by(|a, b| a.1.0.total_cmp(&b.1.0))
+            .map(|(k, _)| (row, k))
+    };
+    let mut at = last.and_then(cheapest);
+    while let Some((row, candidate)) = at {
+        chosen[row] = Some(candidate);
+        at = best[row][candidate].1;
+    }
+    chosen
+}

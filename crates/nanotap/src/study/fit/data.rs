@@ -1,0 +1,543 @@
+//! Measured curves: tables whose columns are quantities of the case and observables.
+//!
+//! A column is called by a key of the case (`gap.tip (nm)`, `drive.frequency (kHz)`, `alpha5`),
+//! which its rows then set, or by an observable, by either of its names (`phase`, `E_dis (eV)`).
+//! What experimenters say is understood: `distance` and `zc` are the gap between tip and sample,
+//! `frequency` is that of the drive, and `amplitude` is what a lock-in amplifier reads, unless
+//! the table has that under a name of its own (then it is, as everywhere, half of peak to peak).
+//! `NAME error (unit)` holds standard errors, `direction` which way the abscissa went, `curve`
+//! to which curve a row belongs.
+
+use crate::Error;
+use crate::case::near_name::near_name;
+use crate::case::{Case, Key};
+use crate::observe::{Dimension, OBSERVABLES, Observable};
+use crate::study::approach::Way;
+
+use super::table::{Entry, Table};
+
+/// All curves, and what their columns are.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// What was measured, every observable once.
+    pub columns: Vec<Column>,
+    /// The keys that rows set, the one that varies along the curves first.
+    pub swept: Vec<Swept>,
+}
+
+/// An observable that was measured.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// What it is.
+    pub observable: &'static Observable,
+    /// What the data call it.
+    pub name: String,
+    /// The unit that the data give it; empty for none.
+    pub unit: String,
+    /// A unit of the data in SI, of a dimensionless case in the model's own.
+    pub factor: f64,
+    /// Root mean square of the values about their mean: what size of residual is none.
+    pub spread: f64,
+}
+
+/// A key that rows set.
+#[derive(Clone, Debug)]
+pub struct Swept {
+    /// The key.
+    pub key: Key,
+    /// What the data call it.
+    pub name: String,
+    /// The unit that the data give it; empty for none.
+    pub unit: String,
+    /// A unit of the data in that of the key.
+    pub factor: f64,
+}
+
+/// Rows that were measured one after another.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Its name.
+    pub name: String,
+    /// Its rows, in the order in which they were measured.
+    pub rows: Vec<Row>,
+}
+
+/// What was measured at one place.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The swept keys, in their own units.
+    pub at: Vec<f64>,
+    /// The measured values, a place a column, in SI or the model's units; phases in degrees.
+    pub values: Vec<Option<f64>>,
+    /// Their standard errors, where they are given.
+    pub errors: Vec<Option<f64>>,
+    /// Which way the abscissa went, where the data say so.
+    pub way: Option<Way>,
+    /// Where it stands: the line of its file, or the row from 1.
+    pub line: u64,
+}
+
+impl Data {
+    /// How many numbers were measured.
+    pub fn count(&self) -> usize {
+        self.rows().flat_map(|row| &row.values).flatten().count()
+    }
+
+    /// The rows of all curves, one curve after the other.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.curves.iter().flat_map(|curve| &curve.rows)
+    }
+
+    /// What `tables` hold; `only` names the columns that count, all if it is empty.
+    ///
+    /// # Errors
+    /// When a column or an entry is not understood, with its place.
+    pub fn read(case: &Case, tables: &[Table], only: &[String]) -> Result<Self, Error> {
+        let mut data = Self {
+            curves: Vec::new(),
+            columns: Vec::new(),
+            swept: Vec::new(),
+        };
+        for table in tables {
+            data.add(case, table, only)?;
+        }
+        if data.columns.is_empty() {
+            return Err(Error::option(
+                "data",
+                "nothing measured is among the columns",
+                "name them as in: distance (nm), amplitude (nm), phase (deg)",
+            ));
+        }
+        if data.swept.is_empty() {
+            return Err(Error::option(
+                "data",
+                "no column says where the values were measured",
+                "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
+            ));
+        }
+        data.finish();
+        Ok(data)
+    }
+
+    fn add(&mut self, case: &Case, table: &Table, only: &[String]) -> Result<(), Error> {
+        let headers: Vec<Header> = table.columns.iter().map(|(h, _)| Header::of(h)).collect();
+        let chosen = |header: &Header, written: &str| {
+            only.is_empty()
+                || matches!(header.name.as_str(), "direction" | "way" | "curve")
+                || only.iter().any(|name| {
+                    name == written || *name == header.name || header.error_of() == Some(name)
+                })
+        };
+        for name in only {
+            let known = |(header, (written, _)): (&Header, &(String, Vec<Entry>))| {
+                name == written || *name == header.name
+            };
+            if !headers.iter().zip(&table.columns).any(known) {
+                let names: Vec<&str> = headers.iter().map(|h| h.name.as_str()).collect();
+                return Err(Error::option(
+                    "columns",
+                    format!("{} has no column `{name}`", table.name),
+                    format!("it has {}", names.join(", ")),
+                ));
+            }
+        }
+        let has = |name: &str| headers.iter().any(|header| header.name == name);
+        let own_amplitude = has("first_harmonic") || has("A");
+        let mut roles: Vec<Role> = Vec::new();
+        for (index, header) in headers.iter().enumerate() {
+            let role = if chosen(header, &table.columns[index].0) {
+                header
+                    .role(case, own_amplitude)
+                    .map_err(|error| error.context(table.place(None, index)))?
+            } else {
+                Role::Nothing
+            };
+            if let Some(before) = roles.iter().position(|known| known.is_same(&role)) {
+                return Err(Error::input(
+                    format!(
+                        "{}: column {} `{}` says the same",
+                        table.place(None, index),
+                        before + 1,
+                        table.columns[before].0
+                    ),
+                    "name the columns that count, with {columns}",
+                ));
+            }
+            roles.push(role);
+        }
+        // Each role at its place among the columns of all tables.
+        let places: Vec<usize> = roles
+            .iter()
+            .zip(&headers)
+            .map(|(role, header)| self.place_of(role, header))
+            .collect();
+        for (role, index) in roles.iter().zip(0..) {
+            if let Role::Error(observable, _) = role
+                && !self.columns.iter().any(|c| c.observable == *observable)
+            {
+                return Err(Error::input(
+                    format!("{}: its values are missing", table.place(None, index)),
+                    format!("give the column `{}` too", observable.name),
+                ));
+            }
+        }
+        let mut rows: Vec<(String, Row)> = Vec::new();
+        for row in 0..table.rows() {
+            rows.push(self.row(table, &roles, &places, row)?);
+        }
+        for (curve, row) in rows {
+            match self.curves.iter_mut().find(|known| known.name == curve) {
+                Some(known) => known.rows.push(row),
+                None => self.curves.push(Curve {
+                    name: curve,
+                    rows: vec![row],
+                }),
+            }
+        }
+        Ok(())
+    }
+
+    fn place_of(&mut self, role: &Role, header: &Header) -> usize {
+        match role {
+            Role::Set(key, factor) => {
+                let known = self.swept.iter().position(|swept| swept.key == *key);
+                known.unwrap_or_else(|| {
+                    self.swept.push(Swept {
+                        key: *key,
+                        name: header.name.clone(),
+                        unit: header.unit.clone(),
+                        factor: *factor,
+                    });
+                    self.swept.len() - 1
+                })
+            }
+            Role::Measured(observable, factor) => {
+                let known = self
+                    .columns
+                    .iter()
+                    .position(|c| c.observable == *observable);
+                known.unwrap_or_else(|| {
+                    self.columns.push(Column {
+                        observable,
+                        name: header.name.clone(),
+                        unit: header.unit.clone(),
+                        factor: *factor,
+                        spread: 0.0,
+                    });
+                    self.columns.len() - 1
+                })
+            }
+            _ => 0,
+        }
+    }
+
+    fn row(
+        &self,
+        table: &Table,
+        roles: &[Role],
+        places: &[usize],
+        index: usize,
+    ) -> Result<(String, Row), Error> {
+        let mut row = Row {
+            at: vec![f64::NAN; self.swept.len()],
+            values: vec![None; self.columns.len()],
+            errors: vec![None; self.columns.len()],
+            way: None,
+            line: table.lines.get(index).copied().unwrap_or(index as u64 + 1),
+        };
+        let mut curve = table.name.clone();
+        for (column, role) in roles.iter().enumerate() {
+            let entry = table.columns[column].1.get(index);
+            let entry = entry.unwrap_or(&Entry::Missing);
+            let refuse = |what: String, remedy: &str| {
+                let place = table.place(Some(index), column);
+                Err(Error::input(format!("{place}: {what}"), remedy))
+            };
+            let number = match (role, entry) {
+                (Role::Nothing, _) | (_, Entry::Missing) => None,
+                (Role::Way, Entry::Text(word)) => {
+                    row.way = way(word);
+                    if row.way.is_none() {
+                        return refuse(format!("`{word}` is no direction"), DIRECTIONS);
+                    }
+                    None
+                }
+                (Role::Curve, Entry::Text(name)) => {
+                    curve.clone_from(name);
+                    None
+                }
+                (Role::Curve, Entry::Number(number)) => {
+                    curve = number.to_string();
+                    None
+                }
+                (Role::Way, Entry::Number(number)) => {
+                    return refuse(format!("{number} is no direction"), DIRECTIONS);
+                }
+                (_, Entry::Text(text)) => {
+                    return refuse(
+                        format!("`{text}` is no number"),
+                        "write numbers with a point, and leave empty what is not known",
+                    );
+                }
+                (_, Entry::Number(number)) if !number.is_finite() => {
+                    return refuse(format!("{number} is not finite"), "leave it empty");
+                }
+                (_, Entry::Number(number)) => Some(*number),
+            };
+            let Some(number) = number else { continue };
+            match role {
+                Role::Set(_, factor) => row.at[places[column]] = number * factor,
+                Role::Measured(_, factor) => row.values[places[column]] = Some(number * factor),
+                Role::Error(observable, factor) => {
+                    if number <= 0.0 {
+                        return refuse(
+                            format!("{number} is no standard error"),
+                            "it must be above zero; leave it empty where it is not known",
+                        );
+                    }
+                    let at = self
+                        .columns
+                        .iter()
+                        .position(|c| c.observable == *observable);
+                    row.errors[at.unwrap_or(0)] = Some(number * factor);
+                }
+                Role::Nothing | Role::Way | Role::Curve => {}
+            }
+        }
+        if let Some(missing) = row.at.iter().position(|at| at.is_nan()) {
+            let key = self.swept[missing].key;
+            let is = |role: &Role| matches!(role, Role::Set(known, _) if *known == key);
+            let column = roles.iter().position(is);
+            return Err(Error::input(
+                match column {
+                    Some(column) => {
+                        let place = table.place(Some(index), column);
+                        format!("{place}: where the row was measured is missing")
+                    }
+                    None => format!("{} does not say {key}, as the others do", table.name),
+                },
+                "give it in every row of every table",
+            ));
+        }
+        Ok((curve, row))
+    }
+
+    /// Rows in the order of measurement, what varies first, sizes of the columns.
+    fn finish(&mut self) {
+        for (index, column) in self.columns.iter_mut().enumerate() {
+            let rows = self.curves.iter().flat_map(|curve| &curve.rows);
+            let values: Vec<f64> = rows.filter_map(|row| *row.values.get(index)?).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let squares = values.iter().map(|value| (value - mean).powi(2));
+            column.spread = (squares.sum::<f64>() / values.len() as f64).sqrt();
+        }
+        let count = self.columns.len();
+        let distinct = |index: usize| {
+            let most = self.curves.iter().map(|curve| {
+                let mut values: Vec<u64> =
+                    curve.rows.iter().map(|r| r.at[index].to_bits()).collect();
+                values.sort_unstable();
+                values.dedup();
+                values.len()
+            });
+            most.max().unwrap_or(0)
+        };
+        let mut order: Vec<usize> = (0..self.swept.len()).collect();
+        order.sort_by_key(|index| std::cmp::Reverse(distinct(*index)));
+        self.swept = order.iter().map(|k| self.swept[*k].clone()).collect();
+        let to_distance = self.swept.first().is_some_and(|s| is_distance(s.key));
+        for curve in &mut self.curves {
+            for row in &mut curve.rows {
+                row.at = order.iter().map(|k| row.at[*k]).collect();
+                // Tables read before one with a further column.
+                row.values.resize(count, None);
+                row.errors.resize(count, None);
+            }
+            if curve.rows.iter().all(|row| row.way.is_some()) {
+                // Approach goes to smaller distances, a sweep upwards to greater values.
+                curve.rows.sort_by(|a, b| {
+                    let first = |row: &Row| row.way == Some(Way::Retract);
+                    let up = first(a) == to_distance;
+                    let along = a.at[0].total_cmp(&b.at[0]);
+                    let along = if up { along } else { along.reverse() };
+                    first(a).cmp(&first(b)).then(along)
+                });
+            }
+        }
+    }
+}
+
+/// Whether a key is the distance between tip and sample.
+pub(super) fn is_distance(key: Key) -> bool {
+    matches!(key, Key::GapTip | Key::Alpha5 | Key::OscillatorGap)
+}
+
+const DIRECTIONS: &str = "write approach or retract, of other sweeps up or down";
+
+/// Which way a word says: a sweep upwards comes first, as an approach does.
+fn way(word: &str) -> Option<Way> {
+    match word.to_lowercase().as_str() {
+        "approach" | "extend" | "trace" | "up" => Some(Way::Approach),
+        "retract" | "retrace" | "down" => Some(Way::Retract),
+        _ => None,
+    }
+}
+
+/// What a column is, with the size of its unit.
+#[derive(Clone, Copy, Debug)]
+enum Role {
+    Set(Key, f64),
+    Measured(&'static Observable, f64),
+    Error(&'static Observable, f64),
+    Way,
+    Curve,
+    Nothing,
+}
+
+impl Role {
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Set(a, _), Self::Set(b, _)) => a == b || is_distance(*a) && is_distance(*b),
+            (Self::Measured(a, _), Self::Measured(b, _))
+            | (Self::Error(a, _), Self::Error(b, _)) => a == b,
+            (Self::Way, Self::Way) | (Self::Curve, Self::Curve) => true,
+            _ => false,
+        }
+    }
+}
+
+/// The word over a column, taken apart.
+#[derive(Clone, Debug)]
+pub(super) struct Header {
+    pub(super) name: String,
+    pub(super) unit: String,
+}
+
+impl Header {
+    pub(super) fn of(written: &str) -> Self {
+        let written = written.trim();
+        let parts = [('(', ')'), ('[', ']')]
+            .into_iter()
+            .find_map(|(open, close)| {
+                let (name, rest) = written.split_once(open)?;
+                Some((name, rest.strip_suffix(close)?))
+            });
+        let (name, unit) = parts.unwrap_or((written, ""));
+        Self {
+            name: name.trim().to_owned(),
+            unit: unit.trim().to_owned(),
+        }
+    }
+
+    fn error_of(&self) -> Option<&str> {
+        self.name.strip_suffix(" error").map(str::trim)
+    }
+
+    fn role(&self, case: &Case, own_amplitude: bool) -> Result<Role, Error> {
+        match self.name.as_str() {
+            "direction" | "way" => return Ok(Role::Way),
+            "curve" => return Ok(Role::Curve),
+            _ => {}
+        }
+        if let Some(of) = self.error_of() {
+            let column = Self {
+                name: of.to_owned(),
+                unit: self.unit.clone(),
+            };
+            return match column.role(case, own_amplitude)? {
+                Role::Measured(observable, factor) => Ok(Role::Error(observable, factor)),
+                _ => Err(Error::input(
+                    format!("errors are taken of what was measured, and `{of}` is set"),
+                    "leave the column away",
+                )),
+            };
+        }
+        if let Some(observable) = measured(&self.name, own_amplitude) {
+            return Ok(Role::Measured(observable, self.unit_of(observable, case)?));
+        }
+        let key = set(&self.name, case)?;
+        Ok(Role::Set(key, self.unit_of_key(key, case)?))
+    }
+
+    fn unit_of(&self, observable: &Observable, case: &Case) -> Result<f64, Error> {
+        let kind = observable.dimension.kind().filter(|_| case.is_physical());
+        match (observable.dimension, kind, self.unit.as_str()) {
+            (Dimension::Angle, _, "" | "deg" | "°" | "degree" | "degrees")
+            | (_, None, "" | "1") => Ok(1.0),
+            (Dimension::Angle, _, "rad") => Ok(1f64.to_degrees()),
+            (_, Some(kind), "") => Err(Error::input(
+                format!("it has no unit, and {} needs one", kind.noun()),
+                format!("name it as in `{} ({})`", self.name, kind.si_unit()),
+            )),
+            (_, Some(kind), unit) => kind
+                .parse(&format!("1 {unit}"))
+                .map_err(|error| Error::input(error.to_string(), "change the unit in brackets")),
+            (_, None, unit) => Err(Error::input(
+                format!("`{unit}` is no unit here"),
+                if case.is_physical() {
+                    "it has none: leave the brackets away"
+                } else {
+                    "a dimensionless case has its own units: leave the brackets away, or give a \
+                     case in physical quantities"
+                },
+            )),
+        }
+    }
+
+    fn unit_of_key(&self, key: Key, case: &Case) -> Result<f64, Error> {
+        let text = format!("1 {}", self.unit);
+        case.value(key, text.trim())
+            .map_err(|error| Error::from(error).remedy("name it as in `distance (nm)`"))
+    }
+}
+
+/// The observable that a word means.
+pub(super) fn measured(name: &str, own_amplitude: bool) -> Option<&'static Observable> {
+    let plain = name.replace([' ', '-'], "_");
+    let name = match plain.as_str() {
+        "amplitude" if !own_amplitude => "first_harmonic",
+        other => other,
+    };
+    let numbers = || OBSERVABLES.iter().filter(|o| o.is_number);
+    let exact = numbers().find(|o| o.name == name || o.si_name == name);
+    exact.or_else(|| numbers().find(|o| o.name == name.to_lowercase()))
+}
+
+/// The key of the case that a word means.
+pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
+    let plain = name.to_lowercase().replace([' ', '-'], "_");
+    let physical = case.is_physical();
+    match plain.as_str() {
+        "distance" | "zc" | "gap" if physical => return Ok(Key::GapTip),
+        "distance" | "zc" | "gap" => return Ok(case.gap_key()),
+        "frequency" if physical => return Ok(Key::DriveFrequency),
+        "frequency" if case.oscillator().is_some() => return Ok(Key::OscillatorOmega),
+        "frequency" => return Ok(Key::Omega),
+        "frequency_shift" => {
+            return Err(Error::input(
+                "a frequency shift belongs to frequency modulation, whose loop is not modelled",
+                "fit amplitude and phase at a fixed drive",
+            ));
+        }
+        _ => {}
+    }
+    case.key(name).map_err(|error| {
+        let words = ["distance", "frequency", "amplitude", "direction", "curve"];
+        let observables = OBSERVABLES.iter().filter(|o| o.is_number);
+        let names = words.into_iter().chain(observables.map(|o| o.name));
+        let names: Vec<&str> = names.collect();
+        let near = near_name(name, names.iter().copied());
+        if name.contains('.') {
+            return error.into();
+        }
+        Error::input(
+            format!("`{name}` is neither an observable nor a key of the case"),
+            match near {
+                Some(near) => format!("did you mean `{near}`? or name the {{columns}} that count"),
+                None => "name the {columns} that count".to_owned(),
+            },
+        )
+    })
+}

@@ -1,0 +1,301 @@
+//! What a fit may change: keys of the case, and what is not quite known of the instrument.
+//!
+//! `X.offset` is added to the values of a column X: to where its rows were measured, or to what
+//! the model says was measured. `X.scale` multiplies what the model says. `gap.offset` is that
+//! of the distance.
+
+use crate::Error;
+use crate::case::{Case, Key};
+use crate::observe::Observable;
+use crate::study::value::{Amount, Intervals};
+
+use super::data::{self, Data, is_distance};
+
+/// What a parameter changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    /// A key of the case.
+    Key(Key),
+    /// What is added to a swept key, by its place.
+    Place(usize),
+    /// What is added to an observable, by its column.
+    Offset(usize),
+    /// What multiplies an observable, by its column.
+    Scale(usize),
+}
+
+/// A free parameter.
+#[derive(Clone, Debug)]
+pub(super) struct Parameter {
+    /// Its name: `sample.stiffness`, `gap.offset`.
+    pub(super) name: String,
+    /// What it changes.
+    pub(super) target: Target,
+    /// The curve that it belongs to; `None`: all.
+    pub(super) curve: Option<usize>,
+    /// Where the fit begins.
+    pub(super) start: f64,
+    /// Its bounds.
+    pub(super) bounds: (f64, f64),
+    /// Over which size it may be elsewhere.
+    pub(super) size: f64,
+}
+
+impl Parameter {
+    /// Its unit in SI, `1` for none.
+    pub(super) fn unit(&self, data: &Data, case: &Case) -> &'static str {
+        match self.target {
+            Target::Key(key) => unit_of(key),
+            Target::Place(at) => unit_of(data.swept[at].key),
+            Target::Scale(_) => "1",
+            Target::Offset(column) => {
+                let dimension = data.columns[column].observable.dimension;
+                match dimension.kind() {
+                    Some(_) if !case.is_physical() => "1",
+                    _ => dimension.si_unit(),
+                }
+            }
+        }
+    }
+
+    /// Whether it counts for a curve.
+    pub(super) fn is_of(&self, curve: usize) -> bool {
+        self.curve.is_none_or(|own| own == curve)
+    }
+}
+
+/// The unit of a key in SI, `1` for none.
+pub(super) fn unit_of(key: Key) -> &'static str {
+    if key.is_physical() {
+        key.kind().si_unit()
+    } else {
+        "1"
+    }
+}
+
+/// The parameters called `free` and, one a curve, `per_curve`.
+pub(super) fn parameters(
+    case: &Case,
+    data: &Data,
+    free: &[String],
+    per_curve: &[String],
+    bounds: &Intervals,
+) -> Result<Vec<Parameter>, Error> {
+    if free.is_empty() && per_curve.is_empty() {
+        return Err(Error::option(
+            "free",
+            "nothing is free",
+            "name keys of the case, as in sample.stiffness,gap.offset",
+        ));
+    }
+    let mut parameters = Vec::new();
+    for (names, option) in [(free, "free"), (per_curve, "per_curve")] {
+        for name in names {
+            let mut parameter =
+                parameter(case, data, name.trim()).map_err(|error| error.at(option))?;
+            if parameters
+                .iter()
+                .any(|p: &Parameter| p.target == parameter.target)
+            {
+                return Err(Error::option(
+                    option,
+                    format!("{name} is free twice"),
+                    "name each parameter once",
+                ));
+            }
+            let given = bounds.0.iter().find(|b| b.name == *name);
+            if let Some(given) = given {
+                bound(case, data, &mut parameter, [&given.low, &given.high])
+                    .map_err(|error| error.at("bounds"))?;
+            }
+            if option == "free" {
+                parameters.push(parameter);
+            } else {
+                let curves = 0..data.curves.len();
+                parameters.extend(curves.map(|curve| Parameter {
+                    curve: Some(curve),
+                    ..parameter.clone()
+                }));
+            }
+        }
+    }
+    let is_free = |name: &str| free.iter().chain(per_curve).any(|known| known == name);
+    if let Some(unknown) = bounds.0.iter().find(|bound| !is_free(&bound.name)) {
+        return Err(Error::option(
+            "bounds",
+            format!("{} is not free", unknown.name),
+            "bound what is named in {free} or {per_curve}",
+        ));
+    }
+    let count = data.count();
+    if count <= parameters.len() {
+        return Err(Error::option(
+            "free",
+            format!(
+                "{count} measured values cannot determine {} parameters",
+                parameters.len()
+            ),
+            "free fewer, or measure more",
+        ));
+    }
+    Ok(parameters)
+}
+
+fn parameter(case: &Case, data: &Data, name: &str) -> Result<Parameter, Error> {
+    if let Some((of, what)) = name.rsplit_once('.')
+        && matches!(what, "offset" | "scale")
+    {
+        return nuisance(case, data, name, of, what);
+    }
+    let key = case.key(name)?;
+    let same = |swept: &&data::Swept| {
+        swept.key == key || key.alternatives().any(|(other, _)| other == swept.key)
+    };
+    if let Some(swept) = data.swept.iter().find(same) {
+        return Err(Error::input(
+            format!("{name} is what the column `{}` sets", swept.name),
+            format!("free {}.offset for an error of it", swept.name),
+        ));
+    }
+    let sets_frequency = data.swept.iter().any(|s| s.key == Key::DriveFrequency);
+    if sets_frequency && key == Key::DriveFreeAmplitude {
+        return Err(Error::input(
+            "drive.free_amplitude is another strength of the drive at every frequency",
+            "free drive.amplitude",
+        ));
+    }
+    let start = case.get(key);
+    if !start.is_finite() {
+        return Err(Error::input(
+            format!("the case does not say where {name} begins"),
+            "give it a value in the case",
+        ));
+    }
+    let range = key.range();
+    // The range's own ends may be excluded.
+    let inside = |end: f64, excluded: bool, to: f64| {
+        if excluded && end.is_finite() {
+            end + to * f64::EPSILON.max(1e-9 * start.abs())
+        } else {
+            end
+        }
+    };
+    Ok(Parameter {
+        name: key.path().to_owned(),
+        target: Target::Key(key),
+        curve: None,
+        start,
+        bounds: (
+            inside(range.low, range.above, 1.0),
+            inside(range.high, range.below, -1.0),
+        ),
+        size: start.abs(),
+    })
+}
+
+fn nuisance(
+    case: &Case,
+    data: &Data,
+    name: &str,
+    of: &str,
+    what: &str,
+) -> Result<Parameter, Error> {
+    let any = (f64::NEG_INFINITY, f64::INFINITY);
+    let own = data
+        .columns
+        .iter()
+        .any(|c| c.name == "A" || c.name == "first_harmonic");
+    let column = data::measured(of, own).and_then(|observable: &Observable| {
+        data.columns.iter().position(|c| c.observable == observable)
+    });
+    let swept = || {
+        let key = data::set(of, case).ok()?;
+        let same =
+            |swept: &data::Swept| swept.key == key || is_distance(swept.key) && is_distance(key);
+        data.swept.iter().position(same)
+    };
+    let (target, start, size, bounds) = match (column, what) {
+        (Some(column), "offset") => (
+            Target::Offset(column),
+            0.0,
+            0.1 * data.columns[column].spread,
+            any,
+        ),
+        (Some(column), _) => (Target::Scale(column), 1.0, 0.1, (1e-9, f64::INFINITY)),
+        (None, _) => match swept() {
+            Some(at) if what == "offset" => {
+                let rows = data.curves.iter().flat_map(|curve| &curve.rows);
+                let values = rows.map(|row| row.at[at]);
+                let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                    (l.min(v), h.max(v))
+                });
+                (Target::Place(at), 0.0, 0.05 * (high - low), any)
+            }
+            _ => {
+                let columns = data.columns.iter().map(|c| c.name.as_str());
+                let names: Vec<&str> = columns
+                    .chain(data.swept.iter().map(|s| s.name.as_str()))
+                    .collect();
+                return Err(Error::input(
+                    format!("{name}: `{of}` is no column that has one"),
+                    format!("there are {}", names.join(", ")),
+                ));
+            }
+        },
+    };
+    Ok(Parameter {
+        name: name.to_owned(),
+        target,
+        curve: None,
+        start,
+        bounds,
+        size,
+    })
+}
+
+/// Sets the bounds of a parameter, and brings its start between them.
+fn bound(
+    case: &Case,
+    data: &Data,
+    parameter: &mut Parameter,
+    ends: [&Amount; 2],
+) -> Result<(), Error> {
+    let read = |amount: &Amount| match parameter.target {
+        Target::Key(key) => Ok(case.value(key, amount.text())?),
+        Target::Place(at) => Ok(case.value(data.swept[at].key, amount.text())?),
+        Target::Offset(column) => {
+            let kind = data.columns[column].observable.dimension.kind();
+            let kind = kind.filter(|_| case.is_physical());
+            let number = amount.text().parse::<f64>().ok();
+            match (kind, number) {
+                (Some(kind), _) => kind
+                    .parse(amount.text())
+                    .map_err(|error| Error::input(error.to_string(), "give it with its unit")),
+                (None, Some(number)) => Ok(number),
+                (None, None) => Err(no_number(amount)),
+            }
+        }
+        Target::Scale(_) => amount.text().parse::<f64>().map_err(|_| no_number(amount)),
+    };
+    let (low, high) = (read(ends[0])?, read(ends[1])?);
+    let (least, most) = parameter.bounds;
+    if !(low < high && low <= most && high >= least) {
+        return Err(Error::input(
+            format!(
+                "{}: nothing lies between {} and {}",
+                parameter.name, ends[0], ends[1]
+            ),
+            "give the lower bound first",
+        ));
+    }
+    parameter.bounds = (low.max(least), high.min(most));
+    parameter.start = parameter
+        .start
+        .clamp(parameter.bounds.0, parameter.bounds.1);
+    parameter.size = parameter.size.min(parameter.bounds.1 - parameter.bounds.0);
+    Ok(())
+}
+
+fn no_number(amount: &Amount) -> Error {
+    Error::input(format!("`{amount}` is no number"), "give a number")
+}

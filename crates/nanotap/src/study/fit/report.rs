@@ -1,0 +1,152 @@
+//! What a fit found.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::study::approach::Way;
+
+/// What a fit found. Values are in SI of a physical case, else in the model's units; phases in
+/// degrees.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FitReport {
+    /// The free parameters.
+    pub parameters: Vec<FittedParameter>,
+    /// Sum of the squared residuals in standard errors.
+    pub chi2: f64,
+    /// Measured values less parameters.
+    pub degrees_of_freedom: usize,
+    /// The probability of a larger chi2 by chance; where all standard errors were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_value: Option<f64>,
+    /// Akaike's criterion, −2 ln L + 2 p: of two laws fitted to the same data the one with the
+    /// smaller value describes them better for its parameters, by more than chance where the
+    /// difference is above some ten. It says nothing of whether either is right.
+    pub aic: f64,
+    /// Whether the model describes the data.
+    pub fits: bool,
+    /// Why not, if it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// What puts the result in doubt.
+    pub remarks: Vec<String>,
+    /// Combinations of parameters that the data do not determine.
+    pub undetermined: Vec<Undetermined>,
+    /// Correlations of the parameters, in their order; 0 of what is not determined.
+    pub correlations: Vec<Vec<f64>>,
+    /// What was measured, and how well.
+    pub columns: Vec<FittedColumn>,
+    /// Key of the case that varies along the curves.
+    pub swept: String,
+    /// Its unit in SI, `1` for none.
+    pub swept_unit: String,
+    /// The rows, curve after curve.
+    pub rows: Vec<FittedRow>,
+    /// Orbits at the rows that the data are not on.
+    pub others: Vec<OtherOrbit>,
+    /// Steps of Levenberg and Marquardt in all.
+    pub iterations: usize,
+    /// Starts that were tried.
+    pub starts: usize,
+    /// The case of the best fit as a file; where parameters are one a curve, that of the first.
+    pub case_file: String,
+    /// Whether the work was stopped before it was done.
+    pub cancelled: bool,
+}
+
+/// A parameter that was free.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedParameter {
+    /// The key of the case, or `NAME.offset`, `NAME.scale` of a column.
+    pub key: String,
+    /// The curve that it belongs to; without it, all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<String>,
+    /// The best value.
+    pub value: f64,
+    /// Its standard error; none where the data do not determine it.
+    pub standard_error: Option<f64>,
+    /// 95 % interval; an end is missing where there is none within the bounds.
+    pub interval: [Option<f64>; 2],
+    /// Its unit in SI, `1` for none.
+    pub unit: String,
+    /// Where the fit began.
+    pub start: f64,
+    /// Whether it ended at a bound.
+    pub at_bound: bool,
+}
+
+/// A combination of parameters that the data do not determine.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Undetermined {
+    /// What is not determined, in words.
+    pub words: String,
+    /// The parameters that are part of it.
+    pub keys: Vec<String>,
+    /// Their changes, in parts of their sizes, of length 1 together.
+    pub direction: Vec<f64>,
+    /// Standard errors by which the residuals change together for this change: below 1.
+    pub singular_value: f64,
+}
+
+/// An observable that was measured.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedColumn {
+    /// What the data call it.
+    pub name: String,
+    /// The observable.
+    pub observable: String,
+    /// Its unit here.
+    pub unit: String,
+    /// Root mean square of its residuals.
+    pub residual: f64,
+    /// Standard error of a value where the rows give none.
+    pub standard_error: f64,
+    /// Whether that was estimated from the residuals.
+    pub estimated: bool,
+}
+
+/// A row of the data with what the model says.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedRow {
+    /// Its curve.
+    pub curve: String,
+    /// Its line in the file, or its number from 1.
+    pub line: u64,
+    /// Which way the abscissa went, where the data say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub way: Option<Way>,
+    /// Where it was measured, offset included.
+    pub at: f64,
+    /// The branch that it lies on.
+    pub branch: Option<usize>,
+    /// Period of the orbit, in drive periods.
+    pub period: Option<usize>,
+    /// What was measured, by the names of the columns.
+    pub readings: BTreeMap<String, Reading>,
+}
+
+/// One measured value.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Reading {
+    /// As measured.
+    pub measured: Option<f64>,
+    /// As the model has it, scale and offset included.
+    pub model: Option<f64>,
+    /// Measured less model, in standard errors.
+    pub residual: Option<f64>,
+}
+
+/// An orbit at a row that the data are not on.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct OtherOrbit {
+    /// The curve.
+    pub curve: String,
+    /// Where.
+    pub at: f64,
+    /// Its branch.
+    pub branch: usize,
+    /// What would be measured on it, by the names of the columns.
+    pub readings: BTreeMap<String, f64>,
+}

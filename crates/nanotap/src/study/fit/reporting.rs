@@ -1,0 +1,312 @@
+//! From the best values to the report.
+
+use std::collections::BTreeMap;
+
+use super::data::Data;
+use super::parameters::{self, Parameter};
+use super::problem::Problem;
+use super::profile;
+use super::report::{
+    FitReport, FittedColumn, FittedParameter, FittedRow, OtherOrbit, Reading, Undetermined,
+};
+use super::search::{Found, Search, UNLIKELY, branches_of};
+use super::statistics::{self, Information, information, persistence, student};
+
+impl Search<'_> {
+    /// Akaike's criterion; standard errors that were estimated count as parameters.
+    fn akaike(&self, found: &Found) -> f64 {
+        let rows = self.problem.data.rows();
+        let (mut logarithms, mut estimated) = (0.0, vec![false; found.noise.len()]);
+        for (row, point) in rows.zip(&found.solution.point) {
+            for (column, noise) in found.noise.iter().enumerate() {
+                if row.values[column].is_some() && !point.lost {
+                    estimated[column] |= row.errors[column].is_none();
+                    let error = row.errors[column].unwrap_or(*noise);
+                    logarithms += (std::f64::consts::TAU * error * error).ln();
+                }
+            }
+        }
+        let estimated = estimated.iter().filter(|estimated| **estimated).count();
+        let parameters = (self.problem.parameters.len() + estimated) as f64;
+        found.solution.cost + logarithms + 2.0 * parameters
+    }
+
+    /// All that was found, from so many starts.
+    pub(super) fn report(&self, found: &Found, starts: usize) -> FitReport {
+        let (case, data) = (self.problem.case, self.problem.data);
+        let parameters = self.problem.parameters;
+        let problem = self.weighted(found.noise.clone(), None);
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let sizes: Vec<f64> = parameters
+            .iter()
+            .zip(x)
+            .map(|(p, value)| match p.target {
+                parameters::Target::Key(_) if *value != 0.0 => value.abs(),
+                _ => p.size,
+            })
+            .collect();
+        let information = information(&found.solution.jacobian, &sizes);
+        let given = self.all_given();
+        let width = if given {
+            student(f64::INFINITY)
+        } else {
+            student(self.freedom() as f64)
+        };
+        let fitted = self.fitted(&problem, found, &information, width);
+        let p_value = given.then(|| self.probability(found));
+        let columns: Vec<FittedColumn> = data
+            .columns
+            .iter()
+            .enumerate()
+            .map(|(index, column)| {
+                let differences = self.differences(x, point, index);
+                let squares: f64 = differences.iter().map(|d| d * d).sum();
+                let dimension = column.observable.dimension;
+                let rows = data.curves.iter().flat_map(|curve| &curve.rows);
+                let mut of = rows.filter(|row| row.values[index].is_some());
+                FittedColumn {
+                    name: column.name.clone(),
+                    observable: column.observable.name.to_owned(),
+                    unit: match dimension.kind() {
+                        Some(_) if !case.is_physical() => dimension.model_unit(),
+                        _ => dimension.si_unit(),
+                    }
+                    .to_owned(),
+                    residual: (squares / differences.len().max(1) as f64).sqrt(),
+                    standard_error: found.noise[index],
+                    estimated: of.any(|row| row.errors[index].is_none()),
+                }
+            })
+            .collect();
+        let (reason, remarks) = self.judge(found, p_value, &fitted, &columns);
+        let undetermined = undetermined(&information, parameters, data);
+        let swept = data.swept[0].key;
+        let best = problem.cases(x).swap_remove(0).leaving_distance_as(case);
+        FitReport {
+            chi2: found.solution.cost,
+            degrees_of_freedom: self.freedom(),
+            p_value,
+            aic: self.akaike(found),
+            fits: reason.is_none(),
+            reason,
+            remarks,
+            undetermined,
+            correlations: (0..parameters.len())
+                .map(|i| information.correlations.row(i).iter().copied().collect())
+                .collect(),
+            columns,
+            swept: swept.path().to_owned(),
+            swept_unit: parameters::unit_of(swept).to_owned(),
+            rows: rows(&problem, found),
+            others: others(&problem, found),
+            iterations: found.steps,
+            starts,
+            case_file: best.to_toml(),
+            cancelled: self.control.is_cancelled(),
+            parameters: fitted,
+        }
+    }
+
+    fn fitted(
+        &self,
+        problem: &Problem<'_>,
+        found: &Found,
+        information: &Information,
+        width: f64,
+    ) -> Vec<FittedParameter> {
+        let data = problem.data;
+        let x = &found.solution.x;
+        let intervals = if self.request.profile && !self.control.is_cancelled() {
+            profile::intervals(problem, &found.solution, information, width)
+        } else {
+            x.iter()
+                .zip(&information.errors)
+                .map(|(value, error)| {
+                    [-1.0, 1.0].map(|side| error.map(|error| value + side * width * error))
+                })
+                .collect()
+        };
+        let all = problem.parameters.iter().zip(x).zip(intervals);
+        all.zip(&information.errors)
+            .map(|(((parameter, value), interval), error)| FittedParameter {
+                key: parameter.name.clone(),
+                curve: parameter.curve.map(|curve| data.curves[curve].name.clone()),
+                value: *value,
+                standard_error: *error,
+                interval,
+                unit: parameter.unit(data, problem.case).to_owned(),
+                start: parameter.start,
+                at_bound: *value <= parameter.bounds.0 || *value >= parameter.bounds.1,
+            })
+            .collect()
+    }
+
+    /// Why the model does not describe the data, and what else puts the result in doubt.
+    fn judge(
+        &self,
+        found: &Found,
+        p_value: Option<f64>,
+        parameters: &[FittedParameter],
+        columns: &[FittedColumn],
+    ) -> (Option<String>, Vec<String>) {
+        let data = self.problem.data;
+        let point = &found.solution.point;
+        let mut remarks = Vec::new();
+        let lost = point.iter().filter(|row| row.lost).count();
+        if lost > 0 {
+            remarks.push(format!(
+                "{lost} of {} rows have no periodic orbit on their branch and do not count",
+                point.len()
+            ));
+        }
+        for parameter in parameters.iter().filter(|p| p.at_bound) {
+            remarks.push(format!(
+                "{} ended at a bound: its standard error and interval do not hold",
+                parameter.key
+            ));
+        }
+        for (index, column) in columns.iter().enumerate() {
+            let differences = self.differences(&found.solution.x, point, index);
+            let persistence = persistence(&differences);
+            if persistence > 5.0 {
+                remarks.push(format!(
+                    "the residuals of {} keep their sign from row to row ({persistence:.0} \
+                     standard errors of their correlation): the law, the branch or an offset is \
+                     not that of the data",
+                    column.name
+                ));
+            }
+        }
+        let unlikely = p_value.filter(|p| *p < UNLIKELY).map(|_| {
+            format!(
+                "chi2 = {:.4e} with {} degrees of freedom: the residuals are larger than the \
+                 standard errors that the data give",
+                found.solution.cost,
+                self.freedom()
+            )
+        });
+        let nothing = columns
+            .iter()
+            .zip(&data.columns)
+            .all(|(fitted, column)| fitted.residual > 0.5 * column.spread);
+        let reason = if 2 * lost > point.len() {
+            Some("more than half of the rows have no periodic orbit".to_owned())
+        } else if nothing {
+            Some("the residuals are as large as the data vary".to_owned())
+        } else {
+            unlikely
+        };
+        (reason, remarks)
+    }
+}
+
+/// The rows with what the model says.
+fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
+    let data = problem.data;
+    let x = &found.solution.x;
+    let rows = problem.rows().into_iter();
+    rows.zip(&found.solution.point)
+        .map(|((curve, row), point)| {
+            let known = !point.lost;
+            let readings = data.columns.iter().enumerate().map(|(index, column)| {
+                let value = point.values[index];
+                let difference = problem.difference(x, curve, row, index, value);
+                let residual = difference.map(|d| -d / problem.error(row, index));
+                let reading = Reading {
+                    measured: row.values[index],
+                    model: known.then(|| problem.read(x, curve, index, value)),
+                    residual: residual.filter(|_| known),
+                };
+                (column.name.clone(), reading)
+            });
+            FittedRow {
+                curve: data.curves[curve].name.clone(),
+                line: row.line,
+                way: row.way,
+                at: problem.place(x, curve, row)[0],
+                branch: known.then_some(point.branch),
+                period: point.orbit.as_ref().filter(|_| known).map(|o| o.period),
+                readings: readings.collect(),
+            }
+        })
+        .collect()
+}
+
+/// What the orbits say that the data are not on.
+fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
+    let data = problem.data;
+    let x = &found.solution.x;
+    let chosen = branches_of(&found.solution.point);
+    let mut others = Vec::new();
+    let mut first = 0;
+    for (curve, rows) in found.candidates.iter().enumerate() {
+        for (row, candidates) in rows.iter().enumerate() {
+            let at = problem.place(x, curve, &data.curves[curve].rows[row]);
+            let besides = candidates
+                .iter()
+                .filter(|c| c.branch != chosen[first + row]);
+            for candidate in besides {
+                let values = problem.values(x, curve, &at, candidate);
+                let Some(values) = values else { continue };
+                let columns = data.columns.iter().zip(values).enumerate();
+                let readings = columns.map(|(index, (column, value))| {
+                    (column.name.clone(), problem.read(x, curve, index, value))
+                });
+                others.push(OtherOrbit {
+                    curve: data.curves[curve].name.clone(),
+                    at: at[0],
+                    branch: candidate.branch,
+                    readings: readings.collect::<BTreeMap<_, _>>(),
+                });
+            }
+        }
+        first += rows.len();
+    }
+    others
+}
+
+/// What the data do not determine, in words.
+fn undetermined(
+    information: &Information,
+    parameters: &[Parameter],
+    data: &Data,
+) -> Vec<Undetermined> {
+    let name = |k: usize| match parameters[k].curve {
+        Some(curve) => format!("{} of {}", parameters[k].name, data.curves[curve].name),
+        None => parameters[k].name.clone(),
+    };
+    let in_words = |direction: &statistics::Direction| {
+        let largest = direction.along.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let mut parts: Vec<usize> = (0..parameters.len())
+            .filter(|&k| direction.along[k].abs() > 0.02 * largest)
+            .collect();
+        parts.sort_by(|a, b| {
+            direction.along[*b]
+                .abs()
+                .total_cmp(&direction.along[*a].abs())
+        });
+        let first = direction.along[parts[0]];
+        let words = if parts.len() == 1 {
+            format!("the data do not determine {}", name(parts[0]))
+        } else {
+            let change = |&k: &usize| {
+                let relative = direction.along[k] / first;
+                format!("{} by {:+.3} %", name(k), relative)
+            };
+            let changes: Vec<String> = parts.iter().map(change).collect();
+            let names: Vec<String> = parts.iter().map(|k| name(*k)).collect();
+            format!(
+                "the data do not tell {} apart: changing {} leaves what was measured as it is",
+                names.join(" and "),
+                changes.join(" and ")
+            )
+        };
+        Undetermined {
+            words,
+            keys: parts.iter().map(|k| name(*k)).collect(),
+            direction: parts.iter().map(|k| direction.along[*k]).collect(),
+            singular_value: direction.singular_value,
+        }
+    };
+    information.undetermined.iter().map(in_words).collect()
+}

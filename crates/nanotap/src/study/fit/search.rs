@@ -1,0 +1,290 @@
+//! The search for the best values: a rough fit that finds the branches, a fine one in standard
+//! errors, other starts where nothing describes the data.
+
+use super::FitRequest;
+use super::branches::Rows;
+use super::data::Data;
+use super::problem::{Point, Problem};
+use super::report::FitReport;
+use super::solve::{Solution, minimise};
+use super::statistics::exceeding;
+use crate::Error;
+use crate::control::Control;
+
+/// A fit at work.
+pub(super) struct Search<'a> {
+    pub(super) problem: Problem<'a>,
+    pub(super) request: &'a FitRequest,
+    pub(super) control: &'a Control<'a>,
+}
+
+/// A fit whose branches are known.
+pub(super) struct Found {
+    pub(super) solution: Solution<Point>,
+    pub(super) noise: Vec<f64>,
+    pub(super) candidates: Vec<Rows>,
+    pub(super) steps: usize,
+}
+
+/// Part of a column's spread that a rough fit takes for a standard error.
+const ROUGH: f64 = 0.03;
+/// Rough standard errors beyond which a residual counts by its logarithm.
+const FAR: f64 = 3.0;
+/// Mean squared rough residual above which nothing describes the data.
+const POOR: f64 = 1.0;
+/// Probability of chi2 below which the model does not describe the data.
+pub(super) const UNLIKELY: f64 = 1e-6;
+/// Times that branches are looked for again.
+const ROUNDS: usize = 6;
+
+impl<'a> Search<'a> {
+    pub(super) fn run(&self) -> Result<FitReport, Error> {
+        let starts = self.starts();
+        let mut best: Option<Found> = None;
+        let mut tried = 0;
+        for start in &starts {
+            if self.control.is_cancelled() {
+                break;
+            }
+            tried += 1;
+            let found = self.fine(self.rough(start.clone()));
+            if let Some(report) = self.control.progress {
+                report(tried, starts.len());
+            }
+            let Some(found) = found else { continue };
+            let good = self.describes(&found);
+            if best
+                .as_ref()
+                .is_none_or(|best| self.misfit(&found) < self.misfit(best))
+            {
+                best = Some(found);
+            }
+            if good {
+                break;
+            }
+        }
+        let best = best.ok_or_else(|| {
+            if self.control.is_cancelled() {
+                Error::new(
+                    crate::ErrorKind::Stopped,
+                    "stopped before anything was fitted",
+                )
+            } else {
+                Error::numerics(format!(
+                    "no periodic orbit was found where the data are, from {tried} start(s)"
+                ))
+                .remedy("change the case, or give {bounds} and more {starts}")
+            }
+        })?;
+        Ok(self.report(&best, tried))
+    }
+
+    /// The case's own values, then others within the bounds, or within a factor of four.
+    fn starts(&self) -> Vec<Vec<f64>> {
+        let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
+        // SplitMix64 (Steele, Lea, Flood 2014).
+        let mut random = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = state;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let parameters = self.problem.parameters;
+        let own = parameters.iter().map(|p| p.start).collect();
+        let mut starts = vec![own];
+        while starts.len() < self.request.starts {
+            let start = parameters.iter().map(|p| {
+                let u = random();
+                let (mut low, mut high) = if p.start > 0.0 && p.bounds.0 >= 0.0 {
+                    (0.25 * p.start, 4.0 * p.start)
+                } else {
+                    (p.start - p.size, p.start + p.size)
+                };
+                if self.request.bounds.0.iter().any(|b| b.name == p.name) {
+                    (low, high) = p.bounds;
+                }
+                let (low, high) = (low.max(p.bounds.0), high.min(p.bounds.1));
+                if low > 0.0 {
+                    low * (high / low).powf(u)
+                } else {
+                    low + u * (high - low)
+                }
+            });
+            starts.push(start.collect());
+        }
+        starts
+    }
+
+    /// The problem with other weights.
+    pub(super) fn weighted(&self, noise: Vec<f64>, robust: Option<f64>) -> Problem<'a> {
+        Problem {
+            noise,
+            robust,
+            ..self.problem
+        }
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.problem.parameters.iter().map(|p| p.bounds).collect()
+    }
+
+    /// Standard errors as long as nothing is known of them.
+    pub(super) fn rough_noise(&self) -> Vec<f64> {
+        let columns = self.problem.data.columns.iter();
+        columns
+            .map(|c| ROUGH * c.spread.max(f64::MIN_POSITIVE))
+            .collect()
+    }
+
+    /// From a start to where branches and parameters are about right.
+    fn rough(&self, mut x: Vec<f64>) -> Vec<f64> {
+        let mut problem = self.weighted(self.rough_noise(), Some(FAR));
+        // Given errors are smaller by far; they count in the end.
+        let plain = plain_errors(problem.data);
+        problem.data = &plain;
+        let mut before: Option<Vec<usize>> = None;
+        for _ in 0..ROUNDS {
+            if self.control.is_cancelled() {
+                break;
+            }
+            let (point, _) = problem.discover(&x);
+            let branches = branches_of(&point);
+            if before.as_ref() == Some(&branches) {
+                break;
+            }
+            let enough = 1e-4 * problem.data.count() as f64;
+            match minimise(&problem, x.clone(), point, &self.bounds(), enough) {
+                Some(solution) => x = solution.x,
+                None => break,
+            }
+            before = Some(branches);
+        }
+        x
+    }
+
+    /// From there to the minimum in standard errors.
+    fn fine(&self, mut x: Vec<f64>) -> Option<Found> {
+        let mut noise = self.rough_noise();
+        let mut found: Option<Found> = None;
+        let mut steps = 0;
+        for _ in 0..ROUNDS {
+            if self.control.is_cancelled() && found.is_some() {
+                break;
+            }
+            let problem = self.weighted(noise.clone(), None);
+            let (point, candidates) = problem.discover(&x);
+            if point.iter().all(|row| row.lost) {
+                return None;
+            }
+            let branches = branches_of(&point);
+            noise = self.noise(&x, &point);
+            let problem = self.weighted(noise.clone(), None);
+            let solution = minimise(&problem, x.clone(), point, &self.bounds(), 1e-8)?;
+            steps += solution.iterations;
+            x.clone_from(&solution.x);
+            let after = self.noise(&x, &solution.point);
+            let settled = noise
+                .iter()
+                .zip(&after)
+                .all(|(a, b)| (a - b).abs() <= 1e-3 * a);
+            let same = found
+                .as_ref()
+                .is_some_and(|found| branches_of(&found.solution.point) == branches);
+            found = Some(Found {
+                solution,
+                noise: noise.clone(),
+                candidates,
+                steps,
+            });
+            if settled && same {
+                break;
+            }
+            noise = after;
+        }
+        found
+    }
+
+    /// Standard error of a value in each column, from its residuals. A column without them has
+    /// none at all.
+    fn noise(&self, x: &[f64], point: &Point) -> Vec<f64> {
+        let count = self.problem.data.count() as f64;
+        let freedom = 1.0 - self.problem.parameters.len() as f64 / count;
+        let columns = self.problem.data.columns.iter().enumerate();
+        columns
+            .map(|(index, column)| {
+                let differences = self.differences(x, point, index);
+                let squares: f64 = differences.iter().map(|d| d * d).sum();
+                let mean = squares / differences.len().max(1) as f64 / freedom;
+                // Rounding of the model.
+                mean.sqrt()
+                    .max(1e-10 * column.spread)
+                    .max(f64::MIN_POSITIVE)
+            })
+            .collect()
+    }
+
+    /// Model less measured values of a column, row by row where both are known.
+    pub(super) fn differences(&self, x: &[f64], point: &Point, column: usize) -> Vec<f64> {
+        let curves = self.problem.data.curves.iter().enumerate();
+        let rows = curves.flat_map(|(curve, of)| of.rows.iter().map(move |row| (curve, row)));
+        rows.zip(point)
+            .filter(|(_, point)| !point.lost)
+            .filter_map(|((curve, row), point)| {
+                let value = point.values[column];
+                self.problem.difference(x, curve, row, column, value)
+            })
+            .collect()
+    }
+
+    /// Mean squared residual in parts of the columns' spread; rows without an orbit count whole.
+    fn misfit(&self, found: &Found) -> f64 {
+        let data = self.problem.data;
+        let (mut sum, mut count) = (0.0, 0);
+        for (index, column) in data.columns.iter().enumerate() {
+            let differences = self.differences(&found.solution.x, &found.solution.point, index);
+            count += differences.len();
+            let size = column.spread.max(f64::MIN_POSITIVE);
+            sum += differences.iter().map(|d| (d / size).powi(2)).sum::<f64>();
+        }
+        let lost = data.count() - count.min(data.count());
+        (sum + lost as f64) / data.count() as f64
+    }
+
+    /// Whether all standard errors were given.
+    pub(super) fn all_given(&self) -> bool {
+        let rows = self.problem.data.rows();
+        let mut values = rows.flat_map(|row| row.values.iter().zip(&row.errors));
+        values.all(|(value, error)| value.is_none() || error.is_some())
+    }
+
+    pub(super) fn freedom(&self) -> usize {
+        self.problem.data.count() - self.problem.parameters.len()
+    }
+
+    /// Whether the model describes the data.
+    fn describes(&self, found: &Found) -> bool {
+        self.misfit(found) < POOR * ROUGH * ROUGH
+            && (!self.all_given() || self.probability(found) > UNLIKELY)
+    }
+
+    pub(super) fn probability(&self, found: &Found) -> f64 {
+        exceeding(found.solution.cost, self.freedom() as f64)
+    }
+}
+
+/// The branch of every row.
+pub(super) fn branches_of(point: &Point) -> Vec<usize> {
+    point.iter().map(|row| row.branch).collect()
+}
+
+/// The data without their errors.
+fn plain_errors(data: &Data) -> Data {
+    let mut plain = data.clone();
+    for curve in &mut plain.curves {
+        for row in &mut curve.rows {
+            row.errors.iter_mut().for_each(|error| *error = None);
+        }
+    }
+    plain
+}

@@ -1,0 +1,208 @@
+//! Tables of named columns, as a file or a program gives them.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value, json};
+
+use crate::Error;
+
+/// Most rows of a table.
+pub const MOST_ROWS: usize = 100_000;
+/// Most bytes of a file.
+const MOST_BYTES: u64 = 256 << 20;
+
+/// What stands in one place of a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Entry {
+    /// Nothing.
+    Missing,
+    /// A number.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
+/// A table: columns of one length, each with its name and, in brackets, its unit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// What it is called.
+    pub name: String,
+    /// Its columns: the header as it was written, and the entries.
+    pub columns: Vec<(String, Vec<Entry>)>,
+    /// Line of each row in the file that it was read from; empty where there is none.
+    pub lines: Vec<u64>,
+}
+
+impl Table {
+    /// Reads a CSV file: fields parted by commas, semicolons or tabs, the first line names the
+    /// columns, lines that begin with `#` are skipped.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is no such table; the message has line and column.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let refuse = |error: std::io::Error| Error::files(format!("cannot read {name}: {error}"));
+        let size = std::fs::metadata(path).map_err(refuse)?.len();
+        if size > MOST_BYTES {
+            return Err(Error::input(
+                format!("{name} has {size} bytes; {MOST_BYTES} at most"),
+                "keep fewer rows",
+            ));
+        }
+        let text = std::fs::read_to_string(path).map_err(refuse)?;
+        Self::parse(&name, &text)
+    }
+
+    /// Reads the text of such a file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .delimiter(delimiter(text))
+            .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+        let refuse = |error: &csv::Error| {
+            let line = error.position().map_or(1, csv::Position::line);
+            let what = match error.kind() {
+                csv::ErrorKind::UnequalLengths {
+                    expected_len, len, ..
+                } => format!("{len} fields where the header names {expected_len} columns"),
+                _ => error.to_string(),
+            };
+            Error::input(
+                format!("{name}, line {line}: {what}"),
+                "give each row a field for every column",
+            )
+        };
+        let header = reader.headers().map_err(|error| refuse(&error))?.clone();
+        let named = header.iter().map(|word| (word.to_owned(), Vec::new()));
+        let mut table = Self {
+            name: name.to_owned(),
+            columns: named.collect(),
+            lines: Vec::new(),
+        };
+        for record in reader.records() {
+            let record = record.map_err(|error| refuse(&error))?;
+            if table.lines.len() == MOST_ROWS {
+                return Err(Error::input(
+                    format!("{name} has more than {MOST_ROWS} rows"),
+                    "keep fewer",
+                ));
+            }
+            let line = record.position().map_or(0, csv::Position::line);
+            table.lines.push(line);
+            for ((_, column), field) in table.columns.iter_mut().zip(&record) {
+                column.push(Entry::of(field));
+            }
+        }
+        Ok(table)
+    }
+
+    /// How many rows it has.
+    pub fn rows(&self) -> usize {
+        self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)
+    }
+
+    /// Where an entry stands, for messages.
+    pub(super) fn place(&self, row: Option<usize>, column: usize) -> String {
+        let header = self.columns.get(column).map_or("", |(header, _)| header);
+        let column = column + 1;
+        let line = match row {
+            None => Some(1),
+            Some(row) => self.lines.get(row).copied(),
+        };
+        match (line.filter(|_| !self.lines.is_empty()), row) {
+            (Some(line), _) => format!("{}, line {line}, column {column} `{header}`", self.name),
+            (None, Some(row)) => format!("{}, `{header}`, row {}", self.name, row + 1),
+            (None, None) => format!("{}, `{header}`", self.name),
+        }
+    }
+}
+
+impl Entry {
+    fn of(field: &str) -> Self {
+        match field.parse::<f64>() {
+            _ if field.is_empty() => Self::Missing,
+            Ok(number) if number.is_nan() => Self::Missing,
+            Ok(number) => Self::Number(number),
+            Err(_) => Self::Text(field.to_owned()),
+        }
+    }
+}
+
+/// What parts the fields: of comma, semicolon and tab the one that stands most often in the
+/// header.
+fn delimiter(text: &str) -> u8 {
+    let header = text
+        .lines()
+        .find(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(|mark| count(*mark))
+        .unwrap_or(b',')
+}
+
+impl Serialize for Table {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let columns: Map<String, Value> = self
+            .columns
+            .iter()
+            .map(|(header, column)| (header.clone(), json!(column)))
+            .collect();
+        json!({"name": self.name, "columns": columns}).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Table {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Given {
+            #[serde(default)]
+            name: Option<String>,
+            columns: Map<String, Value>,
+        }
+        let given = Given::deserialize(deserializer)?;
+        let column = |(header, values): (String, Value)| {
+            let entries = serde_json::from_value::<Vec<Entry>>(values)
+                .map_err(|_| D::Error::custom(format!("{header}: a list is needed")))?;
+            Ok((header, entries))
+        };
+        let columns = given.columns.into_iter().map(column);
+        Ok(Self {
+            name: given.name.unwrap_or_else(|| "data".to_owned()),
+            columns: columns.collect::<Result<_, D::Error>>()?,
+            lines: Vec::new(),
+        })
+    }
+}
+
+impl JsonSchema for Table {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Table".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let column = json!({"type": "array", "items": {"type": ["number", "string", "null"]}});
+        json_schema!({
+            "type": "object",
+            "properties": {
+                "name": {"type": "string"},
+                "columns": {"type": "object", "additionalProperties": column},
+            },
+            "required": ["columns"],
+        })
+    }
+}

@@ -102,10 +102,11 @@ fn offered(help: &str) -> BTreeSet<String> {
 }
 
 /// Entries whose numbers depend on time, rounding, step control or chance.
-const FLEETING: [&str; 13] = [
+const FLEETING: [&str; 14] = [
     "seconds",
     "periods_per_second",
     "residual",
+    "distance_to_orbit",
     "error",
     "errors",
     "determinant_defect",

@@ -45,6 +45,10 @@ pub(crate) struct Arguments {
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
 
+    /// Replace files that nanotap did not write, too
+    #[arg(long, global = true)]
+    pub(crate) force: bool,
+
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -77,7 +81,7 @@ impl OutArgument {
     /// Refuses what is not a table's name, before anything is computed.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let path = self.out.as_deref();
-        path.map_or(Ok(()), |path| file::ending(path, &["csv"]).map(drop))
+        path.map_or(Ok(()), |path| file::claim(path, &["csv"]).map(drop))
     }
 
     /// Writes the table that `csv` makes, where one is wanted.
@@ -100,14 +104,14 @@ impl PlotArgument {
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let path = self.plot.as_deref();
         path.map_or(Ok(()), |path| {
-            file::ending(path, &["svg", "png", "pdf"]).map(drop)
+            file::claim(path, &["svg", "png", "pdf"]).map(drop)
         })
     }
 
     /// Writes the figure that `figure` makes, where one is wanted.
     pub(crate) fn draw(&self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         if let Some(path) = &self.plot {
-            figure().write(path)?;
+            file::draw(path, &figure())?;
         }
         Ok(())
     }

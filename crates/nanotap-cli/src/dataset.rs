@@ -1,7 +1,5 @@
 //! Datasets at the terminal: where they go, work on them, what is said of failures.
 
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use std::time::Instant;
@@ -60,7 +58,10 @@ impl DatasetArguments {
                 table: None,
             },
             Some(path) => Destination {
-                store: path.with_extension("zarr"),
+                store: {
+                    file::claim(path, &["csv"])?;
+                    path.with_extension("zarr")
+                },
                 table: Some(path.clone()),
             },
         };
@@ -148,7 +149,7 @@ impl<S> DatasetReport<S> {
             write_table(store, path)?;
         }
         if let Some(path) = plot {
-            figure(store)?.write(path)?;
+            file::draw(path, &figure(store)?)?;
         }
         Ok(Self {
             path: destination.store,
@@ -193,26 +194,9 @@ pub(crate) fn derived_name(case: Option<&Path>, what: &[&str]) -> String {
         .join("-")
 }
 
-/// Writes the table of a finished dataset, piece by piece; the file appears whole or not
-/// at all.
+/// Writes the table of a finished dataset, piece by piece.
 pub(crate) fn write_table(store: &Store, path: &Path) -> Result<(), Failure> {
-    let refuse = |error: std::io::Error| {
-        Failure::numerics(format!("cannot write {}: {error}", path.display()))
-    };
-    let hidden = format!(".{}.csv.tmp", std::process::id());
-    let temporary = path.with_file_name(hidden);
-    let written = File::create(&temporary).map_err(refuse).and_then(|file| {
-        let mut file = BufWriter::new(file);
-        table::csv::<Failure>(store, |piece| {
-            file.write_all(piece.as_bytes()).map_err(refuse)
-        })?;
-        file.flush().map_err(refuse)?;
-        std::fs::rename(&temporary, path).map_err(refuse)
-    });
-    if written.is_err() {
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written
+    file::write_rows(path, |rows| table::csv(store, |piece| rows.push(piece)))
 }
 
 #[cfg(test)]

@@ -1,32 +1,163 @@
-//! Files that appear whole or not at all.
+//! The files that a command writes: checked before anything is computed, whole or not at all.
+//!
+//! What another program or a person wrote is not replaced unless `--force` says so. A file of
+//! nanotap's is known by what it holds: a picture by the program that it names, a case file by the
+//! checksum in its first line (one that was edited since is a person's), a table by its first
+//! columns.
 
-use std::fs;
-use std::io::Write as _;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use nanotap::files;
+use nanotap_figures::{Figure, MADE_BY};
 
 use crate::failure::Failure;
 
-/// Writes `bytes` to `path` under a temporary name beside it, then renames: a reader
-/// never meets half a file, and a failure leaves what was there before.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let refuse = |why: String| Failure::files(format!("cannot write {}: {why}", path.display()));
-    let Some(name) = path.file_name() else {
-        return Err(refuse("it has no file name".into()));
-    };
-    if path.is_dir() {
-        return Err(refuse("it is a folder".into()));
+/// Whether `--force` was given.
+static FORCE: AtomicBool = AtomicBool::new(false);
+/// What this command was asked to write.
+static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// How the tables begin that commands write, and what stands in those of datasets.
+const TABLES: [&str; 12] = [
+    "tau,tip,tip_rate",
+    "order,tip,tip_lag_degrees",
+    "attractor,classification,",
+    "way,",
+    "branch,kind,",
+    "modes,difference,",
+    "contact,indentation,",
+    "phase_degrees,tip,",
+    "xi,phi1",
+    "curve,line,",
+    "law,",
+    "index,",
+];
+const DATASETS: [&str; 3] = [",classification,", ",attractor", ",start,"];
+
+/// Replaces whatever is there from now on.
+pub(crate) fn force() {
+    FORCE.store(true, Ordering::Relaxed);
+}
+
+/// The ending of `path`, in lower case, among those that can be written there, if the file may
+/// be written: nobody else's, and asked for once.
+pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Failure> {
+    let ending = ending(path, endings)?;
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
+    if !claimed.insert(place) {
+        return Err(Failure::input(
+            format!("{}: two outputs cannot go to one file", path.display()),
+            "give each a name of its own",
+        ));
     }
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}.tmp", std::process::id()));
-    let temporary: PathBuf = path.with_file_name(hidden);
-    let written = fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|error| {
-        let _ = fs::remove_file(&temporary);
-        refuse(error.to_string())
+    if path.is_dir() {
+        return Err(refused(path, "it is a folder"));
+    }
+    if !FORCE.load(Ordering::Relaxed) && path.is_file() {
+        let there = fs::read(path).map_err(|error| refused(path, error))?;
+        if !is_ours(ending, &there) {
+            return Err(Failure::input(
+                format!("{} was not written by nanotap", path.display()),
+                "name another file, or add --force to replace it",
+            ));
+        }
+    }
+    Ok(ending)
+}
+
+/// Whether nanotap wrote a file of that ending which holds these bytes.
+fn is_ours(ending: &str, bytes: &[u8]) -> bool {
+    let first = bytes
+        .split(|byte| *byte == b'\n')
+        .next()
+        .unwrap_or_default();
+    let first = String::from_utf8_lossy(first);
+    match ending {
+        _ if bytes.is_empty() => true,
+        "csv" => {
+            TABLES.iter().any(|table| first.starts_with(table))
+                || DATASETS.iter().any(|column| first.contains(column))
+        }
+        "toml" => {
+            let rest = bytes.get(first.len() + 1..).unwrap_or_default();
+            first == signature(rest)
+        }
+        _ => bytes
+            .windows(MADE_BY.len())
+            .any(|window| window == MADE_BY.as_bytes()),
+    }
+}
+
+/// The first line of a case file that holds `rest`.
+fn signature(rest: &[u8]) -> String {
+    format!(
+        "# Written by nanotap, {:08x}: as long as it is not edited, nanotap may replace it",
+        files::checksum(rest)
+    )
+}
+
+/// Writes `bytes` to `path`.
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    files::write(path, bytes).map_err(|error| refused(path, error))
+}
+
+/// Writes a case file, signed.
+pub(crate) fn write_case(path: &Path, toml: &str) -> Result<(), Failure> {
+    let text = format!("{}\n{toml}", signature(toml.as_bytes()));
+    write(path, text.as_bytes())
+}
+
+/// Writes a picture in the format of the path's ending.
+pub(crate) fn draw(path: &Path, figure: &Figure) -> Result<(), Failure> {
+    write(path, &figure.file(path)?)
+}
+
+/// Where a long table goes, piece by piece.
+pub(crate) struct Rows<'a> {
+    path: &'a Path,
+    file: &'a mut BufWriter<File>,
+}
+
+impl Rows<'_> {
+    /// Writes a piece.
+    pub(crate) fn push(&mut self, text: &str) -> Result<(), Failure> {
+        let written = self.file.write_all(text.as_bytes());
+        written.map_err(|error| refused(self.path, error))
+    }
+}
+
+/// Writes the table that `fill` makes piece by piece.
+pub(crate) fn write_rows(
+    path: &Path,
+    fill: impl FnOnce(&mut Rows<'_>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    /// An error of either kind.
+    enum Stopped {
+        System(std::io::Error),
+        Said(Failure),
+    }
+    impl From<std::io::Error> for Stopped {
+        fn from(error: std::io::Error) -> Self {
+            Self::System(error)
+        }
+    }
+    files::write_with(path, |file| {
+        fill(&mut Rows { path, file }).map_err(Stopped::Said)
     })
+    .map_err(|stopped| match stopped {
+        Stopped::System(error) => refused(path, error),
+        Stopped::Said(failure) => failure,
+    })
+}
+
+fn refused(path: &Path, why: impl std::fmt::Display) -> Failure {
+    Failure::files(format!("cannot write {}: {why}", path.display()))
 }
 
 /// "a, b or c".

@@ -29,6 +29,9 @@ use output::Output;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let output = Output::new(arguments.json, arguments.quiet);
+    if arguments.force {
+        file::force();
+    }
     progress::begin(&output);
     let result = command::run(&arguments.command, &output);
     progress::end();

@@ -38,11 +38,16 @@ pub(crate) fn write(
     })
     .collect();
     csv.push('\n');
-    time_series::sample(model, start, periods, resolution, |row| {
-        let si = si.iter().map(|(column, unit)| row[*column] * unit);
-        csv.push_str(&number::row(row.iter().copied().chain(si)));
-        csv.push('\n');
+    file::write_rows(path, |rows| {
+        rows.push(&csv)?;
+        let mut failed = None;
+        time_series::sample(model, start, periods, resolution, |row| {
+            let si = si.iter().map(|(column, unit)| row[*column] * unit);
+            let line = number::row(row.iter().copied().chain(si)) + "\n";
+            if failed.is_none() {
+                failed = rows.push(&line).err();
+            }
+        })?;
+        failed.map_or(Ok(()), Err)
     })
-    .map_err(|error| Failure::numerics(error.to_string()))?;
-    file::write(path, csv.as_bytes())
 }

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs;
+use std::hash::{BuildHasher as _, RandomState};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,9 @@ pub const DOUBLE_COLUMN: f64 = 178.0;
 
 /// Resolution of PNG files, dots per inch.
 pub const DPI: f64 = 300.0;
+/// What every picture says it was made by: a comment in SVG, the software of PNG, the producer
+/// of PDF.
+pub const MADE_BY: &str = "nanotap";
 
 /// Most pixels of a picture.
 const MOST_PIXELS: f64 = 2e8;
@@ -162,23 +166,29 @@ impl Figure {
     /// If the ending names no format, the figure cannot be drawn, or the file cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FigureError> {
         let path = path.as_ref();
-        let ending = path
-            .extension()
-            .map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let bytes = match ending.as_deref() {
-            Some("svg") => self.to_svg()?.into_bytes(),
-            Some("png") => self.to_png(DPI)?,
-            Some("pdf") => self.to_pdf()?,
-            _ => {
-                return Err(FigureError::UnknownEnding {
-                    path: path.to_path_buf(),
-                });
-            }
-        };
+        let bytes = self.file(path)?;
         write_whole(path, &bytes).map_err(|source| FigureError::Write {
             path: path.to_path_buf(),
             source,
         })
+    }
+
+    /// What [`write`](Self::write) puts into the file of that name.
+    ///
+    /// # Errors
+    /// If the ending names no format, or the figure cannot be drawn.
+    pub fn file(&self, path: &Path) -> Result<Vec<u8>, FigureError> {
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("svg") => Ok(self.to_svg()?.into_bytes()),
+            Some("png") => self.to_png(DPI),
+            Some("pdf") => self.to_pdf(),
+            _ => Err(FigureError::UnknownEnding {
+                path: path.to_path_buf(),
+            }),
+        }
     }
 
     /// The figure as SVG. It may stand in an HTML page beside others.
@@ -380,7 +390,9 @@ fn wrapped(text: &str, width: f64, style: &Style) -> Vec<Words> {
 fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.tmp", std::process::id()));
+    // Two runs, on two machines even, may write the same picture: the hasher starts anywhere.
+    let unique = RandomState::new().hash_one(std::process::id());
+    name.push(format!(".{unique:016x}.tmp"));
     let temporary: PathBuf = path.with_file_name(name);
     fs::write(&temporary, bytes)
         .and_then(|()| fs::rename(&temporary, path))

@@ -54,7 +54,7 @@ pub mod ticks;
 pub use axis::{Axis, ROUNDING, Range, Scale};
 pub use colour::{Colour, Colourmap, LINES, Motion, category};
 pub use error::FigureError;
-pub use figure::{DOUBLE_COLUMN, DPI, Figure, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
+pub use figure::{DOUBLE_COLUMN, DPI, Figure, MADE_BY, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
 pub use layer::{
     Band, Bars, Category, CategoryMap, Dash, Heatmap, Layer, Line, Markers, Note, Place, Points,
     Rule, Shape, Side, Stems,

@@ -8,6 +8,7 @@ use pdf_writer::types::{LineCapStyle, LineJoinStyle};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect as Box, Ref, TextStr};
 
 use crate::colour::Colour;
+use crate::figure::MADE_BY;
 use crate::pixels;
 use crate::raster::{EMBEDDED_DPI, Raster};
 use crate::scene::{Item, Path, Point, Rect, Scene, Segment};
@@ -41,7 +42,7 @@ pub(crate) fn write(scene: &Scene) -> Vec<u8> {
     pdf.catalog(Ref::new(CATALOG)).pages(Ref::new(PAGES));
     pdf.pages(Ref::new(PAGES)).kids([Ref::new(PAGE)]).count(1);
     let mut info = pdf.document_info(Ref::new(INFO));
-    info.producer(TextStr("nanotap"));
+    info.producer(TextStr(MADE_BY));
     if !scene.title.is_empty() {
         info.title(TextStr(&scene.title));
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::colour::Colour;
+use crate::figure::MADE_BY;
 use crate::scene::Rect;
 
 /// Resolution of pixels embedded in vector formats, dots per inch: what journals ask of line art
@@ -71,6 +72,8 @@ pub(crate) fn encode(pixels: &[Colour], columns: usize, rows: usize, dpi: Option
     let mut encoder = png::Encoder::new(&mut bytes, columns as u32, rows as u32);
     encoder.set_compression(png::Compression::High);
     if let Some(dpi) = dpi {
+        // Latin letters and a known keyword: it cannot be refused.
+        let _ = encoder.add_text_chunk("Software".into(), MADE_BY.into());
         let per_metre = (dpi / 0.0254).round() as u32;
         encoder.set_pixel_dims(Some(png::PixelDimensions {
             xppu: per_metre,

@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use base64::Engine as _;
 
 use crate::colour::Colour;
+use crate::figure::MADE_BY;
 use crate::font::Glyph;
 use crate::pixels;
 use crate::raster::{EMBEDDED_DPI, Raster};
@@ -34,6 +35,7 @@ pub(crate) fn write(scene: &Scene) -> String {
     if !scene.title.is_empty() {
         let _ = writeln!(svg, "<title>{}</title>", escaped(&scene.title));
     }
+    let _ = writeln!(svg, "<!-- Made by {MADE_BY} -->");
     svg.push_str("<defs>\n");
     svg.push_str(&page.definitions());
     svg.push_str("</defs>\n");

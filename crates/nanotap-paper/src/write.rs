@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use nanotap::files;
 use rayon::prelude::*;
 
 use super::section::Picture;
@@ -64,14 +65,11 @@ fn draw(picture: &Picture, folder: &Path, ending: &str) -> Result<PathBuf, Paper
     Ok(path)
 }
 
-/// Writes a file under a temporary name and renames it: a reader never meets half of it.
+/// Writes a file, whole or not at all.
 fn put(path: PathBuf, text: &str) -> Result<PathBuf, PaperError> {
-    let temporary = path.with_extension(format!("{}.tmp", std::process::id()));
-    fs::write(&temporary, text)
-        .and_then(|()| fs::rename(&temporary, &path))
-        .map_err(|source| PaperError::Write {
-            path: path.clone(),
-            source,
-        })?;
+    files::write(&path, text.as_bytes()).map_err(|source| PaperError::Write {
+        path: path.clone(),
+        source,
+    })?;
     Ok(path)
 }

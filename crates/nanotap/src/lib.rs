@@ -10,6 +10,7 @@ pub mod case;
 pub mod dataset;
 pub mod error;
 pub mod figure;
+pub mod files;
 pub mod map;
 pub mod model;
 pub mod observe;

@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 /// Writes the dimensionless case where `--out` says.
 fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
     let Some(path) = &out.out else { return Ok(()) };
-    file::ending(path, &["toml"])?;
+    file::claim(path, &["toml"])?;
     if case.law.is_some() {
         return Err(Failure::input(
             format!(
@@ -89,7 +89,7 @@ fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
             "leave --out away, or take --json, which has the law in the model's units",
         ));
     }
-    file::write(path, case_file::to_toml(case).as_bytes())
+    file::write_case(path, &case_file::to_toml(case))
 }
 
 fn remark(case: &Cantilever, output: &Output) {

@@ -61,11 +61,11 @@ struct Written<'a> {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let mut request = arguments.request.read()?;
     let ending = match &arguments.out {
-        Some(path) => Some(file::ending(path, &["toml", "csv"])?),
+        Some(path) => Some(file::claim(path, &["toml", "csv"])?),
         None => None,
     };
     if let Some(path) = &arguments.plot.plot {
-        file::ending(path, &["svg", "png", "pdf"])?;
+        file::claim(path, &["svg", "png", "pdf"])?;
     }
     for path in std::iter::once(&arguments.data).chain(&arguments.also) {
         if path.extension().is_some_and(|ending| ending == "toml") {
@@ -86,14 +86,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             .install(|| FitStudy::run(&case, &request, control))
     })???;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
-        let text = match ending {
-            "toml" => report.case_file.clone(),
-            _ => csv(&report),
-        };
-        file::write(path, text.as_bytes())?;
+        match ending {
+            "toml" => file::write_case(path, &report.case_file)?,
+            _ => file::write(path, csv(&report).as_bytes())?,
+        }
     }
     if let Some(path) = &arguments.plot.plot {
-        fit_figure(&report).write(path)?;
+        file::draw(path, &fit_figure(&report))?;
     }
     if report.cancelled {
         output.warning("stopped before it was done");

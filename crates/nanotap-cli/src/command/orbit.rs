@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
     for path in arguments.out.out.iter().chain(&arguments.harmonics_out) {
-        file::ending(path, &["csv"])?;
+        file::claim(path, &["csv"])?;
     }
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;

@@ -131,7 +131,7 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation) -> String {
     text.push('\n');
     text.push_str(&motion::paragraph(&format!(
         "{} contacts and releases; {} drive periods a second, {} evaluations of the gap a period",
-        run.events.len(),
+        run.events.len() + run.events_left_out,
         number::significant(run.periods_per_second, 3),
         number::significant(run.evaluations_per_period, 3),
     )));

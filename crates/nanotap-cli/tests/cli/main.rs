@@ -4,6 +4,7 @@ mod branches;
 mod case;
 mod existing_motions;
 mod experiments;
+mod files;
 mod modes;
 mod motions;
 mod paper;

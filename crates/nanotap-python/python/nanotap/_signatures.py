@@ -60,6 +60,7 @@ def simulate(
     transient: int | None = None,
     state: Any = None,
     strobe: int = 1,
+    events: int = 50_000,
     max_period: int = 64,
     resolution: int = 200,
     method: Literal["exact", "rk4"] = "exact",
@@ -86,6 +87,9 @@ def simulate(
         without it, rest.
     strobe : int
         How many of the last states at drive phase 0 to keep (0 to 10000000).
+    events : int
+        How many contacts and releases to list at most, the first ones (0 to
+        1000000000).
     max_period : int
         Longest period looked for (1 to 10000).
     resolution : int
@@ -131,6 +135,7 @@ def simulate(
         "transient": transient,
         "state": state,
         "strobe": strobe,
+        "events": events,
         "max_period": max_period,
         "resolution": resolution,
         "method": method,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
-use super::store::{Store, mismatch};
+use super::store::{Store, mismatch, same};
 
 /// What a merge came to.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -31,7 +31,7 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         let store = Store::open(source)?;
         if let Some(first) = stores.first() {
             let first: &Store = first;
-            if store.metadata() != first.metadata() {
+            if !same(store.metadata(), first.metadata()) {
                 return Err(mismatch(source, store.metadata(), first.metadata()));
             }
         }

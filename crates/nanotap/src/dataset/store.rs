@@ -1,7 +1,7 @@
 //! One dataset on disk.
 
 use std::fs;
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -12,12 +12,11 @@ use super::error::StoreError;
 use super::grid::{Axis, Block, Grid};
 use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
 use super::zarr;
+use crate::files::{self, is_temporary};
 
 /// The folder of markers, one a finished chunk. Zarr readers look at metadata only and
 /// never see it.
 const MARKERS: &str = ".chunks";
-/// The ending of files that are being written.
-const TEMPORARY: &str = "tmp";
 /// The attribute that says which axes are cut how, and which arrays are computed.
 const LAYOUT: &str = "chunk_layout";
 /// The attribute by which xarray knows coordinates that label no dimension.
@@ -92,8 +91,13 @@ impl Store {
             Err(_) if path.is_file() => return Err(refuse("it is a file, no folder")),
             Err(error) => return Err(StoreError::io("read", &document)(error)),
         };
-        let parsed: Value = serde_json::from_str(&metadata)
-            .map_err(|error| refuse(&format!("its .zmetadata is no JSON: {error}")))?;
+        let (parsed, metadata) = if let Ok(parsed) = serde_json::from_str::<Value>(&metadata) {
+            (parsed, metadata)
+        } else {
+            let rebuilt = rebuilt(path).ok_or_else(|| torn(path))?;
+            let text = pretty(&rebuilt);
+            (rebuilt, text)
+        };
         let schema = schema_of(path, &parsed["metadata"])?
             .ok_or_else(|| refuse("its .zmetadata was not written by nanotap"))?;
         Ok(Self::with(path, schema, metadata))
@@ -289,8 +293,8 @@ impl Store {
         }
     }
 
-    /// Once every chunk is finished: removes what killed runs left half-written. Returns
-    /// whether every chunk is.
+    /// Once every chunk is finished: removes what killed runs left half-written long ago (others
+    /// may be at work on the same store). Returns whether every chunk is.
     ///
     /// # Errors
     /// When the file system refuses.
@@ -304,10 +308,7 @@ impl Store {
             let folder = self.path.join(name);
             let listing = fs::read_dir(&folder).map_err(StoreError::io("list", &folder))?;
             for file in listing.flatten().map(|entry| entry.path()) {
-                if is_temporary(&file) {
-                    // Another process may just have renamed or removed it.
-                    let _ = fs::remove_file(file);
-                }
+                files::remove_abandoned(&file);
             }
         }
         Ok(true)
@@ -473,8 +474,21 @@ fn refuse_strangers(
     documents: &[(String, String)],
 ) -> Result<(), StoreError> {
     match fs::read_to_string(path.join(zarr::CONSOLIDATED)) {
-        Ok(there) if there == metadata => return Ok(()),
-        Ok(there) => return Err(mismatch(path, &there, metadata)),
+        Ok(there) if same(&there, metadata) => return Ok(()),
+        Ok(there) if is_whole(&there) => return Err(mismatch(path, &there, metadata)),
+        // Torn by a power cut: written anew if the dataset's own attributes are still there to
+        // say that this command made it.
+        Ok(_) => {
+            let root = |text: &str| {
+                let all: Value = serde_json::from_str(text).unwrap_or_default();
+                all["metadata"][zarr::ATTRIBUTES].to_string()
+            };
+            let there = fs::read_to_string(path.join(zarr::ATTRIBUTES)).unwrap_or_default();
+            if same(&there, &root(metadata)) {
+                return Ok(());
+            }
+            return Err(torn(path));
+        }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(StoreError::io("read", path)(error)),
     }
@@ -497,6 +511,55 @@ fn refuse_strangers(
     Ok(())
 }
 
+/// Whether two texts of metadata say the same, in any order.
+pub(super) fn same(a: &str, b: &str) -> bool {
+    let parsed = |text: &str| serde_json::from_str::<Value>(text).ok();
+    a == b || parsed(a).is_some_and(|a| parsed(b) == Some(a))
+}
+
+/// The refusal of a store that does not say any more what it is of.
+fn torn(path: &Path) -> StoreError {
+    StoreError::NotAStore {
+        path: path.into(),
+        what: "its .zmetadata is empty or torn, and the .zattrs and .zarray that it was made of \
+               are not all there; the command that made it mends it if .zattrs is whole, else \
+               remove the folder and compute it again"
+            .into(),
+    }
+}
+
+/// Whether a text of metadata is there to its end.
+fn is_whole(text: &str) -> bool {
+    serde_json::from_str::<Value>(text).is_ok()
+}
+
+/// The consolidated metadata, from the documents that they are made of; `None` where one of
+/// those is damaged too.
+fn rebuilt(path: &Path) -> Option<Value> {
+    let document = |name: &str| -> Option<Value> {
+        serde_json::from_str(&fs::read_to_string(path.join(name)).ok()?).ok()
+    };
+    let mut all = Map::new();
+    for name in [zarr::GROUP, zarr::ATTRIBUTES] {
+        all.insert(name.into(), document(name)?);
+    }
+    let mut arrays: Vec<String> = fs::read_dir(path)
+        .ok()?
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| path.join(name).join(zarr::ARRAY).is_file())
+        .collect();
+    arrays.sort();
+    for array in arrays {
+        for part in [zarr::ARRAY, zarr::ATTRIBUTES] {
+            let name = format!("{array}/{part}");
+            let document = document(&name)?;
+            all.insert(name, document);
+        }
+    }
+    Some(json!({ "zarr_consolidated_format": 1, "metadata": all }))
+}
+
 /// The refusal of a store whose metadata differ.
 pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
     let root = |text: &str| {
@@ -517,7 +580,32 @@ pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
     }
 }
 
+/// Most entries that an array may have and most characters that a word may: more were not
+/// written by nanotap, and would fill the memory.
+const MOST_ENTRIES: u64 = 1 << 32;
+const LONGEST_WORD: usize = 1 << 16;
+/// Most chunks: each is looked at when a store is opened.
+const MOST_CHUNKS: usize = 10_000_000;
+
+/// Whether an array can be called `name`: it is a folder of the store, and nowhere else.
+fn is_name(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    let plain = matches!(parts.next(), Some(std::path::Component::Normal(_)));
+    plain && parts.next().is_none() && !name.starts_with('.') && !name.contains(['/', '\\', ':'])
+}
+
+/// The product of sizes, if an array can have them.
+fn entries(sizes: impl IntoIterator<Item = usize>) -> Option<usize> {
+    let product = sizes
+        .into_iter()
+        .try_fold(1_u64, |product, size| product.checked_mul(size as u64))?;
+    (product <= MOST_ENTRIES).then_some(product as usize)
+}
+
 /// The schema that consolidated metadata describe; `None` if they are not ours.
+///
+/// # Errors
+/// When a coordinate cannot be read, and when names or sizes are such as no dataset has.
 fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreError> {
     let Some(root) = documents[zarr::ATTRIBUTES].as_object() else {
         return Ok(None);
@@ -544,16 +632,38 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         coordinates: Vec::new(),
         attributes,
     };
-    let names = layout["variables"]
+    let strange = |what: String| StoreError::NotAStore {
+        path: path.into(),
+        what,
+    };
+    let too_large = |name: &str| strange(format!("`{name}` has sizes that no dataset has"));
+    // Names and sizes are checked before anything is opened or allocated by them.
+    let arrays = documents.as_object().into_iter().flatten();
+    let arrays = arrays.filter_map(|(key, _)| key.strip_suffix("/.zarray"));
+    let names: Vec<&str> = layout["variables"]
         .as_array()
         .into_iter()
         .flatten()
-        .filter_map(Value::as_str);
+        .filter_map(Value::as_str)
+        .collect();
+    if let Some(name) = arrays.chain(names.iter().copied()).find(|n| !is_name(n)) {
+        return Err(strange(format!("`{name}` is no name of a variable")));
+    }
+    let chunks = entries(schema.grid.axes.iter().map(Axis::chunks));
+    if entries(schema.grid.axes.iter().map(|axis| axis.length)).is_none()
+        || chunks.is_none_or(|chunks| chunks > MOST_CHUNKS)
+    {
+        return Err(too_large("chunk_layout"));
+    }
     for name in names {
         let Some(array) = ArrayDocument::of(documents, name) else {
             return Ok(None);
         };
         let skip = schema.grid.axes.len();
+        let chunk = schema.grid.axes.iter().map(|axis| axis.chunk);
+        if entries(chunk.chain(array.shape.iter().copied().skip(skip))).is_none() {
+            return Err(too_large(name));
+        }
         let tail = array
             .dimensions
             .into_iter()
@@ -582,8 +692,9 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         let file = path
             .join(name)
             .join(zarr::chunk_name(&[], array.shape.len()));
+        let count = entries(array.shape.iter().copied()).ok_or_else(|| too_large(name))?;
         let bytes = fs::read(&file).map_err(StoreError::io("read", &file))?;
-        let values = zarr::decode(&bytes, array.kind, array.shape.iter().product())
+        let values = zarr::decode(&bytes, array.kind, count)
             .map_err(|what| StoreError::Damaged { path: file, what })?;
         schema.coordinates.push(Coordinate {
             name: name.into(),
@@ -624,7 +735,8 @@ impl ArrayDocument {
             .collect::<Option<Vec<_>>>()?;
         Some(Self {
             shape: numbers(&array["shape"])?,
-            kind: zarr::kind(array["dtype"].as_str()?)?,
+            kind: zarr::kind(array["dtype"].as_str()?)
+                .filter(|kind| kind.size() <= LONGEST_WORD)?,
             dimensions,
             attributes,
         })
@@ -635,42 +747,30 @@ fn make_folder(path: &Path) -> Result<(), StoreError> {
     fs::create_dir_all(path).map_err(StoreError::io("make the folder", path))
 }
 
-fn is_temporary(path: &Path) -> bool {
-    let hidden = path
-        .file_name()
-        .is_some_and(|n| n.to_string_lossy().starts_with('.'));
-    hidden && path.extension().is_some_and(|e| e == TEMPORARY)
-}
-
 fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     if fs::read(path).is_ok_and(|there| there == bytes) {
         Ok(())
     } else {
-        write_whole(path, bytes)
+        in_folder(path, || files::write(path, bytes))
     }
 }
 
-/// Writes a file under a temporary name and renames it: it is there whole or not at all.
+/// Writes a file of a chunk, in a folder that may have to be made. Its marker tells whether it
+/// is whole, so that it need not be on the disk at once.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let name = path
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    let temporary = path.with_file_name(format!(".{name}.{}.{TEMPORARY}", std::process::id()));
-    let mut created = fs::File::create(&temporary);
-    if created
+    in_folder(path, || files::write_unsynced(path, bytes))
+}
+
+/// Does `write`, once more after making the folder if it is not there.
+fn in_folder(path: &Path, write: impl Fn() -> std::io::Result<()>) -> Result<(), StoreError> {
+    let mut written = write();
+    if written
         .as_ref()
-        .is_err_and(|e| e.kind() == ErrorKind::NotFound)
+        .is_err_and(|error| error.kind() == ErrorKind::NotFound)
         && let Some(folder) = path.parent()
     {
         make_folder(folder)?;
-        created = fs::File::create(&temporary);
+        written = write();
     }
-    let written = created
-        .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|error| {
-        let _ = fs::remove_file(&temporary);
-        StoreError::io("write", path)(error)
-    })
+    written.map_err(StoreError::io("write", path))
 }

@@ -56,7 +56,12 @@ pub(super) fn kind(dtype: &str) -> Option<Kind> {
         "<f8" => Some(Kind::Real),
         "<i4" => Some(Kind::Whole),
         "|u1" => Some(Kind::Code),
-        other => other.strip_prefix("<U")?.parse().ok().map(Kind::Text),
+        other => other
+            .strip_prefix("<U")?
+            .parse()
+            .ok()
+            .filter(|length| *length <= usize::MAX / 8)
+            .map(Kind::Text),
     }
 }
 

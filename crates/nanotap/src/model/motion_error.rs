@@ -12,6 +12,14 @@ pub enum MotionError {
     /// The flow under a nonlinear force failed.
     #[error(transparent)]
     Nonlinear(#[from] VolterraError),
+    /// A time series with more rows than are made.
+    #[error("a time series of {rows} rows is too long; {most} at most are made")]
+    TooManyRows {
+        /// Rows that it would have.
+        rows: usize,
+        /// Rows that it may have.
+        most: usize,
+    },
 }
 
 impl MotionError {
@@ -30,6 +38,10 @@ impl From<MotionError> for crate::Error {
         match error {
             MotionError::Flow(error) => error.into(),
             MotionError::Nonlinear(error) => Self::numerics(error.to_string()),
+            MotionError::TooManyRows { .. } => Self::input(
+                error.to_string(),
+                "take fewer {periods} or a lower {resolution}",
+            ),
         }
     }
 }

@@ -180,10 +180,10 @@ impl Oscillator {
             let (least, greatest) = range(parameter);
             if !(least..=greatest).contains(&value) {
                 let expected = match parameter {
-                    P::Mass | P::Omega => "a positive, finite number is needed",
+                    P::Mass | P::Omega => "a positive, finite number of at most 1e12 is needed",
                     P::Restitution => "a number from 0 to 1 is needed",
-                    P::Forcing | P::Gap => "a finite number is needed",
-                    _ => "a finite number of at least 0 is needed",
+                    P::Forcing | P::Gap => "a finite number from -1e12 to 1e12 is needed",
+                    _ => "a finite number of at least 0 and at most 1e12 is needed",
                 };
                 return Err(OscillatorError {
                     key: parameter.name(),

@@ -7,6 +7,7 @@ use nanotap_flow::{Flow, Output};
 
 use crate::model::recording::each_period;
 use crate::model::{Model, MotionError};
+use crate::study::limits::MOST_ROWS;
 
 /// The columns before the state.
 const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];
@@ -51,7 +52,7 @@ pub(crate) fn with_modes(state: &[f64], memory: usize, modes: usize) -> Vec<f64>
 /// period.
 ///
 /// # Errors
-/// When the flow fails.
+/// When there would be more than [`MOST_ROWS`] rows, and when the flow fails.
 pub fn sample(
     model: &Model,
     start: &[f64],
@@ -59,6 +60,11 @@ pub fn sample(
     resolution: usize,
     mut row: impl FnMut(&[f64]),
 ) -> Result<(), MotionError> {
+    let rows = periods.saturating_mul(resolution).saturating_add(1);
+    if rows > MOST_ROWS {
+        let most = MOST_ROWS;
+        return Err(MotionError::TooManyRows { rows, most });
+    }
     let outputs = Outputs::new(model);
     let instants = |period: usize| {
         let last = usize::from(period + 1 == periods);

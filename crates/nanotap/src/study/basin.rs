@@ -401,7 +401,7 @@ impl Basin {
             store,
             how,
             rows,
-            |block, item| Some(self.row(block, item)),
+            |block, item| self.row(block, item, &how.control),
             |_, rows| columns(&rows),
         )
     }
@@ -412,19 +412,32 @@ impl Basin {
         let grid = &self.schema.grid;
         let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
         let labels = (0..rows(&block))
-            .map(|item| (!control.is_cancelled()).then(|| self.row(&block, item)))
+            .map(|item| self.row(&block, item, control))
             .collect::<Option<Vec<_>>>()?;
         Some(chunk_files(&self.schema, &block, &columns(&labels)))
     }
 
-    /// The labels of one row of the slice.
-    fn row(&self, block: &Block, item: usize) -> Vec<Label> {
+    /// The labels of one row of the slice; `None` when it was stopped.
+    fn row(&self, block: &Block, item: usize, control: &Control<'_>) -> Option<Vec<Label>> {
         let length = self.schema.grid.axes[1].length;
         let y = block.ranges[0].start + item;
-        let range = y * length..(y + 1) * length;
-        self.basins.chunk(&mut self.map.clone(), range)
+        let end = (y + 1) * length;
+        let mut map = self.map.clone();
+        let mut labels = Vec::with_capacity(length);
+        // A row may take minutes: whoever stops it need not wait for its end.
+        for start in (y * length..end).step_by(UNSTOPPED) {
+            if control.is_cancelled() {
+                return None;
+            }
+            let range = start..end.min(start + UNSTOPPED);
+            labels.append(&mut self.basins.chunk(&mut map, range));
+        }
+        Some(labels)
     }
 }
+
+/// Points of a row between two looks at whether to stop.
+const UNSTOPPED: usize = 64;
 
 /// Rows of the slice in a chunk.
 fn rows(block: &Block) -> usize {

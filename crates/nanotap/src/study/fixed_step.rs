@@ -17,7 +17,9 @@ use serde::Serialize;
 
 use crate::model::strobe::Strobe;
 use crate::model::{FlowError, Model, MotionError};
-use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
+use crate::study::simulate::{
+    Classification, Named, SimulateError, SimulateOptions, is_none, starting_state,
+};
 
 /// How to run.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +32,8 @@ pub struct FixedStepOptions {
     pub state: Option<Vec<f64>>,
     /// How many of the last states at drive phase 0 to keep.
     pub strobe: usize,
+    /// How many of the events to list, the first ones.
+    pub events: usize,
     /// Steps a drive period in each regime: free flight, contact.
     pub steps: [u32; 2],
     /// Where within a step the regime is looked at.
@@ -45,6 +49,7 @@ impl Default for FixedStepOptions {
             transient: 500,
             state: None,
             strobe: 1,
+            events: SimulateOptions::default().events,
             steps: [200, 200],
             switching: Switching::EveryStep,
             classify: ClassifyOptions::default(),
@@ -120,8 +125,11 @@ pub struct FixedStepRun {
     pub contact_fraction: f64,
     /// States at the end of each of the last periods asked for.
     pub strobe: Vec<Vec<f64>>,
-    /// Switches noticed.
+    /// Switches noticed, the first of them.
     pub events: Vec<GridEvent>,
+    /// How many more there were than are listed.
+    #[serde(skip_serializing_if = "is_none")]
+    pub events_left_out: usize,
     /// Speed, drive periods a second.
     pub periods_per_second: f64,
     /// What the exact flow does from the last state.
@@ -194,6 +202,8 @@ pub fn fixed_step_run(
     let seconds = clock.elapsed().as_secs_f64().max(1e-9);
     let (apparent_period, closure) = apparent_period(&strobes);
     let last = strobes.last().cloned().unwrap_or_default();
+    let events_left_out = grid.events.len().saturating_sub(options.events);
+    grid.events.truncate(options.events);
     let named = Named::of(&classify(&mut Strobe::new(model), &last, &options.classify).kind);
     let rate = model.tip_rate();
     let at = |o: &nanotap_flow::Output, x: &[f64]| o.at(model.system.drive(), x, 0.0);
@@ -220,6 +230,7 @@ pub fn fixed_step_run(
             .collect(),
         strobe: strobes.split_off(strobes.len().saturating_sub(options.strobe)),
         events: grid.events,
+        events_left_out,
         periods_per_second: (options.transient + options.periods) as f64 / seconds,
         exact: ExactVerdict {
             classification: named.classification,

@@ -32,6 +32,8 @@ pub struct SimulateOptions {
     pub state: Option<Vec<f64>>,
     /// How many of the last states at drive phase 0 to keep.
     pub strobe: usize,
+    /// How many of the events to list, the first ones.
+    pub events: usize,
     /// What is measured.
     pub observables: Set,
     /// Budgets for naming the motion.
@@ -45,6 +47,7 @@ impl Default for SimulateOptions {
             transient: None,
             state: None,
             strobe: 1,
+            events: LISTED_EVENTS,
             observables: Set::ALL,
             classify: ClassifyOptions::default(),
         }
@@ -133,8 +136,11 @@ pub struct Simulation {
     pub distance_to_orbit: Option<f64>,
     /// States at the end of each of the last periods asked for.
     pub strobe: Vec<Vec<f64>>,
-    /// Contacts begun and ended.
+    /// Contacts begun and ended, the first of them.
     pub events: Vec<ContactEvent>,
+    /// How many more there were than are listed.
+    #[serde(skip_serializing_if = "is_none")]
+    pub events_left_out: usize,
     /// What can be read off the recorded stretch.
     #[serde(flatten)]
     pub observables: Observables,
@@ -151,6 +157,15 @@ pub struct Simulation {
     /// The first recorded periods, for figures and time series.
     #[serde(skip)]
     pub trajectory: Recording,
+}
+
+/// Events that are listed unless more are asked for: their JSON stays below 10 MB.
+const LISTED_EVENTS: usize = 50_000;
+
+/// Whether a count may be left out of a document.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+pub(crate) const fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Periods recorded for figures; bounds the memory of long runs.
@@ -181,7 +196,9 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         events: true,
         each_period: false,
     };
-    let record = watch(model, &state, options.periods, options.observables, kept)?;
+    let mut record = watch(model, &state, options.periods, options.observables, kept)?;
+    let events_left_out = record.events.len().saturating_sub(options.events);
+    record.events.truncate(options.events);
     let named = Named::of(&classify(&mut map, &state, &options.classify).kind);
     Ok(Simulation {
         periods: options.periods,
@@ -197,6 +214,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
             .map(|orbit| nearest_phase(orbit, &record.end).1 / orbit.scale()),
         strobe: record.states,
         events: record.events,
+        events_left_out,
         out_of_range: OutOfRange::of(model, &record.observables),
         observables: record.observables,
         periods_per_second,
@@ -433,6 +451,9 @@ pub struct SimulateRequest {
     /// How many of the last states at drive phase 0 to keep
     #[schemars(range(min = 0, max = MOST_RECORDED), extend("x-value" = "K"))]
     pub strobe: usize,
+    /// How many contacts and releases to list at most, the first ones
+    #[schemars(range(min = 0, max = MOST_EVENTS), extend("x-value" = "K"))]
+    pub events: usize,
     /// Longest period looked for
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
     pub max_period: usize,
@@ -450,6 +471,8 @@ pub struct SimulateRequest {
 
 /// Most drive periods recorded: their events fill some gigabytes.
 pub const MOST_RECORDED: usize = 10_000_000;
+/// Most events listed.
+const MOST_EVENTS: usize = 100 * MOST_RECORDED;
 
 impl Default for SimulateRequest {
     fn default() -> Self {
@@ -459,6 +482,7 @@ impl Default for SimulateRequest {
             transient: options.transient,
             state: options.state,
             strobe: options.strobe,
+            events: options.events,
             max_period: options.classify.max_period,
             resolution: 200,
             method: Method::default(),
@@ -476,6 +500,7 @@ impl SimulateRequest {
             transient: self.transient,
             state: self.state.clone(),
             strobe: self.strobe,
+            events: self.events,
             classify: self.classify(),
             ..SimulateOptions::default()
         }
@@ -489,6 +514,7 @@ impl SimulateRequest {
             transient: self.transient.unwrap_or(default.transient),
             state: self.state.clone(),
             strobe: self.strobe,
+            events: self.events,
             steps: self.steps.0,
             switching: match self.switching {
                 Grid::Step => Switching::EveryStep,

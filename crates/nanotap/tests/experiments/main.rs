@@ -2,6 +2,7 @@
 
 mod approach;
 mod branches;
+mod extremes;
 mod fit;
 mod identities;
 mod modes_that_matter;

@@ -133,8 +133,12 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     std::fs::write(path.join("period_max/2.0.0"), b"x").unwrap();
     let zeros = vec![0; std::fs::read(path.join("tip_max/3.0")).unwrap().len()];
     std::fs::write(path.join("tip_max/3.0"), zeros).unwrap();
-    std::fs::write(path.join("tip_max/.5.0.123.tmp"), b"half").unwrap();
-    std::fs::write(path.join(".chunks/.9.123.tmp"), b"half").unwrap();
+    // Half a day old; what is young may be another process's.
+    let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(43_200);
+    for half in ["tip_max/.5.0.123.tmp", ".chunks/.9.123.tmp"] {
+        let file = std::fs::File::create(path.join(half)).unwrap();
+        file.set_modified(long_ago).unwrap();
+    }
     let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
     assert_eq!(total - store.missing(), finished - 4);
     sweep.compute(&store, &how(2)).unwrap();

@@ -323,7 +323,10 @@ fn oscillators_are_read_and_checked() {
     };
     assert_eq!(soft, Ok(Case::from(Oscillator { stop, ..expected })));
     for (word, words) in [
-        ("mass=0", "`mass` = 0: a positive, finite number is needed"),
+        (
+            "mass=0",
+            "`mass` = 0: a positive, finite number of at most 1e12 is needed",
+        ),
         ("mass=-1", "positive"),
         ("stiffness=-1", "at least 0"),
         ("restitution=1.1", "a number from 0 to 1"),

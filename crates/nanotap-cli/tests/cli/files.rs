@@ -1,0 +1,255 @@
+//! What a command writes, and what it leaves alone.
+
+use crate::util::Folder;
+
+/// Each with the outputs that it can write.
+const WRITERS: [&[&str]; 12] = [
+    &["simulate", "--out", "a.csv", "--plot", "a.svg"],
+    &[
+        "simulate", "--method", "rk4", "--out", "b.csv", "--plot", "b.png",
+    ],
+    &[
+        "orbit",
+        "--period",
+        "1",
+        "--out",
+        "c.csv",
+        "--harmonics-out",
+        "h.csv",
+        "--plot",
+        "c.pdf",
+    ],
+    &["attractors", "--starts", "4", "--out", "d.csv"],
+    &["lyapunov", "--periods", "20", "--out", "e.csv"],
+    &["modes", "--out", "f.csv"],
+    &["convergence", "--out", "g.csv"],
+    &[
+        "branch",
+        "--parameter",
+        "omega",
+        "--from",
+        "3.6",
+        "--to",
+        "3.7",
+        "--out",
+        "i.csv",
+    ],
+    &["approach", "--points", "3", "--out", "j.csv"],
+    &[
+        "sweep",
+        "--over",
+        "omega=3.5:3.6:2",
+        "--periods",
+        "2",
+        "--out",
+        "k.csv",
+    ],
+    &[
+        "basin",
+        "--x",
+        "a1=-1:1:2",
+        "--y",
+        "v1=-1:1:2",
+        "--out",
+        "l.csv",
+    ],
+    &["case", "--out", "m.toml"],
+];
+
+fn typed<'a>(writer: &[&'a str]) -> Vec<&'a str> {
+    [
+        &writer[..1],
+        &["case.toml", "--set", "omega=3.6", "-q"],
+        &writer[1..],
+    ]
+    .concat()
+}
+
+/// The same command twice: what it wrote it may replace, whatever the table.
+#[test]
+fn what_was_written_here_is_replaced() {
+    let folder = Folder::with_paper_case();
+    for writer in WRITERS {
+        for _ in 0..2 {
+            let outcome = folder.run(&typed(writer));
+            assert_eq!(outcome.code, 0, "{writer:?}: {}", outcome.stderr);
+        }
+    }
+}
+
+/// A case with comments, somebody's table, a picture: none is lost.
+#[test]
+fn what_somebody_else_wrote_is_replaced_only_by_force() {
+    let folder = Folder::with_paper_case();
+    folder.write("m.toml", "# my own case\n[model]\nmodes = 3\n");
+    folder.write(
+        "data.csv",
+        "distance (nm),amplitude (nm),phase (deg)\n1,2,3\n",
+    );
+    folder.write("photo.png", b"\x89PNG\r\n\x1a\n of a cat");
+    for arguments in [
+        ["case", "case.toml", "--out", "m.toml"],
+        ["case", "case.toml", "--out", "case.toml"],
+        ["modes", "case.toml", "--out", "data.csv"],
+        ["modes", "case.toml", "--plot", "photo.png"],
+    ] {
+        let before = std::fs::read(folder.path().join(arguments[3])).unwrap();
+        let outcome = folder.run(&arguments);
+        outcome.refused(&["was not written by nanotap", "--force", arguments[3]]);
+        assert_eq!(
+            std::fs::read(folder.path().join(arguments[3])).unwrap(),
+            before
+        );
+    }
+    for arguments in [
+        ["modes", "case.toml", "--force", "--out", "data.csv"],
+        ["case", "case.toml", "--force", "--out", "m.toml"],
+    ] {
+        assert_eq!(folder.run(&arguments).code, 0);
+    }
+    assert!(folder.read("data.csv").starts_with("xi,"));
+    // A case that was written here and edited since is somebody's.
+    assert_eq!(
+        folder.run(&["case", "case.toml", "--out", "m.toml"]).code,
+        0
+    );
+    let edited = folder.read("m.toml").replace("20.0", "21.0");
+    folder.write("m.toml", edited);
+    let outcome = folder.run(&["case", "case.toml", "--out", "m.toml"]);
+    outcome.refused(&["was not written by nanotap"]);
+    assert_eq!(folder.run(&["case", "m.toml"]).code, 0);
+}
+
+#[test]
+fn two_outputs_do_not_share_a_file() {
+    let folder = Folder::with_paper_case();
+    let arguments = [
+        "orbit",
+        "case.toml",
+        "--period",
+        "1",
+        "--out",
+        "x.csv",
+        "--harmonics-out",
+        "x.csv",
+    ];
+    folder.run(&arguments).refused(&["two outputs", "x.csv"]);
+    assert_eq!(folder.names(), ["case.toml"]);
+}
+
+/// The same command twice at the same time on one dataset, and shares of it side by side: each
+/// comes to its end, and the bytes are those of one alone.
+#[test]
+fn two_processes_share_a_dataset() {
+    let folder = Folder::with_paper_case();
+    let sweep = |out: &str, share: &str| {
+        let arguments = [
+            "sweep",
+            "case.toml",
+            "--over",
+            "omega=3.5:3.6:12",
+            "--starts",
+            "1",
+            "--periods",
+            "2",
+            "--transient",
+            "8",
+            "-q",
+            "--threads",
+            "1",
+            "--out",
+            out,
+            "--chunk",
+            share,
+        ];
+        let mut command = folder.command(&arguments);
+        command.stdout(std::process::Stdio::null());
+        command.stderr(std::process::Stdio::piped());
+        command
+    };
+    assert!(sweep("alone.zarr", "1/1").status().unwrap().success());
+    let alone = super::sweeps::bytes(&folder.path().join("alone.zarr"));
+    for round in 0..6 {
+        let out = format!("round-{round}.zarr");
+        let shares = if round % 2 == 0 {
+            ["1/1", "1/1"]
+        } else {
+            ["1/2", "2/2"]
+        };
+        let children = shares.map(|share| sweep(&out, share).spawn().unwrap());
+        for child in children {
+            let output = child.wait_with_output().unwrap();
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "round {round}: {stderr}");
+        }
+        // What is summed up over all chunks, none of two shares could.
+        assert!(sweep(&out, "1/1").status().unwrap().success());
+        assert!(
+            alone == super::sweeps::bytes(&folder.path().join(out)),
+            "round {round}"
+        );
+    }
+}
+
+/// Metadata that a power cut left empty or torn: `merge` reads them from the arrays, and the
+/// same command writes them anew.
+#[test]
+fn torn_metadata_are_rebuilt() {
+    let folder = Folder::with_paper_case();
+    let sweep = [
+        "sweep",
+        "case.toml",
+        "--over",
+        "omega=3.5:3.6:4",
+        "-q",
+        "--out",
+        "s.zarr",
+    ];
+    assert_eq!(folder.run(&sweep).code, 0);
+    let whole = folder.read("s.zarr/.zmetadata");
+    for (round, torn) in ["", &whole[..whole.len() / 2]].into_iter().enumerate() {
+        folder.write("s.zarr/.zmetadata", torn);
+        let merged = format!("merged-{round}.zarr");
+        let outcome = folder.run(&["merge", "s.zarr", "--out", &merged]);
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        assert_eq!(folder.run(&sweep).code, 0);
+        assert_eq!(folder.read("s.zarr/.zmetadata"), whole);
+    }
+    // What it was made of is torn as well: refused, with what to do.
+    folder.write("s.zarr/.zmetadata", "");
+    folder.write("s.zarr/.zattrs", "{");
+    let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
+    outcome.refused(&["empty or torn", "remove the folder"]);
+    folder
+        .run(&sweep)
+        .refused(&["empty or torn", "remove the folder"]);
+}
+
+/// A dataset of another's making cannot write elsewhere, nor ask for all the memory.
+#[test]
+fn merge_refuses_names_and_sizes_that_no_dataset_has() {
+    let folder = Folder::with_paper_case();
+    let sweep = [
+        "sweep",
+        "case.toml",
+        "--over",
+        "omega=3.5:3.6:4",
+        "-q",
+        "--out",
+        "s.zarr",
+    ];
+    assert_eq!(folder.run(&sweep).code, 0);
+    let whole = folder.read("s.zarr/.zmetadata");
+    let variable = "tip_max";
+    for name in ["../outside", "/tmp/outside", "..", "a/b", ".hidden"] {
+        folder.write("s.zarr/.zmetadata", whole.replace(variable, name));
+        let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
+        outcome.refused(&[name, "no name of a variable"]);
+        assert!(!folder.path().join("never.zarr").exists());
+    }
+    let long = whole.replace("[\\\"omega\\\",4,", "[\\\"omega\\\",4000000000000000000,");
+    assert_ne!(long, whole);
+    folder.write("s.zarr/.zmetadata", long);
+    let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
+    outcome.refused(&["sizes that no dataset has"]);
+}

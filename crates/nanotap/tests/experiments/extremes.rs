@@ -1,0 +1,107 @@
+//! Whatever is typed, a study answers or refuses: no panic, and nothing is allocated by a number
+//! that nobody checked.
+
+use std::sync::atomic::AtomicBool;
+
+use nanotap::case::Case;
+use nanotap::control::Control;
+use nanotap::study::registry::{Run, STUDIES, StudyEntry, study};
+use nanotap::study::request::properties;
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+const PAPER: [&str; 7] = [
+    "modes=2",
+    "alpha1=0.1",
+    "alpha2=0.1",
+    "alpha3=0.1",
+    "alpha4=20",
+    "alpha6=0.2",
+    "omega=2.6",
+];
+
+/// Runs a study, stopped before its first step; its words if it refuses.
+fn run(study: &StudyEntry, case: &Case, request: Value) -> Result<(), String> {
+    let stop = AtomicBool::new(true);
+    let control = Control {
+        cancel: Some(&stop),
+        progress: None,
+    };
+    match study.run {
+        Run::Document(run) => run(case, request, &control).map(drop),
+        Run::Dataset(recipe) => recipe(case, request, &control).map(drop),
+    }
+    .map_err(|error| error.to_string())
+}
+
+/// Every count has a largest value, and an error that names it.
+#[test]
+fn every_count_has_a_limit_that_its_refusal_names() {
+    let case = Case::parse(None, &PAPER.map(str::to_owned)).unwrap();
+    for study in STUDIES {
+        let schema = (study.request)();
+        for property in properties(&schema).filter(|p| p.allows("integer") && !p.allows("number")) {
+            // A seed is a name, not a number of things.
+            if property.name == "seed" {
+                continue;
+            }
+            let limit = property.schema["maximum"].as_f64();
+            let limit = limit.unwrap_or_else(|| panic!("{} {}", study.name, property.name));
+            for given in [json!(limit + 1.0), json!(1e18), json!(u64::MAX), json!(-1)] {
+                let request = json!({ property.name: given });
+                let refusal = run(study, &case, request).unwrap_err();
+                assert!(
+                    refusal.starts_with(property.name) && refusal.contains(&limit.to_string()),
+                    "{}: {refusal}",
+                    study.name
+                );
+            }
+        }
+    }
+}
+
+/// A number of any size, most of them of none that makes sense.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        12 => (-9.0..3.0_f64).prop_map(|digits| 10_f64.powf(digits)),
+        1 => prop::sample::select(vec![0.0, -0.0, -1.0, 1e308, 5e-324, 1e-300, f64::MAX, 1e12]),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// The numbers of a case, of any size: a run of few periods, a table of modes, an orbit.
+    #[test]
+    fn no_number_of_a_case_breaks_a_study(
+        modes in 1..7_usize,
+        numbers in prop::array::uniform6(number()),
+        omega in prop_oneof![4 => 1.0..1e4_f64, 1 => number()],
+        contact in prop::sample::select(vec!["", "kelvin-voigt", "moving-surface"]),
+        state in prop::option::of(number()),
+    ) {
+        // What decays or turns a million times in a drive period is computed, but takes long.
+        prop_assume!(!(1e-300..0.5).contains(&omega) && numbers[2] < 1.0);
+        let mut words = vec![format!("modes={modes}"), format!("omega={omega:e}")];
+        for (k, value) in numbers.iter().enumerate() {
+            words.push(format!("alpha{}={value:e}", k + 1));
+        }
+        if !contact.is_empty() {
+            words.push(format!("contact={contact}"));
+        }
+        let Ok(case) = Case::parse(None, &words) else {
+            return Ok(());
+        };
+        let state = state.map(|value| vec![value; 2 * modes]);
+        let requests = [
+            ("modes", json!({"points": 5})),
+            ("simulate", json!({"periods": 2, "transient": 1, "state": state, "max_period": 2})),
+            ("lyapunov", json!({"periods": 2, "transient": 1})),
+            ("attractors", json!({"starts": 1, "max_period": 2})),
+        ];
+        for (name, request) in requests {
+            // Refused or not; it comes back.
+            let _ = run(study(name).unwrap(), &case, request);
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! `nanotap fit`: parameters of lever and sample from measured curves.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::Key;
@@ -41,7 +41,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     threads: ThreadsArgument,
 
-    /// Write the case of the best fit (.toml), or the rows with model and residuals (.csv)
+    /// Write the case of the best fit (.toml), with --per-curve one a curve (NAME-CURVE.toml), or
+    /// the rows with model and residuals (.csv)
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
 
@@ -87,6 +88,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })???;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
         match ending {
+            "toml" if !report.case_files.is_empty() => {
+                for (index, of) in report.case_files.iter().enumerate() {
+                    file::write_case(&of_curve(path, &of.curve, index), &of.case_file)?;
+                }
+            }
             "toml" => file::write_case(path, &report.case_file)?,
             _ => file::write(path, csv(&report).as_bytes())?,
         }
@@ -109,6 +115,28 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         None => Ok(()),
         Some(reason) => Err(Failure::numerics(format!("nothing fits: {reason}"))),
     }
+}
+
+/// Where the case of one curve is written: `best-CURVE.toml` beside `best.toml`.
+fn of_curve(path: &Path, curve: &str, index: usize) -> PathBuf {
+    let name = Path::new(curve)
+        .file_stem()
+        .map(|stem| stem.to_string_lossy());
+    let kept = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
+    let name: String = name.unwrap_or_default().chars().map(kept).collect();
+    let name = if name.is_empty() {
+        (index + 1).to_string()
+    } else {
+        name
+    };
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy());
+    path.with_file_name(format!("{}-{name}.toml", stem.unwrap_or_default()))
 }
 
 /// A row a row of the data.
@@ -162,6 +190,46 @@ fn quantity(parameter: &FittedParameter, value: f64) -> String {
     }
 }
 
+/// The laws that were compared, and what is to be kept in mind.
+fn laws(report: &FitReport) -> String {
+    let mut table = Table::new([
+        ("law", Align::Left),
+        ("AIC", Align::Right),
+        ("BIC", Align::Right),
+        ("above the least", Align::Right),
+        ("weight", Align::Right),
+        ("fits", Align::Left),
+    ]);
+    let known = |value: Option<f64>, digits: usize| {
+        value.map_or_else(String::new, |value| number::significant(value, digits))
+    };
+    let mut text = String::new();
+    for law in &report.laws {
+        table.row([
+            law.law.clone(),
+            known(law.aic, 6),
+            known(law.bic, 6),
+            known(law.above_best, 3),
+            known(law.weight, 3),
+            if law.fits { "yes" } else { "no" }.to_owned(),
+        ]);
+    }
+    text.push_str(&table.render());
+    text.push('\n');
+    for law in report.laws.iter().filter(|law| !law.fits) {
+        let reason = law.reason.as_deref().unwrap_or_default();
+        text.push_str(&motion::paragraph(&format!("{}: {reason}", law.law)));
+    }
+    let best = report.law.as_deref().unwrap_or_default();
+    text.push_str(&motion::paragraph(&format!(
+        "What follows is of {best}. The criteria say which of these laws describes these data best \
+         for its parameters, not that it is right: a law that is missing here, a tip of another \
+         shape or noise that is not normal can favour a wrong one."
+    )));
+    text.push('\n');
+    text
+}
+
 fn text(case: &GivenCase, report: &FitReport) -> String {
     let curves: std::collections::BTreeSet<&str> =
         report.rows.iter().map(|row| row.curve.as_str()).collect();
@@ -173,6 +241,9 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
         number::counted(curves.len(), "curve", "curves"),
     );
     let mut text = format!("{}\n\n", style::bold(&heading));
+    if !report.laws.is_empty() {
+        text.push_str(&laws(report));
+    }
     let mut table = Table::new([
         ("parameter", Align::Left),
         ("value", Align::Right),

@@ -1,6 +1,6 @@
 //! From a first point step by step until the branch ends.
 
-use crate::continuation::bifurcation::{Bifurcation, Tests, between};
+use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, Tests, between};
 use crate::continuation::end::dead_end;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
 use crate::continuation::solver::{BranchSolver, Node};
@@ -169,6 +169,11 @@ pub(crate) fn follow<F: MapFamily>(
         }
         let found = between(solver, &node, &tests, &next_tests, taken, index);
         branch.take(found, options.range);
+        let folds = |b: &Bifurcation| matches!(b.kind, BifurcationKind::Fold);
+        if options.until_fold && branch.bifurcations.iter().any(folds) {
+            branch.end = BranchEnd::Fold;
+            break;
+        }
         arclength += taken;
         branch
             .points

@@ -58,6 +58,8 @@ pub struct ContinuationOptions {
     /// Residual, in units of the orbit's scale, at which a stalled Newton iteration
     /// is accepted: the accuracy of the map.
     pub residual_tolerance: f64,
+    /// Whether the branch is left at its first fold.
+    pub until_fold: bool,
 }
 
 impl ContinuationOptions {
@@ -74,6 +76,7 @@ impl ContinuationOptions {
             state_scale: None,
             parameter_scale: None,
             residual_tolerance: 1e-10,
+            until_fold: false,
         }
     }
 }
@@ -160,6 +163,9 @@ pub enum BranchEnd {
         /// Where.
         parameter: f64,
     },
+    /// It was to be left at its first fold.
+    #[error("the first fold")]
+    Fold,
     /// The allowed number of points was used up.
     #[error("the allowed number of points")]
     PointLimit,
@@ -177,6 +183,7 @@ impl BranchEnd {
             | Self::Closed
             | Self::Collapsed { .. }
             | Self::Vanished { .. }
+            | Self::Fold
             | Self::Grazing { .. } => false,
             Self::LeftDomain | Self::StepTooSmall { .. } | Self::PointLimit | Self::Cancelled => {
                 true

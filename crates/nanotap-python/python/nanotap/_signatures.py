@@ -450,9 +450,11 @@ def fit(
     per_curve: Any = None,
     bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     columns: Any = None,
+    laws: Any = None,
     starts: int = 8,
     seed: int = 0,
     max_period: int = 4,
+    jumps: bool = True,
     profile: bool = True,
     threads: int | None = None,
     progress: Progress = None,
@@ -475,12 +477,17 @@ def fit(
         Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m".
     columns : Any
         Columns of the data that count; without it, all.
+    laws : Any
+        Contact laws to compare, as in hertz,dmt; without it, the case's own.
     starts : int
         Starts to try as long as nothing describes the data (1 to 1000).
     seed : int
         Seed of the further starts.
     max_period : int
         Longest period of the orbits looked for (1 to 64).
+    jumps : bool
+        The place at which the data jump from a branch that ends in a fold counts
+        too.
     profile : bool
         Intervals by the profile of the likelihood.
     threads : int | None
@@ -508,9 +515,11 @@ def fit(
         "per_curve": per_curve,
         "bounds": bounds,
         "columns": columns,
+        "laws": laws,
         "starts": starts,
         "seed": seed,
         "max_period": max_period,
+        "jumps": jumps,
         "profile": profile,
     }
     return _studies.fit(case, options, threads, progress)

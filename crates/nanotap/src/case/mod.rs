@@ -29,6 +29,7 @@ pub mod physical;
 pub mod quantity;
 pub mod schema;
 mod stated;
+pub(crate) mod under_law;
 pub mod units;
 
 use std::collections::BTreeMap;

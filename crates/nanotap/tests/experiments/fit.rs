@@ -5,6 +5,7 @@ use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::study::approach::{ApproachOptions, Way, approach};
 use nanotap::study::fit::{Entry, FitReport, FitRequest, Table, fit, residuals};
+use nanotap::study::orbit::{OrbitOptions, orbit};
 
 /// A stiff lever a little above its resonance: two motions at one distance.
 const LEVER: &str = "[model]\nmodes = 2\n[cantilever]\nk = \"42 N/m\"\nf0 = \"330 kHz\"\nQ = 400\n\
@@ -182,6 +183,83 @@ fn rows_lie_on_the_branch_that_the_data_are_on() {
         let error = parameter.standard_error.unwrap();
         assert!(
             (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
+    }
+}
+
+#[test]
+fn the_place_of_a_jump_is_a_datum() {
+    let truth = case(LEVER, &[]);
+    let curve = curve(&truth, 25.0, 12.0, 53);
+    let table = measured(&curve, &mut Noise(17), [0.1, 0.5], true);
+    let start = case(LEVER, &["sample.stiffness=24 N/m"]);
+    let with = request(vec![table], &FREE);
+    let without = FitRequest {
+        jumps: false,
+        ..with.clone()
+    };
+    let [with, without] = [with, without].map(|request| fitted(&start, &request));
+    assert!(with.fits && without.jumps.is_empty(), "{:?}", with.reason);
+    // Into contact on approach, out of it on retract, each between two rows 0.25 nm apart.
+    assert_eq!(with.jumps.len(), 2);
+    for jump in &with.jumps {
+        let [a, b] = jump.between;
+        let (low, high) = (a.min(b) - 0.1e-9, a.max(b) + 0.1e-9);
+        assert!(low < jump.fold && jump.fold < high, "{jump:?}");
+        assert!(jump.residual.abs() < 3.0, "{jump:?}");
+    }
+    assert_eq!(with.degrees_of_freedom, without.degrees_of_freedom + 2);
+    for (k, truth) in TRUE.iter().enumerate() {
+        let [a, b] = [&with, &without].map(|report| &report.parameters[k]);
+        let error = a.standard_error.unwrap();
+        assert!((a.value - truth).abs() < 4.0 * error, "{a:?}");
+        assert!(
+            error <= b.standard_error.unwrap() * (1.0 + 1e-9),
+            "{a:?} {b:?}"
+        );
+    }
+}
+
+#[test]
+fn a_free_amplitude_is_found_from_resonance_curves() {
+    // From below the resonance, where the lever swings freely.
+    let truth = case(LEVER, &["drive.free_amplitude=22 nm", "cantilever.Q=380"]);
+    let rows = [0.990, 0.993, 0.995, 0.996, 0.9965];
+    let frequencies: Vec<f64> = rows.iter().map(|ratio| ratio * 330e3).collect();
+    let mut noise = Noise(41);
+    let (mut amplitude, mut phase) = (Vec::new(), Vec::new());
+    for frequency in &frequencies {
+        let key = truth.key("drive.frequency").unwrap();
+        let there = truth.with(key, *frequency);
+        let options = OrbitOptions::default();
+        let seen = orbit(&there.model().unwrap(), &options).unwrap();
+        let view = there.physical().unwrap();
+        let seen = seen.observables.in_si(&view.scales);
+        amplitude.push(Entry::Number(
+            1e9 * seen.first_harmonic + 0.01 * noise.normal(),
+        ));
+        phase.push(Entry::Number(seen.phase + 0.05 * noise.normal()));
+    }
+    let frequency = frequencies.iter().map(|f| Entry::Number(1e-3 * f));
+    let table = Table {
+        name: "resonance".to_owned(),
+        columns: vec![
+            ("frequency (kHz)".to_owned(), frequency.collect()),
+            ("amplitude (nm)".to_owned(), amplitude),
+            ("phase (deg)".to_owned(), phase),
+        ],
+        lines: Vec::new(),
+    };
+    let start = case(LEVER, &[]);
+    let request = request(vec![table], &["drive.free_amplitude", "cantilever.Q"]);
+    derivatives_are_right(&start, &request, &[21e-9, 390.0], &[1e-12, 0.05], 1e-6);
+    let report = fitted(&start, &request);
+    assert!(report.fits, "{:?}", report.reason);
+    for (parameter, truth) in report.parameters.iter().zip([22e-9, 380.0]) {
+        let error = parameter.standard_error.unwrap();
+        assert!(
+            (parameter.value - truth).abs() < 5.0 * error,
             "{parameter:?}"
         );
     }
@@ -367,6 +445,8 @@ fn curves_share_a_sample_and_have_distances_of_their_own() {
     let report = fitted(&truth, &request);
     assert!(report.fits, "{:?}", report.reason);
     assert_eq!(report.parameters.len(), 3);
+    let files: Vec<&str> = report.case_files.iter().map(|f| f.curve.as_str()).collect();
+    assert_eq!(files, ["curve 0", "curve 1"]);
     for (parameter, truth) in report.parameters.iter().zip([30.0, 0.4e-9, -0.3e-9]) {
         let error = parameter.standard_error.unwrap();
         assert!(
@@ -441,4 +521,92 @@ fn bad_tables_are_refused_with_their_place() {
     let text = "# measured\n distance [nm]; amplitude [nm] ; phase\n10;;12\n11;10;\n";
     let table = Table::parse("curve.csv", text).unwrap();
     assert_eq!(table.columns[1].1, [Entry::Missing, Entry::Number(10.0)]);
+}
+
+/// A lever over a sample that pulls and presses.
+const PULLING: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"325 kHz\"\nQ = 50\n\
+     [tip]\nradius = \"20 nm\"\n[sample]\nlaw = \"dmt\"\nmodulus = \"2 GPa\"\npoisson = 0.3\n\
+     hamaker = \"1.5e-19 J\"\n[drive]\nactuation = \"tip\"\nfrequency_ratio = 1\n\
+     free_amplitude = \"20 nm\"\n[gap]\ntip = \"15 nm\"\n";
+
+#[test]
+fn of_several_laws_the_one_behind_the_data_is_chosen() {
+    let truth = case(PULLING, &[]);
+    let mut curve = curve(&truth, 18.0, 6.0, 13);
+    curve.retain(|row| row.3 == Way::Approach);
+    let table = measured(&curve, &mut Noise(31), [0.01, 0.05], true);
+    // From the law without attraction: what the others need begins between its bounds.
+    let start = case(
+        &PULLING
+            .replace("dmt", "hertz")
+            .replace("hamaker = \"1.5e-19 J\"\n", ""),
+        &["sample.modulus=3 GPa"],
+    );
+    let bounds = serde_json::from_str(r#"{"sample.hamaker": ["4e-20 J", "4e-19 J"]}"#).unwrap();
+    let request = FitRequest {
+        laws: vec!["hertz, dmt".to_owned(), "thin-sphere".to_owned()],
+        bounds,
+        ..request(vec![table], &["sample.modulus", "sample.hamaker"])
+    };
+    let report = fitted(&start, &request);
+    assert!(report.fits, "{:?}", report.reason);
+    assert_eq!(report.law.as_deref(), Some("dmt"));
+    let of = |law: &str| report.laws.iter().find(|l| l.law == law).unwrap();
+    // Hertz has nothing that pulls, so that one parameter is its own.
+    assert_eq!(of("hertz").parameters.len(), 1);
+    assert!(of("hertz").above_best.unwrap() > 100.0 && !of("hertz").fits);
+    assert_eq!(of("dmt").above_best, Some(0.0));
+    assert!(of("dmt").weight.unwrap() > 0.999);
+    // Of a thin layer the case says neither thickness nor anything about it.
+    let missing = of("thin-sphere").reason.as_ref().unwrap();
+    assert!(missing.contains("thickness"), "{missing}");
+    // −2 ln L of both criteria is the same: they differ in the price of a parameter.
+    let count = (report.degrees_of_freedom + report.parameters.len()) as f64;
+    let prices = (count.ln() - 2.0) * report.parameters.len() as f64;
+    assert!((report.bic - report.aic - prices).abs() < 1e-9 * report.aic.abs());
+    for (parameter, truth) in report.parameters.iter().zip([2e9, 1.5e-19]) {
+        let error = parameter.standard_error.unwrap();
+        assert!(
+            (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
+    }
+    let best = case(&report.case_file, &[]);
+    assert_eq!(
+        best.get(best.key("sample.modulus").unwrap()),
+        report.parameters[0].value
+    );
+}
+
+#[test]
+fn laws_are_refused_in_words() {
+    let start = case(PULLING, &[]);
+    let table = || Table::parse("a.csv", "distance (nm),phase\n10,90\n12,95\n14,100\n").unwrap();
+    for (laws, free, word) in [
+        ("hertz,hooke", "sample.modulus", "hooke"),
+        ("hertz,hertz", "sample.modulus", "twice"),
+        ("hertz,dmt", "sample.viscosity", "sample.viscosity"),
+    ] {
+        let request = FitRequest {
+            laws: vec![laws.to_owned()],
+            ..request(vec![table()], &[free])
+        };
+        let refused = fit(&start, &request, &Control::default()).unwrap_err();
+        assert!(refused.to_string().contains(word), "{refused}");
+    }
+    let plain = Case::parse(None, &["alpha1=0.1".to_owned(), "omega=3".to_owned()]);
+    let request = FitRequest {
+        laws: vec!["hertz".to_owned()],
+        ..request(
+            vec![Table::parse("a.csv", "alpha5,phase\n0,90\n0.1,95\n0.2,97\n").unwrap()],
+            &["alpha4"],
+        )
+    };
+    if let Ok(plain) = plain {
+        let refused = fit(&plain, &request, &Control::default()).unwrap_err();
+        assert!(
+            refused.to_string().contains("physical quantities"),
+            "{refused}"
+        );
+    }
 }

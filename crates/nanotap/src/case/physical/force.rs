@@ -12,6 +12,7 @@ use super::remark::Remark;
 use super::tip::Tip;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
+use crate::model::contact::ContactLaw;
 use crate::model::sample_law::SampleLaw;
 
 /// Permittivity of free space, F/m.
@@ -63,6 +64,29 @@ pub struct SampleForce {
 impl PartialEq for SampleForce {
     fn eq(&self, other: &Self) -> bool {
         self.values == other.values && self.names() == other.names()
+    }
+}
+
+/// The keys that some contact law takes and another does not.
+pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
+    OF_LAWS.into_iter().chain(OF_SAMPLES)
+}
+
+/// Whether nonlinear laws take a key of [`keys_of_contacts`].
+pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
+    let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
+    parameters.clone().any(|p| key_of(p) == key)
+        || key == Key::SampleMaterial && parameters.any(|p| p.name == "modulus")
+        || ADHESION.contains(&key) && adhesion_of(terms).is_some()
+}
+
+/// Whether a linear contact takes a key of [`keys_of_contacts`].
+pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
+    let solid = law == ContactLaw::StandardLinearSolid;
+    match key {
+        Key::SampleDamping | Key::SampleLossTangent => !solid,
+        Key::SampleRelaxationStiffness | Key::SampleRelaxationTime => solid,
+        _ => OF_SAMPLES.contains(&key),
     }
 }
 
@@ -118,16 +142,8 @@ impl SampleForce {
         let refused = |reason: String| PhysicalError::impossible(Key::SampleLaw, name, reason);
         let terms = SampleLaw::terms(name).map_err(|error| refused(error.to_string()))?;
         let parameters = || terms.iter().flat_map(|term| term.entry.parameters);
-        let takes = |key: Key| {
-            parameters().any(|p| key_of(p) == key)
-                || key == Key::SampleMaterial && parameters().any(|p| p.name == "modulus")
-                || ADHESION.contains(&key) && adhesion_of(&terms).is_some()
-        };
-        let strange = OF_LAWS.into_iter().chain(OF_SAMPLES);
-        if let Some(key) = strange
-            .into_iter()
-            .find(|key| reader.has(*key) && !takes(*key))
-        {
+        let strange = keys_of_contacts().find(|key| reader.has(*key) && !takes(&terms, *key));
+        if let Some(key) = strange {
             let mut keys: Vec<&str> = Vec::new();
             for key in parameters().map(|p| key_of(p).path()) {
                 if !keys.contains(&key) {

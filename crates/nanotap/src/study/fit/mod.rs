@@ -18,6 +18,8 @@
 
 mod branches;
 mod data;
+mod jumps;
+mod laws;
 mod parameters;
 mod problem;
 mod profile;
@@ -34,7 +36,8 @@ use serde::{Deserialize, Serialize};
 
 pub use data::{Column, Curve, Data, Row, Swept};
 pub use report::{
-    FitReport, FittedColumn, FittedParameter, FittedRow, OtherOrbit, Reading, Undetermined,
+    ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
+    OtherOrbit, Reading, Undetermined,
 };
 pub use table::{Entry, MOST_ROWS, Table};
 
@@ -74,6 +77,9 @@ pub struct FitRequest {
     /// Columns of the data that count; without it, all
     #[schemars(extend("x-value" = "NAME,…"))]
     pub columns: Vec<String>,
+    /// Contact laws to compare, as in hertz,dmt; without it, the case's own
+    #[schemars(extend("x-value" = "LAW,…"))]
+    pub laws: Vec<String>,
     /// Starts to try as long as nothing describes the data
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: usize,
@@ -83,6 +89,9 @@ pub struct FitRequest {
     /// Longest period of the orbits looked for
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
     pub max_period: usize,
+    /// The place at which the data jump from a branch that ends in a fold counts too
+    #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
+    pub jumps: bool,
     /// Intervals by the profile of the likelihood
     #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
     pub profile: bool,
@@ -96,9 +105,11 @@ impl Default for FitRequest {
             per_curve: Vec::new(),
             bounds: Intervals::default(),
             columns: Vec::new(),
+            laws: Vec::new(),
             starts: 8,
             seed: 0,
             max_period: 4,
+            jumps: true,
             profile: true,
         }
     }
@@ -121,11 +132,20 @@ impl Study for FitStudy {
     }
 }
 
-/// Finds the free parameters.
+/// Finds the free parameters, under each of the laws that are to be compared.
 ///
 /// # Errors
 /// When the data or the parameters are not understood, or no orbit is found where the data are.
 pub fn fit(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+    if names(&request.laws).is_empty() {
+        fit_one(case, request, control)
+    } else {
+        laws::compare(case, request, control)
+    }
+}
+
+/// The same under the law that the case has.
+fn fit_one(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
     #[expect(
         clippy::redundant_closure_for_method_calls,
         reason = "the method itself is not general enough in its lifetime"
@@ -162,6 +182,7 @@ fn with_search<R>(
             max_period: request.max_period,
             noise: Vec::new(),
             robust: None,
+            jumps: Vec::new(),
         },
         request,
         control,

@@ -7,9 +7,10 @@
 use crate::Error;
 use crate::case::{Case, Key};
 use crate::observe::Observable;
-use crate::study::value::{Amount, Intervals};
+use crate::study::value::{Amount, Interval, Intervals};
 
 use super::data::{self, Data, is_distance};
+use super::laws::between;
 
 /// What a parameter changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,8 +92,9 @@ pub(super) fn parameters(
     let mut parameters = Vec::new();
     for (names, option) in [(free, "free"), (per_curve, "per_curve")] {
         for name in names {
+            let given = bounds.0.iter().find(|b| b.name == *name);
             let mut parameter =
-                parameter(case, data, name.trim()).map_err(|error| error.at(option))?;
+                parameter(case, data, name.trim(), given).map_err(|error| error.at(option))?;
             if parameters
                 .iter()
                 .any(|p: &Parameter| p.target == parameter.target)
@@ -103,7 +105,6 @@ pub(super) fn parameters(
                     "name each parameter once",
                 ));
             }
-            let given = bounds.0.iter().find(|b| b.name == *name);
             if let Some(given) = given {
                 bound(case, data, &mut parameter, [&given.low, &given.high])
                     .map_err(|error| error.at("bounds"))?;
@@ -141,7 +142,12 @@ pub(super) fn parameters(
     Ok(parameters)
 }
 
-fn parameter(case: &Case, data: &Data, name: &str) -> Result<Parameter, Error> {
+fn parameter(
+    case: &Case,
+    data: &Data,
+    name: &str,
+    bound: Option<&Interval>,
+) -> Result<Parameter, Error> {
     if let Some((of, what)) = name.rsplit_once('.')
         && matches!(what, "offset" | "scale")
     {
@@ -157,18 +163,17 @@ fn parameter(case: &Case, data: &Data, name: &str) -> Result<Parameter, Error> {
             format!("free {}.offset for an error of it", swept.name),
         ));
     }
-    let sets_frequency = data.swept.iter().any(|s| s.key == Key::DriveFrequency);
-    if sets_frequency && key == Key::DriveFreeAmplitude {
-        return Err(Error::input(
-            "drive.free_amplitude is another strength of the drive at every frequency",
-            "free drive.amplitude",
-        ));
+    let mut start = case.get(key);
+    if let (false, Some(bound)) = (start.is_finite(), bound) {
+        start = between(
+            case.value(key, bound.low.text())?,
+            case.value(key, bound.high.text())?,
+        );
     }
-    let start = case.get(key);
     if !start.is_finite() {
         return Err(Error::input(
             format!("the case does not say where {name} begins"),
-            "give it a value in the case",
+            "give it a value in the case, or {bounds}",
         ));
     }
     let range = key.range();

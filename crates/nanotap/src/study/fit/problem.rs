@@ -1,22 +1,25 @@
 //! The residuals of measured curves and their exact derivatives.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_dynamics::PeriodicOrbit;
 use rayon::prelude::*;
 
-use crate::case::Case;
+use crate::case::{Case, Key};
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Derivative, Dimension, Observables, Set, measure};
 
 use super::branches::{Along, Candidate, Rows, continued, path};
 use super::data::{Data, Row};
+use super::jumps::{Fold, Jump};
 use super::parameters::{Parameter, Target};
 use super::solve::LeastSquares;
 
 /// Measured curves, a case and what of it is free.
+#[derive(Clone)]
 pub(super) struct Problem<'a> {
     pub(super) case: &'a Case,
     pub(super) data: &'a Data,
@@ -27,7 +30,12 @@ pub(super) struct Problem<'a> {
     /// Residuals beyond this many standard errors count by their logarithm only (Cauchy's
     /// loss), so that rows on a branch that is not theirs yet do not lead astray.
     pub(super) robust: Option<f64>,
+    /// Jumps whose folds count beside the rows.
+    pub(super) jumps: Vec<Jump>,
 }
+
+/// Keys of the case, each with its derivative by a parameter.
+type Effects = Vec<(Key, f64)>;
 
 /// The model at one row.
 #[derive(Clone, Debug)]
@@ -48,8 +56,21 @@ pub(super) struct RowPoint {
     at: Option<Arc<(Case, Model)>>,
 }
 
-/// The model at all rows, curve after curve.
-pub(super) type Point = Vec<RowPoint>;
+/// The model at all rows, curve after curve, and at the folds of the jumps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Point {
+    rows: Vec<RowPoint>,
+    /// One a jump; `None` where there is no fold.
+    pub(super) folds: Vec<Option<Fold>>,
+}
+
+impl Deref for Point {
+    type Target = [RowPoint];
+
+    fn deref(&self) -> &[RowPoint] {
+        &self.rows
+    }
+}
 
 impl Problem<'_> {
     /// What is observed.
@@ -67,9 +88,73 @@ impl Problem<'_> {
                     case = case.with(key, *value);
                 }
             }
-            case
+            match self.held_strength() {
+                // As it is at the case's own frequency, while the rows set others.
+                Some(strength) => {
+                    let value = case.get(strength);
+                    case.with(strength, value)
+                }
+                None => case,
+            }
         };
         (0..self.data.curves.len()).map(of).collect()
+    }
+
+    /// The key of the drive's own strength, where that follows from a free amplitude which is a
+    /// parameter and the rows set the frequency.
+    fn held_strength(&self) -> Option<Key> {
+        let free = Target::Key(Key::DriveFreeAmplitude);
+        let sets_frequency = self.data.swept.iter().any(|s| s.key == Key::DriveFrequency);
+        if !sets_frequency || !self.parameters.iter().any(|p| p.target == free) {
+            return None;
+        }
+        let known = |key: &Key| self.case.get(*key).is_finite();
+        [Key::DriveAmplitude, Key::DriveForce]
+            .into_iter()
+            .find(known)
+    }
+
+    /// What of the case changes with each parameter in each curve: keys, each with its
+    /// derivative by the parameter.
+    fn effects(&self, x: &[f64]) -> Vec<Vec<Effects>> {
+        let plain = |parameter: &Parameter| match parameter.target {
+            Target::Key(key) => vec![(key, 1.0)],
+            Target::Place(at) => vec![(self.data.swept[at].key, 1.0)],
+            Target::Offset(_) | Target::Scale(_) => Vec::new(),
+        };
+        let mut all: Vec<Vec<Effects>> = (0..self.data.curves.len())
+            .map(|_| self.parameters.iter().map(plain).collect())
+            .collect();
+        let Some(strength) = self.held_strength() else {
+            return all;
+        };
+        // The mapping is a chain of closed forms: a central difference is good to ten digits.
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            let Target::Key(key) = parameter.target else {
+                continue;
+            };
+            let step = 1e-5
+                * if x[k] == 0.0 {
+                    parameter.size
+                } else {
+                    x[k].abs()
+                };
+            let beside = |side: f64| {
+                let mut x = x.to_vec();
+                x[k] += side * step;
+                self.cases(&x)
+            };
+            let (low, high) = (beside(-1.0), beside(1.0));
+            for (curve, effects) in all.iter_mut().enumerate() {
+                let slope = (high[curve].get(strength) - low[curve].get(strength)) / (2.0 * step);
+                if key == Key::DriveFreeAmplitude {
+                    effects[k] = vec![(strength, slope)];
+                } else if key != strength && slope != 0.0 && slope.is_finite() {
+                    effects[k].push((strength, slope));
+                }
+            }
+        }
+        all
     }
 
     /// Where a row of a curve stands, offsets included.
@@ -216,7 +301,132 @@ impl Problem<'_> {
             })
             .collect();
         let (points, rows): (Vec<Point>, Vec<Rows>) = curves.into_iter().unzip();
-        (points.concat(), rows)
+        let point = Point {
+            rows: points.into_iter().flat_map(|point| point.rows).collect(),
+            folds: Vec::new(),
+        };
+        (point, rows)
+    }
+
+    /// Where the data jump: neighbouring rows on different branches, both of which describe
+    /// their rows, the first ending in a fold. The folds are added to `point`.
+    pub(super) fn find_jumps(&mut self, x: &[f64], point: &mut Point) {
+        self.jumps.clear();
+        point.folds.clear();
+        let rows = self.rows();
+        let near = |k: usize| {
+            let (curve, row) = rows[k];
+            !point[k].lost
+                && (0..self.data.columns.len()).all(|column| {
+                    let value = point[k].values[column];
+                    let difference = self.difference(x, curve, row, column, value);
+                    difference.is_none_or(|d| d.abs() < NEAR * self.error(row, column))
+                })
+        };
+        let bases = self.cases(x);
+        let mut jumps = Vec::new();
+        let mut first = 0;
+        for k in 1..rows.len() {
+            let (same_curve, same_branch) = (
+                rows[k - 1].0 == rows[k].0,
+                point[k - 1].branch == point[k].branch,
+            );
+            if same_curve && same_branch {
+                continue;
+            }
+            let run = first;
+            first = k;
+            let between = [rows[k - 1].1.at[0], rows[k].1.at[0]];
+            if !same_curve || between[0] == between[1] || !near(k - 1) || !near(k) {
+                continue;
+            }
+            let all = rows.iter().filter(|row| row.0 == rows[k].0);
+            let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), row| {
+                (l.min(row.1.at[0]), h.max(row.1.at[0]))
+            });
+            jumps.push(Jump {
+                curve: rows[k].0,
+                rows: [k - 1, k],
+                first: run,
+                between,
+                reach: REACH * (high - low),
+            });
+        }
+        let folds = jumps
+            .par_iter()
+            .map(|jump| self.fold(x, &bases, &point.rows, jump));
+        let found: Vec<Option<Fold>> = folds.collect();
+        (self.jumps, point.folds) = jumps
+            .into_iter()
+            .zip(found)
+            .filter(|(_, fold)| fold.is_some())
+            .unzip();
+    }
+
+    /// Where the branch before a jump ends.
+    fn fold(&self, x: &[f64], bases: &[Case], rows: &[RowPoint], jump: &Jump) -> Option<Fold> {
+        let of = &self.data.curves[jump.curve].rows;
+        let run = (jump.first..=jump.rows[0]).rev();
+        let (index, orbit) = run
+            .filter(|k| !rows[*k].lost)
+            .find_map(|k| Some((k, rows[k].orbit.as_ref()?)))?;
+        let row = of.get(index - self.index_of(jump.curve))?;
+        let at = self.place(x, jump.curve, row);
+        let base = self.case_at(&bases[jump.curve], &at);
+        let offset = at[0] - row.at[0];
+        Fold::beyond(&base, &self.data.swept[0], (at[0], orbit), (jump, offset))
+    }
+
+    /// The first row of a curve, counted over all.
+    fn index_of(&self, curve: usize) -> usize {
+        self.data.curves[..curve].iter().map(|c| c.rows.len()).sum()
+    }
+
+    /// Model less measured place of a jump, in standard errors; 0 where there is no fold.
+    pub(super) fn jump_residual(&self, x: &[f64], point: &Point, index: usize) -> f64 {
+        let (jump, fold) = (&self.jumps[index], &point.folds[index]);
+        let offset: f64 = self
+            .parameters
+            .iter()
+            .zip(x)
+            .filter(|(p, _)| p.target == Target::Place(0) && p.is_of(jump.curve))
+            .map(|(_, value)| value)
+            .sum();
+        fold.as_ref()
+            .map_or(0.0, |fold| (fold.at - offset - jump.at()) / jump.error())
+    }
+
+    /// The derivatives of that residual.
+    fn jump_derivatives(&self, effects: &[Vec<Effects>], point: &Point, index: usize) -> Vec<f64> {
+        let (jump, fold) = (&self.jumps[index], &point.folds[index]);
+        let still = || vec![0.0; self.parameters.len()];
+        let Some(fold) = fold.as_ref().filter(|fold| !fold.lost) else {
+            return still();
+        };
+        let swept = self.data.swept[0].key;
+        let effects = &effects[jump.curve];
+        let mut keys: Vec<Key> = effects.iter().flatten().map(|(key, _)| *key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        keys.retain(|key| *key != swept);
+        let Some(by_key) = fold.derivatives(swept, &keys) else {
+            return still();
+        };
+        let slope = |(k, parameter): (usize, &Parameter)| {
+            if !parameter.is_of(jump.curve) {
+                return 0.0;
+            }
+            let sum: f64 = effects[k]
+                .iter()
+                .filter_map(|(key, by)| {
+                    let at = keys.iter().position(|other| other == key)?;
+                    Some(by * by_key[at])
+                })
+                .sum();
+            let offset = f64::from(u8::from(parameter.target == Target::Place(0)));
+            (sum - offset) / jump.error()
+        };
+        self.parameters.iter().enumerate().map(slope).collect()
     }
 
     /// Of each row the orbit that its data are on.
@@ -270,53 +480,62 @@ impl Problem<'_> {
                 at: None,
             })
         };
-        chosen.into_iter().enumerate().map(pick).collect()
+        Point {
+            rows: chosen.into_iter().enumerate().map(pick).collect(),
+            folds: Vec::new(),
+        }
     }
 
-    /// The derivatives of the state and of what was measured by one parameter.
+    /// The derivatives of the state and of what was measured by one parameter, whose `effects`
+    /// on the case are known.
     fn derivative(
         &self,
         x: &[f64],
         (curve, point): (usize, &RowPoint),
         parameter: usize,
+        effects: &Effects,
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let (at, orbit) = (point.at.as_ref()?, point.orbit.as_ref()?);
         let (case, model) = &**at;
         let start = orbit.states.first()?;
         let columns = &self.data.columns;
-        let still = || vec![0.0; start.len()];
+        let mut state = vec![0.0; start.len()];
+        let mut by = vec![0.0; columns.len()];
         let of = &self.parameters[parameter];
         if !of.is_of(curve) {
-            return Some((still(), vec![0.0; columns.len()]));
+            return Some((state, by));
         }
-        let key = match of.target {
-            Target::Key(key) => key,
-            Target::Place(at) => self.data.swept[at].key,
-            Target::Offset(column) | Target::Scale(column) => {
-                let mut by = vec![0.0; columns.len()];
-                by[column] = match of.target {
-                    Target::Scale(_) => point.values[column],
-                    _ => 1.0,
-                };
-                return Some((still(), by));
-            }
-        };
+        match of.target {
+            Target::Offset(column) => by[column] = 1.0,
+            Target::Scale(column) => by[column] = point.values[column],
+            Target::Key(_) | Target::Place(_) => {}
+        }
         let observables = point.observables.as_ref()?;
-        let at = (start.as_slice(), orbit.period);
-        let derivative = Derivative::of(case, model, key, at, observables, self.set()).ok()?;
-        let by = columns.iter().enumerate().map(|(column, of)| {
-            let number = if case.is_physical() {
-                derivative.number_in_si(of.observable)
-            } else {
-                derivative.number(of.observable)
-            };
-            let scale = self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0);
-            number.map(|number| scale * number)
-        });
-        let by = by.collect::<Option<Vec<f64>>>()?;
-        Some((derivative.state, by))
+        for (key, weight) in effects {
+            let at = (start.as_slice(), orbit.period);
+            let derivative = Derivative::of(case, model, *key, at, observables, self.set()).ok()?;
+            state
+                .iter_mut()
+                .zip(&derivative.state)
+                .for_each(|(sum, part)| *sum += weight * part);
+            for (column, of) in columns.iter().enumerate() {
+                let number = if case.is_physical() {
+                    derivative.number_in_si(of.observable)
+                } else {
+                    derivative.number(of.observable)
+                };
+                let scale = self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0);
+                by[column] += weight * scale * number?;
+            }
+        }
+        Some((state, by))
     }
 }
+
+/// Standard errors within which rows beside a jump must lie for it to count.
+const NEAR: f64 = 6.0;
+/// How far beyond the jump its fold is looked for, in lengths of the curve.
+const REACH: f64 = 0.5;
 
 impl LeastSquares for Problem<'_> {
     type Point = Point;
@@ -356,38 +575,58 @@ impl LeastSquares for Problem<'_> {
             follow().unwrap_or_else(lost)
         };
         let rows = self.rows();
-        Some(rows.par_iter().zip(from.par_iter()).map(one).collect())
+        let rows: Vec<RowPoint> = rows.par_iter().zip(from.par_iter()).map(one).collect();
+        let folds = self
+            .jumps
+            .par_iter()
+            .zip(&from.folds)
+            .map(|(jump, before)| {
+                let found = self.fold(x, &bases, &rows, jump);
+                found.or_else(|| Some(before.as_ref()?.of_before()))
+            });
+        let folds = folds.collect();
+        Some(Point { rows, folds })
     }
 
     fn residuals(&self, x: &[f64], point: &Point) -> DVector<f64> {
         let columns = 0..self.data.columns.len();
         let rows = self.rows();
-        let all = rows.iter().zip(point).flat_map(|((curve, row), point)| {
-            columns.clone().map(move |column| {
-                let value = point.values[column];
-                if !value.is_finite() {
-                    return 0.0;
-                }
-                let difference = self.difference(x, *curve, row, column, value);
-                difference.map_or(0.0, |d| self.counted(d / self.error(row, column)).0)
-            })
-        });
-        DVector::from_iterator(rows.len() * columns.len(), all)
+        let jumps = (0..self.jumps.len()).map(|index| self.jump_residual(x, point, index));
+        let all = rows
+            .iter()
+            .zip(point.iter())
+            .flat_map(|((curve, row), point)| {
+                columns.clone().map(move |column| {
+                    let value = point.values[column];
+                    if !value.is_finite() {
+                        return 0.0;
+                    }
+                    let difference = self.difference(x, *curve, row, column, value);
+                    difference.map_or(0.0, |d| self.counted(d / self.error(row, column)).0)
+                })
+            });
+        let count = rows.len() * columns.len() + self.jumps.len();
+        DVector::from_iterator(count, all.chain(jumps))
     }
 
     fn jacobian(&self, x: &[f64], point: &mut Point) -> Option<DMatrix<f64>> {
         let (columns, count) = (self.data.columns.len(), self.parameters.len());
         let rows = self.rows();
+        let effects = self.effects(x);
+        let jumps = (0..self.jumps.len()).into_par_iter();
+        let jumps: Vec<Vec<f64>> = jumps
+            .map(|index| self.jump_derivatives(&effects, point, index))
+            .collect();
         let blocks: Vec<DMatrix<f64>> = rows
             .par_iter()
-            .zip(point.par_iter_mut())
+            .zip(point.rows.par_iter_mut())
             .map(|((curve, row), point)| {
                 let mut block = DMatrix::zeros(columns, count);
                 if point.lost {
                     return block;
                 }
                 let by: Option<Vec<_>> = (0..count)
-                    .map(|parameter| self.derivative(x, (*curve, point), parameter))
+                    .map(|k| self.derivative(x, (*curve, point), k, &effects[*curve][k]))
                     .collect();
                 let Some(by) = by else {
                     return block;
@@ -408,9 +647,14 @@ impl LeastSquares for Problem<'_> {
                 block
             })
             .collect();
-        let mut jacobian = DMatrix::zeros(rows.len() * columns, count);
+        let mut jacobian = DMatrix::zeros(rows.len() * columns + jumps.len(), count);
         for (row, block) in blocks.iter().enumerate() {
             jacobian.rows_mut(row * columns, columns).copy_from(block);
+        }
+        for (index, slopes) in jumps.iter().enumerate() {
+            for (k, slope) in slopes.iter().enumerate() {
+                jacobian[(rows.len() * columns + index, k)] = *slope;
+            }
         }
         jacobian.iter().all(|v| v.is_finite()).then_some(jacobian)
     }

@@ -15,15 +15,25 @@ pub struct FitReport {
     pub parameters: Vec<FittedParameter>,
     /// Sum of the squared residuals in standard errors.
     pub chi2: f64,
-    /// Measured values less parameters.
+    /// Measured values and jumps less parameters.
     pub degrees_of_freedom: usize,
     /// The probability of a larger chi2 by chance; where all standard errors were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_value: Option<f64>,
     /// Akaike's criterion, −2 ln L + 2 p: of two laws fitted to the same data the one with the
     /// smaller value describes them better for its parameters, by more than chance where the
-    /// difference is above some ten. It says nothing of whether either is right.
+    /// difference is above some ten. It says nothing of whether either is right. A row without
+    /// an orbit counts as missed by the whole spread of its column.
     pub aic: f64,
+    /// Schwarz's criterion, −2 ln L + p ln n: the same with parameters counted by the logarithm
+    /// of how many values were measured.
+    pub bic: f64,
+    /// The contact law of this fit, where several were compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<String>,
+    /// The laws that were compared, in the order of the request.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub laws: Vec<ComparedLaw>,
     /// Whether the model describes the data.
     pub fits: bool,
     /// Why not, if it does not.
@@ -43,6 +53,9 @@ pub struct FitReport {
     pub swept_unit: String,
     /// The rows, curve after curve.
     pub rows: Vec<FittedRow>,
+    /// Where the data jump from one branch to another at a fold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub jumps: Vec<FittedJump>,
     /// Orbits at the rows that the data are not on.
     pub others: Vec<OtherOrbit>,
     /// Steps of Levenberg and Marquardt in all.
@@ -51,8 +64,51 @@ pub struct FitReport {
     pub starts: usize,
     /// The case of the best fit as a file; where parameters are one a curve, that of the first.
     pub case_file: String,
+    /// Where parameters are one a curve, the case of each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub case_files: Vec<CurveCase>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
+}
+
+/// A contact law among others that were fitted to the same data.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct ComparedLaw {
+    /// Its name.
+    pub law: String,
+    /// Whether it describes the data.
+    pub fits: bool,
+    /// Why not, or why it could not be fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Akaike's criterion; none where nothing was fitted.
+    pub aic: Option<f64>,
+    /// Schwarz's criterion.
+    pub bic: Option<f64>,
+    /// How much Akaike's criterion is above the least.
+    pub above_best: Option<f64>,
+    /// Akaike's weight, exp(−above/2) over its sum: how the evidence is shared out if one of
+    /// these laws is right.
+    pub weight: Option<f64>,
+    /// Sum of the squared residuals in standard errors.
+    pub chi2: Option<f64>,
+    /// Measured values less parameters.
+    pub degrees_of_freedom: Option<usize>,
+    /// Its free parameters.
+    pub parameters: Vec<FittedParameter>,
+    /// What puts its fit in doubt.
+    pub remarks: Vec<String>,
+    /// Its best case as a file.
+    pub case_file: Option<String>,
+}
+
+/// The best case of one curve among several.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct CurveCase {
+    /// The curve.
+    pub curve: String,
+    /// Its case as a file.
+    pub case_file: String,
 }
 
 /// A parameter that was free.
@@ -136,6 +192,23 @@ pub struct Reading {
     pub model: Option<f64>,
     /// Measured less model, in standard errors.
     pub residual: Option<f64>,
+}
+
+/// A jump of the data from a branch that ends in a fold.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedJump {
+    /// The curve.
+    pub curve: String,
+    /// The lines of the rows before and after it.
+    pub lines: [u64; 2],
+    /// Where these rows were measured, offset included.
+    pub between: [f64; 2],
+    /// The branches before and after it.
+    pub branches: [usize; 2],
+    /// Where the model's branch ends.
+    pub fold: f64,
+    /// Middle of the rows less that, in standard errors: their distance over √12.
+    pub residual: f64,
 }
 
 /// An orbit at a row that the data are not on.

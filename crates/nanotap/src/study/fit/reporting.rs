@@ -2,40 +2,61 @@
 
 use std::collections::BTreeMap;
 
+use crate::case::Case;
+
 use super::data::Data;
+use super::jumps::Jump;
 use super::parameters::{self, Parameter};
 use super::problem::Problem;
 use super::profile;
 use super::report::{
-    FitReport, FittedColumn, FittedParameter, FittedRow, OtherOrbit, Reading, Undetermined,
+    CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, OtherOrbit,
+    Reading, Undetermined,
 };
 use super::search::{Found, Search, UNLIKELY, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
 
 impl Search<'_> {
-    /// Akaike's criterion; standard errors that were estimated count as parameters.
-    fn akaike(&self, found: &Found) -> f64 {
+    /// The problem in the standard errors, and with the jumps, of what was found.
+    fn problem_of(&self, found: &Found) -> Problem<'_> {
+        let mut problem = self.weighted(found.noise.clone(), None);
+        problem.jumps.clone_from(&found.jumps);
+        problem
+    }
+
+    /// The criteria of Akaike and of Schwarz; standard errors that were estimated count as
+    /// parameters, and values of rows without an orbit as missed by their column's spread.
+    fn criteria(&self, found: &Found) -> [f64; 2] {
         let rows = self.problem.data.rows();
-        let (mut logarithms, mut estimated) = (0.0, vec![false; found.noise.len()]);
-        for (row, point) in rows.zip(&found.solution.point) {
+        // Another law may have no fold to compare: the jumps are left out.
+        let problem = self.problem_of(found);
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let jumps = (0..found.jumps.len()).map(|k| problem.jump_residual(x, point, k).powi(2));
+        let mut deviance = found.solution.cost - jumps.sum::<f64>();
+        let mut estimated = vec![false; found.noise.len()];
+        for (row, point) in rows.zip(point.iter()) {
             for (column, noise) in found.noise.iter().enumerate() {
-                if row.values[column].is_some() && !point.lost {
+                if row.values[column].is_some() {
                     estimated[column] |= row.errors[column].is_none();
                     let error = row.errors[column].unwrap_or(*noise);
-                    logarithms += (std::f64::consts::TAU * error * error).ln();
+                    deviance += (std::f64::consts::TAU * error * error).ln();
+                    if point.lost {
+                        deviance += (self.problem.data.columns[column].spread / error).powi(2);
+                    }
                 }
             }
         }
         let estimated = estimated.iter().filter(|estimated| **estimated).count();
         let parameters = (self.problem.parameters.len() + estimated) as f64;
-        found.solution.cost + logarithms + 2.0 * parameters
+        let count = self.problem.data.count() as f64;
+        [2.0, count.ln()].map(|price| deviance + price * parameters)
     }
 
     /// All that was found, from so many starts.
     pub(super) fn report(&self, found: &Found, starts: usize) -> FitReport {
         let (case, data) = (self.problem.case, self.problem.data);
         let parameters = self.problem.parameters;
-        let problem = self.weighted(found.noise.clone(), None);
+        let problem = self.problem_of(found);
         let (x, point) = (&found.solution.x, &found.solution.point);
         let sizes: Vec<f64> = parameters
             .iter()
@@ -50,7 +71,7 @@ impl Search<'_> {
         let width = if given {
             student(f64::INFINITY)
         } else {
-            student(self.freedom() as f64)
+            student(self.freedom(found) as f64)
         };
         let fitted = self.fitted(&problem, found, &information, width);
         let p_value = given.then(|| self.probability(found));
@@ -81,12 +102,30 @@ impl Search<'_> {
         let (reason, remarks) = self.judge(found, p_value, &fitted, &columns);
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
-        let best = problem.cases(x).swap_remove(0).leaving_distance_as(case);
+        let best = |case_of_curve: Case| case_of_curve.leaving_distance_as(case).to_toml();
+        let cases: Vec<String> = problem.cases(x).into_iter().map(best).collect();
+        let curves = data
+            .curves
+            .iter()
+            .zip(&cases)
+            .map(|(curve, file)| CurveCase {
+                curve: curve.name.clone(),
+                case_file: file.clone(),
+            });
+        let case_files = if parameters.iter().any(|p| p.curve.is_some()) {
+            curves.collect()
+        } else {
+            Vec::new()
+        };
+        let [aic, bic] = self.criteria(found);
         FitReport {
             chi2: found.solution.cost,
-            degrees_of_freedom: self.freedom(),
+            degrees_of_freedom: self.freedom(found),
             p_value,
-            aic: self.akaike(found),
+            aic,
+            bic,
+            law: None,
+            laws: Vec::new(),
             fits: reason.is_none(),
             reason,
             remarks,
@@ -99,9 +138,11 @@ impl Search<'_> {
             swept_unit: parameters::unit_of(swept).to_owned(),
             rows: rows(&problem, found),
             others: others(&problem, found),
+            jumps: jumps(&problem, found),
             iterations: found.steps,
             starts,
-            case_file: best.to_toml(),
+            case_file: cases[0].clone(),
+            case_files,
             cancelled: self.control.is_cancelled(),
             parameters: fitted,
         }
@@ -182,7 +223,7 @@ impl Search<'_> {
                 "chi2 = {:.4e} with {} degrees of freedom: the residuals are larger than the \
                  standard errors that the data give",
                 found.solution.cost,
-                self.freedom()
+                self.freedom(found)
             )
         });
         let nothing = columns
@@ -205,7 +246,7 @@ fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
     let data = problem.data;
     let x = &found.solution.x;
     let rows = problem.rows().into_iter();
-    rows.zip(&found.solution.point)
+    rows.zip(found.solution.point.iter())
         .map(|((curve, row), point)| {
             let known = !point.lost;
             let readings = data.columns.iter().enumerate().map(|(index, column)| {
@@ -230,6 +271,26 @@ fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
             }
         })
         .collect()
+}
+
+/// The jumps of the data with the folds behind them.
+fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
+    let (x, point) = (&found.solution.x, &found.solution.point);
+    let rows = problem.rows();
+    let jump = |(index, jump): (usize, &Jump)| {
+        let fold = point.folds[index].as_ref()?;
+        let residual = -problem.jump_residual(x, point, index);
+        let offset = fold.at - jump.at() + residual * jump.error();
+        Some(FittedJump {
+            curve: problem.data.curves[jump.curve].name.clone(),
+            lines: jump.rows.map(|row| rows[row].1.line),
+            between: jump.between.map(|at| at + offset),
+            branches: jump.rows.map(|row| point[row].branch),
+            fold: fold.at,
+            residual,
+        })
+    };
+    found.jumps.iter().enumerate().filter_map(jump).collect()
 }
 
 /// What the orbits say that the data are not on.

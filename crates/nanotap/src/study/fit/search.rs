@@ -4,6 +4,7 @@
 use super::FitRequest;
 use super::branches::Rows;
 use super::data::Data;
+use super::jumps::Jump;
 use super::problem::{Point, Problem};
 use super::report::FitReport;
 use super::solve::{Solution, minimise};
@@ -22,6 +23,7 @@ pub(super) struct Search<'a> {
 pub(super) struct Found {
     pub(super) solution: Solution<Point>,
     pub(super) noise: Vec<f64>,
+    pub(super) jumps: Vec<Jump>,
     pub(super) candidates: Vec<Rows>,
     pub(super) steps: usize,
 }
@@ -34,6 +36,8 @@ const FAR: f64 = 3.0;
 const POOR: f64 = 1.0;
 /// Probability of chi2 below which the model does not describe the data.
 pub(super) const UNLIKELY: f64 = 1e-6;
+/// Relative difference of two misfits that are one.
+const SAME: f64 = 1e-3;
 /// Times that branches are looked for again.
 const ROUNDS: usize = 6;
 
@@ -53,13 +57,15 @@ impl<'a> Search<'a> {
             }
             let Some(found) = found else { continue };
             let good = self.describes(&found);
-            if best
+            let misfit = self.misfit(&found);
+            let least = best
                 .as_ref()
-                .is_none_or(|best| self.misfit(&found) < self.misfit(best))
-            {
+                .map_or(f64::INFINITY, |best| self.misfit(best));
+            if misfit < least {
                 best = Some(found);
             }
-            if good {
+            // Two starts that end in one minimum are enough to take it for the least.
+            if good || (misfit - least).abs() <= SAME * least {
                 break;
             }
         }
@@ -121,6 +127,7 @@ impl<'a> Search<'a> {
         Problem {
             noise,
             robust,
+            jumps: Vec::new(),
             ..self.problem
         }
     }
@@ -173,13 +180,16 @@ impl<'a> Search<'a> {
                 break;
             }
             let problem = self.weighted(noise.clone(), None);
-            let (point, candidates) = problem.discover(&x);
+            let (mut point, candidates) = problem.discover(&x);
             if point.iter().all(|row| row.lost) {
                 return None;
             }
             let branches = branches_of(&point);
             noise = self.noise(&x, &point);
-            let problem = self.weighted(noise.clone(), None);
+            let mut problem = self.weighted(noise.clone(), None);
+            if self.request.jumps {
+                problem.find_jumps(&x, &mut point);
+            }
             let solution = minimise(&problem, x.clone(), point, &self.bounds(), 1e-8)?;
             steps += solution.iterations;
             x.clone_from(&solution.x);
@@ -194,6 +204,7 @@ impl<'a> Search<'a> {
             found = Some(Found {
                 solution,
                 noise: noise.clone(),
+                jumps: problem.jumps,
                 candidates,
                 steps,
             });
@@ -228,7 +239,7 @@ impl<'a> Search<'a> {
     pub(super) fn differences(&self, x: &[f64], point: &Point, column: usize) -> Vec<f64> {
         let curves = self.problem.data.curves.iter().enumerate();
         let rows = curves.flat_map(|(curve, of)| of.rows.iter().map(move |row| (curve, row)));
-        rows.zip(point)
+        rows.zip(point.iter())
             .filter(|(_, point)| !point.lost)
             .filter_map(|((curve, row), point)| {
                 let value = point.values[column];
@@ -258,8 +269,9 @@ impl<'a> Search<'a> {
         values.all(|(value, error)| value.is_none() || error.is_some())
     }
 
-    pub(super) fn freedom(&self) -> usize {
-        self.problem.data.count() - self.problem.parameters.len()
+    /// Measured values and jumps less parameters.
+    pub(super) fn freedom(&self, found: &Found) -> usize {
+        self.problem.data.count() + found.jumps.len() - self.problem.parameters.len()
     }
 
     /// Whether the model describes the data.
@@ -269,7 +281,7 @@ impl<'a> Search<'a> {
     }
 
     pub(super) fn probability(&self, found: &Found) -> f64 {
-        exceeding(found.solution.cost, self.freedom() as f64)
+        exceeding(found.solution.cost, self.freedom(found) as f64)
     }
 }
 

@@ -1,0 +1,180 @@
+//! The same data under several contact laws.
+
+use super::report::{ComparedLaw, FitReport};
+use super::{FitRequest, fit_one, names};
+use crate::Error;
+use crate::case::under_law::LawName;
+use crate::case::{Case, Key};
+use crate::control::Control;
+
+/// Difference of Akaike's criterion from which on the worse of two laws has next to no support
+/// (Burnham & Anderson, Model Selection and Multimodel Inference, 2nd ed. 2002, Sect. 2.6).
+const DECIDED: f64 = 10.0;
+
+/// Fits each law of the request; the report is that of the best, with all of them in `laws`.
+pub(super) fn compare(
+    case: &Case,
+    request: &FitRequest,
+    control: &Control<'_>,
+) -> Result<FitReport, Error> {
+    let laws = names(&request.laws)
+        .iter()
+        .map(|name| LawName::read(name))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|error| error.at("laws"))?;
+    if let Some(twice) = (1..laws.len()).find(|k| laws[..*k].contains(&laws[*k])) {
+        return Err(Error::option(
+            "laws",
+            format!("{} stands there twice", laws[twice].text()),
+            "name each law once",
+        ));
+    }
+    for (option, given) in [("free", &request.free), ("per_curve", &request.per_curve)] {
+        for name in names(given) {
+            if !laws.iter().any(|law| takes(law, &name)) {
+                return Err(Error::option(
+                    option,
+                    format!("none of these laws takes {name}"),
+                    "free what at least one of them has",
+                ));
+            }
+        }
+    }
+    let begins = middles(request);
+    let mut found: Vec<(String, Result<FitReport, Error>)> = Vec::new();
+    for law in &laws {
+        if control.is_cancelled() {
+            break;
+        }
+        let fitted = case.under_law(law, &begins).and_then(|case| {
+            let of_law = |given: &[String]| -> Vec<String> {
+                let all = names(given).into_iter();
+                all.filter(|name| takes(law, name)).collect()
+            };
+            let mut request = FitRequest {
+                laws: Vec::new(),
+                free: of_law(&request.free),
+                per_curve: of_law(&request.per_curve),
+                ..request.clone()
+            };
+            request.bounds.0.retain(|bound| takes(law, &bound.name));
+            fit_one(&case, &request, control)
+        });
+        found.push((law.text(), fitted));
+    }
+    let rank = |fitted: &Result<FitReport, Error>| match fitted {
+        Ok(report) => (!report.fits, report.aic),
+        Err(_) => (true, f64::INFINITY),
+    };
+    let order = |a: &(bool, f64), b: &(bool, f64)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
+    let best = (0..found.len()).min_by(|a, b| order(&rank(&found[*a].1), &rank(&found[*b].1)));
+    let Some(best) = best else {
+        return Err(Error::new(
+            crate::ErrorKind::Stopped,
+            "stopped before anything was fitted",
+        ));
+    };
+    let compared = table(&found);
+    let (law, report) = found.swap_remove(best);
+    let mut report = report?;
+    report.remarks.extend(cautions(&law, &compared));
+    report.law = Some(law);
+    report.laws = compared;
+    report.cancelled |= control.is_cancelled();
+    Ok(report)
+}
+
+/// Whether a parameter can be free under a law: what is no key of the sample always can.
+fn takes(law: &LawName, name: &str) -> bool {
+    Key::find(name).is_none_or(|key| law.takes(key))
+}
+
+/// Where keys begin that the case does not state: in the middle of their bounds.
+fn middles(request: &FitRequest) -> Vec<(Key, f64)> {
+    let middle = |bound: &crate::study::value::Interval| {
+        let key = Key::find(&bound.name)?;
+        let read = |text: &str| key.kind().parse(text).ok();
+        Some((
+            key,
+            between(read(bound.low.text())?, read(bound.high.text())?),
+        ))
+    };
+    request.bounds.0.iter().filter_map(middle).collect()
+}
+
+/// The middle of two bounds, of positive ones that of their logarithms.
+pub(super) fn between(low: f64, high: f64) -> f64 {
+    if low > 0.0 {
+        (low * high).sqrt()
+    } else {
+        0.5 * (low + high)
+    }
+}
+
+fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
+    let least = found
+        .iter()
+        .filter_map(|(_, fitted)| Some(fitted.as_ref().ok()?.aic));
+    let least = least.fold(f64::INFINITY, f64::min);
+    let likelihood = |aic: f64| (0.5 * (least - aic)).exp();
+    let all: f64 = found
+        .iter()
+        .filter_map(|(_, fitted)| Some(likelihood(fitted.as_ref().ok()?.aic)))
+        .sum();
+    let row = |(law, fitted): &(String, Result<FitReport, Error>)| match fitted {
+        Ok(report) => ComparedLaw {
+            law: law.clone(),
+            fits: report.fits,
+            reason: report.reason.clone(),
+            aic: Some(report.aic),
+            bic: Some(report.bic),
+            above_best: Some(report.aic - least),
+            weight: Some(likelihood(report.aic) / all),
+            chi2: Some(report.chi2),
+            degrees_of_freedom: Some(report.degrees_of_freedom),
+            parameters: report.parameters.clone(),
+            remarks: report.remarks.clone(),
+            case_file: Some(report.case_file.clone()),
+        },
+        Err(error) => ComparedLaw {
+            law: law.clone(),
+            fits: false,
+            reason: Some(error.to_string()),
+            aic: None,
+            bic: None,
+            above_best: None,
+            weight: None,
+            chi2: None,
+            degrees_of_freedom: None,
+            parameters: Vec::new(),
+            remarks: Vec::new(),
+            case_file: None,
+        },
+    };
+    found.iter().map(row).collect()
+}
+
+/// What is to be kept in mind of the choice.
+fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
+    let mut cautions = Vec::new();
+    let near: Vec<&str> = laws
+        .iter()
+        .filter(|law| law.law != best && law.above_best.is_some_and(|above| above < DECIDED))
+        .map(|law| law.law.as_str())
+        .collect();
+    if !near.is_empty() {
+        cautions.push(format!(
+            "the data hardly tell {best} from {}: Akaike's criterion differs by less than {DECIDED}",
+            near.join(" and ")
+        ));
+    }
+    let known = laws.iter().filter(|law| law.fits && law.bic.is_some());
+    let by_bic = known.min_by(|a, b| a.bic.unwrap_or(0.0).total_cmp(&b.bic.unwrap_or(0.0)));
+    if let Some(other) = by_bic.filter(|law| law.law != best) {
+        cautions.push(format!(
+            "Schwarz's criterion, which counts parameters more, prefers {}",
+            other.law
+        ));
+    }
+    cautions
+}

@@ -102,7 +102,7 @@ fn offered(help: &str) -> BTreeSet<String> {
 }
 
 /// Entries whose numbers depend on time, rounding, step control or chance.
-const FLEETING: [&str; 14] = [
+const FLEETING: [&str; 15] = [
     "seconds",
     "periods_per_second",
     "residual",
@@ -114,6 +114,7 @@ const FLEETING: [&str; 14] = [
     "transient",
     "nanotap_version",
     "evaluations",
+    "evaluations_per_period",
     // Of chaos; that of an orbit follows from its multipliers.
     "lyapunov",
     "steps",

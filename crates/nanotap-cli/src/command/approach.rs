@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
-use nanotap::dataset::table::shortest;
+use nanotap::case::quantity::shortest;
 use nanotap::figure::approach::approach_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::physical::Kind;
-use nanotap::dataset::table::shortest;
+use nanotap::case::quantity::shortest;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::observe::{Set, columns, time_series};
 use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
@@ -236,7 +236,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         let _ = writeln!(
             text,
             "\n  {}",
-            style::bold(&format!("loci in {} and {}", report.parameter, loci.second))
+            style::bold(&format!("bifurcation curves in {} and {}", report.parameter, loci.second))
         );
         let mut table = Table::new([
             ("", Align::Left),

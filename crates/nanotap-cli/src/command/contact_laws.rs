@@ -127,8 +127,14 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
         table.row(cells);
     }
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
+    text.push_str(&followed(case, result));
     let linear = result.samples.iter().all(|s| s.case.law.is_none());
-    if let Some(solid) = result.samples.last().filter(|_| linear) {
+    let undamped = |s: &SampleMotion| s.case.alpha6 == 0.0 && s.case.relaxation_time == 0.0;
+    if linear && result.samples.iter().all(undamped) {
+        text.push_str(&motion::paragraph(
+            "the sample has no damper, and without one the laws are the same spring",
+        ));
+    } else if let Some(solid) = result.samples.last().filter(|_| linear) {
         let of_parameter = |parameter: Parameter| {
             let value = solid.case.get(parameter);
             case.physical().map_or_else(
@@ -159,6 +165,33 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
         if let Some(reason) = &sample.reason {
             text.push_str(&motion::paragraph(&format!("{}: {reason}", sample.contact)));
         }
+    }
+    text
+}
+
+/// How the orbits go on with the drive frequency; empty if they were not followed.
+fn followed(case: &GivenCase, result: &Comparison) -> String {
+    let mut text = String::new();
+    for sample in &result.samples {
+        let Some(branch) = &sample.branch else {
+            continue;
+        };
+        let [from, to] = [branch.from, branch.to].map(|value| case.shown(branch.key, value));
+        let mut found: Vec<String> = branch
+            .bifurcations
+            .iter()
+            .map(|b| format!("{} at {}", b.kind, case.shown(branch.key, b.parameter)))
+            .collect();
+        if found.is_empty() {
+            found.push("no bifurcation".into());
+        }
+        let cut = branch.failures.iter().map(|failure| failure.reason.clone());
+        let all: Vec<String> = found.into_iter().chain(cut).collect();
+        text.push_str(&motion::paragraph(&format!(
+            "{} from {from} to {to}: {}",
+            sample.contact,
+            all.join("; ")
+        )));
     }
     text
 }

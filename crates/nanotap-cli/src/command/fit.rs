@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::Key;
-use nanotap::dataset::table::shortest;
+use nanotap::case::quantity::shortest;
 use nanotap::figure::fit::fit_figure;
 use nanotap::study::fit::{FitReport, FitRequest, FitStudy, FittedParameter, Table as Data};
 use nanotap::study::registry::Study as _;

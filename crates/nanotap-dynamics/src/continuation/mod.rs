@@ -22,6 +22,8 @@ pub(crate) mod solver;
 mod step;
 pub mod switching;
 
+use std::fmt;
+
 use crate::control::Control;
 use crate::failure::MapFailure;
 use crate::map::MapFamily;
@@ -119,17 +121,14 @@ pub struct Branch {
 }
 
 /// Why a branch ends.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, Debug)]
 pub enum BranchEnd {
     /// The parameter reached an end of its range.
-    #[error("the end of the parameter range")]
     RangeEnd,
     /// The branch came back to its first point.
-    #[error("the branch is closed")]
     Closed,
     /// Its period divided: it ran into a branch of shorter period (at a flip of that
     /// branch, if the period halves).
-    #[error("the branch meets one of period {period} at {parameter}")]
     Collapsed {
         /// Period of the other branch.
         period: usize,
@@ -140,16 +139,13 @@ pub enum BranchEnd {
     },
     /// The orbit shrank to a point at an end of the range, where the map is not
     /// differentiable: a drive of amplitude zero on a tip that touches at rest.
-    #[error("the orbit shrinks to a point at {parameter}")]
     Vanished {
         /// Where.
         parameter: f64,
     },
     /// A state outgrew the bound.
-    #[error("a state left the domain")]
     LeftDomain,
     /// No point was found at the shortest step.
-    #[error("no further point beyond {parameter} at the shortest step: {reason}")]
     StepTooSmall {
         /// The last point.
         parameter: f64,
@@ -158,23 +154,44 @@ pub enum BranchEnd {
     },
     /// An extremum of a switching function reached zero and the orbit does not go on
     /// beyond (a hard impact).
-    #[error("the orbit ends where it grazes, at {parameter}")]
     Grazing {
         /// Where.
         parameter: f64,
     },
     /// It was to be left at its first fold.
-    #[error("the first fold")]
     Fold,
     /// The allowed number of points was used up.
-    #[error("the allowed number of points")]
     PointLimit,
     /// The caller stopped it.
-    #[error("stopped by the caller")]
     Cancelled,
 }
 
 impl BranchEnd {
+    /// In words, a value of the parameter as `shown` writes it.
+    pub fn words(&self, shown: impl Fn(f64) -> String) -> String {
+        match self {
+            Self::RangeEnd => "the end of the parameter range".into(),
+            Self::Closed => "the branch is closed".into(),
+            Self::Collapsed { period, parameter } => {
+                format!("the branch meets one of period {period} at {}", shown(*parameter))
+            }
+            Self::Vanished { parameter } => {
+                format!("the orbit shrinks to a point at {}", shown(*parameter))
+            }
+            Self::LeftDomain => "a state left the domain".into(),
+            Self::StepTooSmall { parameter, reason } => format!(
+                "no further point beyond {} at the shortest step: {reason}",
+                shown(*parameter)
+            ),
+            Self::Grazing { parameter } => {
+                format!("the orbit ends where it grazes, at {}", shown(*parameter))
+            }
+            Self::Fold => "the first fold".into(),
+            Self::PointLimit => "the allowed number of points".into(),
+            Self::Cancelled => "stopped by the caller".into(),
+        }
+    }
+
     /// True if the branch was cut rather than came to an end: what lies beyond is not
     /// known.
     pub fn is_failure(&self) -> bool {
@@ -189,6 +206,12 @@ impl BranchEnd {
                 true
             }
         }
+    }
+}
+
+impl fmt::Display for BranchEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words(|parameter| parameter.to_string()))
     }
 }
 

@@ -47,6 +47,7 @@ pub use stated::{Value, ValueError};
 use file::{CaseFileError, Described, Source};
 use key::{ModelKind, Section};
 use near_name::near_name;
+use quantity::shortest;
 use physical::{Catalogue, Kind, Physical, Reader, Remark, Scales};
 use stated::Stated;
 use units::Units;
@@ -465,6 +466,18 @@ impl Case {
             si: view.scales.of(parameter, view.cantilever.actuation),
             kind: row.kind,
         })
+    }
+
+    /// A value of a key to ten digits, of a physical case in SI with a prefix.
+    pub fn shown(&self, key: Key, value: f64) -> String {
+        const DIGITS: usize = 10;
+        self.parameter_unit(key).map_or_else(
+            || {
+                let rounded = format!("{value:.*e}", DIGITS - 1);
+                shortest(rounded.parse().unwrap_or(value))
+            },
+            |unit| unit.kind.format_digits(unit.si * value, DIGITS),
+        )
     }
 
     /// A value of a key from text: a number of the dimensionless model, of a physical case

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::error::StoreError;
 use super::schema::{Attributes, Coordinate, Schema, Values, Variable};
 use super::store::Store;
+use crate::case::quantity::shortest;
 
 /// Hands `sink` the table as CSV, piece by piece: the coordinates, then every variable
 /// that has no further dimension. Codes are written as the words of their
@@ -99,16 +100,6 @@ fn named(variable: &Variable, values: &Values, index: usize) -> String {
         }
         _ => cell(values, index),
     }
-}
-
-/// The shortest decimal number that reads back as `value`, without zeros to be counted.
-pub fn shortest(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && !(1e-5..1e16).contains(&size) {
-        return format!("{value:e}");
-    }
-    // Zero has no sign.
-    (value + 0.0).to_string()
 }
 
 fn cell(values: &Values, index: usize) -> String {

@@ -90,6 +90,10 @@ impl BasinTable {
                     panel.with(Points::new(points).diameter(0.3).colour(Colour::BLACK))
                 };
             }
+            // One entry in the legend for the points of all orbits.
+            let grey = Colour::rgb(120, 120, 120);
+            let key = Markers::new([]).size(1.6).colour(grey).white_edge();
+            panel = panel.with(key.label("orbits, each in its colour"));
         }
         Some(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
     }

@@ -552,6 +552,7 @@ fn described(
         key,
         parameter_unit: None,
     };
+    let end = |branch: &Branch| branch.end.words(|value| case.shown(key, value));
     // A seed at an end of the range has nothing on one side, and a branch that was followed
     // from both of its ends is one.
     let branches = &diagram.branches;
@@ -569,7 +570,7 @@ fn described(
             depth,
         } = &diagram.branches[k];
         let parent = parent.and_then(|p| kept.iter().position(|&k| k == p));
-        report.branches.push(summary(branch, parent, *depth));
+        report.branches.push(summary(branch, parent, *depth, end(branch)));
         for p in &branch.points {
             report.points.push(point(case, options, index, p)?);
         }
@@ -583,10 +584,7 @@ fn described(
         if branch.end.is_failure() && !stopped {
             report.failures.push(FailureReport {
                 parameter: branch.points.last().map_or(f64::NAN, |p| p.parameter),
-                reason: format!(
-                    "the period-{} branch was cut: {}",
-                    branch.period, branch.end
-                ),
+                reason: format!("the period-{} branch was cut: {}", branch.period, end(branch)),
             });
         }
     }
@@ -606,7 +604,7 @@ fn are_one(a: &Branch, b: &Branch, span: f64) -> bool {
     a.period == b.period && !a.bifurcations.is_empty() && among(a, b) && among(b, a)
 }
 
-fn summary(branch: &Branch, parent: Option<usize>, depth: usize) -> BranchSummary {
+fn summary(branch: &Branch, parent: Option<usize>, depth: usize, end: String) -> BranchSummary {
     let parameters = || branch.points.iter().map(|p| p.parameter);
     BranchSummary {
         period: branch.period,
@@ -617,7 +615,7 @@ fn summary(branch: &Branch, parent: Option<usize>, depth: usize) -> BranchSummar
             parameters().fold(f64::INFINITY, f64::min),
             parameters().fold(f64::NEG_INFINITY, f64::max),
         ],
-        end: branch.end.to_string(),
+        end,
         complete: !branch.end.is_failure(),
     }
 }

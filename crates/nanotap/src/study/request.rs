@@ -14,6 +14,7 @@ use serde_json::{Map, Value};
 
 use crate::Error;
 use crate::case::near_name::near_name;
+use crate::case::quantity::shortest;
 
 /// The JSON schema of what a study answers: what recurs stands under `$defs`.
 pub fn answer_schema<T: JsonSchema>() -> Schema {
@@ -163,10 +164,11 @@ impl<'a> Property<'a> {
                 if !fits {
                     return refuse(self.wanted());
                 }
-                if self.in_range(number.as_f64().unwrap_or(f64::NAN)) {
+                let given = number.as_f64().unwrap_or(f64::NAN);
+                if self.in_range(given) {
                     return Ok(());
                 }
-                let what = format!("{number} is out of range");
+                let what = format!("{} is out of range", shortest(given));
                 Err(Error::option(self.name, what, self.wanted()))
             }
             _ => refuse(self.wanted()),
@@ -381,7 +383,7 @@ mod tests {
             ),
             (
                 json!({"count": 1e9}),
-                "count: 1000000000.0 is out of range; a whole number from 1 to 100 is needed",
+                "count: 1000000000 is out of range; a whole number from 1 to 100 is needed",
             ),
             (
                 json!({"count": "x"}),

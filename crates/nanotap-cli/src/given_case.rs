@@ -78,11 +78,12 @@ impl GivenCase {
         }
         if !words.is_empty() {
             output.note(&format!(
-                "held while {} varies; with its value the same point again: {}",
+                "held while {} {}; with the same value the same point again: {}",
                 keys.iter()
                     .map(|key| key.path())
                     .collect::<Vec<_>>()
                     .join(" and "),
+                if keys.len() == 1 { "varies" } else { "vary" },
                 words.join(" ")
             ));
         }

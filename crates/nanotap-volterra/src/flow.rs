@@ -19,6 +19,9 @@ const FIRST_INDEX: usize = 4;
 const RESOLVED: f64 = 1e-11;
 /// The same on the first step after a switch.
 const RESOLVED_FRESH: f64 = 1e-8;
+/// What is rounding in a gap or its rate, as a part of the size of their terms: just before a
+/// switch a guard is hardly larger, and no shorter step resolves it better.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// A switch of the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -633,9 +636,15 @@ impl Flow {
             if c[0] > rest + 10.0 * tail + self.unresolved(system, exit) {
                 continue;
             }
-            // After division by the time since the switch, rounding weighs more near it.
-            let resolved = if fresh { RESOLVED_FRESH } else { RESOLVED };
-            if tail > resolved * (c[0].abs() + rest) {
+            let (gap, rate) = gap_scale(system, &self.step.modal);
+            let rounding = match exit.guard {
+                // After division by the time since the switch, rounding weighs more near it.
+                _ if fresh => RESOLVED_FRESH * (c[0].abs() + rest),
+                Guard::Falls(_) | Guard::Rises(_) => ROUNDING * gap,
+                Guard::Turns => ROUNDING * rate,
+                Guard::Own(_) => 0.0,
+            };
+            if tail > rounding.max(RESOLVED * (c[0].abs() + rest)) {
                 return Err(Refusal::Switch);
             }
             if let Fall::At(u) = first_fall(&self.work.series, &mut self.work.scratch)

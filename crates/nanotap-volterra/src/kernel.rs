@@ -23,6 +23,10 @@ pub(crate) const CHECKS: usize = 4;
 pub const MAX_NODES: usize = 32;
 /// Points of the Gauss–Legendre rule of one panel.
 const PANEL_POINTS: usize = 24;
+/// Points of the rule between two nodes of a trajectory's quadrature, which are so near that
+/// its error is rounding: modes turn by less than half a radian between them, and the force's
+/// polynomials by less than half a turn.
+const SHORT_POINTS: usize = 10;
 /// How far a mode may turn or decay within one panel.
 const PANEL_REACH: f64 = 8.0;
 
@@ -91,7 +95,8 @@ pub struct Kernel {
     longest: f64,
     /// Bound of the amplitude in the gap that a unit impulse of force excites.
     pub(crate) reach: f64,
-    panel: ([f64; PANEL_POINTS], [f64; PANEL_POINTS]),
+    panel: Rule<PANEL_POINTS>,
+    short: Rule<SHORT_POINTS>,
     tables: [Vec<OnceLock<Box<Table>>>; 3],
 }
 
@@ -119,9 +124,11 @@ pub(crate) struct Table {
     pub(crate) row_sums: Vec<[f64; 2]>,
 }
 
-/// The Gauss–Legendre rule of a panel.
-fn panel_rule() -> ([f64; PANEL_POINTS], [f64; PANEL_POINTS]) {
-    let (nodes, weights) = gauss_legendre(PANEL_POINTS);
+/// Nodes and weights of a Gauss–Legendre rule on [0, 1].
+type Rule<const POINTS: usize> = ([f64; POINTS], [f64; POINTS]);
+
+fn rule<const POINTS: usize>() -> Rule<POINTS> {
+    let (nodes, weights) = gauss_legendre(POINTS);
     (
         std::array::from_fn(|i| nodes[i]),
         std::array::from_fn(|i| weights[i]),
@@ -219,7 +226,8 @@ impl Kernel {
             coefficients: chebyshev_coefficients(nodes),
             longest,
             reach,
-            panel: panel_rule(),
+            panel: rule(),
+            short: rule(),
             tables: std::array::from_fn(|_| (0..LENGTHS).map(|_| OnceLock::new()).collect()),
         }))
     }
@@ -441,6 +449,45 @@ impl Kernel {
             for ((at, force), w) in places.into_iter().zip(values).zip(&self.panel.1) {
                 out.push((end - map.time(h, at), w * width * map.rate(h, at) * force));
             }
+        }
+    }
+
+    /// Takes the modal coordinates `y` from one place of a step to the next of a trajectory's
+    /// quadrature.
+    pub(crate) fn between(
+        &self,
+        map: TimeMap,
+        h: f64,
+        [from, to]: [f64; 2],
+        y: &mut [f64],
+        coefficients: &[f64],
+    ) {
+        if from == to {
+            return;
+        }
+        let end = map.time(h, to);
+        let places = self.short.0.map(|x| from + (to - from) * x);
+        let forces = series_at(coefficients, &places);
+        let silent = forces.iter().all(|force| *force == 0.0);
+        let parts: [(f64, f64); SHORT_POINTS] = std::array::from_fn(|i| {
+            let weight = self.short.1[i] * (to - from) * map.rate(h, places[i]);
+            (end - map.time(h, places[i]), weight * forces[i])
+        });
+        for block in self.modes.blocks() {
+            let y = &mut y[block.start..block.start + block.size];
+            let source = self.source_of(block);
+            let e = block.exp(end - map.time(h, from));
+            let second = y.get(1).copied().unwrap_or(0.0);
+            let mut value = [
+                e[0][0] * y[0] + e[0][1] * second,
+                e[1][0] * y[0] + e[1][1] * second,
+            ];
+            for &(rest, force) in parts.iter().filter(|_| !silent) {
+                let e = block.exp(rest);
+                value[0] += force * (e[0][0] * source[0] + e[0][1] * source[1]);
+                value[1] += force * (e[1][0] * source[0] + e[1][1] * source[1]);
+            }
+            y.copy_from_slice(&value[..block.size]);
         }
     }
 

@@ -121,4 +121,4 @@ pub use modes::Modes;
 pub use step::Statistics;
 pub use system::{Drive, Options, System, Tone};
 pub use tangent::{Parameter, ToneChange};
-pub use trajectory::{Output, Sample, Trajectory};
+pub use trajectory::{Node, Output, Sample, Trajectory};

@@ -63,6 +63,20 @@ pub struct Sample {
     pub branch: usize,
 }
 
+/// The motion at a node of a trajectory's quadrature, or at an end of one of its steps.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Weight in integrals over time; 0 at the ends of steps.
+    pub weight: f64,
+    /// The motion there.
+    pub sample: Sample,
+    /// How fast the state changes.
+    field: Vec<f64>,
+    piece: usize,
+    /// Where on the step.
+    u: f64,
+}
+
 /// A stretch of a trajectory on one branch of the law, one step long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
@@ -154,7 +168,6 @@ impl Piece {
     }
 
     fn sample(&self, system: &System, u: f64) -> Sample {
-        let time = self.start + self.map.time(self.length, u);
         let mut modal = vec![0.0; system.dimension()];
         system.kernel().partial(
             self.map,
@@ -164,22 +177,26 @@ impl Piece {
             &self.coefficients,
             &mut modal,
         );
+        self.sample_of(system, u, &modal, &self.force_slope())
+    }
+
+    /// The motion at `u`, where the modal coordinates are `modal`.
+    fn sample_of(&self, system: &System, u: f64, modal: &[f64], force_slope: &[f64]) -> Sample {
+        let time = self.start + self.map.time(self.length, u);
         let mut state = DVector::zeros(system.dimension());
-        system.to_state(time, &modal, state.as_mut_slice());
-        let (gap, rate) = system.gap_of(time, &modal);
+        system.to_state(time, modal, state.as_mut_slice());
+        let (gap, rate) = system.gap_of(time, modal);
+        let slope = series(force_slope, u);
         Sample {
             time,
             state,
             gap,
             rate,
             force: series(&self.coefficients, u),
-            force_rate: {
-                let slope = series(&self.force_slope(), u);
-                if slope == 0.0 {
-                    0.0
-                } else {
-                    slope / self.map.rate(self.length, u)
-                }
+            force_rate: if slope == 0.0 {
+                0.0
+            } else {
+                slope / self.map.rate(self.length, u)
             },
             branch: self.branch,
         }
@@ -250,15 +267,21 @@ impl Trajectory {
 
     /// The value of an output and its rate at a sample.
     pub fn read(&self, output: &Output, sample: &Sample) -> (f64, f64) {
+        self.read_with(output, sample, &self.field(sample))
+    }
+
+    /// How fast the state changes at a sample.
+    fn field(&self, sample: &Sample) -> Vec<f64> {
         let mut field = vec![0.0; self.system.dimension()];
-        self.system.field(
-            sample.time,
-            sample.state.as_slice(),
-            sample.branch,
-            &mut field,
-        );
+        let state = sample.state.as_slice();
+        self.system
+            .field(sample.time, state, sample.branch, &mut field);
+        field
+    }
+
+    fn read_with(&self, output: &Output, sample: &Sample, field: &[f64]) -> (f64, f64) {
         let mut value = output.offset + (&output.row * &sample.state)[0];
-        let mut rate: f64 = output.row.iter().zip(&field).map(|(r, f)| r * f).sum();
+        let mut rate: f64 = output.row.iter().zip(field).map(|(r, f)| r * f).sum();
         if output.force != 0.0 {
             value += output.force * sample.force;
             rate += output.force * sample.force_rate;
@@ -271,6 +294,47 @@ impl Trajectory {
         (value, rate)
     }
 
+    /// The nodes of a quadrature of the whole motion and the ends of its steps, in order of
+    /// time: what integrals and extrema are read from.
+    pub fn nodes(&self) -> Vec<Node> {
+        let (places, weights) = gauss_legendre(POINTS);
+        let mut all = Vec::new();
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let panels = self.panels(piece);
+            let width = piece.end / panels as f64;
+            let inner = (0..panels).flat_map(|panel| {
+                let nodes = places.iter().zip(&weights);
+                nodes.map(move |(x, w)| (width * (panel as f64 + x), w * width))
+            });
+            let slope = piece.force_slope();
+            let mut modal = piece.modal.clone();
+            let mut last = 0.0;
+            for (u, weight) in [(0.0, 0.0)]
+                .into_iter()
+                .chain(inner)
+                .chain([(piece.end, 0.0)])
+            {
+                self.system.kernel().between(
+                    piece.map,
+                    piece.length,
+                    [last, u],
+                    &mut modal,
+                    &piece.coefficients,
+                );
+                last = u;
+                let sample = piece.sample_of(&self.system, u, &modal, &slope);
+                all.push(Node {
+                    weight: weight * piece.map.rate(piece.length, u),
+                    field: self.field(&sample),
+                    sample,
+                    piece: index,
+                    u,
+                });
+            }
+        }
+        all
+    }
+
     /// The integrals over time of `count` functions of the motion, which `integrand` writes.
     pub fn integrate(
         &self,
@@ -279,30 +343,13 @@ impl Trajectory {
     ) -> Vec<f64> {
         let mut sums = vec![0.0; count];
         let mut values = vec![0.0; count];
-        self.quadrature(|weight, sample| {
-            integrand(&sample, &mut values);
+        for node in self.nodes().iter().filter(|node| node.weight != 0.0) {
+            integrand(&node.sample, &mut values);
             for (sum, value) in sums.iter_mut().zip(&values) {
-                *sum += weight * value;
-            }
-        });
-        sums
-    }
-
-    /// Hands the samples of a quadrature of the whole motion to `take`, each with its weight,
-    /// in order of time.
-    pub fn quadrature(&self, mut take: impl FnMut(f64, Sample)) {
-        let (nodes, weights) = gauss_legendre(POINTS);
-        for piece in &self.pieces {
-            let panels = self.panels(piece);
-            let width = piece.end / panels as f64;
-            for panel in 0..panels {
-                for (x, w) in nodes.iter().zip(&weights) {
-                    let u = width * (panel as f64 + x);
-                    let weight = w * width * piece.map.rate(piece.length, u);
-                    take(weight, piece.sample(&self.system, u));
-                }
+                *sum += node.weight * value;
             }
         }
+        sums
     }
 
     /// The time mean of an output.
@@ -344,16 +391,20 @@ impl Trajectory {
 
     /// The local extrema of an output inside the span, as times and values, in order.
     pub fn extrema(&self, output: &Output) -> Vec<(f64, f64)> {
+        self.extrema_among(&self.nodes(), output)
+    }
+
+    fn extrema_among(&self, nodes: &[Node], output: &Output) -> Vec<(f64, f64)> {
+        let rate = |node: &Node| self.read_with(output, &node.sample, &node.field).1;
         let mut found: Vec<(f64, f64)> = Vec::new();
-        for piece in &self.pieces {
-            let count = 16 * self.panels(piece);
-            let rate = |u: f64| self.read(output, &piece.sample(&self.system, u)).1;
-            let mut last = (0.0, rate(0.0));
-            for k in 1..=count {
-                let u = piece.end * k as f64 / count as f64;
-                let here = (u, rate(u));
+        for nodes in nodes.chunk_by(|a, b| a.piece == b.piece) {
+            let piece = &self.pieces[nodes[0].piece];
+            let rate_at = |u: f64| self.read(output, &piece.sample(&self.system, u)).1;
+            let mut last = (0.0, rate(&nodes[0]));
+            for node in &nodes[1..] {
+                let here = (node.u, rate(node));
                 if last.1 * here.1 < 0.0 || (last.1 != 0.0 && here.1 == 0.0) {
-                    let u = bisect(&rate, last, here);
+                    let u = bisect(&rate_at, last, here);
                     let sample = piece.sample(&self.system, u);
                     found.push((sample.time, self.read(output, &sample).0));
                 }
@@ -365,12 +416,13 @@ impl Trajectory {
 
     /// The least and the largest value of an output over the span, ends included.
     pub fn range(&self, output: &Output) -> (f64, f64) {
-        let [least, largest] = self.ends_of_range(output);
+        let [least, largest] = self.ends_of_range(&self.nodes(), output);
         (least.1, largest.1)
     }
 
-    /// When an output is least and when it is largest, each with its value.
-    pub fn ends_of_range(&self, output: &Output) -> [(f64, f64); 2] {
+    /// When an output is least and when it is largest, each with its value; `nodes` are the
+    /// trajectory's own ([`Trajectory::nodes`]).
+    pub fn ends_of_range(&self, nodes: &[Node], output: &Output) -> [(f64, f64); 2] {
         let mut ends = [(0.0, f64::INFINITY), (0.0, f64::NEG_INFINITY)];
         let mut take = |time: f64, value: f64| {
             if value < ends[0].1 {
@@ -380,13 +432,11 @@ impl Trajectory {
                 ends[1] = (time, value);
             }
         };
-        for piece in &self.pieces {
-            for u in [0.0, piece.end] {
-                let sample = piece.sample(&self.system, u);
-                take(sample.time, self.read(output, &sample).0);
-            }
+        for node in nodes.iter().filter(|node| node.weight == 0.0) {
+            let value = self.read_with(output, &node.sample, &node.field).0;
+            take(node.sample.time, value);
         }
-        for (time, value) in self.extrema(output) {
+        for (time, value) in self.extrema_among(nodes, output) {
             take(time, value);
         }
         ends

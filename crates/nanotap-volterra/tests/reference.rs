@@ -291,3 +291,25 @@ fn the_frequency_shift_of_van_der_waals_attraction() {
     let shift = std::f64::consts::PI / outer.0 - 1.0;
     digits(shift, -8.661882e-5, 1e-11, "frequency shift");
 }
+
+/// Where the tip just touches, period after period, every step is certified: of random starts
+/// on the lever with two stable motions none may end undecided.
+#[test]
+fn slight_touches_are_followed() {
+    let mut seed = 1_u64;
+    let mut random = || {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let mut map = Strobe::new(air(20.0, 16.67).system(dmt(), NODES), TAU);
+    for start in 0..8 {
+        let mut state = [40.0 * random(), 40.0 * random()];
+        for period in 0..300 {
+            if let Err(error) = map.advance(&mut state) {
+                panic!("start {start}, period {period}: {error:?}");
+            }
+        }
+    }
+}

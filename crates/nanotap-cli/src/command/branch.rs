@@ -236,7 +236,10 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         let _ = writeln!(
             text,
             "\n  {}",
-            style::bold(&format!("bifurcation curves in {} and {}", report.parameter, loci.second))
+            style::bold(&format!(
+                "bifurcation curves in {} and {}",
+                report.parameter, loci.second
+            ))
         );
         let mut table = Table::new([
             ("", Align::Left),

@@ -173,7 +173,10 @@ impl BranchEnd {
             Self::RangeEnd => "the end of the parameter range".into(),
             Self::Closed => "the branch is closed".into(),
             Self::Collapsed { period, parameter } => {
-                format!("the branch meets one of period {period} at {}", shown(*parameter))
+                format!(
+                    "the branch meets one of period {period} at {}",
+                    shown(*parameter)
+                )
             }
             Self::Vanished { parameter } => {
                 format!("the orbit shrinks to a point at {}", shown(*parameter))

@@ -47,8 +47,8 @@ pub use stated::{Value, ValueError};
 use file::{CaseFileError, Described, Source};
 use key::{ModelKind, Section};
 use near_name::near_name;
-use quantity::shortest;
 use physical::{Catalogue, Kind, Physical, Reader, Remark, Scales};
+use quantity::shortest;
 use stated::Stated;
 use units::Units;
 

@@ -196,7 +196,7 @@ impl SweepTable {
         };
         let cloud = |points: &[(f64, f64)], part: f64| {
             let diameter = match points.len() {
-                0..2_000 => 0.5,
+                0..2_000 => 0.8,
                 2_000..20_000 => 0.3,
                 _ => 0.13,
             };
@@ -328,7 +328,7 @@ fn of_direction(direction: &str) -> (f64, Colour) {
     if direction == "down" {
         (1.0, Colour::VERMILLION)
     } else {
-        (1.5, Colour::BLUE)
+        (1.8, Colour::BLUE)
     }
 }
 

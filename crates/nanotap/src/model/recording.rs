@@ -227,10 +227,10 @@ impl NonlinearRecording {
         self.samples.get_or_init(|| {
             let mut all = Vec::new();
             for (k, period) in self.periods.iter().enumerate() {
-                period.quadrature(|weight, mut sample| {
-                    sample.time += self.offset(k);
-                    all.push((weight, sample));
-                });
+                for mut node in period.nodes() {
+                    node.sample.time += self.offset(k);
+                    all.push((node.weight, node.sample));
+                }
             }
             all
         })
@@ -339,10 +339,12 @@ impl Curve {
             Self::Exact(signal) => signal.range(),
             Self::Nonlinear(recording, output) => {
                 let ends = recording.periods.iter().enumerate().map(|(k, period)| {
-                    period.ends_of_range(output).map(|(time, value)| Extremum {
-                        time: recording.offset(k) + time,
-                        value,
-                    })
+                    period
+                        .ends_of_range(&period.nodes(), output)
+                        .map(|(time, value)| Extremum {
+                            time: recording.offset(k) + time,
+                            value,
+                        })
                 });
                 ends.reduce(|a, b| {
                     [

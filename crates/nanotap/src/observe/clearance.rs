@@ -387,16 +387,18 @@ impl SampledClearance {
         })
     }
 
-    /// Takes period `number`, with the samples of its quadrature.
+    /// Takes period `number`, with the nodes of its quadrature.
     pub(super) fn period(
         &mut self,
         nonlinear: &Nonlinear,
         number: usize,
         period: &nanotap_volterra::Trajectory,
-        samples: &[(f64, nanotap_volterra::Sample)],
+        nodes: &[nanotap_volterra::Node],
     ) {
         let range = |height: &nanotap_volterra::Output| {
-            let values = samples.iter().map(|(_, s)| read(nonlinear, height, s));
+            let values = nodes
+                .iter()
+                .map(|node| read(nonlinear, height, &node.sample));
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
                 (low.min(v), high.max(v))
             })

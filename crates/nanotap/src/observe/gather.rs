@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use nanotap_flow::Complex;
-use nanotap_volterra::{Output, Sample, Trajectory};
+use nanotap_volterra::{Node, Output, Sample, Trajectory};
 
 use super::clearance::SampledClearance;
 use super::contact_event::{ContactEvent, ContactEventKind};
@@ -35,7 +35,7 @@ pub(super) struct Gatherer<'a> {
     /// Least and greatest tip deflection of each period.
     lows: Vec<f64>,
     highs: Vec<f64>,
-    samples: Vec<(f64, Sample)>,
+    nodes: Vec<Node>,
 }
 
 impl<'a> Gatherer<'a> {
@@ -75,15 +75,13 @@ impl<'a> Gatherer<'a> {
             energies: [start, start],
             lows: Vec::new(),
             highs: Vec::new(),
-            samples: Vec::new(),
+            nodes: Vec::new(),
         }
     }
 
     /// Takes a period that ends in `state`.
     pub(super) fn take(&mut self, state: &[f64], period: &Trajectory) {
-        self.samples.clear();
-        let samples = &mut self.samples;
-        period.quadrature(|weight, sample| samples.push((weight, sample)));
+        self.nodes = period.nodes();
         self.sum();
         self.extend(period);
         let touches = &self.nonlinear.contact;
@@ -94,7 +92,7 @@ impl<'a> Gatherer<'a> {
             .sum::<f64>();
         self.take_switches(period);
         if let Some(clearance) = &mut self.clearance {
-            clearance.period(self.nonlinear, self.periods, period, &self.samples);
+            clearance.period(self.nonlinear, self.periods, period, &self.nodes);
         }
         let law = self.nonlinear.system.law();
         let (start, end) = period.span();
@@ -128,24 +126,42 @@ impl<'a> Gatherer<'a> {
                 self.output(signal)
                     .map_or(0.0, |output| read(self.nonlinear, output, sample))
             };
-            let samples = self.samples.iter();
+            let nodes = self.nodes.iter();
             let sum: Complex = match need {
                 Need::Least(_) | Need::Greatest(_) => continue,
-                Need::Integral(signal) => samples
-                    .map(|(w, s)| w * value(signal, s))
+                Need::Integral(signal) => nodes
+                    .map(
+                        |Node {
+                             weight: w,
+                             sample: s,
+                             ..
+                         }| w * value(signal, s),
+                    )
                     .sum::<f64>()
                     .into(),
-                Need::Product(a, b) => samples
-                    .map(|(w, s)| w * value(a, s) * value(b, s))
+                Need::Product(a, b) => nodes
+                    .map(
+                        |Node {
+                             weight: w,
+                             sample: s,
+                             ..
+                         }| w * value(a, s) * value(b, s),
+                    )
                     .sum::<f64>()
                     .into(),
                 Need::Fourier(signal, tone) => {
                     let omega = frequency(self.model, tone);
-                    samples
-                        .map(|(w, s)| {
-                            let (sin, cos) = (omega * (offset + s.time)).sin_cos();
-                            Complex::new(cos, -sin) * (w * value(signal, s))
-                        })
+                    nodes
+                        .map(
+                            |Node {
+                                 weight: w,
+                                 sample: s,
+                                 ..
+                             }| {
+                                let (sin, cos) = (omega * (offset + s.time)).sin_cos();
+                                Complex::new(cos, -sin) * (w * value(signal, s))
+                            },
+                        )
                         .sum()
                 }
             };
@@ -164,7 +180,8 @@ impl<'a> Gatherer<'a> {
             let ends = if let Some((_, ends)) = found {
                 *ends
             } else {
-                let of = |output: &Output| period.ends_of_range(output).map(|end| end.1);
+                let of =
+                    |output: &Output| period.ends_of_range(&self.nodes, output).map(|end| end.1);
                 let ends = self.output(signal).map_or([f64::NAN; 2], of);
                 known.push((signal, ends));
                 ends

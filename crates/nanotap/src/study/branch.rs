@@ -570,7 +570,9 @@ fn described(
             depth,
         } = &diagram.branches[k];
         let parent = parent.and_then(|p| kept.iter().position(|&k| k == p));
-        report.branches.push(summary(branch, parent, *depth, end(branch)));
+        report
+            .branches
+            .push(summary(branch, parent, *depth, end(branch)));
         for p in &branch.points {
             report.points.push(point(case, options, index, p)?);
         }
@@ -584,7 +586,11 @@ fn described(
         if branch.end.is_failure() && !stopped {
             report.failures.push(FailureReport {
                 parameter: branch.points.last().map_or(f64::NAN, |p| p.parameter),
-                reason: format!("the period-{} branch was cut: {}", branch.period, end(branch)),
+                reason: format!(
+                    "the period-{} branch was cut: {}",
+                    branch.period,
+                    end(branch)
+                ),
             });
         }
     }

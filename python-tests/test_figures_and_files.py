@@ -125,7 +125,7 @@ def test_basins_branches_and_the_rest_are_drawn(bistable, regular):
     _, right = drawn(plot.show(branch)).axes
     assert "α" in right.get_ylabel() and len(right.lines) >= 1
     drawn(plot.branch(branch, show="spectral_radius"))
-    with pytest.raises(ValueError, match="there are tip_max"):
+    with pytest.raises(ValueError, match="there are branch"):
         plot.branch(branch, show="colour")
     drawn(plot.show(nanotap.lyapunov(regular, periods=500, points=50)))
     drawn(plot.show(nanotap.modes(regular)))
@@ -274,3 +274,37 @@ def test_maps_are_fields_of_gwyddion(mapped, bistable, tmp_path):
     )
     with pytest.raises(ValueError, match="equal steps"):
         export.gsf(log, path)
+
+
+def test_panels_are_chosen_and_drawn_into_given_axes(regular):
+    import matplotlib.pyplot as plt
+
+    orbit = nanotap.orbit(regular)
+    picture, one = plt.subplots()
+    assert nanotap.plot.orbit(orbit, ax=one, panels="b") is picture
+    assert one.get_xlabel()
+    assert len(nanotap.plot.orbit(orbit, panels="ac").axes) == 2
+    with pytest.raises(ValueError, match="there is no panel 'z'"):
+        nanotap.plot.orbit(orbit, panels="z")
+    with pytest.raises(ValueError, match="4 panels, not 1"):
+        nanotap.plot.orbit(orbit, ax=one)
+    plt.close(picture)
+
+
+def test_any_variable_is_drawn_over_one_parameter(regular):
+    sweep = nanotap.sweep(regular, over={"omega": (2.9, 3.1, 5)}, starts=2, periods=4)
+    label = nanotap.plot.sweep(sweep, show="peak_force").axes[0].get_ylabel()
+    assert "force" in label
+    many = nanotap.orbit(regular, omega=np.linspace(2.9, 3.1, 4))
+    assert "phase" in nanotap.plot.show(many, show="phase").axes[0].get_ylabel()
+    with pytest.raises(ValueError, match="`colour` is no number here"):
+        nanotap.plot.orbits(many, show="colour")
+
+
+def test_complex_numbers_are_two_in_netcdf(regular, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    branch = nanotap.branch(regular, parameter="omega", from_=2.95, to=3.05)
+    nanotap.export.netcdf(branch, tmp_path / "b.nc", engine="scipy")
+    back = xarray.open_dataset(tmp_path / "b.nc", engine="scipy")
+    np.testing.assert_array_equal(back.multipliers_re, branch.multipliers.real)
+    np.testing.assert_array_equal(back.multipliers_im, branch.multipliers.imag)

@@ -86,3 +86,32 @@ def test_what_is_no_table_is_refused(curve: dict[str, np.ndarray]) -> None:
         nanotap.fit(case, data=wrong, free=FREE)
     with pytest.raises(ValueError, match=r"sample\.stifness"):
         nanotap.fit(case, data=curve, free="sample.stifness")
+
+
+def test_laws_are_compared(curve: dict[str, np.ndarray]) -> None:
+    case = nanotap.Case.from_toml(LEVER.replace("30 N/m", "24 N/m"))
+    laws = ["spring-damper", "kelvin-voigt"]
+    found = nanotap.fit(case, data=curve, free=FREE, laws=laws, profile=False)
+    assert found.law == "spring-damper"
+    table = found.compared()
+    assert list(table.index) == laws and table.above_best["spring-damper"] == 0
+    assert table.weight.sum() == pytest.approx(1)
+    assert nanotap.fit(case, data=curve, free=FREE, profile=False).compared().empty
+
+
+def test_each_curve_has_its_case(curve: dict[str, np.ndarray]) -> None:
+    case = nanotap.Case.from_toml(LEVER)
+    shifted = {**curve, "distance (nm)": curve["distance (nm)"] + 0.2}
+    found = nanotap.fit(
+        case,
+        data={"one": curve, "two": shifted},
+        free="sample.stiffness",
+        per_curve=["cantilever.Q", "gap.offset"],
+        profile=False,
+    )
+    assert found.best["gap.offset of two"] == pytest.approx(-2e-10, rel=1e-3)
+    best = found.best_case("two")
+    assert best.physical is not None
+    assert best.physical.Q == pytest.approx(found.best["cantilever.Q of two"])
+    with pytest.raises(KeyError):
+        found.best_case("three")

@@ -3,12 +3,14 @@
 import json
 import os
 import pathlib
+import pickle
 import subprocess
 
 import nanotap
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import PHYSICAL
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
@@ -267,3 +269,36 @@ def test_physical_quantities_vary(physical):
         nanotap.window(physical, over="gap.tip=15nm:30nm:3")
     with pytest.raises(ValueError, match=r"gap\.tap"):
         nanotap.sweep(physical, over="gap.tap=15nm:30nm:3")
+
+
+def test_rows_of_states_are_runs_of_their_own(regular):
+    states = np.zeros((3, 6))
+    states[1, 0], states[2, 0] = 0.1, -0.1
+    many = nanotap.simulate(regular, state=states, periods=5, transient=0)
+    assert many.sizes["start"] == 3
+    np.testing.assert_array_equal(many.initial_state, states)
+    for k, state in enumerate(states):
+        one = nanotap.simulate(regular, state=state, periods=5, transient=0)
+        assert float(one.tip_max) == float(many.tip_max[k])
+    both = nanotap.orbit(regular, state=states, omega=[2.9, 3.0])
+    assert both.tip_max.dims == ("omega", "start")
+    with pytest.raises(ValueError, match="rows of them"):
+        nanotap.simulate(regular, state=np.zeros((2, 2, 6)))
+
+
+def test_an_orbit_of_a_physical_case_is_seen_in_si():
+    case = nanotap.Case(**PHYSICAL)
+    orbit = nanotap.orbit(case)
+    assert orbit.series is not None and orbit.physical is not None
+    series = orbit.series_in_si
+    assert series.tip.attrs["units"] == "m" and series.tau.attrs["units"] == "s"
+    # A period of the drive, and the greatest deflection as the document has them.
+    period = float(series.tau[-1]) / orbit.period
+    assert period == pytest.approx(1 / case.physical.drive_frequency, rel=1e-9)
+    assert float(series.tip.max()) <= orbit.physical.tip_max * (1 + 1e-9)
+    assert "greatest tip deflection" in orbit._repr_html_()
+    assert "cantilever.lever" in case._repr_html_() and "PPP-FM" in case._repr_html_()
+    again = pickle.loads(pickle.dumps(orbit))
+    assert again.series.equals(orbit.series)
+    with pytest.raises(ValueError, match="unit of length"):
+        nanotap.orbit(nanotap.Case.paper(omega=3)).series_in_si  # noqa: B018

@@ -23,7 +23,7 @@ REFUSED = [
         "the state has 2 numbers where 6 are needed",
     ),
     ("simulate", {"state": [NAN] * 6}, ValueError, "state: `nan`"),
-    ("simulate", {"state": [[0] * 6]}, ValueError, "one row of numbers"),
+    ("simulate", {"state": [[[0] * 6]]}, ValueError, "one state, or rows of them"),
     ("simulate", {"state": ["a"] * 6}, TypeError, "state: real numbers are needed"),
     ("simulate", {"state": [1j] * 6}, TypeError, "state"),
     ("simulate", {"state": [[1], [2, 3]]}, ValueError, "state"),

@@ -176,7 +176,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
-from ._case import Case, Path
+from ._case import Case, Path, Value
 from ._results import (
     Attractors,
     Convergence,
@@ -279,7 +279,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
         ]
     )
     if name == "orbit":
-        single = signature("float | str", "Orbit")
+        single = signature("Value", "Orbit")
         many = signature("Varied", '"xr.Dataset"')
         whole = signature("Varied", quoted)
         single = single.replace("(\n", "(  # type: ignore[overload-overlap]\n", 1)

@@ -322,24 +322,41 @@ const TOPICS: &[Topic] = &[
 /// When a section is asked for that there is not, the work is stopped, or a computation
 /// that should work does not.
 pub fn report(options: &Options, control: &Control<'_>) -> Result<Report, PaperError> {
+    match report_so_far(options, control)? {
+        (report, true) => Ok(report),
+        (_, false) => Err(PaperError::Cancelled),
+    }
+}
+
+/// The report of the sections that were done before the work was stopped, and whether they are
+/// all.
+///
+/// # Errors
+/// As [`report`], less that of being stopped.
+pub fn report_so_far(
+    options: &Options,
+    control: &Control<'_>,
+) -> Result<(Report, bool), PaperError> {
     let topics = chosen(&options.only)?;
     let whole: u32 = topics.iter().map(|topic| topic.weight).sum();
     let runs = Runs::new(options.quick, control);
     let mut sections = Vec::with_capacity(topics.len());
     let mut begun = 0;
+    let mut all = true;
     for topic in topics {
         let share = |weight: u32| f64::from(weight) / f64::from(whole);
         runs.begin(share(begun), share(topic.weight));
-        sections.push((topic.make)(&runs, Section::new(topic.id, topic.title))?);
+        let made = (topic.make)(&runs, Section::new(topic.id, topic.title));
+        // What was made while the work was stopped is not whole.
         if control.is_cancelled() {
-            return Err(PaperError::Cancelled);
+            all = false;
+            break;
         }
+        sections.push(made?);
         begun += topic.weight;
     }
-    Ok(Report {
-        sections,
-        quick: options.quick,
-    })
+    let quick = options.quick;
+    Ok((Report { sections, quick }, all))
 }
 
 /// Names of all sections.

@@ -125,6 +125,12 @@ impl CaseCore {
         Ok(serde_json::to_string(&CaseDocument::of(&self.case)).map_err(Failure::from)?)
     }
 
+    /// What was stated, by `section.key`, and numbers of the equations, JSON.
+    #[getter]
+    fn stated(&self) -> PyResult<String> {
+        Ok(serde_json::to_string(&*self.case).map_err(Failure::from)?)
+    }
+
     /// The document of the case as it is studied, its distance solved for, JSON.
     #[getter]
     fn document_at_setpoint(&self, py: Python<'_>) -> PyResult<String> {

@@ -135,15 +135,15 @@ type Observed = Result<String, String>;
 type Told = (Option<String>, String);
 
 /// Many cases, each run or brought to its orbit as the study called `name` does, on several
-/// threads: a document (`None` where there is none) and a reason (empty where there is a
+/// threads; one request for all, or one a case. A document (`None` where there is none) and a reason (empty where there is a
 /// document) each, and whether Ctrl-C stopped it.
 #[pyfunction]
-#[pyo3(signature = (cases, name, request, *, threads=None, progress=None))]
+#[pyo3(signature = (cases, name, requests, *, threads=None, progress=None))]
 pub(crate) fn observe(
     py: Python<'_>,
     cases: Vec<PyRef<'_, CaseCore>>,
     name: &str,
-    request: &str,
+    requests: Vec<String>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Vec<Told>, bool)> {
@@ -153,15 +153,22 @@ pub(crate) fn observe(
         .collect::<PyResult<_>>()?;
     let entry = registry::study(name)
         .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
-    let request = json(request)?;
+    let requests = requests
+        .iter()
+        .map(|request| json(request))
+        .collect::<Result<Vec<_>, _>>()?;
+    if requests.len() != 1 && requests.len() != cases.len() {
+        return Err(Failure::input("one request is needed, or one a case").into());
+    }
     let done = watched(py, progress, move |control| {
         let finished = AtomicUsize::new(0);
         let total = cases.len();
-        let one = |studied: &Arc<Case>| -> Result<Observed, Failure> {
+        let one = |(index, studied): (usize, &Arc<Case>)| -> Result<Observed, Failure> {
             if control.is_cancelled() {
                 return Ok(Err("stopped before its turn".into()));
             }
-            let observed = match entry.document(studied, request.clone(), &Control::default()) {
+            let request = requests[index % requests.len()].clone();
+            let observed = match entry.document(studied, request, &Control::default()) {
                 Ok(document) => Ok(document),
                 Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
                 Err(other) => return Err(other.into()),
@@ -173,7 +180,11 @@ pub(crate) fn observe(
             Ok(observed)
         };
         install(threads, || {
-            cases.par_iter().map(one).collect::<Result<Vec<_>, _>>()
+            cases
+                .par_iter()
+                .enumerate()
+                .map(one)
+                .collect::<Result<Vec<_>, _>>()
         })?
     })?;
     let pairs = done.result.into_iter().map(|observed| match observed {

@@ -8,7 +8,7 @@ use nanotap::study::lyapunov::{LyapunovRequest, LyapunovStudy};
 use nanotap::study::registry::{self, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
-use nanotap_paper::{About, Check, Options as PaperOptions, Verdict, report, section_names};
+use nanotap_paper::{About, Check, Options as PaperOptions, Verdict, report_so_far, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -131,7 +131,8 @@ pub(crate) fn paper(
         // Before the work, not after it.
         std::fs::create_dir_all(&out)
             .map_err(|error| Error::files(format!("cannot make {}: {error}", out.display())))?;
-        let report = install(threads, || report(&PaperOptions { only, quick }, control))??;
+        let options = PaperOptions { only, quick };
+        let (report, _) = install(threads, || report_so_far(&options, control))??;
         let written = report.write(&out)?;
         Ok(serde_json::to_string(&Paper {
             out: &out,

@@ -19,6 +19,9 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// How long work that was told to stop may take to do so. What does not listen is left
 /// alone to end by itself: it holds nothing of Python's.
 const PATIENCE: Duration = Duration::from_millis(900);
+/// The same of work that tells its progress: it listens, and what it has done is worth waiting for.
+/// A second Ctrl-C does not wait.
+const LONG_PATIENCE: Duration = Duration::from_secs(30);
 
 /// What came of watched work.
 pub(crate) struct Watched<R> {
@@ -83,8 +86,12 @@ pub(crate) fn watched<R: Send + 'static>(
                     stopped = Some((Instant::now(), error));
                 }
             }
+            if let (Some(_), None) = (&stopped, &done) {
+                Python::attach(Python::check_signals)?;
+            }
+            let patience = if seen.1 > 0 { LONG_PATIENCE } else { PATIENCE };
             match (done, stopped.take()) {
-                (None, Some((since, error))) if since.elapsed() > PATIENCE => return Err(error),
+                (None, Some((since, error))) if since.elapsed() > patience => return Err(error),
                 (None, still) => stopped = still,
                 (Some(done), stopped) => return ended(done, stopped.map(|(_, error)| error)),
             }

@@ -144,7 +144,7 @@ macro_rules! follows {
 }
 
 follows! {
-    fit: "fit.md", 3 commands, 20 numbers;
+    fit: "fit.md", 5 commands, 27 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;

@@ -21,8 +21,10 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Progress: TypeAlias = bool | Callable[[int, int], object] | None
 Box: TypeAlias = Mapping[str, tuple[float, float]] | None
 # A key of the case: one value, or many.
-Varied: TypeAlias = "float | str | Sequence[float] | npt.NDArray[Any] | xr.DataArray"
-
+Varied: TypeAlias = (
+    "float | str | np.floating[Any] | np.integer[Any] | Mapping[str, Any] | Sequence[float] "
+    "| Sequence[str] | npt.NDArray[Any] | xr.DataArray"
+)
 # No machine counts further, and the extension takes no more.
 _MOST = 2**63 - 1
 

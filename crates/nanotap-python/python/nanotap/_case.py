@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Path: TypeAlias = str | os.PathLike[str]
-Value: TypeAlias = float | int | str | Mapping[str, float | int | str]
+Scalar: TypeAlias = "float | str | np.floating[Any] | np.integer[Any]"
+Value: TypeAlias = "Scalar | Mapping[str, Scalar]"
 
 _OTHER_NAMES = {
     alias: name
@@ -245,7 +246,22 @@ class Case:
             for key, value in self._document.items()
             if key not in {"kind", "physical"} and value is not None
         )
-        return f"<table><caption>{escape(self.kind)}</caption>{rows}</table>"
+        numbers = f"<table><caption>{escape(self.kind)}</caption>{rows}</table>"
+        return self._quantities_html() + numbers
+
+    def _quantities_html(self) -> str:
+        """Lever, sample and drive of a physical case with their units."""
+        stated = {
+            key: value
+            for key, value in json.loads(self._core.stated).items()
+            if "." in key
+        }
+        rows = "".join(
+            f"<tr><td>{escape(key)}</td>"
+            f"<td style='text-align:right'>{escape(str(value))}</td></tr>"
+            for key, value in stated.items()
+        )
+        return f"<table><caption>stated</caption>{rows}</table>" if rows else ""
 
 
 def catalogue() -> "pd.DataFrame":

@@ -27,6 +27,12 @@ def describe(ds: "xr.Dataset") -> "xr.Dataset":
     return ds
 
 
+def described(name: str, *, physical: bool) -> tuple[str, str]:
+    """The words for an entry and its unit; empty where there are none."""
+    entry = _GLOSSARY["physical" if physical else "model"].get(name, {})
+    return str(entry.get("words", "")), str(entry.get("unit", ""))
+
+
 def case_attributes(case: "Case", title: str) -> dict[str, str]:
     """What a Dataset says of its origin."""
     from ._nanotap import __version__

@@ -99,18 +99,49 @@ def page(width: float, height: float, **grid: Any) -> Iterator[tuple[Picture, An
         yield picture, picture.subplots(**grid)
 
 
-def draw(description: str, axes: Any = None) -> Figure:
-    """Draws a figure: on a page of its own, or into `axes`, one for each panel.
+def draw(
+    description: str, axes: Any = None, ax: Any = None, panels: str | None = None
+) -> Figure:
+    """Draws a figure: on a page of its own, or into `axes` (`ax`), one for each panel; of its
+    panels those whose letters `panels` has.
 
     Raises:
-        ValueError: there are not as many axes as panels.
+        ValueError: there are not as many axes as panels, or no such panel.
     """
     figure = json.loads(description)
-    panels = figure["panels"]
+    figure["panels"] = chosen = _chosen(figure["panels"], panels)
+    if panels is not None:
+        figure |= {"rows": 1, "cols": len(chosen), "share_x": False}
+        figure |= {"column_widths": [], "row_heights": [], "height": None}
+    return _drawn_at(figure, chosen, ax if axes is None else axes)
+
+
+def _chosen(panels: list[dict[str, Any]], letters: str | None) -> list[dict[str, Any]]:
+    """The panels with these letters."""
+    if letters is None:
+        return panels
+    known = {
+        (panel["letter"] or "(a)").strip("()"): panel
+        for panel in panels
+        if panel["layers"]
+    }
+    missing = [letter for letter in letters if letter not in known]
+    if missing or not letters:
+        message = f"panels: there is no panel {''.join(missing)!r}; there are {''.join(known)}"
+        raise ValueError(message)
+    return [known[letter] for letter in letters]
+
+
+def _drawn_at(
+    figure: dict[str, Any], panels: list[dict[str, Any]], axes: Any
+) -> Figure:
     if axes is not None:
         given = np.atleast_1d(np.asarray(axes, dtype=object)).ravel()
         if len(given) != len(panels):
-            message = f"axes: this figure has {len(panels)} panels, not {len(given)}"
+            message = (
+                f"axes: this figure has {len(panels)} panels, not {len(given)}; "
+                'choose some of them with panels="a"'
+            )
             raise ValueError(message)
         for one, panel in zip(given, panels, strict=True):
             _panel(one, panel)

@@ -53,12 +53,13 @@ def simulate(
 ) -> "xr.Dataset":
     """One run, or one for each value of the arrays among `parameters`."""
     case, varied = _split(case, options, parameters)
-    request = _arguments.request("simulate", options)
-    if varied:
+    states = _states(options)
+    if varied or states is not None:
         if options["method"] == "rk4":
             message = "rk4 runs one case at a time; leave the arrays away"
             raise ValueError(message)
-        return _over(case, varied, "simulate", request, threads, progress)
+        return _over(case, varied, "simulate", options, states, threads, progress)
+    request = _arguments.request("simulate", options)
     periods = _arguments.count("periods", options["periods"])
     shown = (
         min(periods, _SHOWN_PERIODS)
@@ -82,14 +83,19 @@ def orbit(
 ) -> "Orbit | xr.Dataset":
     """A periodic orbit, or one for each value of the arrays among `parameters`."""
     case, varied = _split(case, options, parameters)
+    states = _states(options)
+    if varied or states is not None:
+        return _over(case, varied, "orbit", options, states, threads, progress)
     request = _arguments.request("orbit", options)
-    if varied:
-        return _over(case, varied, "orbit", request, threads, progress)
     _refuse_rows(1, _arguments.count("resolution", options["resolution"]))
     document, (names, values) = _nanotap.orbit(case._core, request)
-    series = _series(names, values)
-    series.attrs.update(case_attributes(case, "a periodic orbit"))
-    return Orbit.of(_document(document), series=series)
+
+    def series() -> "xr.Dataset":
+        ds = _series(names, values)
+        ds.attrs.update(case_attributes(case, "a periodic orbit"))
+        return ds
+
+    return Orbit.of(_document(document), made_series=series)
 
 
 def _document(text: str) -> dict[str, Any]:
@@ -264,32 +270,60 @@ def _fixed_step(
     return describe(ds)
 
 
+def _states(options: Mapping[str, Any]) -> Floats | None:
+    """Several initial states, a row each; `None` where there is one or none."""
+    if options["state"] is None:
+        return None
+    states = _arguments.real(options["state"], "state")
+    if states.ndim < 2:
+        return None
+    if states.ndim != 2 or states.size == 0:
+        message = f"state: one state, or rows of them, are needed, not an array of shape {states.shape}"
+        raise ValueError(message)
+    return states
+
+
 def _over(
     case: Case,
     varied: Mapping[str, Any],
     study: str,
-    request: str,
+    options: Mapping[str, Any],
+    states: Floats | None,
     threads: int | None,
     progress: Progress,
 ) -> "xr.Dataset":
-    """A Dataset over the product of arrays, or over the dimensions of DataArrays."""
+    """A Dataset over the product of arrays, or over the dimensions of DataArrays; of several
+    initial states also over `start`."""
     import xarray as xr
 
     arrays = {key: _as_array(key, value) for key, value in varied.items()}
+    if states is not None:
+        if "start" in arrays:
+            message = "start: this is the dimension of the initial states"
+            raise ValueError(message)
+        starts = np.arange(len(states))
+        arrays["start"] = xr.DataArray(starts, dims="start", coords={"start": starts})
+        requests = [
+            _arguments.request(study, {**options, "state": state}) for state in states
+        ]
+    else:
+        requests = [_arguments.request(study, options)]
     broadcast = dict(zip(arrays, xr.broadcast(*arrays.values()), strict=True))
     first = next(iter(broadcast.values()))
     shape, dims = first.shape, first.dims
-    cases = [
-        case.with_(**{key: array.values[index] for key, array in broadcast.items()})
-        for index in product(*map(range, shape))
-    ]
+    cases, asked = [], []
+    for index in product(*map(range, shape)):
+        keys = {key: array.values[index] for key, array in broadcast.items()}
+        start = keys.pop("start", None) if states is not None else None
+        cases.append(case.with_(**keys))
+        asked.append(requests[0 if start is None else int(start)])
     most = _arguments.optional_count("threads", threads)
     noun = "orbits" if study == "orbit" else "runs"
     with bar(progress, noun) as show:
         found, interrupted = _nanotap.observe(
             [one._core for one in cases],
             study,
-            request,
+            requests if states is None else asked,
             threads=most,
             progress=show,
         )
@@ -305,6 +339,14 @@ def _over(
     entries = max(names, key=len)
     ds = _stacked(documents, names, entries, shape, tuple(map(str, dims)))
     ds = ds.assign_coords(coords)
+    if states is not None:
+        ds.start.attrs.update(long_name="initial state, from 0", units="1")
+        if states.shape[1] == len(entries):
+            ds = ds.assign_coords(state=words(entries))
+            ds["initial_state"] = (("start", "state"), states)
+            ds.initial_state.attrs.update(
+                long_name="initial state", units="model units"
+            )
     failures = np.array([reason for _, reason in found], dtype=object).reshape(shape)
     ds = ds.assign(failure=(dims, failures.astype(str)))
     ds.failure.attrs.update(

@@ -32,6 +32,8 @@ class CaseCore:
     @property
     def document(self) -> str: ...
     @property
+    def stated(self) -> str: ...
+    @property
     def document_at_setpoint(self) -> str: ...
     @property
     def setpoint(self) -> str | None: ...
@@ -113,7 +115,7 @@ def lyapunov(case: CaseCore, request: str) -> tuple[str, _Floats]: ...
 def observe(
     cases: list[CaseCore],
     name: str,
-    request: str,
+    requests: list[str],
     *,
     threads: int | None = None,
     progress: _Progress = None,

@@ -1,8 +1,9 @@
 """What results are: objects with the names of the terminal's JSON."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
@@ -24,16 +25,20 @@ class Record(Mapping[str, Any]):
     __slots__ = ("_entries",)
 
     def __init__(self, entries: Mapping[str, Any]) -> None:
-        self._entries = {key: _wrapped(value) for key, value in entries.items()}
+        self._entries = dict(entries)
 
     def __getitem__(self, name: str) -> Any:
-        return self._entries[name]
+        value = self._entries[name]
+        if isinstance(value, dict | list):
+            # Wrapped when it is looked at: most of a document never is.
+            value = self._entries[name] = _wrapped(value)
+        return value
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
         try:
-            return self._entries[name]
+            return self[name]
         except KeyError:
             message = f"there is no `{name}`; there are {', '.join(self._entries)}"
             raise AttributeError(message) from None
@@ -48,7 +53,7 @@ class Record(Mapping[str, Any]):
         return sorted({*super().__dir__(), *self._entries})
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{key}={value!r}" for key, value in self._entries.items())
+        inside = ", ".join(f"{key}={value!r}" for key, value in self.items())
         return f"Record({inside})"
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -79,11 +84,41 @@ class Fit(Record):
             for p in self["parameters"]
         }
 
-    def best_case(self) -> "Case":
-        """The case of the best fit."""
+    def best_case(self, curve: str | None = None) -> "Case":
+        """The case of the best fit; where parameters are one a curve, that of `curve`.
+
+        Raises:
+            KeyError: there is no such curve.
+        """
         from ._case import Case
 
-        return Case.from_toml(self["case_file"])
+        if curve is None:
+            return Case.from_toml(self["case_file"])
+        files = {one["curve"]: one["case_file"] for one in self.get("case_files", ())}
+        return Case.from_toml(files[curve])
+
+    def compared(self) -> "pd.DataFrame":
+        """The contact laws that were compared, a row each: `fits`, `aic`, `bic`, `above_best`,
+        `weight` …; empty where none were asked for.
+
+        A smaller criterion says which of these laws describes these data better for its
+        parameters, by more than chance from a difference of some ten on. It is no proof that
+        a law is right.
+        """
+        import pandas as pd
+
+        columns = [
+            "law",
+            "fits",
+            "aic",
+            "bic",
+            "above_best",
+            "weight",
+            "chi2",
+            "reason",
+        ]
+        rows = [{c: law.get(c) for c in columns} for law in self.get("laws", ())]
+        return pd.DataFrame(rows, columns=columns).set_index("law")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Fit, (self.to_dict(),)
@@ -97,14 +132,14 @@ def _of_curve(parameter: Mapping[str, Any]) -> str:
 def _wrapped(value: Any) -> Any:
     if isinstance(value, Mapping) and not isinstance(value, Record):
         return Record(value)
-    if isinstance(value, list):
+    if isinstance(value, list) and value and not isinstance(value[0], float | int):
         return [_wrapped(entry) for entry in value]
     return value
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Record):
-        return value.to_dict()
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, list):
         return [_plain(entry) for entry in value]
     return value
@@ -123,10 +158,13 @@ def pairs(value: Sequence[Sequence[float]]) -> npt.NDArray[np.complex128]:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Result:
-    """A result: its chief entries are fields, the others are found by their names too."""
+    """A result: its chief entries are fields, the others are found by their names too.
+
+    Attributes:
+        document: Everything, as the terminal's JSON has it.
+    """
 
     document: Record = field(kw_only=True)
-    """Everything, as the terminal's JSON has it."""
 
     _arrays: ClassVar[frozenset[str]] = frozenset()
     _complex: ClassVar[frozenset[str]] = frozenset()
@@ -147,13 +185,15 @@ class Result:
             values[entry.name] = value
         return cls(**values)
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name == "document":
-            raise AttributeError(name)
-        return getattr(self.document, name)
+    if not TYPE_CHECKING:
+        # A checker of types knows the names that are declared, and finds misspelt ones.
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_") or name == "document":
+                raise AttributeError(name)
+            return getattr(self.document, name)
 
     def __getitem__(self, name: str) -> Any:
-        own = {entry.name for entry in fields(self)}
+        own = {entry.name for entry in fields(self)} | {"series"}
         return getattr(self, name) if name in own else self.document[name]
 
     def __dir__(self) -> list[str]:
@@ -170,20 +210,23 @@ def _number(value: float | None) -> str:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Modes(Result):
-    """Frequencies Ω and mode shapes, free and in contact; Galerkin and of the beam itself."""
+    """Frequencies Ω and mode shapes, free and in contact; Galerkin and of the beam itself.
+
+    Attributes:
+        modes: How many modes.
+        free: Frequencies in free flight (N, Ω).
+        contact: Frequencies in contact (N, Ω).
+        exact_free: Those of the beam itself, in free flight (N, Ω).
+        exact_contact: Those of the beam itself, in contact (N, Ω).
+        shapes: The mode shapes φ_j(ξ) of the bare beam, over `xi` and `mode`.
+    """
 
     modes: int
-    """How many modes."""
     free: Floats
-    """Frequencies in free flight."""
     contact: Floats
-    """Frequencies in contact."""
     exact_free: Floats
-    """Those of the beam itself, in free flight."""
     exact_contact: Floats
-    """Those of the beam itself, in contact."""
     shapes: "xr.DataArray" = field(kw_only=True)
-    """The mode shapes φ_j(ξ) of the bare beam, over `xi` and `mode`."""
 
     _arrays = frozenset({"free", "contact", "exact_free", "exact_contact"})
 
@@ -204,57 +247,123 @@ class Modes(Result):
         return f"Modes(free=[{shown}])"
 
 
+class _Observed:
+    """What is observed of an orbit besides: found in its document, in the model's units."""
+
+    mean_deflection: float
+    indentation: float
+    mean_force: float
+    dissipation: float
+    virial: float
+    contacts_per_period: float
+    impact_speed: float
+    contact_time: float
+    rms_deflection: float
+    gap_range: list[float]
+    least_force: float
+    contact_force: float
+    drive_power: float
+    sample_power: float
+    slope_range: list[float]
+    optical_amplitude: float
+    optical_phase: float
+    beam_clearance: float
+    beam_clearance_xi: float
+    beam_clearance_period: float
+    grazing_contacts: int
+    tone2_response: float
+    tone2_lag: float
+    determinant_defect: float
+
+
 @dataclass(frozen=True, repr=False, eq=False)
-class Orbit(Result):
-    """A periodic orbit, closed by Newton, with its stability and what is observed of it."""
+class Orbit(_Observed, Result):
+    """A periodic orbit, closed by Newton, with its stability and what is observed of it.
+
+    Attributes:
+        period: Minimal period in drive periods.
+        state: State at drive phase 0 (n).
+        states: States at phase 0 of all its periods (period × n).
+        residual: Largest entry of Pⁿ(x) − x.
+        error: Estimated distance of the state from the true orbit.
+        multipliers: Floquet multipliers, largest modulus first (n).
+        stable: Whether every multiplier is inside the unit circle.
+        stability: stable, unstable or marginal.
+        events: Contacts begun and ended: `tau`, `kind`, `gap_rate`.
+        tip_max: Greatest tip deflection W (g0).
+        tip_min: Least tip deflection W (g0).
+        amplitude: Half of peak to peak of W (g0).
+        contact_fraction: Part of the time in contact.
+        peak_force: Greatest force of the sample on the tip (EI g0/L³).
+        energy_balance: Energy fed and drained: `drive_work`, `beam_damping`,
+            `sample_damping`, `stored`, `residual`.
+        harmonics: Components: `order`, `tip`, `tip_phase`, `force`, `force_phase`,
+            `slope`.
+        thd: Part of the tip deflection's power outside the drive's frequency.
+        phase: Phase lag of the tip deflection behind the drive, degrees.
+        first_harmonic: Amplitude of the tip deflection at the drive's frequency (g0).
+        physical: The same in SI, if the case is physical.
+        derivatives: Derivatives by the keys that were asked for: `state`, the
+            observables, `physical`.
+        made_series: What makes the time series.
+
+    Lengths and forces are in the model's units; `physical` has them in SI.
+    """
 
     period: int
-    """Minimal period in drive periods."""
     state: Floats
-    """State at drive phase 0."""
     states: Floats
-    """States at phase 0 of all its periods."""
     residual: float
-    """Largest entry of Pⁿ(x) − x."""
     error: float
-    """Estimated distance of the state from the true orbit."""
     multipliers: npt.NDArray[np.complex128]
-    """Floquet multipliers, largest modulus first."""
     stable: bool
-    """Whether every multiplier is inside the unit circle."""
     stability: str
-    """stable, unstable or marginal."""
     events: list[Record]
-    """Contacts begun and ended: `tau`, `kind`, `gap_rate`."""
     tip_max: float
-    """Greatest tip deflection W."""
     tip_min: float
-    """Least tip deflection W."""
     amplitude: float
-    """Half of peak to peak of W."""
     contact_fraction: float
-    """Part of the time in contact."""
     peak_force: float
-    """Greatest force of the sample on the tip."""
     energy_balance: Record
-    """Energy fed and drained: `drive_work`, `beam_damping`, `sample_damping`, `stored`, `residual`."""
     harmonics: list[Record]
-    """Components: `order`, `tip`, `tip_phase`, `force`, `force_phase`, `slope`."""
     thd: float
-    """Part of the tip deflection's power outside the drive's frequency."""
     phase: float
-    """Phase lag of the tip deflection behind the drive, degrees."""
     first_harmonic: float
-    """Amplitude of the tip deflection at the drive's frequency."""
     physical: Record | None = None
-    """The same in SI, if the case is physical."""
     derivatives: Record | None = None
-    """Derivatives by the keys that were asked for: `state`, the observables, `physical`."""
-    series: "xr.Dataset | None" = field(default=None, kw_only=True)
-    """One repetition as a time series over `tau`; of an orbit found by `orbit`."""
+    made_series: "Callable[[], xr.Dataset] | xr.Dataset | None" = field(
+        default=None, kw_only=True
+    )
 
     _arrays = frozenset({"state", "states"})
     _complex = frozenset({"multipliers"})
+
+    @property
+    def series(self) -> "xr.Dataset | None":
+        """One repetition as a time series over `tau`; of an orbit found by `orbit`."""
+        made = self.made_series
+        if callable(made):
+            made = made()
+            # A frozen object may still remember what it worked out.
+            object.__setattr__(self, "made_series", made)
+        return made
+
+    @property
+    def series_in_si(self) -> "xr.Dataset":
+        """The same in SI: `tau` in s, `tip` and `gap` in m, `force` in N …
+
+        Raises:
+            ValueError: the case is not a physical one, or the orbit has no time series.
+        """
+        from ._si import in_si
+
+        if self.series is None:
+            message = "only an orbit found by nanotap.orbit has a time series"
+            raise ValueError(message)
+        return in_si(self.series)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _orbit_again, (self.document.to_dict(), self.series)
 
     @property
     def spectral_radius(self) -> float:
@@ -282,37 +391,65 @@ class Orbit(Result):
             f"{_number(self.tip_max)})"
         )
 
+    def _repr_html_(self) -> str:
+        """A table for notebooks: in SI where the case is physical."""
+        from ._describe import described
+
+        shown = self.physical if self.physical is not None else self.document
+        rows = [
+            ("period", str(self.period), "drive periods"),
+            ("stability", self.stability, ""),
+            ("largest multiplier", _number(self.spectral_radius), ""),
+        ]
+        for name, value in shown.items():
+            words, unit = described(name, physical=self.physical is not None)
+            if words and isinstance(value, float) and not name.endswith("_eV"):
+                rows.append((words, _number(value), "" if unit == "1" else unit))
+        cells = "".join(
+            f"<tr><td>{escape(words)}</td><td style='text-align:right'>{escape(value)}</td>"
+            f"<td>{escape(unit)}</td></tr>"
+            for words, value, unit in rows
+        )
+        return f"<table><caption>periodic orbit</caption>{cells}</table>"
+
+
+def _orbit_again(document: Mapping[str, Any], series: "xr.Dataset | None") -> Orbit:
+    return Orbit.of(document, made_series=series)
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Attractor(Result):
-    """A motion that others go to: an orbit, a torus or chaos."""
+    """A motion that others go to: an orbit, a torus or chaos.
+
+    Attributes:
+        classification: periodic, quasi-periodic or chaotic.
+        fraction: Part of the starts that go there.
+        lyapunov: Lyapunov exponents per drive period (n).
+        evidence: Why it was named so.
+        count: How many starts went there.
+        period: Minimal period, of an orbit.
+        state: A state on it, at drive phase 0 (n).
+        states: States at phase 0 of all periods of an orbit (period × n).
+        multipliers: Floquet multipliers, of an orbit (n).
+        tip_max: Greatest tip deflection W (g0).
+        tip_min: Least tip deflection W (g0).
+        amplitude: Half of peak to peak of W (g0).
+        contact_fraction: Part of the time in contact.
+    """
 
     classification: str
-    """periodic, quasi-periodic or chaotic."""
     fraction: float
-    """Part of the starts that go there."""
     lyapunov: Floats
-    """Lyapunov exponents per drive period."""
     evidence: str
-    """Why it was named so."""
     count: int | None = None
-    """How many starts went there."""
     period: int | None = None
-    """Minimal period, of an orbit."""
     state: Floats | None = None
-    """A state on it, at drive phase 0."""
     states: Floats | None = None
-    """States at phase 0 of all periods of an orbit."""
     multipliers: npt.NDArray[np.complex128] | None = None
-    """Floquet multipliers, of an orbit."""
     tip_max: float | None = None
-    """Greatest tip deflection W."""
     tip_min: float | None = None
-    """Least tip deflection W."""
     amplitude: float | None = None
-    """Half of peak to peak of W."""
     contact_fraction: float | None = None
-    """Part of the time in contact."""
 
     _arrays = frozenset({"lyapunov", "state", "states"})
     _complex = frozenset({"multipliers"})
@@ -347,10 +484,12 @@ class Attractors(Sequence[Attractor]):
     def __len__(self) -> int:
         return len(self._list)
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name == "document":
-            raise AttributeError(name)
-        return getattr(self.document, name)
+    if not TYPE_CHECKING:
+        # A checker of types knows the names that are declared, and finds misspelt ones.
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_") or name == "document":
+                raise AttributeError(name)
+            return getattr(self.document, name)
 
     @property
     def attractors(self) -> list[Attractor]:
@@ -407,26 +546,29 @@ class Attractors(Sequence[Attractor]):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Lyapunov(Result):
-    """A Lyapunov spectrum with error bars, and a Poincaré section."""
+    """A Lyapunov spectrum with error bars, and a Poincaré section.
+
+    Attributes:
+        classification: What the motion is.
+        exponents: Exponents per drive period, the largest first (n).
+        errors: Their standard errors (n).
+        sum: Their sum.
+        sum_by_trace: The same from the trace of the equations and the time in contact.
+        kaplan_yorke_dimension: Of the attractor's section.
+        evidence: Why the motion was named so.
+        period: Minimal period, if periodic.
+        section: The section's points: `phase`, `tip`, `tip_rate`, `gap_rate`, `state`.
+    """
 
     classification: str
-    """What the motion is."""
     exponents: Floats
-    """Exponents per drive period, the largest first."""
     errors: Floats
-    """Their standard errors."""
     sum: float
-    """Their sum."""
     sum_by_trace: float
-    """The same from the trace of the equations and the time in contact."""
     kaplan_yorke_dimension: float
-    """Of the attractor's section."""
     evidence: str
-    """Why the motion was named so."""
     period: int | None = None
-    """Minimal period, if periodic."""
     section: "xr.Dataset" = field(kw_only=True)
-    """The section's points: `phase`, `tip`, `tip_rate`, `gap_rate`, `state`."""
 
     _arrays = frozenset({"exponents", "errors"})
 
@@ -440,20 +582,25 @@ class Lyapunov(Result):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Convergence(Result):
-    """The same motion with 1 … K modes."""
+    """The same motion with 1 … K modes.
+
+    Attributes:
+        modes: Numbers of modes.
+        difference: Difference of the tip deflection from that of the most modes, as a
+            part of the amplitude (K).
+        enough: The least number of modes from which on the difference stays below the
+            tolerance.
+        tolerance: The difference that is small enough.
+        verdict: The answer in words.
+        motions: The motions with each number of modes.
+    """
 
     modes: list[int]
-    """Numbers of modes."""
     difference: Floats
-    """Difference of the tip deflection from that of the most modes, as a part of the amplitude."""
     enough: int | None
-    """The least number of modes from which on the difference stays below the tolerance."""
     tolerance: float
-    """The difference that is small enough."""
     verdict: str
-    """The answer in words."""
     motions: list[Record]
-    """The motions with each number of modes."""
 
     _arrays = frozenset({"difference"})
 
@@ -470,22 +617,25 @@ class Convergence(Result):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Paper(Result):
-    """The paper computed again."""
+    """The paper computed again.
+
+    Attributes:
+        out: The folder of the report.
+        html: The report.
+        pictures: Its pictures.
+        reproduced: Statements that are reproduced.
+        differs: Statements that differ.
+        ambiguous: Statements that can be read in more than one way.
+        checks: Each statement: `id`, `paper`, `here`, `verdict`, `evidence`, `rerun`.
+    """
 
     out: str
-    """The folder of the report."""
     html: str
-    """The report."""
     pictures: list[str]
-    """Its pictures."""
     reproduced: int
-    """Statements that are reproduced."""
     differs: int
-    """Statements that differ."""
     ambiguous: int
-    """Statements that can be read in more than one way."""
     checks: list[Record]
-    """Each statement: `id`, `paper`, `here`, `verdict`, `evidence`, `rerun`."""
 
     def table(self) -> "pd.DataFrame":
         """A row a statement."""

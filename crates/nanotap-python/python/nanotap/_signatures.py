@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
-from ._case import Case, Path
+from ._case import Case, Path, Value
 from ._results import (
     Attractors,
     Convergence,
@@ -155,7 +155,7 @@ def orbit(  # type: ignore[overload-overlap]
     derivatives: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress = None,
-    **parameters: float | str,
+    **parameters: Value,
 ) -> Orbit: ...
 @overload
 def orbit(

@@ -176,8 +176,8 @@ def gsf(
         _arguments.real(ds[x].values, str(x)),
         _arguments.real(ds[y].values, str(y)),
         _arguments.real(field.values.ravel(), name),
-        "",
-        "",
+        _shared_unit(ds[x].attrs.get("units"), ds[y].attrs.get("units")),
+        _gwyddion(field.attrs.get("units")),
     )
 
     def write(target: str) -> None:
@@ -185,6 +185,38 @@ def gsf(
             stream.write(file)
 
     _written(path, write)
+
+
+# Units as Gwyddion writes them; those of the dimensionless model are none.
+_GWYDDION = {"m", "N", "J", "s", "Hz", "N/m", "Pa", "m/s", "W", "eV"}
+
+
+def _gwyddion(unit: object) -> str:
+    return "deg" if unit == "degree" else str(unit) if unit in _GWYDDION else ""
+
+
+def _shared_unit(x: object, y: object) -> str:
+    """The unit of both axes: the format has one."""
+    return _gwyddion(x) if x == y else ""
+
+
+def netcdf(ds: "xr.Dataset", path: Path, **options: Any) -> None:
+    """A Dataset as netCDF, which has no complex numbers: of those `NAME_re` and `NAME_im`.
+
+    Args:
+        ds: The Dataset.
+        path: The file, ending in .nc.
+        **options: Those of `Dataset.to_netcdf`.
+    """
+    plain = ds.copy()
+    for name, variable in ds.data_vars.items():
+        if variable.dtype.kind == "c":
+            plain = plain.drop_vars(name)
+            for part, values in (("re", variable.real), ("im", variable.imag)):
+                plain[f"{name}_{part}"] = values.assign_attrs(variable.attrs)
+        elif variable.dtype.kind == "b":
+            plain[name] = variable.astype("int8").assign_attrs(variable.attrs)
+    _written(path, lambda target: plain.to_netcdf(target, **options))
 
 
 def _written(path: Path, write: Callable[[str], object]) -> None:

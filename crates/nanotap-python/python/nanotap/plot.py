@@ -1,14 +1,14 @@
 """Figures of results: the terminal's, drawn with matplotlib.
 
 `nanotap.plot.orbit(orbit)`, `sweep(ds)`, `basin(ds)` …; `show(result)` picks by what the
-result is. Each returns a matplotlib Figure; with `axes=` it draws into yours instead. What is
-drawn, its colours and its words are described once, for the terminal and for Python; here
+result is. Each returns a matplotlib Figure; with `axes=` (one for each panel), or `ax=`, it draws
+into yours instead; `panels=` names those to draw, by their letters: `"a"`, `"bd"`. What is drawn, its colours and its words are described once, for the terminal and for Python; here
 results only become the columns that are drawn.
 """
 
 import json
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -35,12 +35,22 @@ __all__ = [
     "fit",
     "modes",
     "orbit",
+    "orbits",
     "page",
     "run",
     "section",
     "show",
     "sweep",
 ]
+
+
+class Where(TypedDict, total=False):
+    """Where a figure is drawn, and which of its panels."""
+
+    axes: Any
+    ax: Any
+    panels: str | None
+
 
 LINES, PERIODS, MOTIONS = _nanotap.colours()
 """Colours of lines in their order, of the periods 1 to 16, and of the other motions by name."""
@@ -65,7 +75,7 @@ _LABELS = {
 def _drawn(
     study: str,
     facts: Mapping[str, Any],
-    axes: Any,
+    where: Where,
     columns: Mapping[str, Any] | None = None,
 ) -> "Figure":
     """The figure that a study's facts and large columns describe."""
@@ -73,7 +83,7 @@ def _drawn(
         name: np.require(np.ravel(values), np.float64, ["C", "A"])
         for name, values in (columns or {}).items()
     }
-    return draw(_nanotap.describe(study, json.dumps(facts), arrays), axes)
+    return draw(_nanotap.describe(study, json.dumps(facts), arrays), **where)
 
 
 def _points(x: Any, y: Any) -> list[list[float]]:
@@ -122,7 +132,7 @@ def _motion(
 
 
 def run(
-    ds: "xr.Dataset", *, periods: float | None = None, axes: Any = None
+    ds: "xr.Dataset", *, periods: float | None = None, **where: Unpack[Where]
 ) -> "Figure":
     """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
@@ -141,10 +151,10 @@ def run(
         title = f"Runge–Kutta, {ds.attrs['steps'][0]} steps a period"
     if "contact" not in ds:
         ds = ds.assign(contact=("tau", np.zeros(ds.sizes["tau"], bool)))
-    return _drawn("motion", _motion(ds, title, shown, endless=not repeats), axes)
+    return _drawn("motion", _motion(ds, title, shown, endless=not repeats), where)
 
 
-def orbit(orbit: Orbit, *, axes: Any = None) -> "Figure":
+def orbit(orbit: Orbit, **where: Unpack[Where]) -> "Figure":
     """An orbit: time series, phase portrait, harmonics, multipliers."""
     ds = orbit.series
     if ds is None:
@@ -157,7 +167,7 @@ def orbit(orbit: Orbit, *, axes: Any = None) -> "Figure":
         "harmonics": _points(spectrum.index, spectrum),
         "multipliers": _points(orbit.multipliers.real, orbit.multipliers.imag),
     }
-    return _drawn("orbit", facts, axes)
+    return _drawn("orbit", facts, where)
 
 
 # Attractors that are drawn, and drive periods of one that never repeats.
@@ -165,7 +175,7 @@ _MOST = 8
 _ENDLESS_PERIODS = 64
 
 
-def attractors(found: Attractors, *, axes: Any = None) -> "Figure":
+def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
     """Phase portraits and strobe points of every attractor, each in its own colour."""
     case = found.case
     curves = []
@@ -195,7 +205,7 @@ def attractors(found: Attractors, *, axes: Any = None) -> "Figure":
         "attractors": curves,
         "unstable": unstable,
     }
-    return _drawn("attractors", facts, axes)
+    return _drawn("attractors", facts, where)
 
 
 def _tips(case: Case, states: Any) -> list[list[float]]:
@@ -217,8 +227,95 @@ def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     }
 
 
-def sweep(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
-    """A sweep: a bifurcation diagram over one parameter, a map of motions over two."""
+def _labelled(ds: "xr.Dataset", name: str) -> str:
+    """The label of an axis."""
+    if name in _LABELS:
+        return _LABELS[name]
+    said = ds[name].attrs
+    words, unit = str(said.get("long_name", name)), str(said.get("units", "1"))
+    return words if unit == "1" else f"{words} ({unit})"
+
+
+def _over_one(
+    ds: "xr.Dataset", name: str, show: str, branch: Any, where: Where
+) -> "Figure":
+    """One variable over one parameter, a colour a period."""
+    import xarray as xr
+
+    if show not in ds or ds[show].dtype.kind not in "iuf":
+        known = (str(n) for n, v in ds.data_vars.items() if v.dtype.kind in "iuf")
+        message = f"show: `{show}` is no number here; there are {', '.join(known)}"
+        raise ValueError(message)
+    shown = ds[show]
+    x, branch, shown = xr.broadcast(ds[name], branch, shown)
+    period, stable = (
+        ds[key].broadcast_like(shown) if key in ds else xr.full_like(shown, default)
+        for key, default in (("period", 1), ("stable", 1))
+    )
+    columns = {
+        "branch": branch,
+        "period": period.fillna(0).clip(0),
+        "stable": stable,
+        "x": x,
+        "y": shown,
+    }
+    rows = _rows(
+        **{
+            k: v.transpose(*shown.dims).stack(row=shown.dims)
+            for k, v in columns.items()
+        }
+    )
+    for row in rows:
+        row.update(
+            branch=int(row["branch"]),
+            period=int(row["period"]),
+            stable=bool(row["stable"]),
+        )
+    facts = {
+        "x_label": _labelled(ds, name),
+        "y_label": _labelled(ds, show),
+        "points": rows,
+        "bifurcations": [],
+        "curves": None,
+    }
+    figure = json.loads(_nanotap.describe("branch", json.dumps(facts), {}))
+    for layer in figure["panels"][0]["layers"]:
+        # Neighbouring values may belong to different motions: points, not lines.
+        layer |= {"kind": "markers", "shape": "circle", "size": 0.6}
+        layer |= {"open": False, "edge": False}
+        if layer["label"] == "period 0":
+            layer |= {"label": "not periodic", "colour": GREY}
+    return draw(json.dumps(figure), **where)
+
+
+def orbits(
+    ds: "xr.Dataset", *, show: str = "first_harmonic", **where: Unpack[Where]
+) -> "Figure":
+    """Orbits or runs over an array of one parameter: any variable that is a number each.
+
+    Raises:
+        ValueError: there is no such variable, or there are several parameters.
+    """
+    names = [name for name in json.loads(ds.attrs.get("over", "[]")) if name in ds.dims]
+    if len(names) != 1:
+        message = "orbits: this figure has one parameter; select values of the others"
+        raise ValueError(message)
+    starts = ds.start if "start" in ds.dims else ds[names[0]] * 0
+    return _over_one(ds, names[0], show, starts, where)
+
+
+def sweep(
+    ds: "xr.Dataset", *, show: str | None = None, **where: Unpack[Where]
+) -> "Figure":
+    """A sweep: a bifurcation diagram over one parameter, a map of motions over two; with `show`
+    any variable over one parameter."""
+    if show is not None:
+        names = [str(d) for d in ds.classification.dims if d != "start"]
+        if len(names) != 1:
+            message = "show: a variable is drawn over one parameter; select values of the other"
+            raise ValueError(message)
+        starts = ds.start if "start" in ds.dims else ds[names[0]] * 0
+        return _over_one(ds, names[0], show, starts, where)
     if "start" not in ds.dims:
         ds = ds.expand_dims("start", axis=-1)
     names = [str(dim) for dim in ds.classification.dims if dim != "start"]
@@ -241,10 +338,10 @@ def sweep(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
     }
     if len(names) == 1:
         columns["period_max"] = ds.period_max.transpose(*order, ...).values
-    return _drawn("sweep", facts, axes, columns)
+    return _drawn("sweep", facts, where, columns)
 
 
-def basin(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
+def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     """Basins: a colour an attractor, and where the attractors' own strobe points lie."""
     y, x = (str(dim) for dim in ds.attractor.dims)
     facts = {
@@ -254,14 +351,17 @@ def basin(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
         "entries": ds.attrs["state_entries"].split(),
     }
     columns = {"x": ds[x].values, "y": ds[y].values, "labels": ds.attractor.values}
-    return _drawn("basin", facts, axes, columns)
+    return _drawn("basin", facts, where, columns)
 
 
-def branch(ds: "xr.Dataset", *, show: str = "tip_max", axes: Any = None) -> "Figure":
+def branch(
+    ds: "xr.Dataset", *, show: str = "tip_max", **where: Unpack[Where]
+) -> "Figure":
     """Branches against the parameter, a colour a period, with their bifurcations; beside them
     the bifurcation curves in two parameters, if they were traced."""
-    if show not in _LABELS or show not in ds:
-        message = f"show: `{show}` is none; there are {', '.join(n for n in _LABELS if n in ds)}"
+    known = [str(n) for n, v in ds.data_vars.items() if v.dims == ("point",)]
+    if show not in known or ds[show].dtype.kind not in "iuf":
+        message = f"show: `{show}` is none; there are {', '.join(known)}"
         raise ValueError(message)
     name = ds.attrs["parameter"]
     marks: list[dict[str, Any]] = []
@@ -269,18 +369,18 @@ def branch(ds: "xr.Dataset", *, show: str = "tip_max", axes: Any = None) -> "Fig
         marks = _rows(
             kind=ds.bifurcation_kind,
             x=ds.bifurcation_parameter,
-            y=ds[f"bifurcation_{show}"],
+            y=ds.get(f"bifurcation_{show}", ds.bifurcation_parameter * np.nan),
         )
     facts = {
         "x_label": f"${ds.attrs['parameter_symbol']}$",
-        "y_label": _LABELS[show],
+        "y_label": _labelled(ds, show),
         "points": _rows(
             branch=ds.branch, period=ds.period, stable=ds.stable, x=ds[name], y=ds[show]
         ),
         "bifurcations": marks,
         "curves": _curves(ds, name) if "locus_first" in ds else None,
     }
-    return _drawn("branch", facts, axes)
+    return _drawn("branch", facts, where)
 
 
 def _rows(**columns: Any) -> list[dict[str, Any]]:
@@ -335,7 +435,7 @@ def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]
     return 10.0**-power, f" ({_PREFIXES[power]}{unit})"
 
 
-def approach(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
+def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     """Amplitude, phase, dissipated energy and peak force against the distance, both ways."""
     name = ds.attrs["parameter"]
     physical = "physical_A" in ds
@@ -412,10 +512,10 @@ def approach(ds: "xr.Dataset", *, axes: Any = None) -> "Figure":
         "x_range": [float(factor * distance.min()), float(factor * distance.max())],
         "panels": panels,
     }
-    return _drawn("approach", facts, axes)
+    return _drawn("approach", facts, where)
 
 
-def section(found: Lyapunov, *, axes: Any = None) -> "Figure":
+def section(found: Lyapunov, **where: Unpack[Where]) -> "Figure":
     """A Poincaré section, and the exponents with their errors."""
     cut = found.section
     phases = np.unique(np.round(cut.phase.values, 9))
@@ -431,20 +531,20 @@ def section(found: Lyapunov, *, axes: Any = None) -> "Figure":
         "exponents": found.exponents.tolist(),
         "errors": np.nan_to_num(found.errors).tolist(),
     }
-    return _drawn("section", facts, axes)
+    return _drawn("section", facts, where)
 
 
-def fit(found: Fit, *, axes: Any = None) -> "Figure":
+def fit(found: Fit, **where: Unpack[Where]) -> "Figure":
     """Measured curves, the fit through them, and the residuals."""
-    return _drawn("fit", found.to_dict(), axes)
+    return _drawn("fit", found.to_dict(), where)
 
 
-def modes(found: Modes, *, axes: Any = None) -> "Figure":
+def modes(found: Modes, **where: Unpack[Where]) -> "Figure":
     """The mode shapes of the bare beam."""
-    return _drawn("modes", {"modes": found.modes}, axes)
+    return _drawn("modes", {"modes": found.modes}, where)
 
 
-def convergence(found: Convergence, *, axes: Any = None) -> "Figure":
+def convergence(found: Convergence, **where: Unpack[Where]) -> "Figure":
     """What the tip deflection still changes, against the number of modes."""
     facts = {
         "modes": list(found.modes),
@@ -452,7 +552,7 @@ def convergence(found: Convergence, *, axes: Any = None) -> "Figure":
         "tolerance": found.tolerance,
         "enough": found.enough,
     }
-    return _drawn("convergence", facts, axes)
+    return _drawn("convergence", facts, where)
 
 
 def show(result: Any, **options: Any) -> "Figure":
@@ -483,4 +583,5 @@ _FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {
     "period_max": sweep,
     "way": approach,
     "tau": run,
+    "failure": orbits,
 }

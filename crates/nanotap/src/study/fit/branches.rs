@@ -38,6 +38,8 @@ pub(super) struct Along<'a> {
     pub(super) max_period: usize,
 }
 
+/// Distance of two orbits, in parts of their size, that do not continue each other in one step.
+const FAR: f64 = 0.3;
 /// Halvings of the way from one row to the next.
 const HALVINGS: usize = 4;
 
@@ -131,8 +133,11 @@ impl Along<'_> {
             let model = case.model().ok()?;
             continued(&mut Strobe::new(&model), orbit)
         });
-        if closed.as_ref().is_some_and(PeriodicOrbit::is_stable) || halvings == 0 {
-            return closed.filter(PeriodicOrbit::is_stable);
+        // Beyond a fold Newton may find an orbit of another branch.
+        let near = |found: &PeriodicOrbit| found.distance_to(orbit).1 <= FAR * orbit.scale();
+        let closed = closed.filter(|found| found.is_stable() && near(found));
+        if closed.is_some() || halvings == 0 {
+            return closed;
         }
         let middle: Vec<f64> = from.iter().zip(to).map(|(a, b)| 0.5 * (a + b)).collect();
         let half = self.follow(from, &middle, orbit, halvings - 1)?;

@@ -1,0 +1,43 @@
+"""Results of physical cases in SI."""
+
+import json
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
+    """The model's units in SI."""
+    physical = json.loads(ds.attrs.get("case", "{}")).get("physical")
+    if physical is None:
+        message = "the case is not in physical quantities: it has no unit of length"
+        raise ValueError(message)
+    length, time = physical["length_unit"], physical["time_unit"]
+    force, energy = physical["force_unit"], physical["energy_unit"]
+    return {
+        "g0": (length, "m"),
+        "sqrt(m L^4/EI)": (time, "s"),
+        "g0 sqrt(EI/(m L^4))": (length / time, "m/s"),
+        "EI g0/L^3": (force, "N"),
+        "EI g0^2/L^3": (energy, "J"),
+    }
+
+
+def in_si(ds: "xr.Dataset") -> "xr.Dataset":
+    """The same with every variable that has a unit of the model in SI: a run, an orbit's series,
+    what is observed over arrays of parameters. States stay in the model's units.
+
+    Raises:
+        ValueError: it is not of a physical case.
+    """
+    units = _units(ds)
+    changed = {}
+    for name, variable in ds.variables.items():
+        factor, unit = units.get(str(variable.attrs.get("units")), (1.0, ""))
+        if unit:
+            attrs = {**variable.attrs, "units": unit}
+            changed[name] = (variable.dims, factor * variable.values, attrs)
+    coords = {name: value for name, value in changed.items() if name in ds.coords}
+    rest = {name: value for name, value in changed.items() if name not in ds.coords}
+    return ds.assign_coords(coords).assign(rest)

@@ -87,7 +87,7 @@ pub(crate) fn watched<R: Send + 'static>(
                 }
             }
             if let (Some(_), None) = (&stopped, &done) {
-                Python::attach(Python::check_signals)?;
+                Python::attach(|py| look(py, None, seen))?;
             }
             let patience = if seen.1 > 0 { LONG_PATIENCE } else { PATIENCE };
             match (done, stopped.take()) {

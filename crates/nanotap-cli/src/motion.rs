@@ -284,7 +284,7 @@ pub(crate) fn multipliers(multipliers: &[[f64; 2]]) -> String {
     ]);
     for [re, im] in multipliers.iter().take(SHOWN) {
         table.row([
-            number::significant(re.hypot(*im), 7),
+            number::significant(nanotap_arithmetic::hypot(*re, *im), 7),
             number::significant(*re, 7),
             number::significant(*im, 7),
         ]);

@@ -17,6 +17,14 @@
 //! | [`continuation`] | how an orbit goes on in one parameter, and its bifurcations |
 //! | [`curve`] | where a bifurcation goes on in two parameters |
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::disallowed_methods,
+        reason = "references are the platform's own functions"
+    )
+)]
+
 pub mod basin;
 pub mod census;
 pub mod classify;

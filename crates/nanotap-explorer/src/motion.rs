@@ -175,7 +175,7 @@ impl Motion {
                     "period {}, {}; largest |multiplier| {}",
                     orbit.period,
                     orbit.stability,
-                    Kind::Number.format_digits(re.hypot(im), 4)
+                    Kind::Number.format_digits(nanotap_arithmetic::hypot(re, im), 4)
                 )
             }
             Self::Run(run) => format!("{}: {}", run.classification.name(), run.evidence),

@@ -1,6 +1,11 @@
 //! Draws typical figures in every format and says how long each took and how large it is:
 //! `cargo run --release -p nanotap-figures --example formats FOLDER`.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::PathBuf;

@@ -1,5 +1,10 @@
 //! Draws one figure of every kind: `cargo run -p nanotap-figures --example gallery [folder]`.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 

@@ -242,10 +242,10 @@ impl Extent {
         let below = if low < self.hard.0 { padding } else { 0.0 };
         let above = if high > self.hard.1 { padding } else { 0.0 };
         if log {
-            let ratio = (high.log10() - low.log10()).max(0.0);
+            let ratio = (libm::log10(high) - libm::log10(low)).max(0.0);
             (
-                low * 10f64.powf(-ratio * below),
-                high * 10f64.powf(ratio * above),
+                low * libm::pow(10f64, -ratio * below),
+                high * libm::pow(10f64, ratio * above),
             )
         } else {
             (low - below * (high - low), high + above * (high - low))
@@ -268,7 +268,7 @@ impl View {
             return None;
         }
         let share = if self.log {
-            (value.ln() - self.from.ln()) / (self.to.ln() - self.from.ln())
+            (libm::log(value) - libm::log(self.from)) / (libm::log(self.to) - libm::log(self.from))
         } else {
             (value - self.from) / (self.to - self.from)
         };

@@ -25,6 +25,14 @@
 //! What is not finite, or not positive on a logarithmic axis, is a gap. A panel without anything to
 //! draw says "no data".
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::disallowed_methods,
+        reason = "references are the platform's own functions"
+    )
+)]
+
 mod axis;
 mod cloud;
 mod colour;

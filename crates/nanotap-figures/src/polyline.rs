@@ -134,7 +134,7 @@ fn straightened(points: &[Point]) -> Vec<Point> {
     let mut farthest = 0.0;
     for &p in &points[1..] {
         let mut distance = anchor.distance(p);
-        let mut direction = (p.y - anchor.y).atan2(p.x - anchor.x);
+        let mut direction = libm::atan2(p.y - anchor.y, p.x - anchor.x);
         let stays = distance >= farthest
             && cone.is_none_or(|(axis, low, high)| (low..=high).contains(&turn(direction - axis)));
         if !stays {
@@ -143,10 +143,10 @@ fn straightened(points: &[Point]) -> Vec<Point> {
             cone = None;
             farthest = 0.0;
             distance = anchor.distance(p);
-            direction = (p.y - anchor.y).atan2(p.x - anchor.x);
+            direction = libm::atan2(p.y - anchor.y, p.x - anchor.x);
         }
         if distance > TOLERANCE {
-            let half = (TOLERANCE / distance).asin();
+            let half = libm::asin(TOLERANCE / distance);
             cone = Some(match cone {
                 None => (direction, -half, half),
                 Some((axis, low, high)) => {

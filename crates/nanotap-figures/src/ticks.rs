@@ -79,7 +79,7 @@ fn multiples(low: f64, high: f64, step: Decimal) -> (i64, i64) {
 
 /// The step 1, 2, 2.5 or 5 times a power of ten that is the smallest with at most `most` marks.
 fn nice_step(low: f64, high: f64, most: usize) -> Decimal {
-    let mut exponent = ((high - low) / most as f64).log10().floor() as i32 - 1;
+    let mut exponent = libm::log10((high - low) / most as f64).floor() as i32 - 1;
     // The loop ends: the steps grow tenfold every round.
     loop {
         for (digits, lower) in [(1, 0), (2, 0), (25, 1), (5, 0)] {
@@ -121,9 +121,9 @@ pub fn linear(low: f64, high: f64, most: usize) -> Ticks {
         digits: 0,
         exponent: step.exponent,
     };
-    if (largest / width).log10() > 5.0 {
+    if libm::log10(largest / width) > 5.0 {
         // Round the lower end down to the power of ten above the span: the rest has few digits.
-        let unit = 10i64.pow((span.log10().ceil() as i32 - step.exponent).clamp(0, 17) as u32);
+        let unit = 10i64.pow((libm::log10(span).ceil() as i32 - step.exponent).clamp(0, 17) as u32);
         offset.digits = marks
             .first()
             .map_or(0, |m| m.digits.div_euclid(unit) * unit);
@@ -137,7 +137,7 @@ pub fn linear(low: f64, high: f64, most: usize) -> Ticks {
         .map(|m| rest(m).value().abs())
         .fold(0.0, f64::max);
     let shift = if largest >= 1e5 || (largest > 0.0 && largest < 9.9e-4) {
-        (largest.log10() + 1e-9).floor() as i32
+        (libm::log10(largest) + 1e-9).floor() as i32
     } else {
         0
     };
@@ -199,8 +199,8 @@ pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Ticks::default();
     }
-    let first = (low.log10() - 1e-9).ceil() as i32;
-    let last = (high.log10() + 1e-9).floor() as i32;
+    let first = (libm::log10(low) - 1e-9).ceil() as i32;
+    let last = (libm::log10(high) + 1e-9).floor() as i32;
     let within = |v: f64| v >= low * (1.0 - 1e-9) && v <= high * (1.0 + 1e-9);
     let fine: Vec<Decimal> = (first - 1..=last)
         .flat_map(|exponent| (2..10).map(move |digits| Decimal { digits, exponent }))
@@ -247,8 +247,8 @@ fn part_of_decade(
     fine: &[Decimal],
     within: impl Fn(f64) -> bool,
 ) -> Ticks {
-    let lowest = low.log10().floor() as i32;
-    let highest = high.log10().ceil() as i32;
+    let lowest = libm::log10(low).floor() as i32;
+    let highest = libm::log10(high).ceil() as i32;
     let mut all: Vec<Decimal> = fine.to_vec();
     all.extend((lowest..=highest).map(|exponent| Decimal {
         digits: 1,

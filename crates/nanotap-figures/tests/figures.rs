@@ -1,5 +1,10 @@
 //! Figures as their readers get them: files of every format.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::f64::consts::TAU;
 
 use nanotap_figures::{

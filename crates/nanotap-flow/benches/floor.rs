@@ -5,6 +5,11 @@
 //! search for a crossing must; `unchained` evaluates at times known beforehand, which is
 //! the most that several motions side by side could reach. `cargo bench -p nanotap-flow`.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 

@@ -4,6 +4,11 @@
 //! The system is a cantilever of N modes that taps a springy sample: α1 = α2 = α3 = 0.1,
 //! α4 = 20, α5 = 0, α6 = 0.2, Ω = 2.6.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::f64::consts::PI;
 use std::sync::Arc;
 

@@ -75,7 +75,7 @@ impl ComplexDd {
     fn exp(self) -> Self {
         let size = self.0.0.abs() + self.1.0.abs();
         let halvings = if size > 0.02 {
-            (size / 0.02).log2().ceil() as i32
+            nanotap_arithmetic::log2(size / 0.02).ceil() as i32
         } else {
             0
         };

@@ -77,7 +77,7 @@ impl Drive {
         if t == 0.0 {
             return Complex::new(1.0, 0.0);
         }
-        let (sin, cos) = (self.frequencies[k] * t).sin_cos();
+        let (sin, cos) = nanotap_arithmetic::sin_cos(self.frequencies[k] * t);
         Complex::new(cos, sin)
     }
 }

@@ -4,6 +4,7 @@
 use crate::Complex;
 use crate::signal::Signal;
 use crate::trajectory::PiecewiseSignal;
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// `amplitude · s^power · e^{rate s}`; a signal is the real part of a sum of these.
 #[derive(Clone, Copy)]
@@ -32,19 +33,22 @@ fn terms(signal: &Signal) -> Vec<Term> {
     std::iter::once(constant)
         .chain(simple)
         .chain(powers)
-        .filter(|t| t.amplitude.norm() != 0.0)
+        .filter(|t| t.amplitude.modulus() != 0.0)
         .collect()
 }
 
 /// `(e^z − 1)/z`, accurate for every `z`.
 pub(crate) fn phi1(z: Complex) -> Complex {
-    if z.norm() < 1e-5 {
+    if z.modulus() < 1e-5 {
         return Complex::new(1.0, 0.0) + z * 0.5 + z * z / 6.0;
     }
     // e^{x+iy} − 1 = (e^x − 1) cos y − 2 sin²(y/2) + i e^x sin y
-    let half = (0.5 * z.im).sin();
-    let (sin, cos) = z.im.sin_cos();
-    Complex::new(z.re.exp_m1() * cos - 2.0 * half * half, z.re.exp() * sin) / z
+    let half = nanotap_arithmetic::sin(0.5 * z.im);
+    let (sin, cos) = nanotap_arithmetic::sin_cos(z.im);
+    Complex::new(
+        nanotap_arithmetic::exp_m1(z.re) * cos - 2.0 * half * half,
+        nanotap_arithmetic::exp(z.re) * sin,
+    ) / z
 }
 
 /// `∫₀^length s^power e^{rate s} ds`.
@@ -53,10 +57,10 @@ fn moment(rate: Complex, power: u32, length: f64) -> Complex {
     if power == 0 {
         return phi1(z) * length;
     }
-    if z.norm() > f64::from(power) + 1.0 {
+    if z.modulus() > f64::from(power) + 1.0 {
         // Integration by parts, stable upwards while |z| exceeds the power.
         let mut integral = phi1(z) * length;
-        let end = z.exp();
+        let end = z.exponential();
         for p in 1..=power {
             integral = (end * length.powi(p as i32) - integral * f64::from(p)) / rate;
         }
@@ -90,7 +94,7 @@ pub fn fourier_integral(signal: &Signal, start: f64, length: f64, omega: f64) ->
             (direct + mirrored) * 0.5
         })
         .sum();
-    sum * (turn * start).exp()
+    sum * (turn * start).exponential()
 }
 
 /// `∫₀^length g h ds`.

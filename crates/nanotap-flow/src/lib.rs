@@ -20,6 +20,13 @@
 //!
 //! Nothing here knows of periods, attractors or microscopes.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::disallowed_methods,
+        reason = "references are the platform's own functions"
+    )
+)]
 // The inner loop is compiled once for any machine and once inside a function for machines
 // with vector registers; only what is inlined there gets their instructions.
 #![allow(clippy::inline_always)]

@@ -4,6 +4,7 @@ use crate::signal::relaxation_masks;
 use crate::simd::{ComplexVector, Vector, layout};
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
 use nalgebra::{DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// A linear regime with its spectral basis and its forced response `x_p(t)`; the
 /// solution is `x(t) = x_p(t) + Re(R e^{Λ(t − t₀)} q)`, `q = L (x(t₀) − x_p(t₀))`.
@@ -200,13 +201,13 @@ impl Kernel {
             for (lanes, mask) in vector.masks.iter_mut().zip(masks[k]) {
                 lanes[i] = mask;
             }
-            let norm = rate.norm();
+            let norm = rate.modulus();
             vector.decay[i] = rate.re;
             vector.frequency[i] = rate.im;
             vector.weight[0][i] = weight.re;
             vector.weight[1][i] = weight.im;
             vector.cube[i] = norm.powi(3);
-            if weight.norm() > 0.0 {
+            if weight.modulus() > 0.0 {
                 kernel.fastest = kernel.fastest.max(norm);
                 kernel.grows |= rate.re > 0.0;
             }

@@ -12,6 +12,7 @@ use crate::integral::phi1;
 use crate::system::{Reset, System};
 use crate::{Complex, Drive, Flow, FlowError, Regime};
 use nalgebra::{DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// The derivative of a [`System`] with respect to one parameter: the same shape
 /// with a derivative in place of every entry. Harmonic terms are differentiated at
@@ -151,7 +152,7 @@ fn response(lambda: Complex, mu: Complex, length: f64) -> Complex {
     } else {
         (mu, lambda)
     };
-    (slow * length).exp() * phi1((fast - slow) * length) * length
+    (slow * length).exponential() * phi1((fast - slow) * length) * length
 }
 
 impl<'a> Sensitivity<'a> {
@@ -324,7 +325,7 @@ impl<'a> Propagator<'a> {
         };
         let simple = regime.basis().clusters.is_empty();
         Self {
-            factors: lambdas.iter().map(|l| (l * length).exp()).collect(),
+            factors: lambdas.iter().map(|l| (l * length).exponential()).collect(),
             responses: if simple {
                 lambdas.iter().map(row).collect()
             } else {
@@ -451,7 +452,7 @@ fn augmented_stretch(
             z[i] += r.re * q.re - r.im * q.im;
         }
     }
-    let end = (extended * length).exp() * z;
+    let end = nanotap_arithmetic::matrix_exp(&(extended * length)) * z;
     for (k, sigma) in modal.iter_mut().enumerate() {
         *sigma = regime
             .basis()

@@ -4,6 +4,7 @@
 use crate::regime::{Kernel, ModalOutput};
 use crate::simd::{self, ComplexVector, Library, Plain, Simd, Vector, layout};
 use crate::{Complex, Drive, Regime};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// `g(s) = c + Re Σ_k a_k e^{λ_k s} + Re Σ_j b_j s^{p_j} e^{λ_j s}`, `s ≥ 0`.
 ///
@@ -82,7 +83,7 @@ fn followed(count: usize) -> [usize; RELAXATIONS] {
 /// For each of the terms' rates, 1 in the lower bounds that follow it and 0 elsewhere.
 pub(crate) fn relaxation_masks(rates: &[Complex]) -> Vec<[f64; RELAXATIONS]> {
     let mut order: Vec<usize> = (0..rates.len()).collect();
-    order.sort_by(|&a, &b| rates[a].norm().total_cmp(&rates[b].norm()));
+    order.sort_by(|&a, &b| rates[a].modulus().total_cmp(&rates[b].modulus()));
     let mut masks = vec![[0.0; RELAXATIONS]; rates.len()];
     for (rank, &k) in order.iter().enumerate() {
         masks[k] = followed(rates.len()).map(|n| if rank < n { 1.0 } else { 0.0 });
@@ -131,11 +132,11 @@ impl Signal {
         for (k, &(rate, a)) in terms.iter().enumerate() {
             let (vector, i) = layout::place(k);
             let vector = &mut signal.vectors[vector];
-            let (b, norm) = (a * rate, rate.norm());
+            let (b, norm) = (a * rate, rate.modulus());
             let c = b * rate;
             vector.decay[i] = rate.re;
             vector.frequency[i] = rate.im;
-            vector.amplitude[i] = a.norm();
+            vector.amplitude[i] = a.modulus();
             for (lanes, mask) in vector.masks.iter_mut().zip(masks[k]) {
                 lanes[i] = mask;
             }
@@ -148,16 +149,17 @@ impl Signal {
                 lanes[1][i] = z.im;
             }
             if rate.re > 0.0 {
-                signal.third_constant += c.norm() * norm * (rate.re * length).exp();
+                signal.third_constant +=
+                    c.modulus() * norm * nanotap_arithmetic::exp(rate.re * length);
             } else {
-                vector.third[i] = c.norm() * norm;
+                vector.third[i] = c.modulus() * norm;
             }
-            signal.size += a.norm();
+            signal.size += a.modulus();
             signal.fastest = signal.fastest.max(norm);
         }
         for term in &signal.powers {
             signal.size += term.bound(0, length);
-            signal.fastest = signal.fastest.max(term.rate.norm());
+            signal.fastest = signal.fastest.max(term.rate.modulus());
         }
         signal
     }
@@ -246,7 +248,7 @@ impl Signal {
             for vector in &mut self.vectors {
                 for (third, decay) in vector.third.iter_mut().zip(vector.decay) {
                     if decay > 0.0 {
-                        self.third_constant += *third * (decay * length).exp();
+                        self.third_constant += *third * nanotap_arithmetic::exp(decay * length);
                         *third = 0.0;
                     }
                 }
@@ -469,7 +471,9 @@ impl Signal {
         let simple: f64 = self
             .terms()
             .map(|(rate, a)| {
-                a.norm() * rate.norm().powi(order as i32) * (rate.re.max(0.0) * length).exp()
+                a.modulus()
+                    * rate.modulus().powi(order as i32)
+                    * nanotap_arithmetic::exp(rate.re.max(0.0) * length)
             })
             .sum();
         constant
@@ -525,12 +529,12 @@ impl Signal {
     pub fn shifted(&self, start: f64, factor: f64, length: f64) -> Self {
         let mut terms: Vec<(Complex, Complex)> = self
             .terms()
-            .map(|(r, a)| (r, a * (r * start).exp() * factor))
+            .map(|(r, a)| (r, a * (r * start).exponential() * factor))
             .collect();
         let mut powers = Vec::new();
         for term in &self.powers {
             // (s + start)^p = Σ_i C(p, i) s^i start^{p−i}
-            let grown = term.amplitude * (term.rate * start).exp() * factor;
+            let grown = term.amplitude * (term.rate * start).exponential() * factor;
             let mut binomial = 1.0;
             for i in (0..=term.power).rev() {
                 let amplitude = grown * binomial * start.powi((term.power - i) as i32);
@@ -566,7 +570,7 @@ impl PowerTerm {
             sum +=
                 self.rate.powu(order - i) * self.weight(order, i) * s.powi((self.power - i) as i32);
         }
-        (self.amplitude * sum * (self.rate * s).exp()).re
+        (self.amplitude * sum * (self.rate * s).exponential()).re
     }
 
     fn bound(self, order: u32, length: f64) -> f64 {
@@ -585,13 +589,13 @@ impl PowerTerm {
                 } else {
                     end
                 };
-                self.rate.norm().powi((order - i) as i32)
+                self.rate.modulus().powi((order - i) as i32)
                     * self.weight(order, i)
                     * at.powi(k as i32)
-                    * (-decay * at).exp()
+                    * nanotap_arithmetic::exp(-decay * at)
             })
             .sum();
-        self.amplitude.norm() * sum
+        self.amplitude.modulus() * sum
     }
 }
 

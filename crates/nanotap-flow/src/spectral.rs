@@ -12,6 +12,7 @@
 use crate::{Complex, FlowError};
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector, Schur};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// A group of close eigenvalues: coordinates `start..start + size` obey
 /// `q̇ = (μ + N) q`.
@@ -92,7 +93,7 @@ impl SpectralBasis {
         }
         let (residual, mut basis) = best.ok_or(FlowError::IllConditioned { regime, digits: 16 })?;
         if residual > 1e-9 || !residual.is_finite() {
-            let digits = (residual / f64::EPSILON).log10().clamp(0.0, 16.0) as u32;
+            let digits = nanotap_arithmetic::log10(residual / f64::EPSILON).clamp(0.0, 16.0) as u32;
             return Err(FlowError::IllConditioned { regime, digits });
         }
         for i in 0..n {
@@ -148,7 +149,7 @@ impl SpectralBasis {
     /// Advances `q` by a time `s`, and leaves `e^{λ_k s}` in `factors`.
     pub(crate) fn advance(&self, q: &mut [Complex], s: f64, factors: &mut [Complex]) {
         for (factor, lambda) in factors.iter_mut().zip(&self.eigenvalues) {
-            *factor = (lambda * s).exp();
+            *factor = (lambda * s).exponential();
         }
         self.apply(q, s, factors);
     }
@@ -179,15 +180,15 @@ impl SpectralBasis {
         z: Complex,
         b: &DVector<Complex>,
     ) -> Result<DVector<Complex>, Complex> {
-        let size = b.iter().map(|v| v.norm()).fold(0.0, f64::max);
+        let size = b.iter().map(|v| v.modulus()).fold(0.0, f64::max);
         let mut y = DVector::zeros(b.len());
         for k in 0..self.len() {
-            if b[k].norm() <= 1e-15 * size {
+            if b[k].modulus() <= 1e-15 * size {
                 continue;
             }
             let denominator = z - self.eigenvalues[k];
-            let scale = z.norm().max(self.eigenvalues[k].norm());
-            if denominator.norm() <= 1e-13 * scale || scale == 0.0 {
+            let scale = z.modulus().max(self.eigenvalues[k].modulus());
+            if denominator.modulus() <= 1e-13 * scale || scale == 0.0 {
                 return Err(self.eigenvalues[k]);
             }
             y[k] = b[k] / denominator;
@@ -195,7 +196,7 @@ impl SpectralBasis {
         for cluster in &self.clusters {
             let (start, size) = (cluster.start, cluster.size());
             let rhs = b.rows(start, size).into_owned();
-            if rhs.iter().all(|v| v.norm() == 0.0) {
+            if rhs.iter().all(|v| v.modulus() == 0.0) {
                 continue;
             }
             let shifted = DMatrix::from_diagonal_element(size, size, z - self.eigenvalues[start])
@@ -227,9 +228,9 @@ impl SpectralBasis {
             let mut power = DMatrix::identity(size, size);
             let mut weight = 1.0;
             for p in 1..200 {
-                power = &power * &cluster.coupling / Complex::new(f64::from(p), 0.0);
+                power = &power * &cluster.coupling / Complex::new(p as f64, 0.0);
                 weight *= horizon;
-                let size = power.iter().map(|z| z.norm()).fold(0.0, f64::max) * weight;
+                let size = power.iter().map(|z| z.modulus()).fold(0.0, f64::max) * weight;
                 if size == 0.0 {
                     break;
                 }
@@ -249,7 +250,7 @@ fn groups(eigenvalues: &[Complex], distance: f64) -> Vec<Vec<Complex>> {
     let mut label: Vec<usize> = (0..n).collect();
     for i in 0..n {
         for j in 0..i {
-            if (eigenvalues[i] - eigenvalues[j]).norm() < distance && label[i] != label[j] {
+            if (eigenvalues[i] - eigenvalues[j]).modulus() < distance && label[i] != label[j] {
                 let (from, to) = (label[i], label[j]);
                 label
                     .iter_mut()
@@ -353,16 +354,19 @@ fn invariant_subspace(
     if real {
         mean.im = 0.0;
     }
-    let radius = group.iter().map(|z| (z - mean).norm()).fold(0.0, f64::max);
+    let radius = group
+        .iter()
+        .map(|z| (z - mean).modulus())
+        .fold(0.0, f64::max);
     let others = eigenvalues
         .iter()
         .filter(|z| !group.contains(z) && (real || z.im > 0.0 || group.len() > 1));
     let gap = others
-        .map(|z| (z - mean).norm())
+        .map(|z| (z - mean).modulus())
         .fold(f64::INFINITY, f64::min);
     let scale = matrix
         .iter()
-        .map(|z| z.norm())
+        .map(|z| z.modulus())
         .fold(f64::MIN_POSITIVE, f64::max);
     let (offset, rounds) = if group.len() == 1 {
         (2.0 * f64::EPSILON * scale, 3)
@@ -408,8 +412,8 @@ fn make_real(basis: &mut DMatrix<Complex>) {
         let largest = column
             .iter()
             .copied()
-            .max_by(|a, b| a.norm().total_cmp(&b.norm()));
-        let turn = largest.map_or(Complex::new(1.0, 0.0), |z| z.conj() / z.norm());
+            .max_by(|a, b| a.modulus().total_cmp(&b.modulus()));
+        let turn = largest.map_or(Complex::new(1.0, 0.0), |z| z.conj() / z.modulus());
         for z in column.iter_mut() {
             *z = Complex::new((*z * turn).re, 0.0);
         }
@@ -438,7 +442,7 @@ mod tests {
         for zeta in [0.0, 0.3, 0.999, 1.0 - 1e-9, 1.0, 1.0 + 1e-13, 1.001, 3.0] {
             let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0, -2.0 * zeta]);
             let x = DVector::from_vec(vec![0.3, -1.2]);
-            let expected = (&a * 2.5).exp() * &x;
+            let expected = nanotap_arithmetic::matrix_exp(&(&a * 2.5)) * &x;
             let got = propagate(&a, &x, 2.5);
             assert!(
                 (&got - &expected).amax() < 2e-14,
@@ -459,7 +463,7 @@ mod tests {
             ],
         );
         let x = DVector::from_vec(vec![0.3, -1.2, 0.7, 0.4]);
-        let expected = (&a * 2.0).exp() * &x;
+        let expected = nanotap_arithmetic::matrix_exp(&(&a * 2.0)) * &x;
         let got = propagate(&a, &x, 2.0);
         assert!((&got - &expected).amax() < 1e-11, "{got} {expected}");
     }
@@ -475,7 +479,7 @@ mod tests {
             ],
         );
         let x = DVector::from_vec(vec![0.3, -1.2, 0.7, 0.4]);
-        let expected = (&a * 3.0).exp() * &x;
+        let expected = nanotap_arithmetic::matrix_exp(&(&a * 3.0)) * &x;
         let got = propagate(&a, &x, 3.0);
         assert!((&got - &expected).amax() < 1e-12, "{got} {expected}");
     }

@@ -8,6 +8,7 @@ use crate::simd::affine::AffineMap;
 use crate::simd::{ComplexVector, layout};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// A jump of the state at a switch: `x⁺ = matrix · x⁻ + offset(t)`.
 #[derive(Clone, Debug, PartialEq)]
@@ -329,7 +330,11 @@ impl System {
             }
         }
         system.fastest = rates
-            .flat_map(|[re, im]| re.iter().zip(im).map(|(re, im)| re.hypot(*im)))
+            .flat_map(|[re, im]| {
+                re.iter()
+                    .zip(im)
+                    .map(|(re, im)| nanotap_arithmetic::hypot(*re, *im))
+            })
             .fold(0.0, f64::max);
         Ok(system)
     }
@@ -548,9 +553,9 @@ impl System {
             .modal
             .iter()
             .zip(&q)
-            .map(|(w, q)| (w * q).norm())
+            .map(|(w, q)| (w * q).modulus())
             .sum();
-        let forced: f64 = modal.tones.iter().map(|z| z.norm()).sum();
+        let forced: f64 = modal.tones.iter().map(|z| z.modulus()).sum();
         f64::EPSILON * (own + forced + modal.constant.abs()) + rounding(output, x)
     }
 
@@ -774,7 +779,7 @@ pub(crate) const ON_SURFACE: f64 = 32.0;
 /// The size of rounding errors in an output's value.
 pub(crate) fn rounding(output: &Output, x: &[f64]) -> f64 {
     let linear: f64 = output.row.iter().zip(x).map(|(r, x)| (r * x).abs()).sum();
-    let harmonic: f64 = output.tones.iter().map(|z| z.norm()).sum();
+    let harmonic: f64 = output.tones.iter().map(|z| z.modulus()).sum();
     f64::EPSILON * (linear + output.constant.abs() + harmonic)
 }
 

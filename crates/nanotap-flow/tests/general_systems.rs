@@ -1,6 +1,11 @@
 //! Systems that are no microscope: several tones, several regimes, every kind of damping,
 //! and what is refused.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 

@@ -1,5 +1,10 @@
 //! Many periods run in one go are the same motion as one after the other.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 

@@ -1,6 +1,11 @@
 //! A body on a surface that recovers by itself (Kelvin and Voigt): contact ends when the
 //! force is zero, and gap and rate are then both zero by definition.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 

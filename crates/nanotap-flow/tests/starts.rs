@@ -1,6 +1,11 @@
 //! Starts at the surface, where gap, rate and more vanish together, and systems with time
 //! scales far apart.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};

@@ -118,7 +118,7 @@ pub(super) fn digits(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    let exponent = value.abs().log10().floor();
+    let exponent = nanotap_arithmetic::log10(value.abs()).floor();
     let text = if (-4.0..7.0).contains(&exponent) {
         let decimals = (digits as f64 - 1.0 - exponent).max(0.0) as usize;
         format!("{value:.decimals$}")

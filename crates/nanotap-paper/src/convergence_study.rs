@@ -166,7 +166,7 @@ fn off_circle(orbit: &OrbitReport) -> f64 {
     orbit
         .multipliers
         .iter()
-        .map(|[re, im]| (re.hypot(*im) - 1.0).abs())
+        .map(|[re, im]| (nanotap_arithmetic::hypot(*re, *im) - 1.0).abs())
         .fold(0.0, f64::max)
 }
 

@@ -1,6 +1,7 @@
 //! Figs. 8–14: the motions at Ω = 20 with a tip mass. One exists; beside it stands what
 //! the paper's own method makes of it.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::rc::Rc;
 
 use nanotap_dynamics::PeriodicOrbit;
@@ -263,7 +264,7 @@ pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         .attractor
         .multipliers
         .iter()
-        .map(|m| (m - 1.0).norm())
+        .map(|m| (m - 1.0).modulus())
         .fold(f64::INFINITY, f64::min);
     let near = grid.filter(|m| rounds_to(m.amplitude, 0.148, 3));
     let amplitude = match near {
@@ -427,7 +428,7 @@ pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
     let nonperiodic = !fast.counted.chaos().is_empty();
     let transient = View::new(&fast.counted.model, &rest, SHOWN)?;
     let radius = fast.attractor.spectral_radius();
-    let fading = 10f64.ln() / -radius.ln();
+    let fading = nanotap_arithmetic::ln(10f64) / -nanotap_arithmetic::ln(radius);
     let mut figure = Figure::new(if grid.is_some() { 2 } else { 1 }, 2)
         .column_widths([1.7, 1.0])
         .with(transient.time_panel("exact flow, N = 3: on the way to period 1"))

@@ -89,7 +89,8 @@ pub(super) fn maps(_: &Runs<'_>, section: Section) -> Result<Section, PaperError
         let mut lines: [Vec<(f64, f64)>; 2] = Default::default();
         for k in 0..POINTS {
             let share = k as f64 / (POINTS - 1) as f64;
-            let alpha4 = STIFFNESSES.0 * (STIFFNESSES.1 / STIFFNESSES.0).powf(share);
+            let alpha4 =
+                STIFFNESSES.0 * nanotap_arithmetic::powf(STIFFNESSES.1 / STIFFNESSES.0, share);
             for (j, omega) in at(alpha1, alpha4)?.into_iter().enumerate() {
                 let ratio = omega / bare[j];
                 lines[j].push((alpha4, ratio));

@@ -54,8 +54,8 @@ const fn oscillator(stop: Stop) -> Oscillator {
 /// A soft stop of this stiffness that gives back the same part of the speed: an impact on
 /// a spring κ and a damper 2ζ√κ alone ends with −exp(−πζ/√(1 − ζ²)) of its speed.
 fn soft(stiffness: f64) -> Oscillator {
-    let loss = -RESTITUTION.ln();
-    let ratio = loss / std::f64::consts::PI.hypot(loss);
+    let loss = -nanotap_arithmetic::ln(RESTITUTION);
+    let ratio = loss / nanotap_arithmetic::hypot(std::f64::consts::PI, loss);
     oscillator(Stop::Soft {
         stiffness,
         damping: 2.0 * ratio * stiffness.sqrt(),
@@ -309,10 +309,10 @@ fn softened(limit: &Orbit, omega: f64, stiffnesses: &[f64]) -> Result<Vec<Orbit>
 /// Every stop on the way, softest first.
 fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperError> {
     let per_decade = runs.either(2, 1);
-    let decades = (STIFFNESSES.1 / STIFFNESSES.0).log10().round() as usize;
+    let decades = nanotap_arithmetic::log10(STIFFNESSES.1 / STIFFNESSES.0).round() as usize;
     let stiffnesses: Vec<f64> = (0..=decades * per_decade)
         .rev()
-        .map(|k| STIFFNESSES.0 * 10f64.powf(k as f64 / per_decade as f64))
+        .map(|k| STIFFNESSES.0 * nanotap_arithmetic::powf(10f64, k as f64 / per_decade as f64))
         .collect();
     let entries = softened(limit, ENTRY, &stiffnesses)?;
     let measured = softened(limit, MEASURED_AT, &stiffnesses)?;
@@ -346,7 +346,8 @@ fn convergence_rate(way: &[Waypoint]) -> f64 {
         .rev()
         .find(|w| w.stiffness <= 0.11 * last.stiffness);
     before.map_or(f64::NAN, |w| {
-        (last.distance / w.distance).ln() / (last.stiffness / w.stiffness).ln()
+        nanotap_arithmetic::ln(last.distance / w.distance)
+            / nanotap_arithmetic::ln(last.stiffness / w.stiffness)
     })
 }
 

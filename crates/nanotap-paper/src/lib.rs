@@ -5,6 +5,14 @@
 //! J. Sound Vib. (2011). No parameter is tuned to agree: each case is the printed one, and
 //! where the print contradicts itself every reading is computed.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::disallowed_methods,
+        reason = "references are the platform's own functions"
+    )
+)]
+
 mod attractors;
 mod bare_tip;
 mod bifurcation_diagram;

@@ -1,5 +1,10 @@
 //! Periods of DMT contact with van der Waals attraction, by number of modes.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 #[path = "../tests/common/mod.rs"]
 mod common;
 

@@ -35,13 +35,13 @@ pub trait Scalar:
     /// The cube root of a number above zero.
     #[must_use]
     fn cbrt(self) -> Self {
-        let root = self.value().cbrt();
+        let root = nanotap_arithmetic::cbrt(self.value());
         self.chain(root, root / (3.0 * self.value()))
     }
     /// `e^x`.
     #[must_use]
     fn exp(self) -> Self {
-        let e = self.value().exp();
+        let e = nanotap_arithmetic::exp(self.value());
         self.chain(e, e)
     }
     /// `1/x`.
@@ -53,7 +53,7 @@ pub trait Scalar:
     /// `tan x`.
     #[must_use]
     fn tan(self) -> Self {
-        let t = self.value().tan();
+        let t = nanotap_arithmetic::tan(self.value());
         self.chain(t, 1.0 + t * t)
     }
     /// `x²`.

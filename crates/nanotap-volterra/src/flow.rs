@@ -412,7 +412,9 @@ impl Flow {
         };
         // An error that is no number is too large as well.
         if quality.error > 1.0 || quality.error.is_nan() {
-            let notches = (2.0 * quality.error.log2() / degree).ceil().clamp(1.0, 8.0) as usize;
+            let notches = (2.0 * nanotap_arithmetic::log2(quality.error) / degree)
+                .ceil()
+                .clamp(1.0, 8.0) as usize;
             let mut next = index + notches;
             // No need to resolve what lies beyond a switch.
             if let Some((_, time)) = passed
@@ -436,7 +438,7 @@ impl Flow {
                 let growth = if quality.rounding {
                     2
                 } else {
-                    (2.0 * (0.5 / quality.error).log2() / degree)
+                    (2.0 * nanotap_arithmetic::log2(0.5 / quality.error) / degree)
                         .floor()
                         .clamp(0.0, 2.0) as usize
                 };

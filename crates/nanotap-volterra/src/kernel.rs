@@ -258,7 +258,7 @@ impl Kernel {
         if length <= 0.0 || length.is_nan() {
             return None;
         }
-        let guess = (2.0 * (self.longest / length).log2()).floor() as i64 - 1;
+        let guess = (2.0 * nanotap_arithmetic::log2(self.longest / length)).floor() as i64 - 1;
         let first = guess.clamp(0, LENGTHS as i64) as usize;
         (first..LENGTHS).find(|&k| self.length(k) <= length)
     }

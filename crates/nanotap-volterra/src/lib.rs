@@ -94,6 +94,14 @@
 //! Continuous memory that is linear in the state belongs into the modes; a law may remember a
 //! branch.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::disallowed_methods,
+        reason = "references are the platform's own functions"
+    )
+)]
+
 pub mod dual;
 pub mod error;
 pub mod flow;

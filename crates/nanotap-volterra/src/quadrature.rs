@@ -8,7 +8,7 @@ pub(crate) fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
     let mut nodes = vec![0.0; count];
     let mut weights = vec![0.0; count];
     for i in 0..count.div_ceil(2) {
-        let mut x = (PI * (i as f64 + 0.75) / (count as f64 + 0.5)).cos();
+        let mut x = nanotap_arithmetic::cos(PI * (i as f64 + 0.75) / (count as f64 + 0.5));
         let mut slope = 1.0;
         for _ in 0..100 {
             let (value, derivative) = legendre(count, x);
@@ -45,7 +45,7 @@ fn legendre(count: usize, x: f64) -> (f64, f64) {
 pub(crate) fn chebyshev_nodes(count: usize) -> Vec<f64> {
     // 2 sin² keeps the distance from 0 accurate, which square-root time needs.
     (0..count)
-        .map(|i| (PI * i as f64 / (2.0 * (count - 1) as f64)).sin().powi(2))
+        .map(|i| nanotap_arithmetic::sin(PI * i as f64 / (2.0 * (count - 1) as f64)).powi(2))
         .collect()
 }
 
@@ -59,7 +59,8 @@ pub(crate) fn chebyshev_coefficients(count: usize) -> Vec<f64> {
         for j in 0..count {
             let sign = if j % 2 == 0 { 1.0 } else { -1.0 };
             let angle = PI * ((i * j) % (2 * last)) as f64 / last as f64;
-            matrix[i * count + j] = sign * angle.cos() * 2.0 * half(i) * half(j) / last as f64;
+            matrix[i * count + j] =
+                sign * nanotap_arithmetic::cos(angle) * 2.0 * half(i) * half(j) / last as f64;
         }
     }
     matrix

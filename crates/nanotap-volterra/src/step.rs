@@ -6,6 +6,7 @@ use crate::law::Force;
 use crate::linear::{add_product, add_rows, factor, solve};
 use crate::quadrature::series;
 use crate::system::System;
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Newton steps before a shorter step is tried.
 const MAX_ITERATIONS: usize = 20;
@@ -212,7 +213,7 @@ impl Solver {
             .zip(&system.gap_tones)
             .enumerate()
         {
-            let (sin, cos) = (tone.frequency * step.start).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * step.start);
             let re = amplitude.re * cos - amplitude.im * sin;
             let im = amplitude.re * sin + amplitude.im * cos;
             for (i, [c, s]) in phasors[k * rows..(k + 1) * rows].iter().enumerate() {
@@ -581,8 +582,8 @@ pub(crate) fn gap_scale(system: &System, y: &[f64]) -> (f64, f64) {
     let mut gap = system.gap_constant.abs();
     let mut rate = 0.0;
     for (tone, amplitude) in system.drive().tones.iter().zip(&system.gap_tones) {
-        gap += amplitude.norm();
-        rate += amplitude.norm() * tone.frequency;
+        gap += amplitude.modulus();
+        rate += amplitude.modulus() * tone.frequency;
     }
     for (k, y) in y.iter().enumerate() {
         gap += (kernel.readout[k] * y).abs();

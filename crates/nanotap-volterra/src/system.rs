@@ -4,6 +4,7 @@ use crate::kernel::{Kernel, LENGTHS, TimeMap};
 use crate::law::{Exit, ForceLaw};
 use crate::{Complex, VolterraError};
 use nalgebra::DVector;
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::sync::{Arc, OnceLock};
 
 /// The largest number of tones.
@@ -257,7 +258,7 @@ impl System {
                 .iter()
                 .flat_map(|tone| {
                     table.times.iter().map(|t| {
-                        let (sin, cos) = (tone.frequency * t).sin_cos();
+                        let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * t);
                         [cos, sin]
                     })
                 })
@@ -269,7 +270,7 @@ impl System {
     pub(crate) fn forced_gap(&self, time: f64) -> [f64; 3] {
         let mut out = [self.gap_constant, 0.0, 0.0];
         for (tone, amplitude) in self.drive.tones.iter().zip(&self.gap_tones) {
-            let (sin, cos) = (tone.frequency * time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
             let z = amplitude * Complex::new(cos, sin);
             out[0] += z.re;
             out[1] -= tone.frequency * z.im;
@@ -299,7 +300,7 @@ impl System {
     pub(crate) fn write_forced(&self, time: f64, x: &mut [f64]) {
         x.copy_from_slice(self.forced.constant.as_slice());
         for (tone, response) in self.drive.tones.iter().zip(&self.forced.tones) {
-            let (sin, cos) = (tone.frequency * time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
             for (x, z) in x.iter_mut().zip(response.iter()) {
                 *x += z.re * cos - z.im * sin;
             }
@@ -350,7 +351,7 @@ impl System {
             }
         }
         for (tone, response) in self.drive.tones.iter().zip(&self.forced.tones) {
-            let (sin, cos) = (tone.frequency * time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
             for (o, z) in out.iter_mut().zip(response.iter()) {
                 *o -= tone.frequency * (z.re * sin + z.im * cos);
             }
@@ -409,7 +410,7 @@ fn check_drive(drive: &Drive, n: usize) -> Result<(), VolterraError> {
         }
         for z in tone.forcing.iter().chain([&tone.gap]) {
             if !(z.re.is_finite() && z.im.is_finite()) {
-                return Err(not_finite("a tone's amplitude", z.norm()));
+                return Err(not_finite("a tone's amplitude", z.modulus()));
             }
         }
     }

@@ -143,7 +143,7 @@ impl Forced {
     fn gap(&self, system: &System, time: f64) -> (f64, f64) {
         let mut out = (self.gap_constant, 0.0);
         for (tone, [own, secular]) in system.drive().tones.iter().zip(&self.gap_tones) {
-            let (sin, cos) = (tone.frequency * time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
             let phasor = Complex::new(cos, sin);
             let amplitude = own + secular * time;
             let rate = amplitude * Complex::new(0.0, tone.frequency) + secular;
@@ -157,7 +157,7 @@ impl Forced {
     fn modal(&self, system: &System, time: f64) -> DVector<f64> {
         let mut out = self.constant.clone();
         for (tone, [own, secular]) in system.drive().tones.iter().zip(&self.tones) {
-            let (sin, cos) = (tone.frequency * time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
             let phasor = Complex::new(cos, sin);
             for ((out, a), b) in out.iter_mut().zip(own.iter()).zip(secular.iter()) {
                 *out += ((a + b * time) * phasor).re;

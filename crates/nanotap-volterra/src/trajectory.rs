@@ -287,7 +287,7 @@ impl Trajectory {
             rate += output.force * sample.force_rate;
         }
         for (tone, z) in self.system.drive().tones.iter().zip(&output.tones) {
-            let (sin, cos) = (tone.frequency * sample.time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * sample.time);
             value += z.re * cos - z.im * sin;
             rate -= tone.frequency * (z.re * sin + z.im * cos);
         }
@@ -364,7 +364,7 @@ impl Trajectory {
         let (start, end) = self.span();
         let sums = self.integrate(2, |s, out| {
             let value = self.read(output, s).0;
-            let (sin, cos) = (omega * s.time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(omega * s.time);
             out[0] = value * cos;
             out[1] = -value * sin;
         });

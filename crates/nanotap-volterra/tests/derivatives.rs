@@ -1,5 +1,10 @@
 //! Jacobians and parameter derivatives against central differences, for every law.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod common;
 
 use common::{beam, table_law as law, value};

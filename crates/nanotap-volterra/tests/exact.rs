@@ -1,5 +1,10 @@
 //! A spring and a damper in contact, against the engine that solves them in closed form.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod common;
 
 use common::beam;

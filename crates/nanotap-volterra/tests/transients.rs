@@ -1,5 +1,10 @@
 //! Transients of every law against an independent integrator of order 16 with events.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod common;
 #[path = "common/extrapolation.rs"]
 mod extrapolation;

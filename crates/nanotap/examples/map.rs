@@ -11,6 +11,11 @@
 //! component away, u = −μ f·(z − z*)/(f·b) with f A = μ f, is worked out from the state at each
 //! strobe (Ott, Grebogi and Yorke, Phys. Rev. Lett. 64, 1196, 1990).
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use nalgebra::DVector;
 use nanotap::Map;
 use nanotap::case::{Case, Key};

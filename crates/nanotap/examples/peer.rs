@@ -6,6 +6,11 @@
 //!
 //! `cargo xtask peers` runs it beside the others. There is no setting: nothing is stepped.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -6,6 +6,14 @@
 //! experimenter would; a [`map`](mod@map) is for algorithms of one's own; a [`study`] runs and reports; a [`figure`] shows a report;
 //! a [`dataset`] keeps many motions on disk.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::disallowed_methods,
+        reason = "references are the platform's own functions"
+    )
+)]
+
 pub mod case;
 pub mod dataset;
 pub mod error;

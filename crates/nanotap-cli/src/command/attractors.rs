@@ -175,7 +175,12 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             ("contact (%)", Align::Point),
         ]);
         for orbit in orbits {
-            let moduli = || orbit.multipliers.iter().map(|[re, im]| re.hypot(*im));
+            let moduli = || {
+                orbit
+                    .multipliers
+                    .iter()
+                    .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im))
+            };
             table.row([
                 orbit.period.to_string(),
                 number::significant(moduli().fold(0.0, f64::max), 6),

@@ -140,7 +140,7 @@ fn csv(report: &BranchReport, observed: Set, names: &[String]) -> String {
 fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
     multipliers
         .iter()
-        .map(|[re, im]| re.hypot(*im))
+        .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im))
         .fold(0.0, f64::max)
 }
 

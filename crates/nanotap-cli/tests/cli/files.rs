@@ -253,3 +253,57 @@ fn merge_refuses_names_and_sizes_that_no_dataset_has() {
     let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
     outcome.refused(&["sizes that no dataset has"]);
 }
+
+/// A chaotic sweep, computed with vector registers and without: every file the same, to the last
+/// bit. Where there are no such registers both are the second.
+#[test]
+fn every_arithmetic_gives_the_same_bytes() {
+    let folder = Folder::with_paper_case();
+    let sweep = |out: &str, path: &str| {
+        let arguments = [
+            "sweep",
+            "case.toml",
+            "--over",
+            "omega=2.5:2.9:6",
+            "--starts",
+            "1",
+            "--periods",
+            "4",
+            "--transient",
+            "20",
+            "-q",
+            "--out",
+            out,
+        ];
+        let mut command = folder.command(&arguments);
+        command.env("NANOTAP_ARITHMETIC", path);
+        assert!(command.output().unwrap().status.success());
+        super::sweeps::bytes(&folder.path().join(out))
+    };
+    assert!(sweep("vectors.zarr", "") == sweep("plain.zarr", "plain"));
+}
+
+/// Chunks of another arithmetic are not gone on with, nor merged.
+#[test]
+fn arithmetics_are_not_mixed() {
+    let folder = Folder::with_paper_case();
+    let sweep = [
+        "sweep",
+        "case.toml",
+        "--over",
+        "omega=3.5:3.6:2",
+        "-q",
+        "--out",
+    ];
+    for out in ["a.zarr", "b.zarr"] {
+        assert_eq!(folder.run(&[&sweep[..], &[out]].concat()).code, 0);
+    }
+    let other = folder
+        .read("b.zarr/.zmetadata")
+        .replace("\"arithmetic\": \"", "\"arithmetic\": \"another-");
+    folder.write("b.zarr/.zmetadata", other);
+    let merge = folder.run(&["merge", "a.zarr", "b.zarr", "--out", "never.zarr"]);
+    merge.refused(&["made otherwise", "arithmetic", "another-"]);
+    let again = folder.run(&[&sweep[..], &["b.zarr"]].concat());
+    again.refused(&["made otherwise", "arithmetic", "another-"]);
+}

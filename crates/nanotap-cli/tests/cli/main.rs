@@ -1,5 +1,10 @@
 //! The program from outside: exit codes, words, JSON and files.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod branches;
 mod case;
 mod existing_motions;

@@ -26,6 +26,11 @@
 //! $ git diff crates/nanotap-cli/tests/contract/snapshots
 //! ```
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod agree;
 mod facts;
 mod snapshot;

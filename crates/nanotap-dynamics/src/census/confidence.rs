@@ -118,10 +118,10 @@ fn poisson_mean(count: usize, probability: f64) -> f64 {
 
 fn poisson_cumulative(count: usize, mean: f64) -> f64 {
     let mut log_term = -mean;
-    let mut sum = log_term.exp();
+    let mut sum = nanotap_arithmetic::exp(log_term);
     for k in 1..=count {
-        log_term += (mean / k as f64).ln();
-        sum += log_term.exp();
+        log_term += nanotap_arithmetic::ln(mean / k as f64);
+        sum += nanotap_arithmetic::exp(log_term);
     }
     sum
 }

@@ -77,7 +77,7 @@ impl Escapes {
         }
         let rate = self.escaped.len() as f64 / self.exposure_between(self.after, early).max(1.0);
         let expected = rate * self.exposure_between(early, f64::INFINITY);
-        expected > 100f64.ln()
+        expected > nanotap_arithmetic::ln(100f64)
     }
 
     /// Part of a wanderer's time that counts towards "none escaped".

@@ -37,7 +37,7 @@ impl Unseen {
         let share = if starts == 0 {
             1.0
         } else {
-            -(error.ln() / starts as f64).exp_m1()
+            -nanotap_arithmetic::exp_m1(nanotap_arithmetic::ln(error) / starts as f64)
         };
         Self {
             motions,

@@ -51,7 +51,9 @@ pub(crate) fn approaches<M: StroboscopicMap>(
         return Ok(true);
     }
     let radius = orbit.spectral_radius();
-    let window = (0.25 / -radius.ln()).ceil().clamp(16.0, LONGEST_WINDOW) as usize;
+    let window = (0.25 / -nanotap_arithmetic::ln(radius))
+        .ceil()
+        .clamp(16.0, LONGEST_WINDOW) as usize;
     let mut highest = [0.0f64; 4];
     for peak in &mut highest {
         for _ in 0..window {
@@ -68,6 +70,7 @@ pub(crate) fn approaches<M: StroboscopicMap>(
             *peak = peak.max(now);
         }
     }
-    let wanted = 1.5 * window as f64 * radius.ln();
-    Ok(highest.windows(2).all(|w| w[1] < w[0]) && (highest[3] / highest[0]).ln() <= wanted)
+    let wanted = 1.5 * window as f64 * nanotap_arithmetic::ln(radius);
+    Ok(highest.windows(2).all(|w| w[1] < w[0])
+        && nanotap_arithmetic::ln(highest[3] / highest[0]) <= wanted)
 }

@@ -38,7 +38,7 @@ pub fn birkhoff_digits<M: StroboscopicMap>(
     for (sum, total) in sums.iter_mut().zip(&mut weights) {
         for k in 1..=periods {
             let t = k as f64 / (periods + 1) as f64;
-            let weight = (-1.0 / (t * (1.0 - t))).exp();
+            let weight = nanotap_arithmetic::exp(-1.0 / (t * (1.0 - t)));
             *total += weight;
             for i in 0..d {
                 let deviation = state[i] - origin[i];
@@ -60,7 +60,7 @@ pub fn birkhoff_digits<M: StroboscopicMap>(
         }
         for (k, unit) in [(i, spread), (d + i, spread * spread)] {
             let difference = (sums[0][k] / weights[0] - sums[1][k] / weights[1]).abs();
-            digits = digits.min(-(difference / unit).max(1e-16).log10());
+            digits = digits.min(-nanotap_arithmetic::log10((difference / unit).max(1e-16)));
         }
     }
     Ok(digits)

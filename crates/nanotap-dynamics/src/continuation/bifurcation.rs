@@ -20,6 +20,7 @@
 //! the circle are known to the square root of rounding only, and so is the point.
 
 use nalgebra::Complex;
+use nanotap_arithmetic::ComplexFunctions as _;
 
 use crate::continuation::solver::{BranchSolver, Node, OrbitTangency};
 use crate::map::MapFamily;
@@ -107,7 +108,7 @@ fn real_product(multipliers: &[Complex<f64>], sign: f64) -> f64 {
         let factor = 1.0 + sign * m;
         // A pair contributes |factor|² > 0.
         negative ^= m.im == 0.0 && factor.re < 0.0;
-        smallest = smallest.min(factor.norm());
+        smallest = smallest.min(factor.modulus());
     }
     if negative { -smallest } else { smallest }
 }
@@ -121,7 +122,7 @@ fn pair_on_circle(multipliers: &[Complex<f64>]) -> (f64, Option<(Complex<f64>, f
     let mut pair_factor = f64::INFINITY;
     for (i, a) in multipliers.iter().enumerate() {
         for b in &multipliers[i + 1..] {
-            let conjugates = a.im != 0.0 && (a - b.conj()).norm() <= 1e-9 * a.norm();
+            let conjugates = a.im != 0.0 && (a - b.conj()).modulus() <= 1e-9 * a.modulus();
             let factor = if conjugates {
                 Complex::new(a.norm_sqr() - 1.0, 0.0)
             } else {
@@ -130,9 +131,9 @@ fn pair_on_circle(multipliers: &[Complex<f64>]) -> (f64, Option<(Complex<f64>, f
             // Products that are not real come in conjugate couples: positive.
             let real = conjugates || (a.im == 0.0 && b.im == 0.0);
             negative ^= real && factor.re < 0.0;
-            smallest = smallest.min(factor.norm());
-            if conjugates && factor.norm() < pair_factor {
-                pair_factor = factor.norm();
+            smallest = smallest.min(factor.modulus());
+            if conjugates && factor.modulus() < pair_factor {
+                pair_factor = factor.modulus();
                 pair = Some((if a.im > 0.0 { *a } else { *b }, factor.re));
             }
         }
@@ -310,7 +311,7 @@ pub(crate) fn between<F: MapFamily>(
             // A real pair of product 1 (a neutral saddle) is no bifurcation.
             let (pair, factor) = pair_on_circle(&multipliers).1?;
             (factor.abs() <= 1e-6).then(|| {
-                let angle = pair.im.atan2(pair.re);
+                let angle = nanotap_arithmetic::atan2(pair.im, pair.re);
                 (BifurcationKind::NeimarkSacker { angle }, z)
             })
         }));

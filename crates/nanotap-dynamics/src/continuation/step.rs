@@ -132,8 +132,9 @@ pub(crate) fn projection<F: MapFamily>(
 }
 
 pub(crate) fn angle<F: MapFamily>(solver: &BranchSolver<'_, F>, a: &Node, b: &Node) -> f64 {
-    solver
-        .product(&a.tangent, a.slope, &b.tangent, b.slope)
-        .clamp(-1.0, 1.0)
-        .acos()
+    nanotap_arithmetic::acos(
+        solver
+            .product(&a.tangent, a.slope, &b.tangent, b.slope)
+            .clamp(-1.0, 1.0),
+    )
 }

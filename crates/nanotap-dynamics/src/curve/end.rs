@@ -2,6 +2,7 @@
 
 use crate::continuation::{BifurcationKind, OrbitTangency};
 use crate::orbit::PeriodicOrbit;
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Distance of a second multiplier from ±1, or of an angle from 0 and π, within which
 /// two events are taken to meet.
@@ -121,13 +122,13 @@ fn second_condition(kind: BifurcationKind, orbit: &PeriodicOrbit) -> Option<&'st
         orbit
             .multipliers
             .iter()
-            .filter(|m| (*m - value).norm() <= TOGETHER)
+            .filter(|m| (*m - value).modulus() <= TOGETHER)
             .count()
     };
     let pair = orbit
         .multipliers
         .iter()
-        .any(|m| m.im > TOGETHER && (m.norm() - 1.0).abs() <= TOGETHER);
+        .any(|m| m.im > TOGETHER && (m.modulus() - 1.0).abs() <= TOGETHER);
     let (plus, minus) = (near(1.0), near(-1.0));
     match kind {
         BifurcationKind::NeimarkSacker { .. } if plus > 1 => Some("1:1 resonance"),

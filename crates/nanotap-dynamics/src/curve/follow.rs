@@ -66,10 +66,9 @@ impl<F: TwoParameterFamily> CurveSolver<'_, F> {
             let next = self
                 .correct(&predicted, &row, &orientation)
                 .and_then(|next| {
-                    let turn = self
-                        .product(&node.tangent, &next.tangent)
-                        .clamp(-1.0, 1.0)
-                        .acos();
+                    let turn = nanotap_arithmetic::acos(
+                        self.product(&node.tangent, &next.tangent).clamp(-1.0, 1.0),
+                    );
                     let shift: Vec<f64> =
                         next.u.iter().zip(&predicted).map(|(a, b)| a - b).collect();
                     let correction = self.product(&shift, &shift).sqrt();

@@ -97,7 +97,7 @@ impl LyapunovSpectrum {
     pub(crate) fn agrees_with(&self, other: &Self) -> bool {
         let length = self.periods.min(other.periods).max(1) as f64;
         let close = |x: f64, ex: f64, y: f64, ey: f64, floor: f64| {
-            (x - y).abs() <= 6.0 * ex.hypot(ey) + floor
+            (x - y).abs() <= 6.0 * nanotap_arithmetic::hypot(ex, ey) + floor
         };
         let exponents = self
             .exponents
@@ -249,7 +249,7 @@ impl LyapunovRun {
             // what the determinant leaves over is the last direction's.
             let others: f64 = self.sample[..d - 1].iter().sum();
             let hidden = self.jacobian.amax() * ROUNDING;
-            if exact - others < hidden.ln() {
+            if exact - others < nanotap_arithmetic::ln(hidden) {
                 self.sample[d - 1] = exact - others;
             }
         }
@@ -264,7 +264,7 @@ impl LyapunovRun {
             let (done, rest) = self.image.split_at_mut(k * d);
             let v = &mut rest[..d];
             let mut length = remove(done, v, d);
-            self.sample[k] = length.max(f64::MIN_POSITIVE).ln();
+            self.sample[k] = nanotap_arithmetic::ln(length.max(f64::MIN_POSITIVE));
             let mut substitute = 0;
             while length <= f64::MIN_POSITIVE && substitute < d {
                 v.fill(0.0);
@@ -304,7 +304,7 @@ fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
     let pivots = lu.u().diagonal();
     pivots
         .iter()
-        .map(|v| v.abs().max(f64::MIN_POSITIVE).ln())
+        .map(|v| nanotap_arithmetic::ln(v.abs().max(f64::MIN_POSITIVE)))
         .sum()
 }
 

@@ -95,7 +95,7 @@ impl Neighbourhood {
                     norm,
                     radius,
                     rate,
-                    decay: -orbit.spectral_radius().ln() / orbit.period as f64,
+                    decay: -nanotap_arithmetic::ln(orbit.spectral_radius()) / orbit.period as f64,
                     floor,
                 }));
             }
@@ -162,19 +162,20 @@ impl Neighbourhood {
     /// largest multiplier; 0 in the ball.
     pub(crate) fn periods_away(&self, state: &[f64]) -> f64 {
         let distance = self.norm.distance(state, &self.center);
-        (distance / self.radius).ln().max(0.0) / self.decay
+        nanotap_arithmetic::ln(distance / self.radius).max(0.0) / self.decay
     }
 
     /// Periods after which a motion that comes from a box with these sides, and decays
     /// as the largest multiplier says, has entered the ball.
     pub(crate) fn expected_entry(&self, sides: &[f64]) -> f64 {
-        self.widening(sides).ln() / self.decay
+        nanotap_arithmetic::ln(self.widening(sides)) / self.decay
     }
 
     /// Periods that the slowest linear decay needs from a box with these sides to the
     /// ball: the natural length of a transient that is no chaos.
     pub fn relaxation(&self, sides: &[f64]) -> f64 {
-        self.widening(sides).ln() * self.period as f64 / -self.rate.ln()
+        nanotap_arithmetic::ln(self.widening(sides)) * self.period as f64
+            / -nanotap_arithmetic::ln(self.rate)
     }
 
     /// How many times wider than the ball a box with these sides is.

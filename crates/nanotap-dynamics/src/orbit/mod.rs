@@ -6,6 +6,7 @@ pub mod search;
 pub mod shooting;
 
 use nalgebra::Complex;
+use nanotap_arithmetic::ComplexFunctions as _;
 
 pub use multipliers::{MultiplierError, Multipliers, Stability};
 pub use search::{OrbitSearch, find_orbits};
@@ -46,7 +47,7 @@ impl PeriodicOrbit {
 
     /// Largest modulus of a multiplier.
     pub fn spectral_radius(&self) -> f64 {
-        self.multipliers.first().map_or(0.0, |m| m.norm())
+        self.multipliers.first().map_or(0.0, |m| m.modulus())
     }
 
     /// True if every multiplier lies inside the unit circle by more than the margin

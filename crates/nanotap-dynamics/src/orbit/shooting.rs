@@ -15,6 +15,7 @@
 //! necessarily the one that the motion tends to: [`mod@crate::classify`] checks that.
 
 use nalgebra::DMatrix;
+use nanotap_arithmetic::ComplexFunctions as _;
 
 use crate::failure::{MapFailure, advance, advance_with_jacobian};
 use crate::map::StroboscopicMap;
@@ -309,21 +310,21 @@ impl Segments {
                     return 0.0;
                 }
                 if turn == 1 {
-                    logarithm += length.ln();
+                    logarithm += nanotap_arithmetic::ln(length);
                 }
                 for (x, o) in v.iter_mut().zip(&image) {
                     *x = o / length;
                 }
             }
         }
-        logarithm.exp()
+        nanotap_arithmetic::exp(logarithm)
     }
 
     fn distance_from_one(&self) -> f64 {
         Multipliers::of_product(&self.jacobians).map_or(f64::NAN, |m| {
             m.values
                 .iter()
-                .fold(f64::INFINITY, |best, v| best.min((v - 1.0).norm()))
+                .fold(f64::INFINITY, |best, v| best.min((v - 1.0).modulus()))
         })
     }
 

@@ -1,5 +1,6 @@
 //! Newton, minimal periods, multipliers.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{ShootingError, ShootingOptions, Stability, StroboscopicMap, close_orbit};
 
 use crate::systems::{Focus, Henon, Logistic, System};
@@ -77,7 +78,7 @@ fn long_unstable_orbits_close_and_repeat() {
                 }
             );
             // |det| = b^17, though the other multiplier is thousands.
-            let sum: f64 = orbit.multipliers.iter().map(|m| m.norm().ln()).sum();
+            let sum: f64 = orbit.multipliers.iter().map(|m| m.modulus().ln()).sum();
             assert!((sum - 17.0 * 0.3f64.ln()).abs() < 1e-8);
         }
     }

@@ -180,7 +180,7 @@ impl Accumulator {
             } else {
                 let time = self.periods as f64 * drive.period() + segment.phase;
                 let turned = |angle: f64| {
-                    let (sin, cos) = angle.sin_cos();
+                    let (sin, cos) = nanotap_arithmetic::sin_cos(angle);
                     Complex::new(cos, sin)
                 };
                 (turned(omega * time), turned(omega * length))

@@ -156,7 +156,8 @@ impl<S: Simd> Search<'_, S> {
                 s += step;
             } else {
                 stuck += 1;
-                s += least * f64::from(stuck.saturating_sub(PATIENCE).min(40)).exp2();
+                s += least
+                    * nanotap_arithmetic::exp2(f64::from(stuck.saturating_sub(PATIENCE).min(40)));
             }
             Enclosure { jet, relaxed } = self.enclosure(s);
         }

@@ -8,6 +8,7 @@ use super::walk::Interval;
 use crate::regime::Kernel;
 use crate::signal::{Amplitude, Signal};
 use crate::simd::{self, ComplexVector, Simd, WIDTH, layout};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Angle through which the fastest followed term turns from point to point: a larger one
 /// needs fewer points, a smaller one leaves fewer intervals open.
@@ -88,18 +89,23 @@ impl Table {
             return None;
         }
         let mut order: Vec<usize> = (0..kernel.count).collect();
-        order.sort_by(|&a, &b| kernel.rate(a).norm().total_cmp(&kernel.rate(b).norm()));
+        order.sort_by(|&a, &b| {
+            kernel
+                .rate(a)
+                .modulus()
+                .total_cmp(&kernel.rate(b).modulus())
+        });
         let step_of = |term: usize, grid: usize| {
-            (ANGLE / kernel.rate(order[term]).norm()).min(period / INTERVALS[grid])
+            (ANGLE / kernel.rate(order[term]).modulus()).min(period / INTERVALS[grid])
         };
         // The slowest term sets how coarse the coarse grid can be.
         let slowest = step_of(0, 1);
         let follows = |term: &usize| slowest <= MOST_POINTS * step_of(*term, 0);
         let fine_terms = (1..order.len().min(most)).take_while(follows).count() + 1;
-        let fastest = kernel.rate(order[fine_terms - 1]).norm();
+        let fastest = kernel.rate(order[fine_terms - 1]).modulus();
         let slow = order
             .iter()
-            .filter(|&&k| kernel.rate(k).norm() * COARSER < fastest);
+            .filter(|&&k| kernel.rate(k).modulus() * COARSER < fastest);
         let terms = [fine_terms, slow.count().clamp(1, FOLLOWED[1])];
         let [fine_step, coarse_step] = [step_of(terms[0] - 1, 0), step_of(terms[1] - 1, 1)];
         let vectors =
@@ -214,7 +220,7 @@ impl Grid {
             let (vector, lane) = layout::place(k);
             let entry = &mut weights[vector];
             if followed.contains(&k) {
-                entry[0][lane] = (kernel.rate(k).norm() * step).powi(6) / 7200.0;
+                entry[0][lane] = (kernel.rate(k).modulus() * step).powi(6) / 7200.0;
             } else {
                 entry[1][lane] = 1.0;
             }
@@ -239,8 +245,8 @@ fn exponentials(kernel: &Kernel, k: usize, step: f64, count: usize) -> Vec<Pair>
     let mut highest = 1;
     while powers.len() < count {
         let s = step * highest as f64;
-        let (sin, cos) = (rate.im * s).sin_cos();
-        let grown = (rate.re * s).exp();
+        let (sin, cos) = nanotap_arithmetic::sin_cos(rate.im * s);
+        let grown = nanotap_arithmetic::exp(rate.re * s);
         for p in 0..highest.min(count - highest) {
             powers.push(product(powers[p], [grown * cos, grown * sin]));
         }

@@ -37,7 +37,7 @@ pub(crate) fn exp<S: Simd>(x: S::Register) -> S::Register {
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
     if S::LIBRARY {
-        return S::load(&S::store(x).map(f64::exp));
+        return S::load(&S::store(x).map(nanotap_arithmetic::exp));
     }
     let c = S::splat;
     let x = S::clamp(x, -708.0, 709.0);
@@ -73,7 +73,10 @@ pub(crate) fn sin_cos<S: Simd>(x: S::Register) -> (S::Register, S::Register) {
     const PIO2_3: f64 = 2.022_266_248_711_166_5e-21;
     if S::LIBRARY {
         let x = S::store(x);
-        return (S::load(&x.map(f64::sin)), S::load(&x.map(f64::cos)));
+        return (
+            S::load(&x.map(nanotap_arithmetic::sin)),
+            S::load(&x.map(nanotap_arithmetic::cos)),
+        );
     }
     let c = S::splat;
     let shifted = S::fma(x, c(std::f64::consts::FRAC_2_PI), c(ROUND));

@@ -1,11 +1,15 @@
 //! Four numbers at a time: the arithmetic of the inner loop, and nothing of it elsewhere.
 //!
 //! The same source is compiled for any machine ([`Plain`]) and for vector registers with
-//! fused multiply-add (`Avx2`; [`dispatch`] picks at run time). The two agree to
-//! rounding, and each gives the same bits on every run.
+//! fused multiply-add (`Avx2`; [`dispatch`] picks at run time). Both do the same operations in
+//! the same order, each rounded once, and so give the same bits. `NANOTAP_ARITHMETIC=plain` in
+//! the environment picks the first: it is how tests run both.
 //!
 //! [`functions`] has the exponentials, [`layout`] how lists lie in vectors, [`affine`] the
 //! change of coordinates at a switch.
+
+#[cfg(target_arch = "x86_64")]
+use std::sync::LazyLock;
 
 pub(crate) mod affine;
 #[cfg(target_arch = "x86_64")]
@@ -32,7 +36,7 @@ pub(crate) type ComplexVector = [Vector; 2];
 
 /// An arithmetic of four numbers: how they are held and computed with.
 pub(crate) trait Simd: Copy {
-    /// Whether functions come from the standard library, one lane at a time.
+    /// Whether functions are those of `nanotap-arithmetic`, one lane at a time.
     const LIBRARY: bool = false;
     /// What holds four numbers.
     type Register: Copy;
@@ -93,8 +97,16 @@ pub(crate) fn dispatch<W: Work>(work: W) -> W::Output {
     work.run::<Plain>()
 }
 
+/// Whether this machine has fused multiply-add in vectors of four, and nobody asked for the plain
+/// path.
 #[cfg(target_arch = "x86_64")]
-/// Whether this machine has fused multiply-add in vectors of four.
+#[inline(always)]
 fn avx2_available() -> bool {
-    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+    static WANTED: LazyLock<bool> = LazyLock::new(|| {
+        let plain = std::env::var_os("NANOTAP_ARITHMETIC").is_some_and(|path| path == "plain");
+        !plain
+            && std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("fma")
+    });
+    *WANTED
 }

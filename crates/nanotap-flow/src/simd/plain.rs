@@ -6,13 +6,14 @@ use super::{Simd, Vector, WIDTH, Work};
 #[derive(Clone, Copy)]
 pub(crate) struct Plain;
 
-/// With the standard library's functions, for angles beyond [`LARGEST_ANGLE`](super::LARGEST_ANGLE).
+/// With functions that reduce any angle, for those beyond
+/// [`LARGEST_ANGLE`](super::LARGEST_ANGLE). The same on every machine, it need not fuse.
 #[derive(Clone, Copy)]
 pub(crate) struct Library;
 
-/// The arithmetic of arrays, shared by [`Plain`] and [`Library`].
+/// The arithmetic of arrays, shared by [`Plain`] and [`Library`], with its `a b + c`.
 macro_rules! arrays {
-    () => {
+    ($fma:expr) => {
         type Register = Vector;
 
         #[inline(always)]
@@ -46,11 +47,11 @@ macro_rules! arrays {
         }
         #[inline(always)]
         fn fma(a: Vector, b: Vector, c: Vector) -> Vector {
-            std::array::from_fn(|i| a[i] * b[i] + c[i])
+            std::array::from_fn(|i| $fma(a[i], b[i], c[i]))
         }
         #[inline(always)]
         fn fnma(a: Vector, b: Vector, c: Vector) -> Vector {
-            std::array::from_fn(|i| c[i] - a[i] * b[i])
+            std::array::from_fn(|i| $fma(-a[i], b[i], c[i]))
         }
         #[inline(always)]
         fn sums(a: [Vector; 4]) -> Vector {
@@ -110,10 +111,11 @@ fn run_apart<S: Simd, W: Work>(work: W) -> W::Output {
 }
 
 impl Simd for Plain {
-    arrays!();
+    // Rounded once, as vector registers do it: by the processor, or in software.
+    arrays!(f64::mul_add);
 }
 
 impl Simd for Library {
     const LIBRARY: bool = true;
-    arrays!();
+    arrays!(|a: f64, b: f64, c: f64| a * b + c);
 }

@@ -71,7 +71,7 @@ impl Formula for Electrostatic {
     }
 
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
-        let away = |d: f64| c[1] / c[2] * (c[2] / d).ln_1p();
+        let away = |d: f64| c[1] / c[2] * nanotap_arithmetic::ln_1p(c[2] / d);
         Some(if branch == 0 {
             away(gap)
         } else {
@@ -153,7 +153,7 @@ impl Formula for Dlvo {
     }
 
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
-        let away = |d: f64| -c[1] / c[2] * (c[2] * d).exp() - c[3] / d;
+        let away = |d: f64| -c[1] / c[2] * nanotap_arithmetic::exp(c[2] * d) - c[3] / d;
         Some(if branch == 0 {
             away(gap)
         } else {

@@ -98,7 +98,8 @@ fn contact_radius_root<S: Scalar>(c: &[S], indentation: S) -> S {
         return c[3];
     }
     // From above the quartic, convex there, lets Newton fall on the root from one side.
-    let mut s = (delta.max(0.0) / curvature).sqrt().sqrt() + (tension / curvature).cbrt();
+    let mut s =
+        (delta.max(0.0) / curvature).sqrt().sqrt() + nanotap_arithmetic::cbrt(tension / curvature);
     for _ in 0..60 {
         let cube = curvature * s * s * s;
         let slope = 4.0 * cube - tension;

@@ -93,7 +93,7 @@ impl Formula for VanDerWaals {
         let away = |d: f64| match self.0 {
             Shape::Sphere => -c[1] / d,
             // The cone's is not bounded far away: it is counted from a0.
-            Shape::Cone => c[1] * (d / c[0]).ln(),
+            Shape::Cone => c[1] * nanotap_arithmetic::ln(d / c[0]),
             Shape::Punch => -c[1] / (2.0 * d * d),
         };
         Some(if branch == 0 {

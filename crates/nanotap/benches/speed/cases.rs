@@ -1,5 +1,6 @@
 //! The cases that are timed.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::sync::Arc;
 
 use nanotap::case::Case;
@@ -70,7 +71,7 @@ pub(crate) fn grazing(gap: f64) -> (Cantilever, Vec<f64>) {
     let case = paper(3);
     let model = model(&case);
     let free = &model.system.regimes()[0];
-    let swing = free.project(&model.gap).tones[0].norm();
+    let swing = free.project(&model.gap).tones[0].modulus();
     let state = free.response().at(model.system.drive(), 0.0);
     let case = Cantilever {
         alpha5: swing * (1.0 + gap),

@@ -3,6 +3,11 @@
 //! A name after `--` picks benches (`cargo bench -p nanotap -- setup`). `cargo test` runs
 //! each once. `docs/performance.md` says what was found.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod basin;
 mod cases;
 mod census;

@@ -72,7 +72,7 @@ pub fn prefixed(kind: Kind, si: f64, size: f64) -> (f64, String) {
     let shown = (size * si).abs();
     let takes_prefix = kind != Kind::AngularFrequency;
     let power = if takes_prefix && shown > 0.0 && shown.is_finite() {
-        (3 * (shown.log10() / 3.0).floor() as i32).clamp(-18, 12)
+        (3 * (nanotap_arithmetic::log10(shown) / 3.0).floor() as i32).clamp(-18, 12)
     } else {
         0
     };

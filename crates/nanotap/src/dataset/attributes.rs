@@ -14,6 +14,8 @@ pub fn of_case(title: &str, kind: &str, case: &Case) -> Attributes {
     attributes.insert("title".into(), title.into());
     attributes.insert("kind".into(), kind.into());
     attributes.insert("nanotap_version".into(), env!("CARGO_PKG_VERSION").into());
+    // Chunks of different arithmetics differ in their last digits: they are not mixed.
+    attributes.insert("arithmetic".into(), nanotap_arithmetic::VERSION.into());
     attributes.insert("case".into(), text(case));
     attributes
 }

@@ -187,12 +187,12 @@ impl OrbitCurves {
         let reach = 1.15 * largest;
         let circle = (0..=360)
             .map(|d| f64::from(d).to_radians())
-            .map(|a| (a.cos(), a.sin()));
+            .map(|a| (nanotap_arithmetic::cos(a), nanotap_arithmetic::sin(a)));
         let (inside, outside): (Vec<_>, Vec<_>) = self
             .multipliers
             .iter()
             .map(|m| (m[0], m[1]))
-            .partition(|(re, im)| re.hypot(*im) <= 1.0);
+            .partition(|(re, im)| nanotap_arithmetic::hypot(*re, *im) <= 1.0);
         let mut panel = Panel::new(
             Axis::linear("Re $μ$").range(-reach, reach),
             Axis::linear("Im $μ$").range(-reach, reach),

@@ -61,7 +61,7 @@ impl Shown {
         match self {
             Self::SpectralRadius => multipliers
                 .iter()
-                .map(|[re, im]| re.hypot(*im))
+                .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im))
                 .fold(0.0, f64::max),
             Self::Observable(observable) => {
                 let value = (observable.of)(observables).number().unwrap_or(f64::NAN);

@@ -633,7 +633,7 @@ impl GridScale {
             return (from - low, to + high);
         }
         if self.log {
-            let ratio = (to / from).powf(0.5 / steps);
+            let ratio = nanotap_arithmetic::powf(to / from, 0.5 / steps);
             (from / ratio, to * ratio)
         } else {
             let half = 0.5 * (to - from) / steps;

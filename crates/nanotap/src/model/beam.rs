@@ -49,7 +49,7 @@ impl Mode {
         let beta = centre + excess;
         // At a root cos β = −sech β and sin β = ±tanh β, which turns σ into
         // tanh(β/2) for odd and coth(β/2) for even modes.
-        let half = (0.5 * beta).tanh();
+        let half = nanotap_arithmetic::tanh(0.5 * beta);
         Ok(Self {
             number,
             beta,
@@ -104,7 +104,9 @@ impl Mode {
         }
         let x = self.beta * xi;
         if x < 1.0 {
-            return self.beta * (x.sinh() + x.sin() - self.sigma * cosh_minus_cos(x));
+            return self.beta
+                * (nanotap_arithmetic::sinh(x) + nanotap_arithmetic::sin(x)
+                    - self.sigma * cosh_minus_cos(x));
         }
         let (sin, cos) = self.sin_cos(xi);
         self.beta * (self.tip_wave(xi) - self.clamp_wave(x) + sin + self.sigma * cos)
@@ -125,13 +127,14 @@ impl Mode {
 
     /// The part of cosh x − σ sinh x that decays from the clamp: (1 + σ)/2 · e^{−x}.
     fn clamp_wave(&self, x: f64) -> f64 {
-        0.5 * (1.0 + self.sigma) * (-x).exp()
+        0.5 * (1.0 + self.sigma) * nanotap_arithmetic::exp(-x)
     }
 
     /// The part of cosh x − σ sinh x that decays from the tip, (1 − σ)/2 · e^x, with
     /// (1 − σ)/2 = s/(e^β + s), s = (−1)^(j+1).
     fn tip_wave(&self, xi: f64) -> f64 {
-        self.sign() * (-self.beta * (1.0 - xi)).exp() / (1.0 + self.sign() * (-self.beta).exp())
+        self.sign() * nanotap_arithmetic::exp(-self.beta * (1.0 - xi))
+            / (1.0 + self.sign() * nanotap_arithmetic::exp(-self.beta))
     }
 
     /// sin β_jξ and cos β_jξ. The product β_jξ, rounded, would cost two digits at
@@ -141,7 +144,7 @@ impl Mode {
         let product = half_turns * xi;
         let rest = half_turns.mul_add(xi, -product);
         let reduced = product - 2.0 * (0.5 * product).round();
-        (PI * reduced + (PI * rest + self.excess * xi)).sin_cos()
+        nanotap_arithmetic::sin_cos(PI * reduced + (PI * rest + self.excess * xi))
     }
 }
 
@@ -153,11 +156,14 @@ fn alternating(number: usize) -> f64 {
 /// The root e of cos β + sech β = 0 with β = centre + e, centre = (j − ½)π, where the
 /// equation reads sin e = ± sech(centre + e): Newton from the asymptotic value.
 fn excess(centre: f64, sign: f64) -> f64 {
-    let mut excess = (sign * centre.cosh().recip()).clamp(-1.0, 1.0).asin();
+    let mut excess = nanotap_arithmetic::asin(
+        (sign * nanotap_arithmetic::cosh(centre).recip()).clamp(-1.0, 1.0),
+    );
     for _ in 0..20 {
         let beta = centre + excess;
-        let sech = sign * beta.cosh().recip();
-        let step = (excess.sin() - sech) / (excess.cos() + sech * beta.tanh());
+        let sech = sign * nanotap_arithmetic::cosh(beta).recip();
+        let step = (nanotap_arithmetic::sin(excess) - sech)
+            / (nanotap_arithmetic::cos(excess) + sech * nanotap_arithmetic::tanh(beta));
         excess = (excess - step).clamp(-FRAC_PI_2, FRAC_PI_2);
         if step.abs() <= f64::EPSILON * excess.abs() {
             break;
@@ -168,7 +174,7 @@ fn excess(centre: f64, sign: f64) -> f64 {
 
 /// cosh x − cos x without cancellation.
 fn cosh_minus_cos(x: f64) -> f64 {
-    2.0 * ((0.5 * x).sinh().powi(2) + (0.5 * x).sin().powi(2))
+    2.0 * (nanotap_arithmetic::sinh(0.5 * x).powi(2) + nanotap_arithmetic::sin(0.5 * x).powi(2))
 }
 
 /// sinh x − sin x for |x| < 1, by its Taylor series 2 Σ x^{4k+3}/(4k+3)!.

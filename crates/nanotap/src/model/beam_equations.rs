@@ -323,7 +323,7 @@ impl<'a> Beam<'a> {
         if case.tone2_ratio.is_none() {
             return drive;
         }
-        let (sin, cos) = case.tone2_phase.to_radians().sin_cos();
+        let (sin, cos) = nanotap_arithmetic::sin_cos(case.tone2_phase.to_radians());
         drive.with_tone(1, case.tone2_amplitude * cos, case.tone2_amplitude * sin)
     }
 

@@ -36,7 +36,7 @@ pub fn frequencies(alpha1: f64, alpha4: f64, count: usize) -> Result<Vec<f64>, C
 /// holds exactly one root, and there are no others.
 fn wave_number(mode: &Mode, alpha1: f64, alpha4: f64) -> f64 {
     let spring_over_mass = alpha4 - alpha1 * mode.stiffness();
-    let balance = (alpha4 / alpha1).powf(0.25);
+    let balance = nanotap_arithmetic::powf(alpha4 / alpha1, 0.25);
     let (low, high) = if spring_over_mass > 0.0 {
         (mode.beta, pinned_wave_number(mode.number).min(balance))
     } else if spring_over_mass < 0.0 {
@@ -58,20 +58,21 @@ fn wave_number(mode: &Mode, alpha1: f64, alpha4: f64) -> f64 {
 
 /// The characteristic function divided by β³ cosh β.
 fn characteristic(beta: f64, alpha1: f64, alpha4: f64) -> f64 {
-    beta.cos()
-        + beta.cosh().recip()
+    nanotap_arithmetic::cos(beta)
+        + nanotap_arithmetic::cosh(beta).recip()
         + (alpha4 / beta.powi(3) - alpha1 * beta) * pinned_characteristic(beta)
 }
 
 /// sin β − cos β tanh β, whose roots are the clamped-pinned wave numbers.
 fn pinned_characteristic(beta: f64) -> f64 {
     if beta >= 1.0 {
-        return beta.sin() - beta.cos() * beta.tanh();
+        return nanotap_arithmetic::sin(beta)
+            - nanotap_arithmetic::cos(beta) * nanotap_arithmetic::tanh(beta);
     }
     // The leading terms cancel: Σ (−1)^k 2^{2k+2} β^{4k+3}/(4k+3)!, over cosh β.
     let x = 4.0 * beta.powi(4);
     let series = 1.0 - x / 840.0 * (1.0 - x / 7920.0 * (1.0 - x / 32760.0 * (1.0 - x / 93024.0)));
-    2.0 / 3.0 * beta.powi(3) * series / beta.cosh()
+    2.0 / 3.0 * beta.powi(3) * series / nanotap_arithmetic::cosh(beta)
 }
 
 /// The root of tan β = tanh β in ((j, j + ¼)π), where tan(¼π − e) = tanh β means
@@ -81,7 +82,7 @@ fn pinned_wave_number(number: usize) -> f64 {
     let mut beta = centre;
     // Contracts by 2e^{−2β} < 10⁻³ a step.
     for _ in 0..6 {
-        beta = centre - (-2.0 * beta).exp().atan();
+        beta = centre - nanotap_arithmetic::atan(nanotap_arithmetic::exp(-2.0 * beta));
     }
     beta
 }
@@ -110,8 +111,8 @@ fn bisect(before: impl Fn(f64) -> bool, mut low: f64, mut high: f64) -> f64 {
 pub fn base_excitation_gain(omega: f64) -> Result<f64, CantileverError> {
     check(Parameter::Omega, omega)?;
     let beta = omega.sqrt();
-    let sech = beta.cosh().recip();
-    Ok((beta.cos() * sech + 1.0) / (sech + beta.cos()))
+    let sech = nanotap_arithmetic::cosh(beta).recip();
+    Ok((nanotap_arithmetic::cos(beta) * sech + 1.0) / (sech + nanotap_arithmetic::cos(beta)))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! A whole number does not vary, so that its row and column of the Jacobian are zero and one
 //! multiplier is.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -75,7 +76,7 @@ impl Nonlinear {
             })
             .collect();
         let response = free.project(height);
-        let swing: f64 = response.tones.iter().map(|z| z.norm()).sum();
+        let swing: f64 = response.tones.iter().map(|z| z.modulus()).sum();
         let size = swing.max(height.constant.abs());
         let tolerance = TOLERANCE * if size > 0.0 { size } else { 1.0 };
         let forcing = Drive {
@@ -216,8 +217,9 @@ impl Nonlinear {
             // From where contact begins outwards and inwards, ever farther.
             let contact = self.contact_gap().unwrap_or(0.0);
             let reach = 10.0 * (tip + contact.abs());
-            let ladder =
-                |k: i32| reach * 1e-9_f64.powf(f64::from(k) / f64::from(EQUILIBRIUM_POINTS));
+            let ladder = |k: i32| {
+                reach * nanotap_arithmetic::powf(1e-9, f64::from(k) / f64::from(EQUILIBRIUM_POINTS))
+            };
             let outwards = (0..=EQUILIBRIUM_POINTS).map(|k| contact + ladder(k));
             let inwards = (0..=EQUILIBRIUM_POINTS).rev().map(|k| contact - ladder(k));
             let mut gaps: Vec<f64> = outwards
@@ -644,16 +646,14 @@ impl Nonlinear {
                 let own: f64 = (0..n).map(|j| row[j] * field[n + j]).sum();
                 let tones = self.system.drive().tones.iter();
                 let forced = tones.map(|tone| {
-                    let (sin, cos) = (tone.frequency * switch.time).sin_cos();
+                    let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * switch.time);
                     -tone.frequency.powi(2) * (tone.gap.re * cos - tone.gap.im * sin)
                 });
                 own + forced.sum::<f64>()
             };
-            Some(
-                (acceleration(switch.to) / acceleration(switch.from))
-                    .abs()
-                    .ln(),
-            )
+            Some(nanotap_arithmetic::ln(
+                (acceleration(switch.to) / acceleration(switch.from)).abs(),
+            ))
         });
         self.free_log_determinant() + onto_rate * by_rate[0] + jumps.sum::<f64>()
     }

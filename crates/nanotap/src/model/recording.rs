@@ -263,7 +263,7 @@ pub(crate) fn read(
     let tones = nonlinear.system.drive().tones.iter().zip(&output.tones);
     let harmonic: f64 = tones
         .map(|(tone, z)| {
-            let (sin, cos) = (tone.frequency * sample.time).sin_cos();
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * sample.time);
             z.re * cos - z.im * sin
         })
         .sum();
@@ -383,7 +383,7 @@ impl Curve {
             Self::Exact(signal) => signal.fourier(omega),
             Self::Nonlinear(recording, output) => {
                 let sum = recording.integral(|s| {
-                    let (sin, cos) = (omega * s.time).sin_cos();
+                    let (sin, cos) = nanotap_arithmetic::sin_cos(omega * s.time);
                     Complex::new(cos, -sin) * recording.read(output, s)
                 });
                 sum * (2.0 / recording.end().max(f64::MIN_POSITIVE))

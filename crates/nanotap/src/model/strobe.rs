@@ -320,10 +320,9 @@ impl ExactStrobe {
 /// log|det| of what an impact does to volumes: the reset itself, and once more as much
 /// for the times at which neighbouring motions meet the stop.
 fn log_impact(transition: &Transition) -> f64 {
-    transition
-        .reset
-        .as_ref()
-        .map_or(0.0, |r| 2.0 * r.matrix.determinant().abs().ln())
+    transition.reset.as_ref().map_or(0.0, |r| {
+        2.0 * nanotap_arithmetic::ln(r.matrix.determinant().abs())
+    })
 }
 
 /// Sums log|det| over a period: tr A · t in every regime, and the impacts.

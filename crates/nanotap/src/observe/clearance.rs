@@ -12,6 +12,7 @@
 //! coordinates at the start of the stretch, which decay. Exactly computed are only periods
 //! whose bound is below the least height already found.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -217,9 +218,9 @@ impl ClearanceSearch {
                     row[j] = 1.0;
                     let amplitude = regime.project(&Output::linear(row, beam.base.tones.len()));
                     for (sum, weight) in weights.iter_mut().zip(&amplitude.modal) {
-                        *sum += share * weight.norm();
+                        *sum += share * weight.modulus();
                     }
-                    let tones: f64 = amplitude.tones.iter().map(|tone| tone.norm()).sum();
+                    let tones: f64 = amplitude.tones.iter().map(|tone| tone.modulus()).sum();
                     response += share * (amplitude.constant.abs() + tones);
                 }
                 RegimeBound {
@@ -234,7 +235,7 @@ impl ClearanceSearch {
         let clamp = beam.height(0.0);
         Some(Self {
             above_tip: end.constant - model.height.constant,
-            clamp: clamp.constant - clamp.tones.iter().map(|tone| tone.norm()).sum::<f64>(),
+            clamp: clamp.constant - clamp.tones.iter().map(|tone| tone.modulus()).sum::<f64>(),
             bounds,
             start: None,
             higher: 0.0,

@@ -158,7 +158,8 @@ impl<'a> Gatherer<'a> {
                                  sample: s,
                                  ..
                              }| {
-                                let (sin, cos) = (omega * (offset + s.time)).sin_cos();
+                                let (sin, cos) =
+                                    nanotap_arithmetic::sin_cos(omega * (offset + s.time));
                                 Complex::new(cos, -sin) * (w * value(signal, s))
                             },
                         )

@@ -1,5 +1,6 @@
 //! Harmonics of tip deflection, slope and force.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -59,11 +60,11 @@ impl Spectrum {
                 let (t, f) = (tip.fourier(omega), force.fourier(omega));
                 Harmonic {
                     order: j as f64 / repetition as f64,
-                    tip: t.norm(),
+                    tip: t.modulus(),
                     tip_phase: lag(t),
-                    force: f.norm(),
+                    force: f.modulus(),
                     force_phase: lag(f),
-                    slope: slope.as_ref().map(|s| s.fourier(omega).norm()),
+                    slope: slope.as_ref().map(|s| s.fourier(omega).modulus()),
                 }
             })
             .collect();
@@ -79,14 +80,14 @@ impl Spectrum {
             harmonics,
             thd,
             phase: lag(first),
-            first_harmonic: first.norm(),
+            first_harmonic: first.modulus(),
         }
     }
 }
 
 /// The lag φ of `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
 pub(crate) fn lag(c: Complex) -> f64 {
-    let degrees = -(c * Complex::new(0.0, 1.0)).arg().to_degrees();
+    let degrees = -(c * Complex::new(0.0, 1.0)).argument().to_degrees();
     if degrees <= -180.0 {
         degrees + 360.0
     } else {

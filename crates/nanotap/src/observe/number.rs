@@ -45,15 +45,15 @@ impl Number for f64 {
     }
 
     fn hypotenuse(self, y: Self) -> Self {
-        self.hypot(y)
+        nanotap_arithmetic::hypot(self, y)
     }
 
     fn degrees(self, x: Self) -> Self {
-        self.atan2(x).to_degrees()
+        nanotap_arithmetic::atan2(self, x).to_degrees()
     }
 
     fn turn(self) -> (Self, Self) {
-        self.sin_cos()
+        nanotap_arithmetic::sin_cos(self)
     }
 }
 
@@ -69,7 +69,7 @@ impl Number for Dual {
     }
 
     fn hypotenuse(self, y: Self) -> Self {
-        let value = self.value.hypot(y.value);
+        let value = nanotap_arithmetic::hypot(self.value, y.value);
         let change = self.value * self.derivative + y.value * y.derivative;
         Self::new(value, change / value)
     }
@@ -77,12 +77,12 @@ impl Number for Dual {
     fn degrees(self, x: Self) -> Self {
         let size = self.value * self.value + x.value * x.value;
         let change = (x.value * self.derivative - self.value * x.derivative) / size;
-        let value = self.value.atan2(x.value);
+        let value = nanotap_arithmetic::atan2(self.value, x.value);
         Self::new(value.to_degrees(), change.to_degrees())
     }
 
     fn turn(self) -> (Self, Self) {
-        let (sin, cos) = self.value.sin_cos();
+        let (sin, cos) = nanotap_arithmetic::sin_cos(self.value);
         let by = self.derivative;
         (Self::new(sin, cos * by), Self::new(cos, -sin * by))
     }

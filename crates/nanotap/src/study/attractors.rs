@@ -1,6 +1,7 @@
 //! Every motion that coexists: a census from many seeded starts, each attractor with what
 //! can be read off it.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     AttractorKind, Census, CensusOptions, ClassifyOptions, Control, Fraction, OrbitSearch,
     PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
@@ -490,7 +491,7 @@ pub fn orbit_exponents(orbit: &PeriodicOrbit) -> Vec<f64> {
     orbit
         .multipliers
         .iter()
-        .map(|m| m.norm().ln() / orbit.period as f64)
+        .map(|m| nanotap_arithmetic::ln(m.modulus()) / orbit.period as f64)
         .collect()
 }
 

@@ -305,7 +305,7 @@ fn look(model: &Model, found: OrbitReport) -> OrbitLook {
         spectral_radius: found
             .multipliers
             .first()
-            .map_or(0.0, |[re, im]| re.hypot(*im)),
+            .map_or(0.0, |[re, im]| nanotap_arithmetic::hypot(*re, *im)),
         stable: found.stable,
         force_loop: force_loop(&height, &force),
         state: found.state,

@@ -137,7 +137,10 @@ fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
             tip_max: Some(o.observables.tip_max),
             tip_min: Some(o.observables.tip_min),
             contact_fraction: Some(o.observables.contact_fraction),
-            spectral_radius: o.multipliers.first().map(|[re, im]| re.hypot(*im)),
+            spectral_radius: o
+                .multipliers
+                .first()
+                .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im)),
             reason: None,
         },
         Err(reason) => Motion {

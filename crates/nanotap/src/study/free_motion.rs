@@ -1,6 +1,7 @@
 //! What the tip does far from the sample, of any model, from the steady response of its
 //! regime of free flight.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;
 
 use crate::model::Model;
@@ -34,9 +35,9 @@ impl FreeMotion {
             .copied()
             .unwrap_or(Complex::new(0.0, 0.0));
         Self {
-            amplitude: first.norm(),
+            amplitude: first.modulus(),
             phase: lag(first),
-            reach: tones(&model.gap).iter().map(|tone| tone.norm()).sum(),
+            reach: tones(&model.gap).iter().map(|tone| tone.modulus()).sum(),
         }
     }
 }
@@ -57,9 +58,9 @@ mod tests {
             };
             let z = free_response(&case).unwrap();
             let free = FreeMotion::of(&Model::cantilever(&case).unwrap());
-            assert!((free.amplitude / (case.alpha2 * z.norm()) - 1.0).abs() < 1e-11);
-            assert!((free.phase + z.arg().to_degrees()).abs() < 1e-9);
-            let reach = case.alpha2 * (z + 1.0).norm();
+            assert!((free.amplitude / (case.alpha2 * z.modulus()) - 1.0).abs() < 1e-11);
+            assert!((free.phase + z.argument().to_degrees()).abs() < 1e-9);
+            let reach = case.alpha2 * (z + 1.0).modulus();
             assert!((free.reach / reach - 1.0).abs() < 1e-11);
         }
     }

@@ -108,7 +108,7 @@ fn pair(eigenvalue: Complex<f64>) -> [f64; 2] {
 
 /// The damping ratio ζ = −Re λ/|λ| of an eigenvalue [Re, Im].
 pub fn damping_ratio([re, im]: [f64; 2]) -> f64 {
-    let size = re.hypot(im);
+    let size = nanotap_arithmetic::hypot(re, im);
     // An eigenvalue zero belongs to no beam; it would damp nothing.
     if size == 0.0 { 0.0 } else { -re / size }
 }

@@ -1,5 +1,6 @@
 //! A periodic orbit by Newton, with its stability and what can be read off it.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 
 use nalgebra::DVector;
@@ -308,7 +309,9 @@ fn nonlinear_defect(orbit: &PeriodicOrbit, recording: &NonlinearRecording) -> f6
         .sum();
     let found = if nonlinear.remembers {
         let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
-        kept.iter().map(|m| m.norm().ln()).sum()
+        kept.iter()
+            .map(|m| nanotap_arithmetic::ln(m.modulus()))
+            .sum()
     } else {
         orbit.log_determinant
     };
@@ -322,7 +325,10 @@ fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Traject
         Some(forgetting) if !trajectory.events().is_empty() => {
             // One direction is lost, and its multiplier is zero.
             let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
-            let found: f64 = kept.iter().map(|m| m.norm().ln()).sum();
+            let found: f64 = kept
+                .iter()
+                .map(|m| nanotap_arithmetic::ln(m.modulus()))
+                .sum();
             (found - expected - log_remembered(model, forgetting, trajectory)).abs()
         }
         _ => (orbit.log_determinant - expected).abs(),
@@ -341,18 +347,20 @@ fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajector
     let tip = &model.height.row;
     let back = |length: f64| {
         if !basis.clusters.is_empty() {
-            return (flight.matrix() * -length).exp() * &forgetting.kick;
+            return nanotap_arithmetic::matrix_exp(&(flight.matrix() * -length)) * &forgetting.kick;
         }
         let kicked = &basis.left * forgetting.kick.map(|v| Complex::new(v, 0.0));
         let turned = kicked.zip_map(
             &DVector::from_column_slice(&basis.eigenvalues),
-            |q, rate| q * (rate * -length).exp(),
+            |q, rate| q * (rate * -length).exponential(),
         );
         (&basis.right * turned).map(|z| z.re)
     };
-    let factor = |length: f64| 1.0 + (forgetting.rate * length).exp() * (tip * back(length))[0];
+    let factor = |length: f64| {
+        1.0 + nanotap_arithmetic::exp(forgetting.rate * length) * (tip * back(length))[0]
+    };
     flights(model, trajectory)
-        .map(|length| factor(length).abs().ln())
+        .map(|length| nanotap_arithmetic::ln(factor(length).abs()))
         .sum()
 }
 
@@ -403,7 +411,7 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
                 .iter()
                 .find(|x| x.target == e.to)?;
             let reset = transition.reset.as_ref().filter(|_| forgets.is_none())?;
-            Some(2.0 * reset.matrix.determinant().abs().ln())
+            Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))
         })
         .sum();
     flow + impacts

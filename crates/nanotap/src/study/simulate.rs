@@ -273,8 +273,10 @@ fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOpt
     };
     let (nearest, distance) = nearest_phase(orbit, &classified.state);
     let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
-    let decay = -orbit.spectral_radius().ln();
-    let rest = ((distance / near).ln() / decay).ceil().max(0.0) as usize;
+    let decay = -nanotap_arithmetic::ln(orbit.spectral_radius());
+    let rest = (nanotap_arithmetic::ln(distance / near) / decay)
+        .ceil()
+        .max(0.0) as usize;
     if !nearest.is_empty() {
         state.copy_from_slice(nearest);
     }

@@ -18,6 +18,7 @@
 //! Of a rigid stop the part beyond the stop is cut off. A sample with a memory starts
 //! relaxed: it would forget within a contact or two.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{StartBox, StartBoxError, StartSet};
 use nanotap_flow::Regime;
 
@@ -53,7 +54,12 @@ pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
         let swing = |r: &Regime| (-r.matrix()[(n + j, j)]).max(0.0).sqrt();
         let half = moving()
             .map(|r| {
-                let response: f64 = r.response().tones.iter().map(|tone| tone[j].norm()).sum();
+                let response: f64 = r
+                    .response()
+                    .tones
+                    .iter()
+                    .map(|tone| tone[j].modulus())
+                    .sum();
                 let damping = -r.matrix()[(n + j, n + j)];
                 widening(swing(r), damping, omega) * response + r.response().constant[j].abs()
             })
@@ -116,7 +122,7 @@ fn reach(model: &Model, j: usize) -> f64 {
 /// Twice the root of what resonance would gain on a degree of freedom that swings at
 /// `swing` and loses speed at the rate `damping`, over what a drive at `omega` gives it.
 fn widening(swing: f64, damping: f64, omega: f64) -> f64 {
-    let here = (swing * swing - omega * omega).hypot(damping * omega);
+    let here = nanotap_arithmetic::hypot(swing * swing - omega * omega, damping * omega);
     let resonant = damping * swing;
     let gain = if resonant > 0.0 {
         here / resonant

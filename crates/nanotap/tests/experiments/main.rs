@@ -1,5 +1,10 @@
 //! Experiments against closed forms, invariants and independent methods.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod approach;
 mod branches;
 mod extremes;

@@ -1,5 +1,10 @@
 //! Nonlinear force laws from the case file to what is observed.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod common;
 mod derivatives;
 mod reference;

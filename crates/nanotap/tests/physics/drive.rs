@@ -9,6 +9,7 @@ use nanotap::model::drive_form::Actuation;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::{Set, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::{Complex, Flow};
 
 use crate::contact_laws::on;
@@ -60,10 +61,10 @@ fn tones_superpose_in_free_flight() {
         for (drive, frequency, amplitude, phase) in tones {
             let z = response_at(&case, frequency).unwrap();
             assert!(
-                (amplitude / (drive * z.norm()) - 1.0).abs() < 1e-10,
+                (amplitude / (drive * z.modulus()) - 1.0).abs() < 1e-10,
                 "{actuation}"
             );
-            let off = (phase + z.arg().to_degrees()).rem_euclid(360.0);
+            let off = (phase + z.argument().to_degrees()).rem_euclid(360.0);
             assert!(off.min(360.0 - off) < 1e-8, "{actuation}: {off}");
         }
         // All of the motion is in these two.
@@ -99,7 +100,7 @@ fn slow_drives_are_static() {
     ] {
         let found = response(actuation);
         assert!(
-            (found - Complex::new(expected, 0.0)).norm() < 1e-4,
+            (found - Complex::new(expected, 0.0)).modulus() < 1e-4,
             "{actuation}: {found}"
         );
     }

@@ -116,7 +116,8 @@ fn chatter_ends_in_closed_form() {
     assert_eq!(flow.regime(), 1, "it sticks");
     let mut x = [1.0, 1.0];
     flow.state(&mut x);
-    assert!((x[0] - ball.gap).abs() < 1e-8 && x[1] == 0.0, "{x:?}");
+    // At 7e5 a unit in the last place is 1e-10, and a bounce adds some.
+    assert!((x[0] - ball.gap).abs() < 1e-7 && x[1] == 0.0, "{x:?}");
     let run = recorder.finish(model.system.clone());
     let stuck = run.events().iter().find(|e| e.to == 1).unwrap();
     assert!(

@@ -1,6 +1,11 @@
 //! The physics and the mathematics of nanotap against references, closed forms and
 //! independent methods.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod contact_laws;
 mod derivatives;
 mod drive;

@@ -1,5 +1,6 @@
 //! What an experimenter reads off a motion, against closed forms.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::f64::consts::TAU;
 
 use nanotap::case::physical::free_response::free_response;
@@ -42,9 +43,9 @@ fn free_amplitude_and_phase_are_the_closed_form() {
             let z = free_response(&case).unwrap();
             let (_, found) = period_1(&case);
             let o = &found.observables;
-            near(o.first_harmonic, z.norm() * case.alpha2, 1e-10);
+            near(o.first_harmonic, z.modulus() * case.alpha2, 1e-10);
             near(o.amplitude, o.first_harmonic, 1e-10);
-            near(o.phase, -z.arg().to_degrees(), 1e-9);
+            near(o.phase, -z.argument().to_degrees(), 1e-9);
             assert_eq!(
                 (o.dissipation, o.virial, o.indentation, o.contact_time),
                 (0.0, 0.0, 0.0, 0.0)
@@ -102,12 +103,12 @@ fn virial_and_dissipation_of_a_permanent_contact() {
         mean_force * o.mean_deflection + 0.5 * (force * tip.conj()).re,
         1e-11,
     );
-    let power = 0.5 * case.alpha6 * (case.omega * gap.norm()).powi(2);
+    let power = 0.5 * case.alpha6 * (case.omega * gap.modulus()).powi(2);
     near(o.sample_power, power, 1e-11);
     near(o.dissipation, power * TAU / case.omega, 1e-11);
     near(
         o.indentation,
-        gap.norm() - case.alpha5 - o.mean_deflection,
+        gap.modulus() - case.alpha5 - o.mean_deflection,
         1e-11,
     );
     near(

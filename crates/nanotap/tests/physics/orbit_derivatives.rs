@@ -60,7 +60,8 @@ fn compare(case: &Case, start: &[f64], period: usize, key: Key, step: f64) {
         let scale = largest(exact).max(largest(values) / size);
         for (exact, slope) in exact.iter().zip(slopes) {
             assert!(
-                (exact - slope).abs() <= 1e-6 * scale,
+                // A rigid stop is indented by nothing but rounding.
+                (exact - slope).abs() <= 1e-6 * scale + 1e-13,
                 "d {name} / d {}: {exact:e}, by differences {slope:e}",
                 key.path()
             );

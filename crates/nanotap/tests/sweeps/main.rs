@@ -1,5 +1,10 @@
 //! Sweeps, basins and their datasets.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 mod basins;
 mod datasets;
 mod folder;

@@ -260,7 +260,7 @@ fn comparison(what: &str, kind: Kind, used: f64, other: f64) -> Remark {
         kind.format(used),
         kind.format(other)
     );
-    if (used / other).ln().abs() > 2.0_f64.ln() {
+    if nanotap_arithmetic::ln(used / other).abs() > nanotap_arithmetic::ln(2.0_f64) {
         Remark::warning(text)
     } else {
         Remark::note(text)
@@ -396,8 +396,9 @@ fn modal_mass_factor(beta: f64, ratio: f64) -> f64 {
         let lower = 1.0 - x / 840.0 * (1.0 - x / 7920.0 * (1.0 - x / 32760.0));
         1.5 * upper / lower
     } else {
-        let (sin, cos) = beta.sin_cos();
-        beta * sin * beta.sinh() / (sin * beta.cosh() - cos * beta.sinh())
+        let (sin, cos) = nanotap_arithmetic::sin_cos(beta);
+        beta * sin * nanotap_arithmetic::sinh(beta)
+            / (sin * nanotap_arithmetic::cosh(beta) - cos * nanotap_arithmetic::sinh(beta))
     };
     (1.0 + ratio + 2.0 * ratio * q) / (1.0 - 3.0 * ratio + 2.0 * ratio * q)
 }

@@ -85,7 +85,10 @@ impl Hertz {
 
     /// The force at the indentation Δ, (4/3) E* √R Δ^(3/2) in N.
     pub fn force(self) -> f64 {
-        4.0 / 3.0 * self.reduced_modulus * self.radius.sqrt() * self.indentation.powf(1.5)
+        4.0 / 3.0
+            * self.reduced_modulus
+            * self.radius.sqrt()
+            * nanotap_arithmetic::powf(self.indentation, 1.5)
     }
 }
 

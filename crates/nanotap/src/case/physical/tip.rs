@@ -36,10 +36,10 @@ impl TipShape {
         use std::f64::consts::PI;
         match self {
             Self::Cone { height, half_angle } => {
-                PI / 3.0 * height.powi(3) * half_angle.tan().powi(2)
+                PI / 3.0 * height.powi(3) * nanotap_arithmetic::tan(half_angle).powi(2)
             }
             Self::Pyramid { height, half_angle } => {
-                4.0 / 3.0 * height.powi(3) * half_angle.tan().powi(2)
+                4.0 / 3.0 * height.powi(3) * nanotap_arithmetic::tan(half_angle).powi(2)
             }
             Self::Sphere { radius } => 4.0 / 3.0 * PI * radius.powi(3),
         }

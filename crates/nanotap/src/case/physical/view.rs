@@ -1,5 +1,6 @@
 //! A case as an experimenter states it, mapped to the model: the view in SI.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
@@ -77,11 +78,11 @@ impl Physical {
         self.cantilever.validate()?;
         self.parameters = PhysicalParameters::from_case(&self.cantilever, &self.scales);
         let response = free_response(&self.cantilever)?;
-        self.free_amplitude = self.cantilever.alpha2 * response.norm() * self.scales.length;
-        self.free_phase = -response.arg().to_degrees();
+        self.free_amplitude = self.cantilever.alpha2 * response.modulus() * self.scales.length;
+        self.free_phase = -response.argument().to_degrees();
         if let Some(ratio) = self.cantilever.tone2_ratio {
             let second = response_at(&self.cantilever, ratio.value() * self.cantilever.omega)?;
-            let amplitude = self.cantilever.tone2_amplitude * second.norm();
+            let amplitude = self.cantilever.tone2_amplitude * second.modulus();
             self.second_free_amplitude = Some(amplitude * self.scales.length);
         }
         self.tip_height = self.scales.length - self.parameters.tip_gap;
@@ -248,7 +249,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let unit = Scales::new(&lever, 1.0).of(Parameter::Alpha2, like.actuation);
     let response = free_response(&free)?;
     let strength =
-        |strength, response: Complex<f64>, key| applied(strength, response.norm() / unit, key);
+        |strength, response: Complex<f64>, key| applied(strength, response.modulus() / unit, key);
     let (base, free_amplitude) = strength(drive.strength, response, Key::DriveFreeAmplitude)?;
     let second = match (drive.second, like.tone2_ratio) {
         (Some(second), Some(ratio)) => {
@@ -311,7 +312,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         parameters,
         free_amplitude,
         second_free_amplitude: second.map(|(_, (_, free))| free),
-        free_phase: -response.arg().to_degrees(),
+        free_phase: -response.argument().to_degrees(),
         setpoint,
         tip_height: beam_gap - tip_gap,
         data,

@@ -17,7 +17,7 @@ impl Dual {
 
     /// Sine and cosine of an angle in degrees.
     pub(crate) fn sin_cos_degrees(self) -> (Self, Self) {
-        let (sin, cos) = self.value.to_radians().sin_cos();
+        let (sin, cos) = nanotap_arithmetic::sin_cos(self.value.to_radians());
         let rate = self.derivative.to_radians();
         (Self::new(sin, cos * rate), Self::new(cos, -sin * rate))
     }

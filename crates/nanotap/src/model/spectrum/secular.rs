@@ -9,6 +9,7 @@
 //! accuracy, and a pair may turn from complex to real without any special case.
 
 use nalgebra::{Complex, DMatrix, DVector, Schur};
+use nanotap_arithmetic::ComplexFunctions as _;
 
 type C = Complex<f64>;
 
@@ -106,11 +107,11 @@ impl Secular<'_> {
                 scale * p / *u
             };
             tip += *u * p;
-            tip_size += u.norm() * p.abs();
+            tip_size += u.modulus() * p.abs();
         }
         // A strong load holds the tip and the sum cancels; then 1 + g Σ p²/D = 0 gives it.
         let load = self.load_at(k, own, root);
-        if load.norm() * tip_size > 2.0 * scale.norm() {
+        if load.modulus() * tip_size > 2.0 * scale.modulus() {
             -scale / load
         } else {
             tip
@@ -405,11 +406,12 @@ impl Secular<'_> {
             .zip(self.stiffness)
             .map(|(p, kappa)| p * p / kappa)
             .sum();
-        let determinant = (self.load.stiffness * compliance).ln_1p() - leading.ln();
+        let determinant = nanotap_arithmetic::ln_1p(self.load.stiffness * compliance)
+            - nanotap_arithmetic::ln(leading);
         let product: f64 = factors
             .iter()
             .zip(self.stiffness)
-            .map(|(factor, kappa)| (factor.c / kappa).ln_1p())
+            .map(|(factor, kappa)| nanotap_arithmetic::ln_1p(factor.c / kappa))
             .sum();
         (found - trace).abs() <= 1e-8 * trace_size
             && (product - determinant).abs() <= 1e-8 * (1.0 + determinant.abs())

@@ -116,7 +116,7 @@ fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
         .iter()
         .filter_map(|(_, fitted)| Some(fitted.as_ref().ok()?.aic));
     let least = least.fold(f64::INFINITY, f64::min);
-    let likelihood = |aic: f64| (0.5 * (least - aic)).exp();
+    let likelihood = |aic: f64| nanotap_arithmetic::exp(0.5 * (least - aic));
     let all: f64 = found
         .iter()
         .filter_map(|(_, fitted)| Some(likelihood(fitted.as_ref().ok()?.aic)))

@@ -271,7 +271,7 @@ impl Problem<'_> {
             return (residual, 1.0);
         };
         let t = residual / c;
-        let root = t.powi(2).ln_1p().sqrt();
+        let root = nanotap_arithmetic::ln_1p(t.powi(2)).sqrt();
         if root < 1e-8 {
             return (residual, 1.0);
         }
@@ -458,7 +458,7 @@ impl Problem<'_> {
                 let value = point.values[column];
                 let difference = self.difference(x, curve, &measured[row], column, value)?;
                 let t = difference / self.error(&measured[row], column) / 3.0;
-                Some(9.0 * (t * t).ln_1p())
+                Some(9.0 * nanotap_arithmetic::ln_1p(t * t))
             });
             residuals.sum()
         };

@@ -39,7 +39,7 @@ impl Search<'_> {
                 if row.values[column].is_some() {
                     estimated[column] |= row.errors[column].is_none();
                     let error = row.errors[column].unwrap_or(*noise);
-                    deviance += (std::f64::consts::TAU * error * error).ln();
+                    deviance += nanotap_arithmetic::ln(std::f64::consts::TAU * error * error);
                     if point.lost {
                         deviance += (self.problem.data.columns[column].spread / error).powi(2);
                     }
@@ -49,7 +49,7 @@ impl Search<'_> {
         let estimated = estimated.iter().filter(|estimated| **estimated).count();
         let parameters = (self.problem.parameters.len() + estimated) as f64;
         let count = self.problem.data.count() as f64;
-        [2.0, count.ln()].map(|price| deviance + price * parameters)
+        [2.0, nanotap_arithmetic::ln(count)].map(|price| deviance + price * parameters)
     }
 
     /// All that was found, from so many starts.

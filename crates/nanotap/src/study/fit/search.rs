@@ -112,7 +112,7 @@ impl<'a> Search<'a> {
                 }
                 let (low, high) = (low.max(p.bounds.0), high.min(p.bounds.1));
                 if low > 0.0 {
-                    low * (high / low).powf(u)
+                    low * nanotap_arithmetic::powf(high / low, u)
                 } else {
                     low + u * (high - low)
                 }

@@ -104,8 +104,8 @@ pub(super) fn student(freedom: f64) -> f64 {
 /// The probability that Student's t is between −t and t: finite sums for whole degrees of
 /// freedom (Abramowitz & Stegun 26.7.3 and 26.7.4).
 fn within(t: f64, freedom: f64) -> f64 {
-    let angle = (t / freedom.sqrt()).atan();
-    let (sine, cosine) = angle.sin_cos();
+    let angle = nanotap_arithmetic::atan(t / freedom.sqrt());
+    let (sine, cosine) = nanotap_arithmetic::sin_cos(angle);
     let odd = freedom % 2.0 == 1.0;
     let (mut term, mut sum, mut k) = if odd {
         (cosine, 0.0, 1.0)
@@ -131,7 +131,7 @@ pub(super) fn exceeding(value: f64, freedom: f64) -> f64 {
     if x.is_nan() || x <= 0.0 {
         return 1.0;
     }
-    let front = (a * x.ln() - x - ln_gamma(a)).exp();
+    let front = nanotap_arithmetic::exp(a * nanotap_arithmetic::ln(x) - x - ln_gamma(a));
     if x < a + 1.0 {
         let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
         while term > 1e-16 * sum {
@@ -163,12 +163,12 @@ pub(super) fn exceeding(value: f64, freedom: f64) -> f64 {
 fn ln_gamma(mut a: f64) -> f64 {
     let mut shift = 0.0;
     while a < 16.0 {
-        shift -= a.ln();
+        shift -= nanotap_arithmetic::ln(a);
         a += 1.0;
     }
     let b = 1.0 / (a * a);
-    shift + (a - 0.5) * a.ln() - a
-        + 0.5 * std::f64::consts::TAU.ln()
+    shift + (a - 0.5) * nanotap_arithmetic::ln(a) - a
+        + 0.5 * nanotap_arithmetic::ln(std::f64::consts::TAU)
         + (1.0 / 12.0 - b * (1.0 / 360.0 - b * (1.0 / 1260.0 - b / 1680.0))) / a
 }
 

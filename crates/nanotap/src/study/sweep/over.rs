@@ -216,7 +216,7 @@ impl Over {
         match self.spacing {
             Spacing::Listed => self.listed.get(index).copied().unwrap_or(self.to),
             Spacing::Linear => self.from + (self.to - self.from) * share,
-            Spacing::Log => self.from * (self.to / self.from).powf(share),
+            Spacing::Log => self.from * nanotap_arithmetic::powf(self.to / self.from, share),
         }
     }
 

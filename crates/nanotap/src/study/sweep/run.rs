@@ -111,7 +111,7 @@ impl Outcome {
             outcome.period = orbit.period;
             outcome.multiplier = orbit.spectral_radius();
             // Exact for an orbit; the chaos it may have been before does not count.
-            outcome.lyapunov = outcome.multiplier.ln() / orbit.period as f64;
+            outcome.lyapunov = nanotap_arithmetic::ln(outcome.multiplier) / orbit.period as f64;
         } else if let Some(spectrum) = &named.spectrum {
             (outcome.lyapunov, outcome.lyapunov_error) = spectrum.largest();
         }

@@ -6,7 +6,7 @@ use clap::Args;
 use nanotap::control::Control;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::time_series;
+use nanotap::observe::{PhysicalMotion, time_series};
 use nanotap::study::orbit::{OrbitReport, OrbitRequest, OrbitStudy};
 use nanotap::study::registry::Study as _;
 
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         )?;
     }
     if let Some(path) = &arguments.harmonics_out {
-        file::write(path, harmonics_csv(orbit).as_bytes())?;
+        file::write(path, harmonics_csv(orbit, found.physical.as_ref()).as_bytes())?;
     }
     arguments
         .plot
@@ -74,13 +74,24 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, found, |found| text(&case, &model, &found.motion))
 }
 
-fn harmonics_csv(orbit: &OrbitReport) -> String {
-    let beam = orbit.spectrum.harmonics.iter().any(|h| h.slope.is_some());
+/// A row a harmonic; of a physical case the SI columns follow.
+fn harmonics_csv(orbit: &OrbitReport, physical: Option<&PhysicalMotion>) -> String {
+    let harmonics = &orbit.spectrum.harmonics;
+    let setting = physical.and_then(|motion| motion.setting.as_ref());
+    let in_si = setting.map_or(&[][..], |setting| &setting.harmonics);
     let mut csv = String::from("order,tip,tip_lag_degrees,force,force_lag_degrees");
-    csv.push_str(if beam { ",slope\n" } else { "\n" });
-    for h in &orbit.spectrum.harmonics {
+    if harmonics.iter().any(|h| h.slope.is_some()) {
+        csv.push_str(",slope");
+    }
+    if !in_si.is_empty() {
+        csv.push_str(",frequency (Hz),tip (m),force (N)");
+    }
+    csv.push('\n');
+    for (k, h) in harmonics.iter().enumerate() {
         let cells = [h.order, h.tip, h.tip_phase, h.force, h.force_phase];
-        csv.push_str(&number::row(cells.into_iter().chain(h.slope)));
+        let si = in_si.get(k).map(|h| [h.frequency, h.tip, h.force]);
+        let cells = cells.into_iter().chain(h.slope);
+        csv.push_str(&number::row(cells.chain(si.into_iter().flatten())));
         csv.push('\n');
     }
     csv

@@ -65,7 +65,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         )?;
     }
     if let Some(path) = &arguments.harmonics_out {
-        file::write(path, harmonics_csv(orbit, found.physical.as_ref()).as_bytes())?;
+        file::write(
+            path,
+            harmonics_csv(orbit, found.physical.as_ref()).as_bytes(),
+        )?;
     }
     arguments
         .plot

@@ -175,9 +175,15 @@ pub(crate) fn follow<F: MapFamily>(
             break;
         }
         arclength += taken;
-        branch
-            .points
-            .push(point(solver, &next, &next_tests, arclength)?);
+        let reached = point(solver, &next, &next_tests, arclength)?;
+        let multiplier = reached.orbit.spectral_radius();
+        branch.points.push(reached);
+        if multiplier > options.max_multiplier {
+            branch.end = BranchEnd::Repelling {
+                parameter: next.parameter,
+            };
+            break;
+        }
         let turn = angle(solver, &node, &next);
         if next.iterations <= 4 && turn < 0.5 * options.max_angle {
             step = (1.5 * step).min(options.max_step);

@@ -62,6 +62,8 @@ pub struct ContinuationOptions {
     pub residual_tolerance: f64,
     /// Whether the branch is left at its first fold.
     pub until_fold: bool,
+    /// The branch is left where a disturbance grows by more than this in the orbit's period.
+    pub max_multiplier: f64,
 }
 
 impl ContinuationOptions {
@@ -79,6 +81,7 @@ impl ContinuationOptions {
             parameter_scale: None,
             residual_tolerance: 1e-10,
             until_fold: false,
+            max_multiplier: f64::INFINITY,
         }
     }
 }
@@ -160,6 +163,11 @@ pub enum BranchEnd {
     },
     /// It was to be left at its first fold.
     Fold,
+    /// Its multipliers passed [`ContinuationOptions::max_multiplier`].
+    Repelling {
+        /// Where.
+        parameter: f64,
+    },
     /// The allowed number of points was used up.
     PointLimit,
     /// The caller stopped it.
@@ -190,6 +198,10 @@ impl BranchEnd {
                 format!("the orbit ends where it grazes, at {}", shown(*parameter))
             }
             Self::Fold => "the first fold".into(),
+            Self::Repelling { parameter } => format!(
+                "the orbit repels too strongly to be met beyond {}",
+                shown(*parameter)
+            ),
             Self::PointLimit => "the allowed number of points".into(),
             Self::Cancelled => "stopped by the caller".into(),
         }
@@ -204,7 +216,8 @@ impl BranchEnd {
             | Self::Collapsed { .. }
             | Self::Vanished { .. }
             | Self::Fold
-            | Self::Grazing { .. } => false,
+            | Self::Grazing { .. }
+            | Self::Repelling { .. } => false,
             Self::LeftDomain | Self::StepTooSmall { .. } | Self::PointLimit | Self::Cancelled => {
                 true
             }

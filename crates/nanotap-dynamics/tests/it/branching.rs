@@ -109,6 +109,25 @@ fn the_henon_fixed_point_turns_at_its_fold() {
     }
 }
 
+/// The fixed point 1 − 1/r of the logistic map has the multiplier 2 − r: −1.5 at r = 3.5.
+#[test]
+fn a_branch_is_left_where_its_orbit_repels_too_strongly() {
+    let orbit = orbit_at(&LOGISTIC, 2.5, &[0.6], 1);
+    let options = ContinuationOptions {
+        max_multiplier: 1.5,
+        ..ContinuationOptions::over(2.0, 4.0)
+    };
+    let up = Direction::Increasing;
+    let b = continue_orbit(&LOGISTIC, 2.5, &orbit, up, &options, &Control::default()).unwrap();
+    let BranchEnd::Repelling { parameter } = b.end else {
+        panic!("{}", b.end)
+    };
+    assert!((3.5..3.5 + 2.0 * options.max_step).contains(&parameter));
+    assert!(!b.end.is_failure());
+    let before = &b.points[b.points.len() - 2].orbit;
+    assert!(before.spectral_radius() <= 1.5);
+}
+
 /// a = 3(1−b)²/4 for the first flip, (1−b)² + (1+b)²/4 for the second.
 #[test]
 fn henon_flips_and_its_doubled_branch() {

@@ -47,6 +47,8 @@ pub struct BranchOptions {
     pub max_points: usize,
     /// Branches after which no more are followed.
     pub max_branches: usize,
+    /// A branch is left where a disturbance grows by more than this in the orbit's period.
+    pub max_multiplier: f64,
     /// What is measured of every orbit.
     pub observables: Set,
 }
@@ -91,6 +93,7 @@ impl BranchOptions {
             max_step: continuation.max_step,
             max_points: 20_000,
             max_branches: 64,
+            max_multiplier: continuation.max_multiplier,
             observables: Set::COMMON,
         }
     }
@@ -101,6 +104,7 @@ impl BranchOptions {
             max_step: self.max_step,
             initial_step: over.initial_step.min(self.max_step),
             max_points: self.max_points,
+            max_multiplier: self.max_multiplier,
             ..over
         }
     }

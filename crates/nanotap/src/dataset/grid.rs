@@ -126,6 +126,25 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Ten entries by four are three chunks, the last one short; eight are two, none empty.
+    #[test]
+    fn chunks_are_as_many_and_as_long_as_counted_by_hand() {
+        let ranges = |length, chunk| {
+            let grid = Grid {
+                axes: vec![Axis::new("x", length, chunk)],
+            };
+            let all = (0..grid.chunks()).map(|chunk| grid.block(chunk).ranges[0].clone());
+            all.collect::<Vec<_>>()
+        };
+        assert_eq!(ranges(10, 4), [0..4, 4..8, 8..10]);
+        assert_eq!(ranges(8, 4), [0..4, 4..8]);
+        assert_eq!(ranges(3, 9), [0..3]);
+        // Two rows by five columns, by two: row-major, as Zarr's names say.
+        let axes = vec![Axis::new("y", 2, 1), Axis::new("x", 5, 2)];
+        let block = Grid { axes }.block(4);
+        assert_eq!((block.place, block.ranges), (vec![1, 1], vec![1..2, 2..4]));
+    }
+
     proptest! {
         /// Every entry of the grid lies in exactly one block, and slots do not collide.
         #[test]

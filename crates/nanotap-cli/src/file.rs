@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use nanotap::files;
+use nanotap::dataset::files;
 use nanotap_figures::{Figure, MADE_BY};
 
 use crate::failure::Failure;

@@ -1,6 +1,6 @@
 //! Numbers as a person reads them, and as a table holds them.
 
-use nanotap::case::quantity::shortest;
+use nanotap::number::shortest;
 
 /// `value` with `digits` significant digits: `0.1447`, `20.34`, `3.113e-8`.
 ///

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nanotap::files;
+use nanotap::dataset::files;
 use rayon::prelude::*;
 
 use super::section::Picture;

@@ -18,9 +18,9 @@ pub mod case;
 pub mod dataset;
 pub mod error;
 pub mod figure;
-pub mod files;
 pub mod map;
 pub mod model;
+pub mod number;
 pub mod observe;
 pub mod study;
 

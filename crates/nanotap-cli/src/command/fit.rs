@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::Key;
-use nanotap::case::quantity::shortest;
 use nanotap::figure::fit::fit_figure;
+use nanotap::number::shortest;
 use nanotap::study::fit::{FitReport, FitRequest, FitStudy, FittedParameter, Table as Data};
 use nanotap::study::registry::Study as _;
 use serde::Serialize;

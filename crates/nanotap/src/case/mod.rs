@@ -48,7 +48,6 @@ use file::{CaseFileError, Described, Source};
 use key::{ModelKind, Section};
 use near_name::near_name;
 use physical::{Catalogue, Kind, Physical, Reader, Remark, Scales};
-use quantity::shortest;
 use stated::Stated;
 use units::Units;
 
@@ -56,6 +55,7 @@ use crate::model::cantilever::Cantilever;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
+use crate::number::shortest;
 
 /// How many modes a case has that does not say.
 pub const DEFAULT_MODES: usize = 3;

@@ -26,6 +26,7 @@
 pub mod attributes;
 mod deflate;
 pub mod error;
+pub mod files;
 pub mod grid;
 pub mod gsf;
 pub mod merge;

@@ -12,7 +12,7 @@ use super::error::StoreError;
 use super::grid::{Axis, Block, Grid};
 use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
 use super::zarr;
-use crate::files::{self, is_temporary};
+use crate::dataset::files::{self, is_temporary};
 
 /// The folder of markers, one a finished chunk. Zarr readers look at metadata only and
 /// never see it.

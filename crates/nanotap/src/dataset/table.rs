@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::error::StoreError;
 use super::schema::{Attributes, Coordinate, Schema, Values, Variable};
 use super::store::Store;
-use crate::case::quantity::shortest;
+use crate::number::shortest;
 
 /// Hands `sink` the table as CSV, piece by piece: the coordinates, then every variable
 /// that has no further dimension. Codes are written as the words of their

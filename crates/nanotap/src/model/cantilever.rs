@@ -10,6 +10,7 @@ use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::higher_modes::HigherModes;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
+use crate::number::shortest;
 
 /// Which cosine term the drive has in Eq. (14) of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
@@ -299,7 +300,7 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
 
 /// A field of a [`Cantilever`] that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("`{key}` = {value}: {reason}")]
+#[error("`{key}` = {}: {reason}", shortest(*value))]
 pub struct CantileverError {
     /// The field's name in a case file.
     pub key: &'static str,
@@ -494,7 +495,7 @@ mod tests {
             let error = case.validate().unwrap_err();
             assert_eq!((error.key, error.reason), (key, reason));
             let message = error.to_string();
-            assert!(message.contains(key) && message.contains(&error.value.to_string()));
+            assert!(message.contains(key) && message.contains(&shortest(error.value)));
         }
     }
 

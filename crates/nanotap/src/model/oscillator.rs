@@ -11,6 +11,7 @@ use nanotap_flow::{Drive, HarmonicVector, Output, Reset, Sticking, System, Trans
 use serde::Serialize;
 
 use crate::model::{Model, ModelError, ModelTangent, Powers, Product};
+use crate::number::shortest;
 
 /// The stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -52,7 +53,7 @@ pub struct Oscillator {
 
 /// A parameter of an oscillator that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{key} = {value}: {expected}")]
+#[error("{key} = {}: {expected}", shortest(*value))]
 pub struct OscillatorError {
     /// Its name.
     pub key: &'static str,

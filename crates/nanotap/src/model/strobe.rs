@@ -182,6 +182,8 @@ struct ExactStrobe {
     /// Work space of a Jacobian.
     carried: Jacobian,
     gap: Arc<Output>,
+    /// Whether tip and surface part at equal speeds.
+    parts_at_rest: bool,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
 }
@@ -193,6 +195,7 @@ impl ExactStrobe {
             last: Vec::new(),
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
+            parts_at_rest: model.forgetting.is_some(),
             tangents: tangents.into(),
         }
     }
@@ -309,6 +312,8 @@ impl ExactStrobe {
         self.begin(state)?;
         let mut collector = GapExtrema {
             gap: &self.gap,
+            parts_at_rest: self.parts_at_rest,
+            switched: false,
             tangencies,
         };
         self.flow.run_period(&mut collector)?;
@@ -342,8 +347,16 @@ impl Observer for LogDeterminant {
 /// Collects the local extrema of the gap over a period.
 struct GapExtrema<'a> {
     gap: &'a Output,
+    /// Whether tip and surface part at equal speeds: the gap is then least, and zero, where they
+    /// part, which is no grazing.
+    parts_at_rest: bool,
+    /// Whether the stretch begins with a switch.
+    switched: bool,
     tangencies: &'a mut Vec<Tangency>,
 }
+
+/// Nearer to the parting, in drive periods, an extremum of the gap is the parting itself.
+const PARTING: f64 = 1e-6;
 
 impl Observer for GapExtrema<'_> {
     fn segment(&mut self, segment: &SegmentView<'_>) {
@@ -359,12 +372,20 @@ impl Observer for GapExtrema<'_> {
             segment.length,
         );
         let rate = signal.differentiated(segment.length);
+        let period = system.drive().period();
         for s in sign_changes(&rate, segment.length) {
-            let phase = (segment.phase + s) / system.drive().period();
+            if self.parts_at_rest && self.switched && s < PARTING * period {
+                continue;
+            }
+            let phase = (segment.phase + s) / period;
             self.tangencies.push(Tangency {
                 phase,
                 value: signal.at(s),
             });
         }
+    }
+
+    fn switch(&mut self, _: &SwitchView<'_>) {
+        self.switched = true;
     }
 }

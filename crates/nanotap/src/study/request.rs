@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 
 use crate::Error;
 use crate::case::near_name::near_name;
-use crate::case::quantity::shortest;
+use crate::number::shortest;
 
 /// The JSON schema of what a study answers: what recurs stands under `$defs`.
 pub fn answer_schema<T: JsonSchema>() -> Schema {

@@ -4,7 +4,9 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
+use nanotap::model::strobe::Strobe;
 use nanotap::observe::begins_contact;
+use nanotap_dynamics::StroboscopicMap as _;
 use nanotap_flow::{Flow, Trajectory};
 
 use crate::contact_laws::on;
@@ -132,4 +134,26 @@ fn limits_of_the_surface() {
     let run = Trajectory::record(&free.system, &vec![0.0; free.dimension()], 2).unwrap();
     let (least, most) = run.signal_by_regime(&free.force).range().unwrap();
     assert_eq!((least.value, most.value), (0.0, 0.0));
+}
+
+/// Where tip and surface part, gap and rate vanish together at every frequency: that is no
+/// grazing. The orbit of one contact a period that the paper's lever has here grazes nowhere.
+#[test]
+fn parting_is_no_grazing() {
+    for k in 0..40 {
+        let omega = 19.5 + 0.02 * f64::from(k);
+        let model = Model::cantilever(&on(ContactLaw::KelvinVoigt, omega)).unwrap();
+        let mut map = Strobe::new(&model);
+        let mut state = vec![0.0; model.dimension()];
+        for _ in 0..40 {
+            map.advance(&mut state).unwrap();
+        }
+        let mut tangencies = Vec::new();
+        map.advance_with_tangencies(&mut state, &mut tangencies)
+            .unwrap();
+        assert!(!tangencies.is_empty());
+        for tangency in tangencies {
+            assert!(tangency.value.abs() > 1e-3, "{omega}: {tangency:?}");
+        }
+    }
 }

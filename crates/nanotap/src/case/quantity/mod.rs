@@ -325,16 +325,6 @@ impl Kind {
     }
 }
 
-/// The shortest decimal number that reads back as `value`, without zeros to be counted.
-pub fn shortest(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && !(1e-5..1e16).contains(&size) {
-        return format!("{value:e}");
-    }
-    // Zero has no sign.
-    (value + 0.0).to_string()
-}
-
 /// Writes an energy in joules as electronvolts with four significant digits: "12.3 eV".
 pub fn format_electronvolts(joules: f64) -> String {
     engineering(joules / JOULES_PER_ELECTRONVOLT, Some(4), "eV", 0, true)

@@ -25,8 +25,11 @@ pub(crate) fn verdict(classification: Classification, period: Option<usize>) -> 
 }
 
 /// A phase in degrees.
-fn degrees(phase: f64) -> String {
-    number::significant(shown_phase(phase), 4)
+/// A lag in degrees behind a tone, or how far ahead of it.
+pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
+    let phase = shown_phase(phase);
+    let way = if phase < 0.0 { "ahead of" } else { "behind" };
+    format!("{}° {way} {tone}", number::significant(phase.abs(), digits))
 }
 
 /// Tip, gap, contact and force.
@@ -75,14 +78,14 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
         "at the drive's frequency",
         &number::significant(o.first_harmonic, 6),
         &si(Kind::Length, o.first_harmonic),
-        &format!("{}° behind the drive", degrees(o.phase)),
+        &lag(o.phase, "the drive", 4),
     ]);
-    if let Some((amplitude, lag)) = o.tone2_response.zip(o.tone2_lag) {
+    if let Some((amplitude, phase)) = o.tone2_response.zip(o.tone2_lag) {
         table.row([
             "at the second tone",
             &number::significant(amplitude, 6),
             &si(Kind::Length, amplitude),
-            &format!("{}° behind that tone", degrees(lag)),
+            &lag(phase, "that tone", 4),
         ]);
     }
     table.row([
@@ -167,14 +170,14 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
     if let Some([low, high]) = o.slope_range {
         table.row(["slope at the tip", &range(low, high), "", ""]);
     }
-    if let Some((amplitude, lag)) = o.optical_amplitude.zip(o.optical_phase) {
+    if let Some((amplitude, phase)) = o.optical_amplitude.zip(o.optical_phase) {
         table.row([
             "an optical lever reads",
             &number::significant(amplitude, 6),
             &si(Kind::Length, amplitude),
             &format!(
-                "{}° behind the drive, calibrated by a static force",
-                degrees(lag)
+                "{}, calibrated by a static force",
+                lag(phase, "the drive", 4)
             ),
         ]);
     }
@@ -224,9 +227,9 @@ pub(crate) fn energy(o: &Observables, units: &Units) -> String {
 pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> String {
     const SHOWN: usize = 8;
     let mut text = format!(
-        "  {}\n  phase {}° behind the drive, distortion (THD) {} %\n",
+        "  {}\n  phase {}, distortion (THD) {} %\n",
         style::bold("harmonics of the tip deflection and of the force"),
-        number::significant(shown_phase(spectrum.phase), 6),
+        lag(spectrum.phase, "the drive", 6),
         number::significant(100.0 * spectrum.thd, 4),
     );
     let symbol = if matches!(units, Units::Si(_)) {

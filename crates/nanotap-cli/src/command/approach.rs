@@ -142,9 +142,9 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     );
     let mut text = format!("{}\n\n", style::bold(&heading));
     text.push_str(&motion::paragraph(&format!(
-        "free: amplitude {}, {}° behind the drive; it touches from {} on",
+        "free: amplitude {}, {}; it touches from {} on",
         shown(Kind::Length, report.free_amplitude),
-        number::significant(shown_phase(report.free_phase), 4),
+        motion::lag(report.free_phase, "the drive", 4),
         shown(Kind::Length, report.free_reach)
     )));
     let mut table = Table::new([

@@ -21,7 +21,7 @@ use crate::failure::Failure;
 use crate::given_case::at_setpoint;
 use crate::output::Output;
 use crate::table::{Align, Table};
-use crate::{file, number, style};
+use crate::{file, motion, number, style};
 
 /// Check a case and show it resolved.
 #[derive(Args, Debug)]
@@ -201,9 +201,8 @@ fn physical(title: &str, view: &Physical) -> String {
     ]);
     let free = Kind::Length.format(view.free_amplitude);
     let phase = format!(
-        "free amplitude of the tip, {:.1}° behind the {}",
-        shown_phase(view.free_phase),
-        view.phase_reference()
+        "free amplitude of the tip, {}",
+        motion::lag(view.free_phase, &format!("the {}", view.phase_reference()), 4)
     );
     given.row(["A0", &free, &phase]);
     if let Some(setpoint) = view.setpoint {

@@ -136,4 +136,22 @@ mod tests {
         let error = average.standard_error()[0];
         assert!(error > 0.6 * expected && error < 1.7 * expected);
     }
+
+    /// Sixteen zeros and ones, by hand: in pairs of equals the means of two scatter more
+    /// (variance 2/7 of eight), alternating the values themselves do (4/15 of sixteen). The
+    /// larger of both errors is the one that counts.
+    #[test]
+    fn both_block_lengths_count() {
+        let error = |pattern: [f64; 4]| {
+            let mut average = BlockAverage::new(1);
+            for k in 0..16 {
+                average.push(&[pattern[k % 4]]);
+            }
+            average.standard_error()[0]
+        };
+        let by_pairs = (2.0_f64 / 7.0 / 8.0).sqrt();
+        let by_values = (4.0_f64 / 15.0 / 16.0).sqrt();
+        assert!((error([0.0, 0.0, 1.0, 1.0]) - by_pairs).abs() < 1e-15);
+        assert!((error([0.0, 1.0, 0.0, 1.0]) - by_values).abs() < 1e-15);
+    }
 }

@@ -202,7 +202,11 @@ fn physical(title: &str, view: &Physical) -> String {
     let free = Kind::Length.format(view.free_amplitude);
     let phase = format!(
         "free amplitude of the tip, {}",
-        motion::lag(view.free_phase, &format!("the {}", view.phase_reference()), 4)
+        motion::lag(
+            view.free_phase,
+            &format!("the {}", view.phase_reference()),
+            4
+        )
     );
     given.row(["A0", &free, &phase]);
     if let Some(setpoint) = view.setpoint {

@@ -192,13 +192,10 @@ impl Accumulator {
                 }
             }
         }
-        let products = &plan.request.products;
-        if products.iter().any(|&(g, h)| used(g) && used(h)) {
+        if regime.products.iter().any(|weights| !weights.is_empty()) {
             stretch.pair(&regime.rates);
-            for (sum, &(g, h)) in self.products.iter_mut().zip(products) {
-                if used(g) && used(h) {
-                    *sum += stretch.product(&regime.weights[g], &regime.weights[h]);
-                }
+            for (sum, weights) in self.products.iter_mut().zip(&regime.products) {
+                *sum += stretch.product(weights);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::stretch::{Rate, Rates};
+use super::stretch::{Rate, Rates, pair_weights};
 use crate::regime::{Kernel, ModalOutput};
 use crate::search::table::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};
@@ -163,7 +163,6 @@ impl Request {
                 End::Greatest => ranges[at].greatest = Some(key),
             }
         }
-        let products = !self.products.is_empty();
         let regimes = regimes.iter().zip(outputs).zip(signs).enumerate();
         let regimes = regimes
             .map(|(r, ((regime, outputs), signs))| {
@@ -173,8 +172,14 @@ impl Request {
                     .iter()
                     .any(|transition| transition.table.as_ref().is_some_and(Table::is_complete));
                 let drive = system.drive();
-                let plan =
-                    RegimePlan::new(regime, drive, outputs, &frequencies, products, tabulated);
+                let plan = RegimePlan::new(
+                    regime,
+                    drive,
+                    outputs,
+                    &frequencies,
+                    &self.products,
+                    tabulated,
+                );
                 RegimePlan { signs, ..plan }
             })
             .collect();
@@ -230,6 +235,8 @@ pub(super) struct RegimePlan {
     pub(super) outputs: Vec<ModalOutput>,
     /// Of each channel the weights of modes, tones and constant; none where it is zero.
     pub(super) weights: Vec<Vec<Complex>>,
+    /// Of each product the weights of pairs of terms; none where a channel is zero.
+    pub(super) products: Vec<Vec<[Complex; 2]>>,
     pub(super) kernels: Vec<Kernel>,
     pub(super) rates: Rates,
     /// The rates as each frequency sees them.
@@ -247,13 +254,15 @@ impl RegimePlan {
         drive: &Drive,
         outputs: Vec<ModalOutput>,
         frequencies: &[f64],
-        products: bool,
+        products: &[(usize, usize)],
         tabulated: bool,
     ) -> Self {
-        let weights = outputs.iter().map(weights).collect();
+        let weights: Vec<Vec<Complex>> = outputs.iter().map(weights).collect();
+        let product = |&(g, h): &(usize, usize)| pair_weights(&weights[g], &weights[h]);
+        let pairs = products.iter().map(product).collect();
         let kernel = |output| Kernel::new(regime, drive, output);
         let kernels: Vec<Kernel> = outputs.iter().map(kernel).collect();
-        let rates = Rates::new(&regime.basis().eigenvalues, drive, products);
+        let rates = Rates::new(&regime.basis().eigenvalues, drive, !products.is_empty());
         let turned = frequencies
             .iter()
             .map(|&omega| rates.turned(omega))
@@ -264,6 +273,7 @@ impl RegimePlan {
         Self {
             outputs,
             weights,
+            products: pairs,
             kernels,
             rates,
             turned,

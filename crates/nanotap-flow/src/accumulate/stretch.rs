@@ -194,22 +194,14 @@ impl Stretch {
         }
     }
 
-    /// `∫ g h ds`.
-    pub(super) fn product(&self, g: &[Complex], h: &[Complex]) -> f64 {
-        let mut sum = 0.0;
-        let mut pairs = self.pairs.iter();
-        for (j, (gj, hj)) in g.iter().zip(h).enumerate() {
-            let rest = g[j..].iter().zip(&h[j..]).zip(&mut pairs);
-            for (k, ((gk, hk), [direct, crossed])) in rest.enumerate() {
-                let mut term = (gj * hk * direct).re + (gj * hk.conj() * crossed).re;
-                if k > 0 {
-                    // The other order: crossed pairs are each other's conjugates.
-                    term += (gk * hj * direct).re + (gk * hj.conj() * crossed.conj()).re;
-                }
-                sum += term;
-            }
-        }
-        0.5 * sum
+    /// `∫ g h ds` of the outputs whose [`pair_weights`] these are.
+    pub(super) fn product(&self, weights: &[[Complex; 2]]) -> f64 {
+        let pairs = weights.iter().zip(&self.pairs);
+        pairs
+            .map(|([v, w], [direct, crossed])| {
+                (v.re * direct.re - v.im * direct.im) + (w.re * crossed.re - w.im * crossed.im)
+            })
+            .sum()
     }
 
     /// A bound of the output's size, where no term grows.
@@ -230,6 +222,24 @@ impl Stretch {
         }
         ends
     }
+}
+
+/// The weights of the pairs of terms in the product of two outputs with these weights: for
+/// `j ≤ k` half of `g_j h_k + g_k h_j` and of `g_j h̄_k + ḡ_k h_j`, once where `j = k`; the
+/// crossed pairs of the other order are their conjugates.
+pub(super) fn pair_weights(g: &[Complex], h: &[Complex]) -> Vec<[Complex; 2]> {
+    let mut weights = Vec::new();
+    for (j, (gj, hj)) in g.iter().zip(h).enumerate() {
+        for (k, (gk, hk)) in g.iter().zip(h).enumerate().skip(j) {
+            let (mut direct, mut crossed) = (gj * hk, gj * hk.conj());
+            if k > j {
+                direct += gk * hj;
+                crossed += gk.conj() * hj;
+            }
+            weights.push([direct * 0.5, crossed * 0.5]);
+        }
+    }
+    weights
 }
 
 /// `Re Σ a b`.

@@ -146,6 +146,11 @@ def _series(names: list[str], values: Floats) -> "xr.Dataset":
     """A time series: its columns over `tau`, those of the state together."""
     import xarray as xr
 
+    return describe(xr.Dataset(*_columns(names, values)))
+
+
+def _columns(names: list[str], values: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and coordinates of a time series."""
     tau = values[:, 0]
     plain = [name for name in names[1:6] if name in names]
     entries = names[6:]
@@ -160,7 +165,30 @@ def _series(names: list[str], values: Floats) -> "xr.Dataset":
     if entries:
         variables["states"] = (("tau", "state"), values[:, 6:])
         coords["state"] = words(entries)
-    return describe(xr.Dataset(variables, coords))
+    return variables, coords
+
+
+def _recorded(
+    document: dict[str, Any], entries: list[str]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and coordinates of strobe points and events, which leave the document."""
+    strobe = np.array(document.pop("strobe"), dtype=float).reshape(-1, len(entries))
+    events = document.pop("events")
+    variables = {
+        "strobe": (("strobe_period", "state"), strobe),
+        "events": ("event", np.array([e["tau"] for e in events], dtype=float)),
+        "event_kind": ("event", np.array([e["kind"] for e in events], dtype=str)),
+    }
+    if all("gap_rate" in event for event in events):
+        rates = np.array([event["gap_rate"] for event in events], dtype=float)
+        variables["event_gap_rate"] = ("event", rates)
+    last = document["periods"]
+    told = {"long_name": "end of this recorded period", "units": "drive periods"}
+    ends = np.arange(last - len(strobe) + 1, last + 1)
+    return variables, {
+        "strobe_period": ("strobe_period", ends, told),
+        "state": words(entries),
+    }
 
 
 def _run_dataset(
@@ -168,28 +196,12 @@ def _run_dataset(
 ) -> "xr.Dataset":
     import xarray as xr
 
-    entries = case.state_names
-    strobe = np.array(document.pop("strobe"), dtype=float).reshape(-1, len(entries))
-    events = document.pop("events")
-    variables, attributes = _variables(document, entries)
-    last = document["periods"]
-    ds = _series(names, values)
-    ds = ds.assign(variables).assign(
-        strobe=(("strobe_period", "state"), strobe),
-        events=("event", np.array([event["tau"] for event in events], dtype=float)),
-        event_kind=("event", np.array([event["kind"] for event in events], dtype=str)),
-    )
-    if all("gap_rate" in event for event in events):
-        rates = np.array([event["gap_rate"] for event in events], dtype=float)
-        ds = ds.assign(event_gap_rate=("event", rates))
-    ds = ds.assign_coords(
-        strobe_period=np.arange(last - len(strobe) + 1, last + 1), state=words(entries)
-    )
-    ds.strobe_period.attrs.update(
-        long_name="end of this recorded period", units="drive periods"
-    )
+    series, times = _columns(names, values)
+    recorded, coords = _recorded(document, case.state_names)
+    variables, attributes = _variables(document, case.state_names)
+    # At once: every `assign` copies and aligns the whole dataset.
+    ds = xr.Dataset(series | variables | recorded, times | coords)
     ds.attrs.update(case_attributes(case, "one run"), **attributes)
-    assert isinstance(ds, xr.Dataset)
     return describe(ds)
 
 
@@ -243,23 +255,12 @@ def _fixed_step(
 ) -> "xr.Dataset":
     import xarray as xr
 
-    entries = case.state_names
     exact = parsed.pop("exact")
-    strobe = np.array(parsed.pop("strobe"), dtype=float).reshape(-1, len(entries))
-    events = parsed.pop("events")
     steps = parsed.pop("steps")
-    variables, attributes = _variables(parsed, entries)
-    last = parsed["periods"]
-    ds = xr.Dataset(
-        {name: ("tau", values[:, k]) for k, name in enumerate(names) if k},
-        {"tau": values[:, 0], "state": words(entries)},
-    )
-    ds = ds.assign(variables).assign(
-        strobe=(("strobe_period", "state"), strobe),
-        events=("event", np.array([event["tau"] for event in events], dtype=float)),
-        event_kind=("event", np.array([event["kind"] for event in events], dtype=str)),
-    )
-    ds = ds.assign_coords(strobe_period=np.arange(last - len(strobe) + 1, last + 1))
+    recorded, coords = _recorded(parsed, case.state_names)
+    variables, attributes = _variables(parsed, case.state_names)
+    series = {name: ("tau", values[:, k]) for k, name in enumerate(names) if k}
+    ds = xr.Dataset(series | variables | recorded, coords | {"tau": values[:, 0]})
     ds.attrs.update(case_attributes(case, "one run with time steps"), **attributes)
     ds.attrs.update(
         steps=steps,

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from ._results import Attractors, Convergence, Fit, Lyapunov, Paper, Record
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Found = TypeVar("Found")
 
 
 def _run(
@@ -51,16 +53,20 @@ def attractors(
     return found
 
 
+def _finished(found: Found, interrupted: bool) -> Found:
+    """What a study found, if nobody stopped it."""
+    if interrupted:
+        message = "stopped before it was done"
+        raise Interrupted(message, found)
+    return found
+
+
 def branch(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "xr.Dataset":
     """Branches over `point`; of work that Ctrl-C stopped, what was followed."""
     document, interrupted = _run("branch", case, options, threads, progress)
-    ds = _branch_dataset(case, document)
-    if interrupted:
-        message = "stopped before it was done"
-        raise Interrupted(message, ds)
-    return ds
+    return _finished(_branch_dataset(case, document), interrupted)
 
 
 def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
@@ -151,11 +157,7 @@ def approach(
 ) -> "xr.Dataset":
     """An approach curve over `way` and distance; of one that Ctrl-C stopped, what was done."""
     document, interrupted = _run("approach", case, options, threads, progress)
-    ds = _approach_dataset(case, document)
-    if interrupted:
-        message = "stopped before it was done"
-        raise Interrupted(message, ds)
-    return ds
+    return _finished(_approach_dataset(case, document), interrupted)
 
 
 def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
@@ -249,11 +251,7 @@ def contact_laws(
 ) -> Record:
     """The motion under each contact law."""
     document, interrupted = _run("contact-laws", case, options, threads, progress)
-    found = Record(document)
-    if interrupted:
-        message = "stopped before it was done"
-        raise Interrupted(message, found)
-    return found
+    return _finished(Record(document), interrupted)
 
 
 def fit(
@@ -270,11 +268,7 @@ def fit(
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
     document, interrupted = _run("fit", case, asked, threads, progress)
-    found = Fit(document)
-    if interrupted:
-        message = "stopped before it was done"
-        raise Interrupted(message, found)
-    return found
+    return _finished(Fit(document), interrupted)
 
 
 def paper(

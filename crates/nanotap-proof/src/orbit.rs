@@ -1,0 +1,710 @@
+//! Existence and uniqueness of a periodic orbit.
+//!
+//! An orbit of n drive periods with m switches is a zero of m(d + 1) equations in the states
+//! x_s after its switches and their times t_s: each flight from a switch ends in the state
+//! with which the next one begins, and there the guard that was left is zero. With J the
+//! Jacobian of these equations over a box X around an approximate zero z, and C an approximate
+//! inverse of J, Krawczyk's operator
+//!
+//! K(X) = z − C F(z) + (1 − C J(X)) (X − z)
+//!
+//! maps X into its inside only if X holds exactly one zero, which then lies in K(X) (Krawczyk
+//! 1969; Moore 1977; Rump, Acta Numerica 19, 2010, Sec. 13). Since the states at all switches are
+//! unknowns, no enclosure is carried through more than one flight, and none swells.
+
+use nalgebra::DMatrix;
+
+use crate::ProofError;
+use crate::flight::{Ends, stays_positive};
+use crate::interval::Interval;
+use crate::matrix::{Matrix, dot};
+use crate::multipliers::{self, Multipliers};
+use crate::system::{Reset, System, Transition};
+
+/// An approximate periodic orbit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Its period n in drive periods.
+    pub period: usize,
+    /// The regime in which it stays if it has no switch.
+    pub regime: usize,
+    /// Its switches in order of time.
+    pub switches: Vec<Switch>,
+}
+
+/// A switch of an approximate orbit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Switch {
+    /// When, from phase 0 of the first period on.
+    pub time: f64,
+    /// The regime left.
+    pub from: usize,
+    /// By which of its transitions.
+    pub transition: usize,
+    /// The state just after it.
+    pub state: Vec<f64>,
+}
+
+/// An orbit that was proved to exist.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Theorem {
+    /// Its minimal period in drive periods.
+    pub period: usize,
+    /// The state at drive phase 0 of each of its periods.
+    pub states: Vec<Vec<Interval>>,
+    /// Its switches.
+    pub switches: Vec<EnclosedSwitch>,
+    /// How far around it there is no other; `None` without switches, where there is no other
+    /// that stays in its regime.
+    pub alone: Option<Alone>,
+    /// Its multipliers.
+    pub multipliers: Multipliers,
+}
+
+/// A switch of an orbit that exists.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnclosedSwitch {
+    /// When, from phase 0 of the first period on.
+    pub time: Interval,
+    /// The regime left.
+    pub from: usize,
+    /// The regime entered.
+    pub to: usize,
+    /// The state just after it.
+    pub state: Vec<Interval>,
+}
+
+/// No other orbit of the same period and sequence of regimes has all its switches this near.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alone {
+    /// Largest difference of the time of any switch.
+    pub time: f64,
+    /// Largest difference of each entry of the state after any switch.
+    pub state: Vec<f64>,
+}
+
+/// The flight from one switch to the next.
+struct Leg {
+    regime: usize,
+    /// The transition with which it ends.
+    exit: usize,
+    /// Drive periods from that of its first switch to that of its last.
+    periods: f64,
+}
+
+/// The unknowns of the equations: each switch's state and its time within its drive period.
+struct Equations<'a> {
+    system: &'a System,
+    legs: Vec<Leg>,
+}
+
+/// A box around numbers.
+#[derive(Clone)]
+struct Unknowns {
+    states: Vec<Vec<Interval>>,
+    phases: Vec<Interval>,
+}
+
+/// Most equations that are solved; their matrix grows with the square.
+pub const MOST_UNKNOWNS: usize = 3000;
+/// Part of the way of an entry of the state in a radian of the drive that it is measured by at
+/// least.
+const MOVED: f64 = 0.1;
+/// Newton steps in plain numbers before the test.
+const NEWTON_STEPS: usize = 4;
+/// Boxes tried: the first has this part of the size of the unknowns, each next one is larger
+/// by [`WIDER`].
+const FIRST_BOX: f64 = 1e-14;
+const WIDER: f64 = 10.0;
+const LARGEST_BOX: f64 = 0.1;
+/// How often the enclosure is put into the operator again.
+const TIGHTENING: usize = 3;
+
+/// Proves that there is a periodic orbit near an approximate one.
+///
+/// # Errors
+/// [`ProofError`] says what could not be proved.
+pub fn prove(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
+    if candidate.period == 0 {
+        return Err(ProofError::Candidate {
+            what: "its period is 0",
+        });
+    }
+    if candidate.switches.is_empty() {
+        return without_switches(system, candidate);
+    }
+    let d = system.dimension;
+    let count = candidate.switches.len() * (d + 1);
+    if count > MOST_UNKNOWNS {
+        return Err(ProofError::TooLarge {
+            unknowns: count,
+            limit: MOST_UNKNOWNS,
+        });
+    }
+    let (equations, offsets) = Equations::of(system, candidate)?;
+    let period = system.period.middle();
+    let mut center: Vec<f64> = Vec::with_capacity(count);
+    for (switch, offset) in candidate.switches.iter().zip(&offsets) {
+        center.extend(&switch.state);
+        center.push(switch.time - offset * period);
+    }
+    let weights = equations.weights(&center, period);
+    let (alone, enclosure) = equations.solved(&center, &weights)?;
+    let enclosed = equations.unknowns(&enclosure);
+    equations.check_flights(&enclosed)?;
+    let states = equations.states_at_phase_zero(&enclosed, &offsets, candidate.period)?;
+    minimal(&states)?;
+    let switches = candidate
+        .switches
+        .iter()
+        .zip(enclosed.states.iter().zip(&enclosed.phases))
+        .zip(&offsets)
+        .zip(&equations.legs)
+        .map(
+            |(((switch, (state, &phase)), &offset), leg)| EnclosedSwitch {
+                time: phase + Interval::point(offset) * system.period,
+                from: switch.from,
+                to: leg.regime,
+                state: state.clone(),
+            },
+        )
+        .collect();
+    Ok(Theorem {
+        period: candidate.period,
+        states,
+        switches,
+        alone: Some(Alone {
+            time: (Interval::point(alone) * Interval::point(weights[d])).lo(),
+            state: weights[..d]
+                .iter()
+                .map(|&w| (Interval::point(alone) * Interval::point(w)).lo())
+                .collect(),
+        }),
+        multipliers: multipliers::enclosed(&equations.monodromy(&enclosed)?, &weights[..d]),
+    })
+}
+
+impl<'a> Equations<'a> {
+    /// The equations of an orbit with the switches of `candidate`, and the drive period in
+    /// which each of them is.
+    fn of(system: &'a System, candidate: &Candidate) -> Result<(Self, Vec<f64>), ProofError> {
+        let wrong = |what| Err(ProofError::Candidate { what });
+        let period = system.period.middle();
+        let (mut offsets, mut targets) = (Vec::new(), Vec::new());
+        for switch in &candidate.switches {
+            let Some(transition) = system
+                .regimes
+                .get(switch.from)
+                .and_then(|regime| regime.parts.transitions.get(switch.transition))
+            else {
+                return wrong("it has a switch that the system has not");
+            };
+            if switch.state.len() != system.dimension {
+                return wrong("a state has another length than the system's");
+            }
+            if !(switch.time.is_finite() && switch.state.iter().all(|x| x.is_finite())) {
+                return wrong("not all its numbers are finite");
+            }
+            targets.push(transition.target);
+            offsets.push((switch.time / period).floor());
+        }
+        let count = targets.len();
+        let legs = (0..count)
+            .map(|s| {
+                let next = (s + 1) % count;
+                let around = if next == 0 {
+                    candidate.period as f64
+                } else {
+                    0.0
+                };
+                Leg {
+                    regime: targets[s],
+                    exit: candidate.switches[next].transition,
+                    periods: offsets[next] - offsets[s] + around,
+                }
+            })
+            .collect::<Vec<_>>();
+        for (s, leg) in legs.iter().enumerate() {
+            if candidate.switches[(s + 1) % count].from != leg.regime {
+                return wrong("a flight does not start in the regime in which it ends");
+            }
+        }
+        Ok((Self { system, legs }, offsets))
+    }
+
+    fn size(&self) -> usize {
+        self.legs.len() * (self.system.dimension + 1)
+    }
+
+    fn next(&self, leg: usize) -> usize {
+        (leg + 1) % self.legs.len()
+    }
+
+    fn exit(&self, leg: usize) -> &Transition {
+        let leg = &self.legs[leg];
+        &self.system.regimes[leg.regime].parts.transitions[leg.exit]
+    }
+
+    fn unknowns(&self, flat: &[Interval]) -> Unknowns {
+        let d = self.system.dimension;
+        let blocks = flat.chunks(d + 1);
+        Unknowns {
+            states: blocks.clone().map(|b| b[..d].to_vec()).collect(),
+            phases: blocks.map(|b| b[d]).collect(),
+        }
+    }
+
+    fn duration(&self, leg: usize, phases: &[Interval]) -> Interval {
+        let whole = Interval::point(self.legs[leg].periods) * self.system.period;
+        whole + (phases[self.next(leg)] - phases[leg])
+    }
+
+    /// What a change of each unknown is measured by: a radian of the drive, and the largest
+    /// entry of each kind at any switch, or a part of how far it moves in that time.
+    fn weights(&self, center: &[f64], period: f64) -> Vec<f64> {
+        let (d, radian) = (self.system.dimension, period / std::f64::consts::TAU);
+        let mut weights = vec![f64::MIN_POSITIVE; d];
+        for (block, leg) in center.chunks(d + 1).zip(&self.legs) {
+            let state: Vec<Interval> = block[..d].iter().copied().map(Interval::point).collect();
+            let phasors = self.system.phasors(Interval::point(block[d]));
+            let field = self.system.regimes[leg.regime].field(&state, &phasors);
+            for (i, w) in weights.iter_mut().enumerate() {
+                let moved = MOVED * radian * field[i].middle().abs();
+                *w = w.max(block[i].abs()).max(moved);
+            }
+        }
+        weights.push(radian);
+        weights
+    }
+
+    /// F.
+    fn residual(&self, at: &Unknowns) -> Vec<Interval> {
+        let mut all = Vec::with_capacity(self.size());
+        for s in 0..self.legs.len() {
+            let e = self.next(s);
+            let flown = self.flown(s, at);
+            let exit = self.exit(s);
+            let after = reset_state(exit, &flown.end, &flown.phasors);
+            all.extend(at.states[e].iter().zip(after).map(|(&x, y)| x - y));
+            let before = if exit.reset.is_some() {
+                &flown.end
+            } else {
+                &at.states[e]
+            };
+            all.push(exit.guard.at(before, &flown.phasors));
+        }
+        all
+    }
+
+    /// One flight, for all unknowns of the box.
+    fn flown(&self, leg: usize, at: &Unknowns) -> Flown {
+        let regime = &self.system.regimes[self.legs[leg].regime];
+        let start = self.system.phasors(at.phases[leg]);
+        let phasors = self.system.phasors(at.phases[self.next(leg)]);
+        let factors = regime.factors(self.duration(leg, &at.phases));
+        let mut modal = regime.modal(&at.states[leg], &start);
+        for (q, &factor) in modal.iter_mut().zip(&factors) {
+            *q = *q * factor;
+        }
+        Flown {
+            end: regime.state(&modal, &phasors),
+            propagator: regime.propagator(&factors),
+            departure: regime.field(&at.states[leg], &start),
+            phasors,
+        }
+    }
+
+    /// The columns of J, each as its rows that are not zero.
+    fn jacobian(&self, at: &Unknowns) -> Vec<Vec<(usize, Interval)>> {
+        let d = self.system.dimension;
+        let mut columns = vec![Vec::new(); self.size()];
+        let mut add = |row: usize, column: usize, x: Interval| {
+            let column: &mut Vec<(usize, Interval)> = &mut columns[column];
+            match column.iter_mut().find(|(r, _)| *r == row) {
+                Some((_, sum)) => *sum += x,
+                None => column.push((row, x)),
+            }
+        };
+        for s in 0..self.legs.len() {
+            let e = self.next(s);
+            let (rows, here, there) = (s * (d + 1), s * (d + 1), e * (d + 1));
+            let flown = self.flown(s, at);
+            let regime = &self.system.regimes[self.legs[s].regime];
+            let exit = self.exit(s);
+            let jump = |m: Matrix<Interval>| match &exit.reset {
+                None => m,
+                Some(reset) => &reset.matrix * &m,
+            };
+            let propagator = jump(flown.propagator.clone());
+            let started = propagator.apply(&flown.departure);
+            let arrival = regime.field(&flown.end, &flown.phasors);
+            let landed = reset_rate(self.system, exit, &arrival, &flown.phasors);
+            for i in 0..d {
+                for j in 0..d {
+                    add(rows + i, here + j, -propagator[(i, j)]);
+                }
+                add(rows + i, here + d, started[i]);
+                add(rows + i, there + i, Interval::ONE);
+                add(rows + i, there + d, -landed[i]);
+            }
+            let guard = &exit.guard;
+            let explicit = guard.explicit_rate(&self.system.frequencies, &flown.phasors);
+            if exit.reset.is_some() {
+                let started = flown.propagator.apply(&flown.departure);
+                for j in 0..d {
+                    add(
+                        rows + d,
+                        here + j,
+                        dot(&guard.row, &flown.propagator.column(j)),
+                    );
+                }
+                add(rows + d, here + d, -dot(&guard.row, &started));
+                add(rows + d, there + d, dot(&guard.row, &arrival) + explicit);
+            } else {
+                for j in 0..d {
+                    add(rows + d, there + j, guard.row[j]);
+                }
+                add(rows + d, there + d, explicit);
+            }
+        }
+        columns
+    }
+
+    /// Newton steps in plain numbers, then boxes around what they lead to: how large a box,
+    /// relative to the weights, holds no other zero, and the smallest enclosure found.
+    fn solved(&self, start: &[f64], weights: &[f64]) -> Result<(f64, Vec<Interval>), ProofError> {
+        let size = self.size();
+        let weight = |k: usize| weights[k % weights.len()];
+        let points = |center: &[f64]| -> Vec<Interval> {
+            center.iter().copied().map(Interval::point).collect()
+        };
+        let mut center = start.to_vec();
+        let mut inverse = DMatrix::zeros(0, 0);
+        let mut residual = Vec::new();
+        for step in 0..=NEWTON_STEPS {
+            let at = self.unknowns(&points(&center));
+            // C in units of the weights, so that its rows are comparable.
+            if step < 2 {
+                let mut matrix = DMatrix::zeros(size, size);
+                for (j, column) in self.jacobian(&at).iter().enumerate() {
+                    for &(i, x) in column {
+                        matrix[(i, j)] = x.middle() * weight(j);
+                    }
+                }
+                inverse = matrix.try_inverse().ok_or(ProofError::NoIsolatedOrbit)?;
+                // Its rows become columns, which is how it is read.
+                inverse.transpose_mut();
+            }
+            residual = self.residual(&at);
+            if step < NEWTON_STEPS {
+                for (k, x) in center.iter_mut().enumerate() {
+                    let step: f64 = inverse
+                        .column(k)
+                        .iter()
+                        .zip(&residual)
+                        .map(|(c, f)| c * f.middle())
+                        .sum();
+                    *x -= step * weight(k);
+                }
+                if center.iter().any(|x| !x.is_finite()) {
+                    return Err(ProofError::NoIsolatedOrbit);
+                }
+            }
+        }
+        let times = |row: &[f64], sparse: &mut dyn Iterator<Item = (usize, Interval)>| {
+            sparse.fold(Interval::ZERO, |sum, (i, x)| {
+                sum + Interval::point(row[i]) * x
+            })
+        };
+        let offsets: Vec<f64> = (0..size)
+            .map(|k| {
+                let row = inverse.column(k);
+                times(row.as_slice(), &mut residual.iter().copied().enumerate()).magnitude()
+            })
+            .collect();
+        let boxed = |radii: &dyn Fn(usize) -> f64| -> Vec<Interval> {
+            let around = |(k, &x): (usize, &f64)| {
+                let radius = Interval::point(radii(k)) * Interval::point(weight(k));
+                Interval::around(x, radius.hi())
+            };
+            center.iter().enumerate().map(around).collect()
+        };
+        let least = offsets.iter().copied().fold(0.0, f64::max);
+        let mut radius = FIRST_BOX.max(2.0 * least);
+        let mut found: Option<(f64, Vec<f64>)> = None;
+        while radius < LARGEST_BOX {
+            let columns = self.jacobian(&self.unknowns(&boxed(&|_| radius)));
+            // |1 − C J(X)| in units of the weights, a row each.
+            let defects = |k: usize| -> Vec<f64> {
+                let row = inverse.column(k);
+                (0..size)
+                    .map(|j| {
+                        let product = times(row.as_slice(), &mut columns[j].iter().copied());
+                        let product = product * Interval::point(weight(j));
+                        let unit = if j == k {
+                            Interval::ONE
+                        } else {
+                            Interval::ZERO
+                        };
+                        (unit - product).magnitude()
+                    })
+                    .collect()
+            };
+            let mapped = |defects: &[f64], radii: &dyn Fn(usize) -> f64, k: usize| {
+                let moved: Interval = defects
+                    .iter()
+                    .enumerate()
+                    .map(|(j, &x)| Interval::point(x) * Interval::point(radii(j)))
+                    .sum();
+                (moved + Interval::point(offsets[k])).hi()
+            };
+            let rows: Vec<Vec<f64>> = (0..size).map(defects).collect();
+            let radii: Vec<f64> = (0..size)
+                .map(|k| mapped(&rows[k], &|_| radius, k))
+                .collect();
+            if !radii.iter().all(|&r| r < radius) {
+                if found.is_some() {
+                    break;
+                }
+                radius *= WIDER;
+                continue;
+            }
+            let mut radii = radii;
+            if found.is_none() {
+                for _ in 0..TIGHTENING {
+                    radii = (0..size)
+                        .map(|k| mapped(&rows[k], &|j| radii[j], k).min(radii[k]))
+                        .collect();
+                }
+            }
+            found = Some(match found {
+                None => (radius, radii),
+                Some((_, tight)) => (radius, tight),
+            });
+            radius *= WIDER;
+        }
+        let (alone, radii) = found.ok_or(ProofError::NoIsolatedOrbit)?;
+        Ok((alone, boxed(&|k| radii[k])))
+    }
+
+    /// Proves that no flight has a switch before its end.
+    fn check_flights(&self, at: &Unknowns) -> Result<(), ProofError> {
+        for (s, leg) in self.legs.iter().enumerate() {
+            let regime = &self.system.regimes[leg.regime];
+            let duration = self.duration(s, &at.phases);
+            if !duration.is_positive() {
+                return Err(ProofError::Grazing { flight: s, at: 0.0 });
+            }
+            let phasors = self.system.phasors(at.phases[s]);
+            let modal = regime.modal(&at.states[s], &phasors);
+            let before = (s + self.legs.len() - 1) % self.legs.len();
+            let known = &self.exit(before).starts_at_zero;
+            for guard in 0..regime.guards.len() {
+                let zeros_at_start = known
+                    .iter()
+                    .find(|(transition, _)| *transition == guard)
+                    .map_or(0, |&(_, zeros)| zeros);
+                let ends = Ends {
+                    zeros_at_start,
+                    zero_at_end: guard == leg.exit,
+                };
+                let start = at.phases[s];
+                stays_positive(self.system, regime, guard, &modal, start, duration, ends).map_err(
+                    |open| ProofError::Grazing {
+                        flight: s,
+                        at: open.at,
+                    },
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The states at phase 0 of each period. Where a switch may be at phase 0, what both
+    /// flights say.
+    fn states_at_phase_zero(
+        &self,
+        at: &Unknowns,
+        offsets: &[f64],
+        periods: usize,
+    ) -> Result<Vec<Vec<Interval>>, ProofError> {
+        let phasors = self.system.phasors(Interval::ZERO);
+        let mut all = Vec::with_capacity(periods);
+        for period in 0..periods {
+            let mut state: Option<Vec<Interval>> = None;
+            for (s, leg) in self.legs.iter().enumerate() {
+                // A flight is met in its own period and, around the orbit's end, one later.
+                for around in [0.0, periods as f64] {
+                    let whole = period as f64 + around - offsets[s];
+                    let since = Interval::point(whole) * self.system.period - at.phases[s];
+                    let left = self.duration(s, &at.phases) - since;
+                    if since.hi() < 0.0 || left.hi() < 0.0 {
+                        continue;
+                    }
+                    let regime = &self.system.regimes[leg.regime];
+                    let start = self.system.phasors(at.phases[s]);
+                    let mut modal = regime.modal(&at.states[s], &start);
+                    for (q, factor) in modal.iter_mut().zip(regime.factors(since)) {
+                        *q = *q * factor;
+                    }
+                    let here = regime.state(&modal, &phasors);
+                    state = Some(match state {
+                        None => here,
+                        Some(other) => here.iter().zip(other).map(|(a, b)| a.hull(b)).collect(),
+                    });
+                }
+            }
+            all.push(state.ok_or(ProofError::Candidate {
+                what: "its switches do not cover its periods",
+            })?);
+        }
+        Ok(all)
+    }
+
+    /// The derivative of the flow from just after each switch to just after the next.
+    fn monodromy(&self, at: &Unknowns) -> Result<Vec<Matrix<Interval>>, ProofError> {
+        let d = self.system.dimension;
+        (0..self.legs.len())
+            .map(|s| {
+                let e = self.next(s);
+                let flown = self.flown(s, at);
+                let regime = &self.system.regimes[self.legs[s].regime];
+                let exit = self.exit(s);
+                let before = if exit.reset.is_some() {
+                    &flown.end
+                } else {
+                    &at.states[e]
+                };
+                let arrival = regime.field(before, &flown.phasors);
+                let explicit = exit
+                    .guard
+                    .explicit_rate(&self.system.frequencies, &flown.phasors);
+                let rate = dot(&exit.guard.row, &arrival) + explicit;
+                if rate.contains(0.0) {
+                    return Err(ProofError::Grazing {
+                        flight: s,
+                        at: self.duration(s, &at.phases).middle(),
+                    });
+                }
+                let after = self.system.regimes[exit.target].field(&at.states[e], &flown.phasors);
+                let landed = reset_rate(self.system, exit, &arrival, &flown.phasors);
+                let saltation = Matrix::from_fn(d, d, |i, j| {
+                    let jump = match &exit.reset {
+                        Some(reset) => reset.matrix[(i, j)],
+                        None if i == j => Interval::ONE,
+                        None => Interval::ZERO,
+                    };
+                    jump + (after[i] - landed[i]) * exit.guard.row[j] / rate
+                });
+                Ok(&saltation * &flown.propagator)
+            })
+            .collect()
+    }
+}
+
+/// What comes of a flight.
+struct Flown {
+    /// The state at its end.
+    end: Vec<Interval>,
+    /// The derivative of that by the state at its start, at fixed times.
+    propagator: Matrix<Interval>,
+    /// ẋ at its start.
+    departure: Vec<Interval>,
+    /// The tones at its end.
+    phasors: Vec<crate::Rectangle>,
+}
+
+/// The state after a switch.
+fn reset_state(
+    exit: &Transition,
+    before: &[Interval],
+    phasors: &[crate::Rectangle],
+) -> Vec<Interval> {
+    match &exit.reset {
+        None => before.to_vec(),
+        Some(Reset { matrix, offset }) => matrix
+            .apply(before)
+            .iter()
+            .zip(offset.at(phasors))
+            .map(|(&x, o)| x + o)
+            .collect(),
+    }
+}
+
+/// How fast the state after a switch changes with its time: R f⁻ + ρ̇.
+fn reset_rate(
+    system: &System,
+    exit: &Transition,
+    arrival: &[Interval],
+    phasors: &[crate::Rectangle],
+) -> Vec<Interval> {
+    match &exit.reset {
+        None => arrival.to_vec(),
+        Some(Reset { matrix, offset }) => matrix
+            .apply(arrival)
+            .iter()
+            .zip(offset.rate(&system.frequencies, phasors))
+            .map(|(&x, o)| x + o)
+            .collect(),
+    }
+}
+
+/// Proves that no shorter part of the orbit closes: a shorter period divides its period.
+fn minimal(states: &[Vec<Interval>]) -> Result<(), ProofError> {
+    let count = states.len();
+    for shorter in (1..count).filter(|k| count.is_multiple_of(*k)) {
+        let apart = states[0]
+            .iter()
+            .zip(&states[shorter])
+            .any(|(a, b)| a.is_disjoint(*b));
+        if !apart {
+            return Err(ProofError::ShorterPeriod { period: shorter });
+        }
+    }
+    Ok(())
+}
+
+/// An orbit that stays in one regime is its forced response, where that is the only motion
+/// that repeats.
+fn without_switches(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
+    let Some(regime) = system.regimes.get(candidate.regime) else {
+        return Err(ProofError::Candidate {
+            what: "it is in a regime that the system has not",
+        });
+    };
+    if candidate.period != 1 {
+        return Err(ProofError::ShorterPeriod { period: 1 });
+    }
+    let multipliers = multipliers::of_flow(regime, system.period);
+    if !multipliers
+        .iter()
+        .all(|m| (*m - crate::Rectangle::ONE).modulus().is_positive())
+    {
+        return Err(ProofError::NoIsolatedOrbit);
+    }
+    let modal = vec![crate::Rectangle::ZERO; regime.basis.values.len()];
+    for guard in 0..regime.guards.len() {
+        let ends = Ends::default();
+        stays_positive(
+            system,
+            regime,
+            guard,
+            &modal,
+            Interval::ZERO,
+            system.period,
+            ends,
+        )
+        .map_err(|open| ProofError::Grazing {
+            flight: 0,
+            at: open.at,
+        })?;
+    }
+    let phasors = system.phasors(Interval::ZERO);
+    Ok(Theorem {
+        period: 1,
+        states: vec![regime.response.at(&phasors)],
+        switches: Vec::new(),
+        alone: None,
+        multipliers: Multipliers::of_each(&multipliers),
+    })
+}

@@ -1,0 +1,312 @@
+//! A harmonically forced piecewise-linear system whose numbers are intervals, and its flow in
+//! closed form.
+//!
+//! In a regime ẋ = A x + f(t) with f(t) = f₀ + Σ Re(F_k e^{iω_k t}). With the forced response
+//! p(t) = p₀ + Σ Re(P_k e^{iω_k t}), p₀ = −A⁻¹f₀ and P_k = (iω_k − A)⁻¹F_k, and with L, R and λ
+//! from an [`Eigenbasis`], the motion from x at time t is
+//! x(t + s) = p(t + s) + Re(R e^{λs} L (x − p(t))).
+
+use crate::ProofError;
+use crate::complex::Rectangle;
+use crate::eigen::Eigenbasis;
+use crate::interval::Interval;
+use crate::matrix::{Matrix, dot};
+
+/// A vector `constant + Σ_k Re(tones_k e^{iω_k t})`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HarmonicVector {
+    /// The constant part.
+    pub constant: Vec<Interval>,
+    /// The complex amplitude of each tone.
+    pub tones: Vec<Vec<Rectangle>>,
+}
+
+/// A scalar `row · x + constant + Σ_k Re(tones_k e^{iω_k t})`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output {
+    /// What multiplies the state.
+    pub row: Vec<Interval>,
+    /// The constant part.
+    pub constant: Interval,
+    /// The complex amplitude of each tone.
+    pub tones: Vec<Rectangle>,
+}
+
+/// A jump of the state, `x⁺ = matrix · x⁻ + offset(t)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reset {
+    /// d × d.
+    pub matrix: Matrix<Interval>,
+    /// Of length d.
+    pub offset: HarmonicVector,
+}
+
+/// A way out of a regime, taken when its guard falls to zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transition {
+    /// Positive inside the regime.
+    pub guard: Output,
+    /// The next regime.
+    pub target: usize,
+    /// The jump of the state, if there is one.
+    pub reset: Option<Reset>,
+    /// Guards of the next regime that start at exactly zero, by transition, with how many
+    /// derivatives vanish with them, the guard itself counted.
+    pub starts_at_zero: Vec<(usize, usize)>,
+}
+
+/// What a regime is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegimeParts {
+    /// A, d × d.
+    pub matrix: Matrix<Interval>,
+    /// f(t).
+    pub forcing: HarmonicVector,
+    /// The ways out of it.
+    pub transitions: Vec<Transition>,
+}
+
+/// A regime with its flow.
+#[derive(Clone, Debug)]
+pub struct Regime {
+    pub(crate) parts: RegimeParts,
+    pub(crate) basis: Eigenbasis,
+    pub(crate) response: HarmonicVector,
+    /// The guard of each transition along a motion.
+    pub(crate) guards: Vec<ModalOutput>,
+}
+
+/// An output along a motion of a regime: Re Σ_k w_k q_k e^{λ_k s} and what is forced.
+#[derive(Clone, Debug)]
+pub(crate) struct ModalOutput {
+    pub(crate) weights: Vec<Rectangle>,
+    pub(crate) constant: Interval,
+    pub(crate) tones: Vec<Rectangle>,
+}
+
+/// A system.
+#[derive(Clone, Debug)]
+pub struct System {
+    pub(crate) dimension: usize,
+    pub(crate) period: Interval,
+    pub(crate) frequencies: Vec<Interval>,
+    pub(crate) regimes: Vec<Regime>,
+}
+
+impl HarmonicVector {
+    /// Its value where the tones have these phasors.
+    pub(crate) fn at(&self, phasors: &[Rectangle]) -> Vec<Interval> {
+        (0..self.constant.len())
+            .map(|i| {
+                let tones = self.tones.iter().zip(phasors);
+                self.constant[i] + tones.map(|(z, &e)| (z[i] * e).re).sum()
+            })
+            .collect()
+    }
+
+    /// Its rate, at the phasors' time.
+    pub(crate) fn rate(&self, frequencies: &[Interval], phasors: &[Rectangle]) -> Vec<Interval> {
+        (0..self.constant.len())
+            .map(|i| {
+                let tones = self.tones.iter().zip(frequencies.iter().zip(phasors));
+                tones
+                    .map(|(z, (&w, &e))| (z[i] * e * Rectangle::imaginary(w)).re)
+                    .sum()
+            })
+            .collect()
+    }
+}
+
+impl Output {
+    /// Its value at a state.
+    pub(crate) fn at(&self, state: &[Interval], phasors: &[Rectangle]) -> Interval {
+        let tones = self.tones.iter().zip(phasors);
+        dot(&self.row, state) + self.constant + tones.map(|(&z, &e)| (z * e).re).sum()
+    }
+
+    /// How fast it changes at a fixed state.
+    pub(crate) fn explicit_rate(
+        &self,
+        frequencies: &[Interval],
+        phasors: &[Rectangle],
+    ) -> Interval {
+        let tones = self.tones.iter().zip(frequencies.iter().zip(phasors));
+        tones
+            .map(|(&z, (&w, &e))| (z * e * Rectangle::imaginary(w)).re)
+            .sum()
+    }
+}
+
+impl System {
+    /// Joins regimes. `frequencies` are those of the tones, all multiples of 2π over `period`.
+    ///
+    /// # Errors
+    /// [`ProofError::Eigenvalues`] or [`ProofError::Resonance`] where the flow of a regime has
+    /// no closed form that can be enclosed.
+    ///
+    /// # Panics
+    /// When sizes do not fit.
+    pub fn new(
+        period: Interval,
+        frequencies: Vec<Interval>,
+        regimes: Vec<RegimeParts>,
+    ) -> Result<Self, ProofError> {
+        let dimension = regimes.first().map_or(0, |r| r.matrix.rows());
+        let regimes = regimes
+            .into_iter()
+            .enumerate()
+            .map(|(r, parts)| Regime::new(r, parts, &frequencies))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            dimension,
+            period,
+            frequencies,
+            regimes,
+        })
+    }
+
+    /// Dimension d of the state.
+    pub const fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// The drive period T.
+    pub const fn period(&self) -> Interval {
+        self.period
+    }
+
+    /// e^{iω_k t}.
+    pub(crate) fn phasors(&self, time: Interval) -> Vec<Rectangle> {
+        let turn = |&w: &Interval| Rectangle::imaginary(w * time).exp();
+        self.frequencies.iter().map(turn).collect()
+    }
+}
+
+impl Regime {
+    fn new(index: usize, parts: RegimeParts, frequencies: &[Interval]) -> Result<Self, ProofError> {
+        let basis =
+            Eigenbasis::of(&parts.matrix).ok_or(ProofError::Eigenvalues { regime: index })?;
+        let response = forced(&basis, &parts.forcing, frequencies)
+            .ok_or(ProofError::Resonance { regime: index })?;
+        let mut regime = Self {
+            parts,
+            basis,
+            response,
+            guards: Vec::new(),
+        };
+        regime.guards = regime
+            .parts
+            .transitions
+            .iter()
+            .map(|transition| regime.project(&transition.guard))
+            .collect();
+        Ok(regime)
+    }
+
+    fn project(&self, output: &Output) -> ModalOutput {
+        let complex: Vec<Rectangle> = output.row.iter().map(|&x| x.into()).collect();
+        let tones = output.tones.iter().zip(&self.response.tones);
+        ModalOutput {
+            weights: (0..self.basis.values.len())
+                .map(|k| dot(&complex, &self.basis.right.column(k)))
+                .collect(),
+            constant: output.constant + dot(&output.row, &self.response.constant),
+            tones: tones.map(|(&z, p)| z + dot(&complex, p)).collect(),
+        }
+    }
+
+    /// ẋ.
+    pub(crate) fn field(&self, state: &[Interval], phasors: &[Rectangle]) -> Vec<Interval> {
+        let forcing = self.parts.forcing.at(phasors);
+        let linear = self.parts.matrix.apply(state);
+        linear.iter().zip(forcing).map(|(&a, f)| a + f).collect()
+    }
+
+    /// Modal coordinates of what a motion has beside the forced response.
+    pub(crate) fn modal(&self, state: &[Interval], phasors: &[Rectangle]) -> Vec<Rectangle> {
+        let forced = self.response.at(phasors);
+        let beside: Vec<Rectangle> = state
+            .iter()
+            .zip(forced)
+            .map(|(&x, p)| Rectangle::real(x - p))
+            .collect();
+        self.basis.left.apply(&beside)
+    }
+
+    /// e^{λ_k s}.
+    pub(crate) fn factors(&self, duration: Interval) -> Vec<Rectangle> {
+        let values = self.basis.values.iter();
+        values.map(|&z| z.scale(duration).exp()).collect()
+    }
+
+    /// The state that has these modal coordinates at the phasors' time.
+    pub(crate) fn state(&self, modal: &[Rectangle], phasors: &[Rectangle]) -> Vec<Interval> {
+        let forced = self.response.at(phasors);
+        (0..forced.len())
+            .map(|i| dot(self.basis.right.row(i), modal).re + forced[i])
+            .collect()
+    }
+
+    /// The derivative of the state after a time by the state before, Re(R e^{λs} L).
+    pub(crate) fn propagator(&self, factors: &[Rectangle]) -> Matrix<Interval> {
+        let (n, m) = (self.basis.right.rows(), factors.len());
+        let turned = Matrix::from_fn(n, m, |i, k| self.basis.right[(i, k)] * factors[k]);
+        Matrix::from_fn(n, n, |i, j| {
+            (0..m)
+                .map(|k| {
+                    let (a, b) = (turned[(i, k)], self.basis.left[(k, j)]);
+                    a.re * b.re - a.im * b.im
+                })
+                .sum()
+        })
+    }
+}
+
+/// The forced response, `None` at an undamped resonance.
+fn forced(
+    basis: &Eigenbasis,
+    forcing: &HarmonicVector,
+    frequencies: &[Interval],
+) -> Option<HarmonicVector> {
+    let n = forcing.constant.len();
+    let paired = |k: usize| basis.values[k].im != Interval::ZERO;
+    // Columns of pairs have the factor 2, which the sum over both members undoes.
+    let half = |k: usize| Interval::point(if paired(k) { 0.5 } else { 1.0 });
+    let solve = |rate: Rectangle, by: &[Rectangle]| -> Option<Vec<Rectangle>> {
+        if by.iter().all(|z| *z == Rectangle::ZERO) {
+            return Some(vec![Rectangle::ZERO; n]);
+        }
+        let mut response = vec![Rectangle::ZERO; n];
+        for k in 0..basis.values.len() {
+            for conjugate in [false, true] {
+                if conjugate && !paired(k) {
+                    continue;
+                }
+                let turned = |z: Rectangle| if conjugate { z.conj() } else { z };
+                let row: Vec<Rectangle> = basis.left.row(k).iter().map(|&z| turned(z)).collect();
+                let along = dot(&row, by);
+                if along == Rectangle::ZERO {
+                    continue;
+                }
+                let modal = along / (rate - turned(basis.values[k]));
+                for (i, x) in response.iter_mut().enumerate() {
+                    *x += turned(basis.right[(i, k)]).scale(half(k)) * modal;
+                }
+            }
+        }
+        response.iter().all(|z| z.is_finite()).then_some(response)
+    };
+    let constant: Vec<Rectangle> = forcing.constant.iter().map(|&x| x.into()).collect();
+    Some(HarmonicVector {
+        constant: solve(Rectangle::ZERO, &constant)?
+            .iter()
+            .map(|z| z.re)
+            .collect(),
+        tones: forcing
+            .tones
+            .iter()
+            .zip(frequencies)
+            .map(|(tone, &w)| solve(Rectangle::imaginary(w), tone))
+            .collect::<Option<_>>()?,
+    })
+}

@@ -8,6 +8,7 @@ import subprocess
 
 import nanotap
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import PHYSICAL
 
@@ -168,3 +169,30 @@ def test_an_oscillator_is_a_case_too():
     ):
         with pytest.raises(ValueError, match="oscillator"):
             refused()
+
+
+def test_a_force_curve_is_a_file_columns_or_rows(tmp_path):
+    lever = {
+        "cantilever": {"k": "1 N/m", "f0": "100 kHz", "Q": 200},
+        "drive": {"frequency": "100 kHz", "free_amplitude": "20 nm"},
+        "gap": {"tip": "15 nm"},
+    }
+    gaps, forces = np.array([-1.0, 0.0, 5.0]), np.array([20.0, 0.0, 0.0])
+    columns = {"gap (nm)": gaps, "force (nN)": forces}
+    rows = [["gap (m)", "force (N)"], *zip(1e-9 * gaps, 1e-9 * forces, strict=True)]
+    path = tmp_path / "curve.csv"
+    pd.DataFrame(columns).to_csv(path, index=False)
+    exact = nanotap.orbit(nanotap.Case(**lever, sample={"stiffness": "20 N/m"}))
+    for table in (columns, pd.DataFrame(columns), rows, str(path)):
+        case = nanotap.Case(**lever, sample={"law": "table", "table": table})
+        assert np.allclose(case.physical["force_table"], 1e-9 * np.c_[gaps, forces])
+        found = nanotap.orbit(case)
+        assert found.first_harmonic == pytest.approx(exact.first_harmonic, rel=1e-9)
+    with pytest.raises(ValueError, match="turns back"):
+        nanotap.Case(
+            **lever,
+            sample={
+                "law": "table",
+                "table": {"gap (nm)": [0, 1, 0.5], "force (nN)": [1, 0, 0]},
+            },
+        )

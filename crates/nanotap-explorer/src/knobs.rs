@@ -69,9 +69,11 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
     Key::all().filter(move |key| {
         // Another kind of model is another case.
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
+        // A curve is no knob.
+        let curve = key.entry().takes == Takes::Table;
         let beside = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {
-            key.is_physical() || beside
+            key.is_physical() && !curve || beside
         } else {
             takes
         }

@@ -123,13 +123,14 @@ pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, na
     let mut presets = Vec::new();
     if let Some(path) = path {
         let source = file::read(path)?;
-        Case::parse(Some(source.clone()), set)?;
+        let set = file::with_tables(set)?;
+        Case::parse(Some(source.clone()), &set)?;
         presets.push(Preset {
             name: "file".into(),
             words: source.name.clone(),
             path: source.name,
             text: source.text,
-            set: set.to_vec(),
+            set,
         });
     }
     presets.extend(BUILT_IN.iter().map(|(name, words, text, set)| Preset {

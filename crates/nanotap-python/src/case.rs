@@ -86,6 +86,7 @@ impl CaseCore {
         catalogues: Vec<(String, String)>,
     ) -> PyResult<Self> {
         let source = source.map(|(name, text)| Source { name, text });
+        let overrides = file::with_tables(&overrides).map_err(Failure::from)?;
         Ok(Self::make(source, overrides, catalogues)?)
     }
 
@@ -97,6 +98,7 @@ impl CaseCore {
         catalogues: Vec<PathBuf>,
     ) -> PyResult<Self> {
         let source = file::read(&path).map_err(Failure::from)?;
+        let overrides = file::with_tables(&overrides).map_err(Failure::from)?;
         let catalogues = catalogues
             .iter()
             .map(|path| Ok((path.display().to_string(), text_of(path)?)))

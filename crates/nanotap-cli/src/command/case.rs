@@ -303,6 +303,17 @@ fn force_rows(table: &mut Table, force: &SampleForce) {
         table.row(["", term.entry.name, term.entry.words]);
         table.row(["", "", &format!("F = {}", term.entry.formula)]);
     }
+    if let Some(points) = force.table.as_ref().map(|table| table.rows().points())
+        && let [(first, _), .., (last, _)] = points
+    {
+        let rows = number::counted(points.len(), "row", "rows");
+        let gap = |gap: f64| Kind::Length.format(gap);
+        table.row([
+            "",
+            &rows,
+            &format!("of gap and force, from {} to {}", gap(*first), gap(*last)),
+        ]);
+    }
     let mut told = Vec::new();
     for (parameter, key, value) in force.parameters() {
         if told.contains(&key) {

@@ -128,6 +128,7 @@ fn no_document_is_left_out() {
             "period-doubling.md",
             "samples.md",
             "stiff-lever.md",
+            "table.md",
             "tip-mass.md",
         ]
     );
@@ -153,6 +154,7 @@ follows! {
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
+    the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 2 commands, 5 numbers;
 }

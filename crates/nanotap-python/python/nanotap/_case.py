@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 Path: TypeAlias = str | os.PathLike[str]
 Scalar: TypeAlias = "float | str | np.floating[Any] | np.integer[Any]"
-Value: TypeAlias = "Scalar | Mapping[str, Scalar]"
+Table: TypeAlias = (
+    "pd.DataFrame | Mapping[str, Iterable[float]] | Iterable[Iterable[float | str]]"
+)
+Value: TypeAlias = "Scalar | Mapping[str, Scalar | Table]"
 
 _OTHER_NAMES = {
     alias: name
@@ -38,7 +41,9 @@ class Case:
     or their readable names (`tip_mass_ratio`, `drive_amplitude`, `beam_damping`,
     `contact_stiffness`, `gap`, `contact_damping`, `drive_frequency`). Physical: the tables
     as dictionaries, with quantities and their units: texts (`"10 nm"`), numbers in SI (`1e-8`), or
-    quantities of pint, astropy or unyt.
+    quantities of pint, astropy or unyt. A force curve, `sample={"law": "table", "table": …}`,
+    is the path of a CSV file, or its columns as a dictionary or a pandas table whose keys say the
+    units: `{"gap (nm)": […], "force (nN)": […]}`.
 
     >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
     2.6
@@ -327,8 +332,23 @@ def _written(name: str, value: Any) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | float) and not isinstance(value, bool):
         return json.dumps(text(name, value)) if si_unit(name) else repr(value)
+    if name == "sample.table":
+        return json.dumps(_rows(value))
     message = f"{name}: a number or a text is needed, not {value!r}"
     raise TypeError(message)
+
+
+def _rows(table: Any) -> list[list[float | str]]:
+    """The rows of a table, the names of its columns first."""
+    if not hasattr(table, "items"):
+        return [[_plain(entry) for entry in row] for row in table]
+    columns = {str(name): np.asarray(column, float) for name, column in table.items()}
+    rows = np.column_stack(list(columns.values())).tolist()
+    return [list(columns), *rows]
+
+
+def _plain(entry: Any) -> float | str:
+    return entry if isinstance(entry, str) else float(entry)
 
 
 def _short(value: Any) -> str:

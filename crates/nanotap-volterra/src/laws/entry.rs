@@ -39,6 +39,8 @@ impl Dimension {
     pub const SURFACE_ENERGY: Self = Self::new(1, 0, -2, 0, "J/m²");
     /// A force a length.
     pub const STIFFNESS: Self = Self::new(1, 0, -2, 0, "N/m");
+    /// A force.
+    pub const FORCE: Self = Self::new(1, 1, -2, 0, "N");
     /// A force a velocity.
     pub const DAMPING: Self = Self::new(1, 0, -1, 0, "N s/m");
     /// A dynamic viscosity.

@@ -36,15 +36,41 @@ pub const MAX_TERMS: usize = 8;
 pub struct TableLaw {
     /// What is said of it.
     pub entry: &'static Entry,
-    make: fn(Vec<f64>) -> Arc<dyn ForceLaw>,
+    make: Make,
+}
+
+/// What a law is made of.
+#[derive(Clone, Copy, Debug)]
+enum Make {
+    /// Its parameters.
+    Formula(fn(Vec<f64>) -> Arc<dyn ForceLaw>),
+    /// Parameters and rows of gap and force.
+    Rows,
 }
 
 impl TableLaw {
     /// The law with these parameters, in the order of its entry.
     ///
     /// # Errors
-    /// When the number of parameters is wrong or a value makes no sense.
+    /// When the number of parameters is wrong, a value makes no sense, or the law needs the
+    /// rows of a table ([`TableLaw::through`]).
     pub fn with(&self, parameters: &[f64]) -> Result<Arc<dyn ForceLaw>, VolterraError> {
+        self.check(parameters)?;
+        match self.make {
+            Make::Formula(make) => Ok(make(parameters.to_vec())),
+            Make::Rows => Err(VolterraError::Table {
+                row: 1,
+                reason: "a force curve needs at least two rows",
+            }),
+        }
+    }
+
+    /// Whether it is said by rows of gap and force.
+    pub const fn has_rows(&self) -> bool {
+        matches!(self.make, Make::Rows)
+    }
+
+    fn check(&self, parameters: &[f64]) -> Result<(), VolterraError> {
         let expected = self.entry.parameters.len();
         if parameters.len() != expected {
             return Err(VolterraError::Shape {
@@ -62,7 +88,7 @@ impl TableLaw {
                 });
             }
         }
-        Ok((self.make)(parameters.to_vec()))
+        Ok(())
     }
 }
 
@@ -70,7 +96,7 @@ macro_rules! table {
     ($($entry:expr => $formula:expr),* $(,)?) => {
         &[$(TableLaw {
             entry: &$entry,
-            make: |p| make($formula, p),
+            make: Make::Formula(|p| make($formula, p)),
         }),*]
     };
 }
@@ -83,7 +109,7 @@ const fn voigt(shape: Shape, pulls: bool) -> kelvin_voigt::KelvinVoigt {
     kelvin_voigt::KelvinVoigt { shape, pulls }
 }
 
-/// Every law that has parameters ([`polyline::Polyline`] has points instead).
+/// Every law that parameters alone say ([`polyline::TABLE`] has rows beside them).
 pub static TABLE: &[TableLaw] = table! {
     elastic::HERTZ => elastic::Elastic(Shape::Sphere),
     elastic::CONE => elastic::Elastic(Shape::Cone),
@@ -112,13 +138,17 @@ pub static TABLE: &[TableLaw] = table! {
     spring_damper::SPRING_DAMPER => spring_damper::SpringDamper,
 };
 
+/// Every law.
+pub fn all() -> impl Iterator<Item = &'static TableLaw> {
+    TABLE.iter().chain([&polyline::TABLE])
+}
+
 /// The law of a name.
 ///
 /// # Errors
 /// [`VolterraError::UnknownLaw`].
 pub fn law(name: &str) -> Result<&'static TableLaw, VolterraError> {
-    TABLE
-        .iter()
+    all()
         .find(|law| law.entry.name == name)
         .ok_or_else(|| VolterraError::UnknownLaw { name: name.into() })
 }

@@ -85,6 +85,9 @@ pub struct PhysicalSummary {
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_law: Vec<LawParameterDocument>,
+    /// Gaps and forces of a tabulated law, m and N.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub force_table: Vec<(f64, f64)>,
     /// Gap of the tip, m.
     pub tip_gap: f64,
     /// Gap of the beam, m.
@@ -151,6 +154,12 @@ impl PhysicalSummary {
                 })
                 .collect()
             }),
+            force_table: view
+                .sample
+                .force
+                .as_ref()
+                .and_then(|force| force.table.as_ref())
+                .map_or_else(Vec::new, |table| table.rows().points().to_vec()),
             tip_gap: parameters.tip_gap,
             beam_gap: scales.length,
             length_unit: scales.length,

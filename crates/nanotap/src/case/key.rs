@@ -165,6 +165,8 @@ pub enum Takes {
     MaterialName,
     /// A ratio of two frequencies: `25/4`, `6.25`.
     FrequencyRatio,
+    /// Rows of gap and force, or the name of a CSV file of them.
+    Table,
 }
 
 /// The values that a number may have.
@@ -404,6 +406,7 @@ impl Key {
             ),
             Takes::Count(_) => Some("it is a whole number"),
             Takes::FrequencyRatio => Some("it is a ratio of whole numbers"),
+            Takes::Table => Some("it is a curve; vary sample.force_factor or sample.gap_factor"),
             Takes::Word(_) | Takes::Law | Takes::LeverName | Takes::MaterialName => {
                 Some("it is a name, not a quantity")
             }

@@ -312,6 +312,12 @@ keys! {
         Sample, "law", Takes::Law,
         "how the sample answers the tip: a linear contact, or nonlinear force laws, one or a sum with +",
     );
+    SampleTable = other(
+        Sample, "table", Takes::Table,
+        "force curve of sample.law = \"table\": rows of gap and force, or a CSV file of them",
+    );
+    SampleGapFactor = quantity(Sample, "gap_factor", Number, R::POSITIVE, "factor by which a table's gaps are stretched").or(1.0);
+    SampleForceFactor = quantity(Sample, "force_factor", Number, R::NOT_NEGATIVE, "factor of a table's forces").or(1.0);
     SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue");
     SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
         .feeds(Parameter::Alpha4);

@@ -22,6 +22,7 @@ pub mod document;
 mod error;
 mod family;
 pub mod file;
+pub mod force_table;
 pub mod key;
 mod keys;
 pub mod near_name;
@@ -127,13 +128,15 @@ impl Case {
     /// `overrides` in place of what it says; levers and materials are those of `catalogue`.
     ///
     /// # Errors
-    /// Everything that is wrong with the file and the words, each with its place.
+    /// Everything that is wrong with the file and the words, each with its place, and with the
+    /// force curve that one of them names.
     pub fn load(
         path: Option<&Path>,
         overrides: &[String],
         catalogue: &Arc<Catalogue>,
     ) -> Result<Self, CaseFileError> {
-        Self::parse_with(path.map(file::read).transpose()?, overrides, catalogue)
+        let overrides = file::with_tables(overrides)?;
+        Self::parse_with(path.map(file::read).transpose()?, &overrides, catalogue)
     }
 
     /// The case of a text and of `key=value` words, with the built-in levers and materials.

@@ -98,6 +98,17 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             say("type", "string".into());
             return schema;
         }
+        Takes::Table => {
+            say("type", json!(["string", "array"]));
+            say(
+                "examples",
+                json!([
+                    "curve.csv",
+                    [["gap (nm)", "force (nN)"], [-1, 8.5], [0, 0], [9, 0]]
+                ]),
+            );
+            return schema;
+        }
         Takes::FrequencyRatio => {
             say("type", json!(["string", "number"]));
             say("examples", json!(["25/4", 6.25]));

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::file::{CaseFileError, Header, Place, Problem, Source};
+use super::force_table::{ForceTable, ForceTableError};
 use super::key::{Key, Takes};
 use super::quantity::{Kind, Quantity, QuantityError};
 use nanotap_volterra::VolterraError;
@@ -22,6 +23,8 @@ pub enum Value {
     Name(Arc<str>),
     /// A ratio of frequencies.
     Ratio(FrequencyRatio),
+    /// Rows of gap and force.
+    Table(ForceTable),
 }
 
 impl Value {
@@ -32,6 +35,7 @@ impl Value {
             Self::Word(word) => (*word).to_owned(),
             Self::Name(name) => name.to_string(),
             Self::Ratio(ratio) => ratio.to_string(),
+            Self::Table(table) => table.text(),
         }
     }
 }
@@ -53,6 +57,9 @@ pub enum ValueError {
     /// No ratio of frequencies.
     #[error(transparent)]
     Ratio(#[from] RatioError),
+    /// No force curve.
+    #[error(transparent)]
+    Table(#[from] ForceTableError),
     /// No contact law.
     #[error("there is no law \"{given}\"; there are {}", laws().join(", "))]
     Law {
@@ -116,6 +123,7 @@ impl Key {
             Takes::Law => law(text)?,
             Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
+            Takes::Table => Value::Table(ForceTable::parse(text)?),
         })
     }
 }

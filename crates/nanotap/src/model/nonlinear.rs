@@ -154,8 +154,10 @@ impl Nonlinear {
 
     /// The gap at which contact begins from outside, if there is one.
     pub(crate) fn contact_gap(&self) -> Option<f64> {
-        let mut outside = self.system.exits(0).iter();
-        outside.find_map(|exit| match exit.guard {
+        let outside = (0..self.contact.len()).filter(|branch| !self.contact[*branch]);
+        let exits = outside.flat_map(|branch| self.system.exits(branch));
+        let mut inwards = exits.filter(|exit| self.contact[exit.target]);
+        inwards.find_map(|exit| match exit.guard {
             Guard::Falls(level) => Some(level),
             _ => None,
         })

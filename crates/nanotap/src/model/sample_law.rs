@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use nanotap_volterra::laws::entry::{Entry, ParameterEntry};
-use nanotap_volterra::laws::{TABLE, TableLaw, build_sum, law};
+use nanotap_volterra::laws::polyline::Rows;
+use nanotap_volterra::laws::{TableLaw, all, build_sum, law};
 use nanotap_volterra::{ForceLaw, VolterraError};
 use serde::ser::SerializeSeq;
 use serde::{Serialize, Serializer};
@@ -15,18 +16,20 @@ pub struct SampleLaw {
     terms: Vec<&'static TableLaw>,
     /// The parameters of the terms, one after the other.
     values: Vec<f64>,
+    /// The rows of a table, in whatever units its factors are measured in.
+    rows: Option<Arc<Rows>>,
 }
 
 impl PartialEq for SampleLaw {
     fn eq(&self, other: &Self) -> bool {
-        self.values == other.values && self.names().eq(other.names())
+        self.values == other.values && self.rows == other.rows && self.names().eq(other.names())
     }
 }
 
 impl SampleLaw {
     /// The names of all laws.
     pub fn all() -> impl Iterator<Item = &'static str> {
-        TABLE.iter().map(|law| law.entry.name)
+        all().map(|law| law.entry.name)
     }
 
     /// The laws that `text` names, `hertz` or `hertz + exponential-damping`.
@@ -40,12 +43,20 @@ impl SampleLaw {
     }
 
     /// These laws with `values`, the parameters of all terms one after the other, in the model's
-    /// units.
+    /// units, and the rows of a table if it is one of them.
     ///
     /// # Errors
-    /// When a value makes no sense, or two of the laws cannot be added.
-    pub fn new(terms: Vec<&'static TableLaw>, values: Vec<f64>) -> Result<Self, VolterraError> {
-        let law = Self { terms, values };
+    /// When a value makes no sense, rows are missing, or two of the laws cannot be added.
+    pub fn new(
+        terms: Vec<&'static TableLaw>,
+        values: Vec<f64>,
+        rows: Option<Arc<Rows>>,
+    ) -> Result<Self, VolterraError> {
+        let law = Self {
+            terms,
+            values,
+            rows,
+        };
         law.build()?;
         Ok(law)
     }
@@ -82,6 +93,7 @@ impl SampleLaw {
         Self {
             terms: self.terms.clone(),
             values: values.map(|(value, slope)| value + step * slope).collect(),
+            rows: self.rows.clone(),
         }
     }
 
@@ -95,7 +107,11 @@ impl SampleLaw {
         for term in &self.terms {
             let count = term.entry.parameters.len().min(rest.len());
             let (own, others) = rest.split_at(count);
-            built.push((term.entry, term.with(own)?));
+            let law = match &self.rows {
+                Some(rows) => term.through(rows, own),
+                None => term.with(own),
+            };
+            built.push((term.entry, law?));
             rest = others;
         }
         build_sum(&built)
@@ -106,18 +122,23 @@ impl Serialize for SampleLaw {
     /// As the list of its laws, each a map from names to values in the model's units.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Term {
+        struct Term<'a> {
             law: &'static str,
             #[serde(flatten)]
             parameters: std::collections::BTreeMap<&'static str, f64>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            rows: Option<&'a [(f64, f64)]>,
         }
         let mut values = self.values.iter().copied();
         let mut terms = serializer.serialize_seq(Some(self.terms.len()))?;
-        for entry in self.entries() {
+        for law in &self.terms {
+            let entry = law.entry;
+            let rows = self.rows.as_deref().filter(|_| law.has_rows());
             let parameters = entry.parameters.iter().map(|p| p.name);
             terms.serialize_element(&Term {
                 law: entry.name,
                 parameters: parameters.zip(values.by_ref()).collect(),
+                rows: rows.map(Rows::points),
             })?;
         }
         terms.end()

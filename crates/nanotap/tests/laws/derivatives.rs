@@ -9,7 +9,7 @@ use nanotap_dynamics::StroboscopicMap;
 use crate::common::{DMT, air};
 
 /// Largest difference over the largest entry of the column.
-fn worst(case: &Case, keys: &[Key], state: &[f64]) -> f64 {
+pub(crate) fn worst(case: &Case, keys: &[Key], state: &[f64]) -> f64 {
     let model = case.model().unwrap();
     let tangents = keys.iter().map(|k| case.tangent(&model, *k).unwrap());
     let n = model.dimension();

@@ -9,3 +9,4 @@ mod common;
 mod derivatives;
 mod reference;
 mod refusals;
+mod table;

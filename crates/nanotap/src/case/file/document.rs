@@ -5,6 +5,9 @@ use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
+use crate::case::force_table::table_of;
+use crate::table::Table;
+
 use super::problem::{CaseFileError, Place, Problem, Source};
 
 /// A value as written.
@@ -16,8 +19,22 @@ pub enum Value {
     Number(f64),
     /// Text: a quantity with its unit, or a name.
     Text(String),
-    /// What no key takes: a boolean, a date, an array, a table. Its name, with article.
+    /// An array of rows of one length.
+    Rows(Table),
+    /// What no key takes: a boolean, a date, another array, a table. Its name, with article.
     Other(&'static str),
+}
+
+impl Value {
+    /// What it is, with article.
+    pub const fn noun(&self) -> &'static str {
+        match self {
+            Self::Integer(_) | Self::Number(_) => "a number",
+            Self::Text(_) => "text",
+            Self::Rows(_) => "an array",
+            Self::Other(noun) => noun,
+        }
+    }
 }
 
 /// One `key = value`.
@@ -44,7 +61,7 @@ impl Entry {
             Value::Text(text) => Some(text.clone()),
             Value::Integer(integer) => Some(integer.to_string()),
             Value::Number(number) => Some(number.to_string()),
-            Value::Other(_) => None,
+            Value::Rows(_) | Value::Other(_) => None,
         }
     }
 
@@ -189,7 +206,7 @@ fn judge(value: &DeValue<'_>) -> Value {
         DeValue::String(text) => Value::Text(text.clone().into_owned()),
         DeValue::Boolean(_) => Value::Other("a boolean"),
         DeValue::Datetime(_) => Value::Other("a date"),
-        DeValue::Array(_) => Value::Other("an array"),
+        DeValue::Array(_) => table_of(value).map_or(Value::Other("an array"), Value::Rows),
         DeValue::Table(_) => Value::Other("a table"),
     }
 }

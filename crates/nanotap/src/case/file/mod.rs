@@ -24,6 +24,9 @@ pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
 pub(crate) use reader::{Described, cosine_term, modes, parse, word};
 
+use toml::de::{DeTable, DeValue};
+
+use super::force_table::{ForceTable, file_named};
 use super::{Case, Kind, Value, What};
 use crate::case::key::Key;
 use crate::model::cantilever::{Cantilever, CosineTerm};
@@ -92,7 +95,7 @@ impl Case {
                 let gap = if text.is_empty() { "" } else { "\n" };
                 let _ = writeln!(text, "{gap}[{}]", key.section().name());
             }
-            let plain = matches!(value, Value::Number(_, Kind::Number));
+            let plain = matches!(value, Value::Number(_, Kind::Number) | Value::Table(_));
             let quote = if plain { "" } else { "\"" };
             let _ = writeln!(text, "{} = {quote}{}{quote}", key.name(), value.text());
         }
@@ -100,11 +103,74 @@ impl Case {
     }
 }
 
-/// Reads the text of a case file.
+/// Reads the text of a case file. A force curve that it names, by a path relative to it, stands
+/// in the text as an array: nothing else of a case is ever read from disk.
 ///
 /// # Errors
-/// When there is none, it cannot be read or is no text.
+/// When there is none, it cannot be read or is no text, or its force curve is none.
 pub fn read(path: &Path) -> Result<Source, CaseFileError> {
+    let source = text_of(path)?;
+    let Some((span, name)) = table_named(&source.text) else {
+        return Ok(source);
+    };
+    let folder = path.parent().unwrap_or_else(|| Path::new(""));
+    let place = Place::Span(span.clone());
+    let table = table(&folder.join(name), place)
+        .map_err(|problem| CaseFileError::one(Some(source.clone()), problem))?;
+    let mut text = source.text;
+    text.replace_range(span, &table.text());
+    Ok(Source { text, ..source })
+}
+
+/// The `key=value` words of a command line, with the rows of the force curve that one of them
+/// names in place of its name.
+///
+/// # Errors
+/// When it is no force curve.
+pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
+    let key = Key::SampleTable.path();
+    let word = |word: &String| {
+        let named = word.split_once('=').filter(|(name, _)| name.trim() == key);
+        let quoted = |text: &str| match DeValue::parse(text.trim()).ok()?.into_inner() {
+            DeValue::String(name) => Some(name.into_owned()),
+            _ => None,
+        };
+        let text = named.map(|(_, text)| quoted(text).unwrap_or_else(|| text.to_owned()));
+        let Some(name) = text.as_deref().and_then(file_named) else {
+            return Ok(word.clone());
+        };
+        let place = Place::Override(word.clone());
+        let table = table(Path::new(name), place);
+        let table = table.map_err(|problem| CaseFileError::one(None, problem))?;
+        Ok(format!("{key}={}", table.text()))
+    };
+    words.iter().map(word).collect()
+}
+
+/// The force curve in a file, named at `place`.
+fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
+    ForceTable::read(path).map_err(|error| {
+        Problem::new(place, error.to_string())
+            .help(error.remedy)
+            .key(Some(Key::SampleTable.path()))
+    })
+}
+
+/// The file that the text of a case names as its force curve, and where.
+fn table_named(text: &str) -> Option<(std::ops::Range<usize>, String)> {
+    let (tables, _) = DeTable::parse_recoverable(text);
+    let section = tables.get_ref().get(Key::SampleTable.section().name())?;
+    let DeValue::Table(section) = section.get_ref() else {
+        return None;
+    };
+    let value = section.get(Key::SampleTable.name())?;
+    let DeValue::String(name) = value.get_ref() else {
+        return None;
+    };
+    Some((value.span(), file_named(name)?.to_owned()))
+}
+
+fn text_of(path: &Path) -> Result<Source, CaseFileError> {
     let name = path.display().to_string();
     let refuse = |why: String, help: &str| {
         CaseFileError::one(

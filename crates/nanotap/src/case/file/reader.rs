@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::document::{Document, Entry, Value as Written};
 use super::problem::{CaseFileError, Place, Problem, Problems, Source};
 use super::refusal;
+use crate::case::force_table::ForceTable;
 use crate::case::key::{Default, Key, ModelKind, Section, Takes};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Origin, Said, Stated, Value};
@@ -202,10 +203,13 @@ fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
 
 fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
     let at = |message: String| Problem::new(entry.value_place.clone(), message);
+    if let (Takes::Table, Written::Rows(rows)) = (key.entry().takes, &entry.value) {
+        return ForceTable::of(rows)
+            .map(Value::Table)
+            .map_err(|error| at(format!("{key}: {error}")).help(error.remedy));
+    }
     let Some(text) = entry.text() else {
-        let Written::Other(what) = entry.value else {
-            return Err(at(format!("`{key}` = {} is no value", entry.written)));
-        };
+        let what = entry.value.noun();
         return Err(at(format!("`{key}` = {} is {what}", entry.written))
             .help("write a quantity with its unit, in quotes, or a plain number"));
     };
@@ -213,6 +217,7 @@ fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
         use crate::case::stated::ValueError;
         match error {
             ValueError::Quantity(error) => at(format!("{key}: {error}")),
+            ValueError::Table(error) => at(format!("{key}: {error}")).help(error.remedy),
             ValueError::Ratio(error) => at(format!("{key} = {text}: {error}")),
             ValueError::Law { given } => {
                 refusal::not_among(entry, &given, &crate::case::stated::laws())

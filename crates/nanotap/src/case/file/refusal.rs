@@ -254,10 +254,13 @@ pub(super) fn number(entry: &Entry) -> Result<f64, Problem> {
                 )),
             })
         }
-        Value::Other(what) => Err(
-            refuse(format!("`{key}` = {written} is {what}, not a number"))
-                .help(format!("write a number, as in {key} = 0.1")),
-        ),
+        Value::Rows(_) | Value::Other(_) => {
+            let what = entry.value.noun();
+            Err(
+                refuse(format!("`{key}` = {written} is {what}, not a number"))
+                    .help(format!("write a number, as in {key} = 0.1")),
+            )
+        }
     }
 }
 
@@ -286,8 +289,7 @@ pub(super) fn count(entry: &Entry, most: usize) -> Result<usize, Problem> {
             refuse(&outside)
         }
         Value::Number(_) => refuse("is not a whole number"),
-        Value::Text(_) => refuse("is text, not a number"),
-        Value::Other(what) => refuse(&format!("is {what}, not a number")),
+        other => refuse(&format!("is {}, not a number", other.noun())),
     })
 }
 

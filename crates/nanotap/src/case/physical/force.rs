@@ -1,15 +1,18 @@
 //! A nonlinear force law of the sample, from the quantities that a case states.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use nanotap_volterra::laws::TableLaw;
 use nanotap_volterra::laws::entry::{Dimension, ParameterEntry};
+use nanotap_volterra::laws::polyline::Rows;
 
 use super::error::PhysicalError;
 use super::mapping::Scales;
 use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::Tip;
+use crate::case::force_table::ForceTable;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
@@ -19,7 +22,10 @@ use crate::model::sample_law::SampleLaw;
 const VACUUM: f64 = 8.854_187_812_8e-12;
 
 /// The keys that only nonlinear laws take.
-const OF_LAWS: [Key; 17] = [
+const OF_LAWS: [Key; 20] = [
+    Key::SampleTable,
+    Key::SampleGapFactor,
+    Key::SampleForceFactor,
     Key::SampleHamaker,
     Key::SampleWorkOfAdhesion,
     Key::SampleWorkOfRetraction,
@@ -59,11 +65,13 @@ pub struct SampleForce {
     pub terms: Vec<&'static TableLaw>,
     /// Their parameters, one term after the other.
     pub values: Vec<f64>,
+    /// The rows of a table, in m and N.
+    pub table: Option<ForceTable>,
 }
 
 impl PartialEq for SampleForce {
     fn eq(&self, other: &Self) -> bool {
-        self.values == other.values && self.names() == other.names()
+        self.values == other.values && self.table == other.table && self.names() == other.names()
     }
 }
 
@@ -76,6 +84,7 @@ pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
 pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
     parameters.clone().any(|p| key_of(p) == key)
+        || key == Key::SampleTable && terms.iter().any(|term| term.has_rows())
         || key == Key::SampleMaterial && parameters.any(|p| p.name == "modulus")
         || ADHESION.contains(&key) && adhesion_of(terms).is_some()
 }
@@ -116,6 +125,8 @@ fn key_of(parameter: &ParameterEntry) -> Key {
         "sample_charge" => Key::SampleCharge,
         "tip_charge" => Key::TipCharge,
         "repulsion" => Key::SampleRepulsion,
+        "gap_factor" => Key::SampleGapFactor,
+        "force_factor" => Key::SampleForceFactor,
         // A test sees that there is no other.
         _ => Key::SampleHamaker,
     }
@@ -145,7 +156,12 @@ impl SampleForce {
         let strange = keys_of_contacts().find(|key| reader.has(*key) && !takes(&terms, *key));
         if let Some(key) = strange {
             let mut keys: Vec<&str> = Vec::new();
-            for key in parameters().map(|p| key_of(p).path()) {
+            let rows = terms.iter().find(|term| term.has_rows());
+            let rows = rows.map(|_| Key::SampleTable.path());
+            for key in rows
+                .into_iter()
+                .chain(parameters().map(|p| key_of(p).path()))
+            {
                 if !keys.contains(&key) {
                     keys.push(key);
                 }
@@ -159,7 +175,17 @@ impl SampleForce {
         let mut force = Self {
             values: Vec::new(),
             terms: terms.clone(),
+            table: reader.table(Key::SampleTable).cloned(),
         };
+        if force.table.is_none() && terms.iter().any(|term| term.has_rows()) {
+            return Err(PhysicalError::missing(
+                Key::SampleTable,
+                format!(
+                    "sample.law = \"{name}\" needs a force curve, as in table = \"curve.csv\" with \
+                     the columns `gap (nm)` and `force (nN)`"
+                ),
+            ));
+        }
         for parameter in parameters() {
             let value = force.value(reader, tip, parameter)?;
             if !parameter.range.holds(value) {
@@ -168,7 +194,8 @@ impl SampleForce {
             }
             force.values.push(value);
         }
-        SampleLaw::new(terms, force.values.clone()).map_err(|error| refused(error.to_string()))?;
+        SampleLaw::new(terms, force.values.clone(), force.rows())
+            .map_err(|error| refused(error.to_string()))?;
         Ok(Some(force))
     }
 
@@ -271,7 +298,11 @@ impl SampleForce {
             let Some(values) = parameters.map(value).collect::<Option<Vec<f64>>>() else {
                 continue;
             };
-            let other = Self { terms, values };
+            let other = Self {
+                terms,
+                values,
+                table: None,
+            };
             if other.names() != self.names() {
                 all.push(other);
             }
@@ -282,6 +313,10 @@ impl SampleForce {
     /// The laws' names.
     pub fn name(&self) -> String {
         self.names().join(" + ")
+    }
+
+    fn rows(&self) -> Option<Arc<Rows>> {
+        self.table.as_ref().map(|table| Arc::clone(table.rows()))
     }
 
     fn names(&self) -> Vec<&'static str> {
@@ -308,7 +343,7 @@ impl SampleForce {
         let entries = self.terms.iter().flat_map(|term| term.entry.parameters);
         let values = entries.zip(&self.values);
         let values = values.map(|(p, value)| value / size(p.dimension, scales));
-        SampleLaw::new(self.terms.clone(), values.collect()).map_err(|error| {
+        SampleLaw::new(self.terms.clone(), values.collect(), self.rows()).map_err(|error| {
             PhysicalError::impossible(Key::SampleLaw, self.names().join(" + "), error.to_string())
         })
     }
@@ -341,6 +376,15 @@ impl SampleForce {
             remarks.push(Remark::note(format!(
                 "{key} is not given: taken as {}",
                 key.kind().format(value)
+            )));
+        }
+        if let Some((gap, force)) = self.table.as_ref().and_then(|t| t.rows().points().last())
+            && *force != 0.0
+        {
+            remarks.push(Remark::note(format!(
+                "the force of the table's last row, {} at {}, stays the same farther away",
+                Kind::Force.format(*force),
+                Kind::Length.format(*gap)
             )));
         }
         if has("tip_modulus") && tip.elastic.is_none() {
@@ -404,11 +448,11 @@ fn size(dimension: Dimension, scales: &Scales) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nanotap_volterra::laws::TABLE;
+    use nanotap_volterra::laws::all;
 
     #[test]
     fn every_parameter_of_every_law_has_its_key() {
-        for law in TABLE {
+        for law in all() {
             for p in law.entry.parameters {
                 let hamaker = ["hamaker", "attraction"].contains(&p.name);
                 assert_eq!(key_of(p) == Key::SampleHamaker, hamaker, "{}", p.name);

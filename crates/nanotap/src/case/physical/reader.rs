@@ -2,6 +2,7 @@
 
 use super::catalogue::{Catalogue, Lever, Material};
 use super::error::PhysicalError;
+use crate::case::force_table::ForceTable;
 use crate::case::key::Key;
 use crate::case::stated::{Stated, Value};
 use crate::model::drive_form::FrequencyRatio;
@@ -42,6 +43,14 @@ impl<'a> Reader<'a> {
     pub(crate) fn ratio(self, key: Key) -> Option<FrequencyRatio> {
         match self.stated.get(key)? {
             Value::Ratio(ratio) => Some(*ratio),
+            _ => None,
+        }
+    }
+
+    /// Rows of gap and force.
+    pub(crate) fn table(self, key: Key) -> Option<&'a ForceTable> {
+        match self.stated.get(key)? {
+            Value::Table(table) => Some(table),
             _ => None,
         }
     }

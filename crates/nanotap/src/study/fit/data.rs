@@ -14,7 +14,7 @@ use crate::case::{Case, Key};
 use crate::observe::{Dimension, OBSERVABLES, Observable};
 use crate::study::approach::Way;
 
-use super::table::{Entry, Table};
+use crate::table::{Entry, Header, Table};
 
 /// All curves, and what their columns are.
 #[derive(Clone, Debug)]
@@ -408,29 +408,7 @@ impl Role {
     }
 }
 
-/// The word over a column, taken apart.
-#[derive(Clone, Debug)]
-pub(super) struct Header {
-    pub(super) name: String,
-    pub(super) unit: String,
-}
-
 impl Header {
-    pub(super) fn of(written: &str) -> Self {
-        let written = written.trim();
-        let parts = [('(', ')'), ('[', ']')]
-            .into_iter()
-            .find_map(|(open, close)| {
-                let (name, rest) = written.split_once(open)?;
-                Some((name, rest.strip_suffix(close)?))
-            });
-        let (name, unit) = parts.unwrap_or((written, ""));
-        Self {
-            name: name.trim().to_owned(),
-            unit: unit.trim().to_owned(),
-        }
-    }
-
     fn error_of(&self) -> Option<&str> {
         self.name.strip_suffix(" error").map(str::trim)
     }

@@ -28,18 +28,17 @@ mod reporting;
 mod search;
 mod solve;
 mod statistics;
-mod table;
 
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::table::{Entry, MOST_ROWS, Table};
 pub use data::{Column, Curve, Data, Row, Swept};
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
     OtherOrbit, Reading, Undetermined,
 };
-pub use table::{Entry, MOST_ROWS, Table};
 
 use parameters::parameters;
 use problem::Problem;

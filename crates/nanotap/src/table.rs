@@ -1,4 +1,4 @@
-//! Tables of named columns, as a file or a program gives them.
+//! Tables of named columns, each with its unit, as a file or a program gives them.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -111,7 +111,7 @@ impl Table {
     }
 
     /// Where an entry stands, for messages.
-    pub(super) fn place(&self, row: Option<usize>, column: usize) -> String {
+    pub(crate) fn place(&self, row: Option<usize>, column: usize) -> String {
         let header = self.columns.get(column).map_or("", |(header, _)| header);
         let column = column + 1;
         let line = match row {
@@ -126,8 +126,32 @@ impl Table {
     }
 }
 
+/// The word over a column, taken apart.
+#[derive(Clone, Debug)]
+pub(crate) struct Header {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+}
+
+impl Header {
+    pub(crate) fn of(written: &str) -> Self {
+        let written = written.trim();
+        let parts = [('(', ')'), ('[', ']')]
+            .into_iter()
+            .find_map(|(open, close)| {
+                let (name, rest) = written.split_once(open)?;
+                Some((name, rest.strip_suffix(close)?))
+            });
+        let (name, unit) = parts.unwrap_or((written, ""));
+        Self {
+            name: name.trim().to_owned(),
+            unit: unit.trim().to_owned(),
+        }
+    }
+}
+
 impl Entry {
-    fn of(field: &str) -> Self {
+    pub(crate) fn of(field: &str) -> Self {
         match field.parse::<f64>() {
             _ if field.is_empty() => Self::Missing,
             Ok(number) if number.is_nan() => Self::Missing,

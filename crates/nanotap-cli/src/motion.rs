@@ -6,8 +6,10 @@ use std::fmt::Write as _;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
+use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Derivative, Observables, PhysicalMotion, Spectrum};
+use nanotap::observe::{Derivative, Observables, PhysicalMotion, Spectrum, time_series};
+use nanotap::study::proof::ProofReport;
 use nanotap::study::simulate::Classification;
 
 use crate::output::Output;
@@ -302,6 +304,65 @@ pub(crate) fn multipliers(multipliers: &[[f64; 2]]) -> String {
     }
     text
 }
+
+/// What was proved of an orbit: the theorem, and its enclosures.
+pub(crate) fn proof(proof: &ProofReport, model: &Model) -> String {
+    let Some(theorem) = &proof.theorem else {
+        return paragraph(&proof.statement);
+    };
+    let mut text = format!("  {}\n", style::bold("theorem"));
+    text.push_str(&paragraph(&proof.statement));
+    let mut table = Table::new([
+        ("", Align::Left),
+        ("at least", Align::Point),
+        ("at most", Align::Point),
+        ("unique within, at its switches", Align::Left),
+    ]);
+    let alone = theorem.unique_within.as_ref();
+    let mut row = |name: String, [low, high]: [f64; 2], alone: Option<f64>| {
+        let alone = alone.map_or_else(String::new, |radius| format!("{radius:.1e}"));
+        table.row([name, low.to_string(), high.to_string(), alone]);
+    };
+    let names = time_series::state_names(model);
+    for (k, (name, bounds)) in names.into_iter().zip(&theorem.state).enumerate() {
+        row(name, *bounds, alone.map(|a| a.state[k]));
+    }
+    for switch in theorem.switches.iter().take(SWITCHES_SHOWN) {
+        let what = if switch.begins {
+            "contact begins"
+        } else {
+            "contact ends"
+        };
+        row(what.to_owned(), switch.time, alone.map(|a| a.time));
+    }
+    text.push_str(&table.render());
+    if theorem.switches.len() > SWITCHES_SHOWN {
+        let more = theorem.switches.len() - SWITCHES_SHOWN;
+        text.push_str(&paragraph(&format!(
+            "and {more} more switches (--json has all)"
+        )));
+    }
+    let mut table = Table::new([
+        ("Re μ", Align::Point),
+        ("Im μ", Align::Point),
+        ("within", Align::Left),
+        ("multipliers", Align::Right),
+    ]);
+    for disc in &theorem.multipliers {
+        let [re, im] = disc.center.map(|x| number::significant(x, 12));
+        table.row([
+            re,
+            im,
+            format!("{:.1e}", disc.radius),
+            disc.count.to_string(),
+        ]);
+    }
+    text.push_str(&table.render());
+    text
+}
+
+/// Switches of a theorem that are listed.
+const SWITCHES_SHOWN: usize = 12;
 
 /// The derivatives of what is observed of an orbit with respect to a key: of a physical case in
 /// SI units.

@@ -91,7 +91,7 @@ impl Fast {
             "orbit",
             &self.counted.case,
             &format!(
-                "--period {} {}",
+                "--period {} {} --prove",
                 self.attractor.period,
                 rerun::state(&self.attractor.states[0])
             ),

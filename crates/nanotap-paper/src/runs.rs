@@ -11,11 +11,13 @@ use nanotap_dynamics::{
 
 use super::check::digits;
 use super::{PaperError, rerun};
+use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap::observe::{Observables, Set, measure};
 use nanotap::study::orbit::{OrbitReport, report};
+use nanotap::study::proof::Prover;
 use nanotap::study::start_box::default_box;
 
 /// The seed of every set of starts.
@@ -245,6 +247,19 @@ impl Counted {
         })
     }
 
+    /// What is proved of an orbit, as the end of what is said of it; nothing where nothing is.
+    pub(super) fn proved(&self, orbit: &PeriodicOrbit) -> String {
+        let prover = Prover::new(&Case::from(self.case.clone()));
+        let theorem = self
+            .look(orbit)
+            .ok()
+            .and_then(|o| prover.report(&o).theorem);
+        theorem.map_or_else(String::new, |theorem| match theorem.stability {
+            "undecided" => ", proved to exist".to_owned(),
+            word => format!(", proved to exist and to be {word}"),
+        })
+    }
+
     /// What kinds of motion attract, most frequent first.
     pub(super) fn kinds(&self) -> Vec<String> {
         self.census
@@ -271,9 +286,10 @@ impl Counted {
             let count = attractor.fraction.count;
             parts.push(match &attractor.kind {
                 AttractorKind::Periodic(orbit) => format!(
-                    "a stable period-{} orbit ({count} starts, largest |μ| {})",
+                    "a stable period-{} orbit ({count} starts, largest |μ| {}{})",
                     orbit.period,
-                    digits(orbit.spectral_radius(), 4)
+                    digits(orbit.spectral_radius(), 4),
+                    self.proved(orbit)
                 ),
                 AttractorKind::QuasiPeriodic(_) => format!("a torus ({count} starts)"),
                 AttractorKind::Chaotic { spectrum, lifetime } => {

@@ -64,10 +64,11 @@ impl Slow {
                 "unstable"
             };
             parts.push(format!(
-                "W from {} to {}, {stability}, μ = {}",
+                "W from {} to {}, {stability}, μ = {}{}",
                 digits(o.tip_min, 4),
                 digits(o.tip_max, 4),
-                multiplier(orbit)
+                multiplier(orbit),
+                self.counted.proved(orbit)
             ));
         }
         Ok(if orbits.is_empty() {
@@ -97,7 +98,10 @@ impl Slow {
             Some(orbit) => rerun::on_case(
                 "orbit",
                 &self.counted.case,
-                &format!("--period {period} {}", rerun::state(&orbit.states[0])),
+                &format!(
+                    "--period {period} {} --prove",
+                    rerun::state(&orbit.states[0])
+                ),
             ),
             None => self.counted.rerun(),
         }

@@ -147,7 +147,7 @@ const NEARLY_DEPENDENT: f64 = 1e-6;
 /// of the entries of states.
 pub(crate) fn enclosed(factors: &[Matrix<Interval>], weights: &[f64]) -> Multipliers {
     product_in_frames(factors, weights)
-        .map(|product| discs(&product))
+        .map(|product| discs(&product).into_iter().map(around_real).collect())
         .map(Multipliers::apart)
         .unwrap_or_default()
 }
@@ -273,6 +273,20 @@ fn discs(product: &Matrix<Rectangle>) -> Vec<Disc> {
             }
         })
         .collect()
+}
+
+/// Discs that may hold real numbers, around real ones: multipliers come in conjugate pairs, and
+/// one that is alone is real.
+fn around_real(disc: Disc) -> Disc {
+    if disc.center.im.abs() > disc.radius {
+        return disc;
+    }
+    let radius = Interval::point(disc.radius) + Interval::point(disc.center.im.abs());
+    Disc {
+        center: Complex::new(disc.center.re, 0.0),
+        radius: radius.hi(),
+        ..disc
+    }
 }
 
 /// Eigenvectors of a matrix that is nearly diagonal, to first order of what is beside it.

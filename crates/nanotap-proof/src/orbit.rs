@@ -110,6 +110,8 @@ pub const MOST_UNKNOWNS: usize = 3000;
 /// Part of the way of an entry of the state in a radian of the drive that it is measured by at
 /// least.
 const MOVED: f64 = 0.1;
+/// And by this part of the largest entry at least.
+const LEAST: f64 = 1e-9;
 /// Newton steps in plain numbers before the test.
 const NEWTON_STEPS: usize = 4;
 /// Boxes tried: the first has this part of the size of the unknowns, each next one is larger
@@ -120,7 +122,8 @@ const LARGEST_BOX: f64 = 0.1;
 /// How often the enclosure is put into the operator again.
 const TIGHTENING: usize = 3;
 
-/// Proves that there is a periodic orbit near an approximate one.
+/// Proves that there is a periodic orbit near an approximate one: so near that it is the only
+/// one there.
 ///
 /// # Errors
 /// [`ProofError`] says what could not be proved.
@@ -272,6 +275,10 @@ impl<'a> Equations<'a> {
                 let moved = MOVED * radian * field[i].middle().abs();
                 *w = w.max(block[i].abs()).max(moved);
             }
+        }
+        let largest = weights.iter().copied().fold(0.0, f64::max);
+        for w in &mut weights {
+            *w = w.max(LEAST * largest);
         }
         weights.push(radian);
         weights
@@ -484,7 +491,15 @@ impl<'a> Equations<'a> {
             radius *= WIDER;
         }
         let (alone, radii) = found.ok_or(ProofError::NoIsolatedOrbit)?;
-        Ok((alone, boxed(&|k| radii[k])))
+        // The theorem is of the orbit that was given, not of one that Newton went to.
+        let near = |(k, &x): (usize, &f64)| (start[k] - x).abs() <= alone * weight(k);
+        if !center.iter().enumerate().all(near) {
+            return Err(ProofError::NoIsolatedOrbit);
+        }
+        // From any point of the enclosure, not only from its middle.
+        let widest = radii.iter().copied().fold(0.0, f64::max);
+        let alone = (Interval::point(alone) - Interval::point(widest)).lo();
+        Ok((alone.max(0.0), boxed(&|k| radii[k])))
     }
 
     /// Proves that no flight has a switch before its end.

@@ -175,6 +175,16 @@ impl System {
         self.period
     }
 
+    /// The angular frequencies of the tones.
+    pub fn frequencies(&self) -> &[Interval] {
+        &self.frequencies
+    }
+
+    /// What the regimes are made of.
+    pub fn regimes(&self) -> impl ExactSizeIterator<Item = &RegimeParts> {
+        self.regimes.iter().map(|regime| &regime.parts)
+    }
+
     /// e^{iω_k t}.
     pub(crate) fn phasors(&self, time: Interval) -> Vec<Rectangle> {
         let turn = |&w: &Interval| Rectangle::imaginary(w * time).exp();

@@ -123,6 +123,11 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             k + 1,
             attractor.evidence
         )));
+        let proof = attractor.orbit.as_ref().and_then(|o| o.proof.as_ref());
+        if let Some(proof) = proof {
+            let word = if proof.proved { "theorem: " } else { "" };
+            text.push_str(&motion::paragraph(&format!("{word}{}", proof.statement)));
+        }
         if attractor.orbit.is_none() {
             text.push_str(&motion::paragraph(&format!(
                 "Lyapunov exponents per drive period: {}",
@@ -190,6 +195,16 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             ]);
         }
         text.push_str(&table.render());
+        for (k, orbit) in orbits.iter().enumerate() {
+            if let Some(proof) = &orbit.proof {
+                let word = if proof.proved { "theorem: " } else { "" };
+                text.push_str(&motion::paragraph(&format!(
+                    "unstable orbit {}: {word}{}",
+                    k + 1,
+                    proof.statement
+                )));
+            }
+        }
     }
     let sides: Vec<String> = found
         .sides

@@ -128,6 +128,10 @@ fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
     text.push_str(&motion::spectrum(&orbit.spectrum, orbit.period, &units));
     text.push('\n');
     text.push_str(&motion::multipliers(&orbit.multipliers));
+    if let Some(proof) = &orbit.proof {
+        text.push('\n');
+        text.push_str(&motion::proof(proof, model));
+    }
     for (key, derivative) in &orbit.derivatives {
         text.push('\n');
         text.push_str(&motion::derivative(key, derivative));

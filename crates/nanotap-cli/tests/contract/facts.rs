@@ -102,7 +102,7 @@ fn offered(help: &str) -> BTreeSet<String> {
 }
 
 /// Entries whose numbers depend on time, rounding, step control or chance.
-const FLEETING: [&str; 15] = [
+const FLEETING: [&str; 17] = [
     "seconds",
     "periods_per_second",
     "residual",
@@ -119,6 +119,9 @@ const FLEETING: [&str; 15] = [
     "lyapunov",
     "steps",
     "start",
+    // Of a proof: how wide its enclosures are, and how far the test of uniqueness reached.
+    "radius",
+    "unique_within",
 ];
 
 /// Arrays whose entries but the first come from step control.

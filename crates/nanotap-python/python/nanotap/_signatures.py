@@ -153,6 +153,7 @@ def orbit(  # type: ignore[overload-overlap]
     harmonics: int = 20,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
+    prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Value,
@@ -166,6 +167,7 @@ def orbit(
     harmonics: int = 20,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
+    prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
@@ -178,6 +180,7 @@ def orbit(
     harmonics: int = 20,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
+    prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
@@ -200,6 +203,8 @@ def orbit(
     derivatives : Sequence[str] | None
         Keys of the case by which to differentiate the orbit and all that is
         observed of it.
+    prove : bool
+        Prove in interval arithmetic that it exists, is alone, and is stable or not.
     threads : int | None
         Of arrays: threads; without it, one a core.
     progress : Progress
@@ -226,6 +231,7 @@ def orbit(
         "harmonics": harmonics,
         "resolution": resolution,
         "derivatives": derivatives,
+        "prove": prove,
     }
     return _motions.orbit(case, options, threads, progress, parameters)
 
@@ -237,6 +243,7 @@ def attractors(
     box: Box = None,
     max_period: int = 64,
     unstable: int = 0,
+    prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Attractors:
@@ -262,6 +269,9 @@ def attractors(
         Longest period looked for (1 to 10000).
     unstable : int
         Also list unstable orbits up to this period (0 to 10000).
+    prove : bool
+        Prove in interval arithmetic that each orbit exists, is alone, and is stable
+        or not.
     threads : int | None
         Threads; without it, one a core.
     progress : Progress
@@ -285,6 +295,7 @@ def attractors(
         "box": box,
         "max_period": max_period,
         "unstable": unstable,
+        "prove": prove,
     }
     return _studies.attractors(case, options, threads, progress)
 

@@ -18,6 +18,7 @@ use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitReport, report};
+use crate::study::proof::Prover;
 use crate::study::registry::Study;
 use crate::study::simulate::{Classification, SimulateError, largest_exponent};
 use crate::study::start_box::{box_with, default_box, default_starts};
@@ -204,6 +205,15 @@ pub struct AttractorReport {
 }
 
 impl Attractors {
+    /// Proves every orbit in it, as far as that can be.
+    fn prove(&mut self, case: &Case) {
+        let prover = Prover::new(case);
+        let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
+        for orbit in stable.chain(self.unstable.iter_mut().flatten()) {
+            orbit.proof = Some(prover.report(orbit));
+        }
+    }
+
     /// The same with every attractor told in SI too, of the case `view`.
     #[must_use]
     pub fn in_si(mut self, view: &Physical) -> Self {
@@ -540,6 +550,8 @@ pub struct AttractorsRequest {
     /// Also list unstable orbits up to this period
     #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
     pub unstable: usize,
+    /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
+    pub prove: bool,
 }
 
 impl Default for AttractorsRequest {
@@ -551,6 +563,7 @@ impl Default for AttractorsRequest {
             sides: Intervals::default(),
             max_period: options.classify.max_period,
             unstable: options.unstable,
+            prove: false,
         }
     }
 }
@@ -595,7 +608,10 @@ impl Study for AttractorsStudy {
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let found = attractors(&model, &request.options(&model)?, control)?;
+        let mut found = attractors(&model, &request.options(&model)?, control)?;
+        if request.prove {
+            found.prove(case);
+        }
         Ok(match case.physical() {
             Some(resolved) => found.in_si(resolved),
             None => found,

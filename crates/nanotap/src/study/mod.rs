@@ -14,6 +14,7 @@ pub mod limits;
 pub mod lyapunov;
 pub mod modes;
 pub mod orbit;
+pub mod proof;
 pub mod recipe;
 pub mod registry;
 pub mod request;

@@ -23,6 +23,7 @@ use crate::observe::{
 };
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
+use crate::study::proof::{ProofReport, Prover};
 use crate::study::registry::Study;
 use crate::study::simulate::{Named, SimulateError, starting_state};
 use crate::study::start_box::default_box;
@@ -129,6 +130,9 @@ pub struct OrbitReport {
     /// What of the range of a nonlinear force law it leaves.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
+    /// What was proved of it, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proof: Option<ProofReport>,
     /// Its full length, for figures.
     #[serde(skip)]
     pub trajectory: Recording,
@@ -295,6 +299,7 @@ pub fn report(
         out_of_range: OutOfRange::of(model, &seen.observables),
         observables: seen.observables,
         derivatives: BTreeMap::new(),
+        proof: None,
         trajectory: seen.recording,
     })
 }
@@ -436,6 +441,8 @@ pub struct OrbitRequest {
     /// Keys of the case by which to differentiate the orbit and all that is observed of it
     #[schemars(extend("x-value" = "KEY,…"))]
     pub derivatives: Vec<String>,
+    /// Prove in interval arithmetic that it exists, is alone, and is stable or not
+    pub prove: bool,
 }
 
 impl Default for OrbitRequest {
@@ -447,6 +454,7 @@ impl Default for OrbitRequest {
             harmonics: options.harmonics,
             resolution: 200,
             derivatives: Vec::new(),
+            prove: false,
         }
     }
 }
@@ -488,6 +496,9 @@ impl Study for OrbitStudy {
             let at = (found.state.as_slice(), found.period);
             let derivative = Derivative::of(case, &model, key, at, &found.observables, Set::ALL)?;
             found.derivatives.insert(key.path(), derivative);
+        }
+        if request.prove {
+            found.proof = Some(Prover::new(case).report(&found));
         }
         let physical = case.physical().map(|resolved| {
             PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved)

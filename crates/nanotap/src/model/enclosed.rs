@@ -1,0 +1,378 @@
+//! The cantilever's equations with numbers that are intervals, for proofs.
+//!
+//! Every parameter is the interval of all decimal numbers that are read as its value
+//! ([`Interval::typed`]), wave numbers β_j come from an interval Newton step on
+//! cos β + sech β = 0, and matrices, forcing and guards follow by the same formulas as the
+//! plain ones, Eqs. (8)–(18), rounded outwards.
+
+use nanotap_proof::{
+    HarmonicVector, Interval, Matrix, Output, ProofError, Rectangle, RegimeParts, Reset, System,
+    Transition,
+};
+
+use crate::model::beam::Modes;
+use crate::model::cantilever::{Cantilever, CosineTerm};
+use crate::model::contact::ContactLaw;
+use crate::model::contact::law::{Answer, Combination};
+use crate::model::drive_form::{Actuation, FrequencyRatio};
+use crate::model::higher_modes::HigherModes;
+
+/// Why a case has no equations in intervals.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EnclosureError {
+    /// Its flow has no closed form.
+    #[error("the law `{law}` is nonlinear: only piecewise-linear motion is known in closed form")]
+    NonlinearLaw {
+        /// The law.
+        law: String,
+    },
+    /// Modes that were measured.
+    #[error("proofs are of uniform beams, and this one has measured higher modes")]
+    MeasuredModes,
+    /// Another model.
+    #[error("proofs are of cantilevers, and this is an oscillator")]
+    Oscillator,
+    /// A motion that was integrated step by step.
+    #[error("the motion is not known in closed form")]
+    NotPiecewiseLinear,
+    /// A wave number could not be enclosed.
+    #[error("the wave number of mode {mode} could not be enclosed")]
+    WaveNumber {
+        /// The mode, from 1.
+        mode: usize,
+    },
+    /// The flow could not be enclosed.
+    #[error(transparent)]
+    Flow(#[from] ProofError),
+}
+
+/// A mode's numbers that the equations need.
+struct EnclosedMode {
+    /// β⁴.
+    stiffness: Interval,
+    /// φ(1).
+    tip: Interval,
+    /// ∫φ.
+    integral: Interval,
+}
+
+/// The equations of motion in the state (a, ȧ, s).
+struct EnclosedBeam {
+    modes: Vec<EnclosedMode>,
+    memory: bool,
+    tones: usize,
+    frequencies: Vec<Interval>,
+    /// M⁻¹p over p.
+    give: Interval,
+    alpha1: Interval,
+    alpha3: Interval,
+    /// V_T.
+    height: Output,
+    /// V̇_T.
+    height_rate: Output,
+    /// Force along p and along I of each tone.
+    drives: Vec<[Rectangle; 2]>,
+}
+
+/// The system of a cantilever in intervals.
+///
+/// # Errors
+/// [`EnclosureError`] where that cannot be had.
+pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
+    if let Some(law) = &case.law {
+        return Err(EnclosureError::NonlinearLaw { law: law.name() });
+    }
+    if case.higher_modes != HigherModes::NONE {
+        return Err(EnclosureError::MeasuredModes);
+    }
+    let law = ContactLaw::law(case, None);
+    let beam = EnclosedBeam::new(case, law.has_memory)?;
+    let recovers = law.onsets.is_some();
+    let gap = beam.combined(&law.gap, exact);
+    let hold = if recovers {
+        beam.combined(&law.hold, derived)
+    } else {
+        scaled(&gap, -Interval::ONE)
+    };
+    let reset = law
+        .left
+        .as_ref()
+        .map(|left| beam.memory_jump(&beam.combined(left, exact)));
+    let begins = Transition {
+        guard: gap,
+        target: 1,
+        reset: None,
+        starts_at_zero: if recovers { Vec::new() } else { vec![(0, 1)] },
+    };
+    // A Kelvin–Voigt surface parts with gap and rate zero, any other with the gap alone.
+    let ends = Transition {
+        guard: hold,
+        target: 0,
+        reset,
+        starts_at_zero: vec![(0, if recovers { 2 } else { 1 })],
+    };
+    let regimes = vec![
+        beam.regime(&law.flight, begins),
+        beam.regime(&law.contact, ends),
+    ];
+    let repetition = case.tone2_ratio.map_or(1, FrequencyRatio::denominator);
+    let period =
+        Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::typed(case.omega);
+    Ok(System::new(period, beam.frequencies.clone(), regimes)?)
+}
+
+/// β_j: Newton's operator maps an interval around the computed root into itself, so that it
+/// holds just one root, which lies in the image.
+fn wave_number(number: usize, approximate: f64) -> Option<Interval> {
+    let around = Interval::around(approximate, 1e-12 * approximate);
+    let sech = |beta: Interval| {
+        let (_, cosh) = beta.sinh_cosh();
+        Interval::ONE / cosh
+    };
+    let middle = Interval::point(approximate);
+    let value = middle.sin_cos().1 + sech(middle);
+    let (sinh, cosh) = around.sinh_cosh();
+    let slope = -around.sin_cos().0 - sinh / cosh * sech(around);
+    let newton = middle - value / slope;
+    // Root j is the one between (j − 1)π and jπ.
+    let pi = Interval::pi();
+    let (from, to) = (number as f64 - 1.0, number as f64);
+    let own = (newton - Interval::point(from) * pi).is_positive()
+        && (Interval::point(to) * pi - newton).is_positive();
+    (own && around.encloses(newton)).then_some(newton)
+}
+
+impl EnclosedMode {
+    /// σ_j = (sinh β − sin β)/(cosh β + cos β) is tanh(β/2) of an odd root and coth(β/2) of
+    /// an even one, as cos β = −sech β there.
+    fn new(number: usize, approximate: f64) -> Result<Self, EnclosureError> {
+        let beta =
+            wave_number(number, approximate).ok_or(EnclosureError::WaveNumber { mode: number })?;
+        let falling = (-beta).exp();
+        let tanh = (Interval::ONE - falling) / (Interval::ONE + falling);
+        let odd = number % 2 == 1;
+        let sigma = if odd { tanh } else { Interval::ONE / tanh };
+        Ok(Self {
+            stiffness: beta.square().square(),
+            tip: Interval::point(if odd { 2.0 } else { -2.0 }),
+            integral: Interval::point(2.0) * sigma / beta,
+        })
+    }
+}
+
+/// A number of a law, which is 0, ±1 or a product or quotient of typed parameters and their
+/// sums without cancellation: it is within 8 of its last places.
+fn derived(value: f64) -> Interval {
+    if value == 0.0 {
+        return Interval::ZERO;
+    }
+    let typed = Interval::typed(value);
+    typed + typed * Interval::around_zero(8.0 * f64::EPSILON)
+}
+
+/// The same of a number that is ±1 by definition wherever it is ±1.
+fn exact(value: f64) -> Interval {
+    if value.abs() == 1.0 {
+        Interval::point(value)
+    } else {
+        derived(value)
+    }
+}
+
+fn scaled(output: &Output, factor: Interval) -> Output {
+    Output {
+        row: output.row.iter().map(|&x| x * factor).collect(),
+        constant: output.constant * factor,
+        tones: output.tones.iter().map(|z| z.scale(factor)).collect(),
+    }
+}
+
+fn sum(a: &Output, b: &Output) -> Output {
+    Output {
+        row: a.row.iter().zip(&b.row).map(|(&a, &b)| a + b).collect(),
+        constant: a.constant + b.constant,
+        tones: a.tones.iter().zip(&b.tones).map(|(&a, &b)| a + b).collect(),
+    }
+}
+
+impl EnclosedBeam {
+    fn new(case: &Cantilever, memory: bool) -> Result<Self, EnclosureError> {
+        let typed = Interval::typed;
+        let approximate = Modes::shared(case.modes)
+            .map_err(|_| EnclosureError::WaveNumber { mode: case.modes })?;
+        let modes = approximate
+            .iter()
+            .map(|mode| EnclosedMode::new(mode.number, mode.beta))
+            .collect::<Result<Vec<_>, _>>()?;
+        let count = modes.len();
+        let (omega, alpha1, alpha3) = (typed(case.omega), typed(case.alpha1), typed(case.alpha3));
+        let mut frequencies = vec![omega];
+        // s sin wτ + c cos wτ = Re((c − i s) e^{iwτ}); a phase turns it.
+        let sine = |s: Interval, c: Interval| Rectangle::new(c, -s);
+        let mut amplitudes = vec![(typed(case.alpha2), Rectangle::ONE)];
+        if let Some(ratio) = case.tone2_ratio {
+            let [p, q] = [ratio.numerator(), ratio.denominator()];
+            frequencies.push(omega * Interval::point(f64::from(p)) / Interval::point(f64::from(q)));
+            let degrees = typed(case.tone2_phase);
+            let phase = degrees * Interval::pi() / Interval::point(180.0);
+            let turn = Rectangle::imaginary(phase).exp();
+            amplitudes.push((typed(case.tone2_amplitude), turn));
+        }
+        let mut gap_tones = Vec::new();
+        let mut drives = Vec::new();
+        for ((amplitude, turn), &rate) in amplitudes.into_iter().zip(&frequencies) {
+            let zero = Interval::ZERO;
+            let one = sine(amplitude, zero) * turn;
+            let (tip, spread, gap) = match case.actuation {
+                Actuation::Base => {
+                    let inertia = amplitude * rate.square();
+                    let drag = match case.cosine_term {
+                        CosineTerm::Corrected => amplitude * alpha3 * rate,
+                        CosineTerm::Printed => amplitude * alpha3,
+                    };
+                    (
+                        sine(alpha1 * inertia, zero) * turn,
+                        sine(inertia, -drag) * turn,
+                        one,
+                    )
+                }
+                Actuation::Tip => (one, Rectangle::ZERO, Rectangle::ZERO),
+                Actuation::Distributed => (Rectangle::ZERO, one, Rectangle::ZERO),
+            };
+            drives.push([tip, spread]);
+            gap_tones.push(gap);
+        }
+        let size = 2 * count + usize::from(memory);
+        let tip_row = |block: usize| {
+            let mut row = vec![Interval::ZERO; size];
+            for (j, mode) in modes.iter().enumerate() {
+                row[block * count + j] = mode.tip;
+            }
+            row
+        };
+        let rate_tones = gap_tones.iter().zip(&frequencies);
+        let height_rate = Output {
+            row: tip_row(1),
+            constant: Interval::ZERO,
+            tones: rate_tones
+                .map(|(&z, &w)| z * Rectangle::imaginary(w))
+                .collect(),
+        };
+        // M = 1 + α1 p pᵀ, pᵀp = 4N: M⁻¹p = p/(1 + 4N α1).
+        let give = Interval::ONE / (Interval::ONE + Interval::point(4.0 * count as f64) * alpha1);
+        Ok(Self {
+            height: Output {
+                row: tip_row(0),
+                constant: typed(case.alpha5),
+                tones: gap_tones,
+            },
+            height_rate,
+            memory,
+            tones: frequencies.len(),
+            frequencies,
+            give,
+            alpha1,
+            alpha3,
+            drives,
+            modes,
+        })
+    }
+
+    fn size(&self) -> usize {
+        2 * self.modes.len() + usize::from(self.memory)
+    }
+
+    /// M⁻¹ = 1 − α1 p pᵀ/(1 + 4N α1), times a vector.
+    fn over_mass(&self, vector: &[Rectangle]) -> Vec<Rectangle> {
+        let along: Rectangle = self
+            .modes
+            .iter()
+            .zip(vector)
+            .map(|(mode, z)| z.scale(mode.tip))
+            .sum();
+        let taken = along.scale(self.alpha1 * self.give);
+        let each = self.modes.iter().zip(vector);
+        each.map(|(mode, &z)| z - taken.scale(mode.tip)).collect()
+    }
+
+    fn combined(&self, combination: &Combination, number: fn(f64) -> Interval) -> Output {
+        let mut output = sum(
+            &scaled(&self.height, number(combination.height.value)),
+            &scaled(&self.height_rate, number(combination.rate.value)),
+        );
+        if self.memory {
+            output.row[2 * self.modes.len()] += number(combination.memory.value);
+        }
+        output
+    }
+
+    fn regime(&self, answer: &Answer, exit: Transition) -> RegimeParts {
+        let (n, size) = (self.modes.len(), self.size());
+        let mut matrix = Matrix::zeros(size, size);
+        let mut constant = vec![Interval::ZERO; size];
+        let mut tones = vec![vec![Rectangle::ZERO; size]; self.tones];
+        for j in 0..n {
+            matrix[(j, n + j)] = Interval::ONE;
+            let unit = |size: Interval| -> Vec<Rectangle> {
+                let mut unit = vec![Rectangle::ZERO; n];
+                unit[j] = Rectangle::real(size);
+                self.over_mass(&unit)
+            };
+            let springs = unit(self.modes[j].stiffness);
+            let dampers = unit(self.alpha3);
+            for i in 0..n {
+                matrix[(n + i, j)] = -springs[i].re;
+                matrix[(n + i, n + j)] = -dampers[i].re;
+            }
+        }
+        for (tone, [tip, spread]) in tones.iter_mut().zip(&self.drives) {
+            let force: Vec<Rectangle> = self
+                .modes
+                .iter()
+                .map(|mode| tip.scale(mode.tip) + spread.scale(mode.integral))
+                .collect();
+            tone[n..2 * n].copy_from_slice(&self.over_mass(&force));
+        }
+        // The force acts along M⁻¹p, and a memory changes by itself.
+        let force = self.combined(&answer.force, derived);
+        let mut rows: Vec<(usize, Interval, Output)> = (0..n)
+            .map(|i| (n + i, self.modes[i].tip * self.give, force.clone()))
+            .collect();
+        if self.memory {
+            let rate = self.combined(&answer.memory_rate, derived);
+            rows.push((2 * n, Interval::ONE, rate));
+        }
+        for (i, factor, output) in rows {
+            for (j, &x) in output.row.iter().enumerate() {
+                matrix[(i, j)] += factor * x;
+            }
+            constant[i] += factor * output.constant;
+            for (tone, z) in tones.iter_mut().zip(&output.tones) {
+                tone[i] += z.scale(factor);
+            }
+        }
+        RegimeParts {
+            matrix,
+            forcing: HarmonicVector { constant, tones },
+            transitions: vec![exit],
+        }
+    }
+
+    /// The memory becomes `value`, and nothing else changes.
+    fn memory_jump(&self, value: &Output) -> Reset {
+        let (size, at) = (self.size(), 2 * self.modes.len());
+        let mut matrix = Matrix::identity(size);
+        let mut offset = HarmonicVector {
+            constant: vec![Interval::ZERO; size],
+            tones: vec![vec![Rectangle::ZERO; size]; self.tones],
+        };
+        for (j, &x) in value.row.iter().enumerate() {
+            matrix[(at, j)] = x;
+        }
+        offset.constant[at] = value.constant;
+        for (tone, &z) in offset.tones.iter_mut().zip(&value.tones) {
+            tone[at] = z;
+        }
+        Reset { matrix, offset }
+    }
+}

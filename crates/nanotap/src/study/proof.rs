@@ -1,0 +1,274 @@
+//! Proofs of periodic orbits: what Newton found becomes a theorem, or is said not to.
+//!
+//! A proof is about the model's dimensionless numbers, each standing for every decimal number
+//! that is read as it; see [`enclosed`] for the equations and [`nanotap_proof`] for the method.
+
+use std::fmt::Write as _;
+
+use nanotap_flow::Trajectory;
+use nanotap_proof::{Candidate, Interval, ProofError, Stability, Switch, System, Theorem, prove};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::case::Case;
+use crate::model::cantilever::{Cantilever, CosineTerm};
+use crate::model::contact::ContactLaw;
+use crate::model::drive_form::Actuation;
+use crate::model::enclosed::{EnclosureError, enclosed};
+use crate::model::recording::Recording;
+use crate::number::shortest;
+use crate::study::orbit::OrbitReport;
+
+/// What was proved of a periodic orbit.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ProofReport {
+    /// Whether the orbit was proved to exist.
+    pub proved: bool,
+    /// The theorem, or why there is none.
+    pub statement: String,
+    /// What is known, if it exists.
+    #[serde(flatten)]
+    pub theorem: Option<TheoremReport>,
+}
+
+/// A theorem's numbers. An interval is its lower and its upper bound, both exact.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TheoremReport {
+    /// Minimal period in drive periods.
+    pub period: usize,
+    /// State at drive phase 0, entry by entry.
+    pub state: Vec<[f64; 2]>,
+    /// When contact begins and ends.
+    pub switches: Vec<SwitchReport>,
+    /// How far from it no other orbit of the same contacts is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unique_within: Option<UniqueWithin>,
+    /// Discs that hold the multipliers.
+    pub multipliers: Vec<DiscReport>,
+    /// What is proved: stable, unstable or undecided.
+    pub stability: &'static str,
+}
+
+/// A switch between flight and contact.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SwitchReport {
+    /// Time from drive phase 0 on.
+    pub time: [f64; 2],
+    /// Whether contact begins or ends.
+    pub begins: bool,
+}
+
+/// No other orbit of the same period and contacts has every switch so near.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct UniqueWithin {
+    /// Difference of the time of every switch.
+    pub time: f64,
+    /// Difference of each entry of the state at every switch.
+    pub state: Vec<f64>,
+}
+
+/// A disc of complex numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct DiscReport {
+    /// Its centre: real and imaginary part.
+    pub center: [f64; 2],
+    /// Its radius.
+    pub radius: f64,
+    /// How many multipliers it holds.
+    pub count: usize,
+}
+
+/// Why an orbit is not proved.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum NotProved {
+    /// The case has no equations in intervals.
+    #[error(transparent)]
+    Equations(#[from] EnclosureError),
+    /// The test failed.
+    #[error(transparent)]
+    Test(#[from] ProofError),
+}
+
+/// What proves the orbits of one case.
+#[derive(Debug)]
+pub struct Prover {
+    system: Result<System, EnclosureError>,
+    /// The numbers that a theorem is about.
+    about: String,
+}
+
+impl Prover {
+    /// Of a case.
+    pub fn new(case: &Case) -> Self {
+        let cantilever = case.cantilever().ok_or(EnclosureError::Oscillator);
+        Self {
+            system: cantilever.clone().and_then(enclosed),
+            about: cantilever.map(about).unwrap_or_default(),
+        }
+    }
+
+    /// Proves one orbit.
+    ///
+    /// # Errors
+    /// [`NotProved`] says why that was not possible.
+    pub fn theorem(&self, orbit: &OrbitReport) -> Result<Theorem, NotProved> {
+        let system = self.system.as_ref().map_err(Clone::clone)?;
+        let Recording::Exact(trajectory) = &orbit.trajectory else {
+            return Err(EnclosureError::NotPiecewiseLinear.into());
+        };
+        Ok(prove(system, &candidate(trajectory, orbit.period))?)
+    }
+
+    /// The same as a report.
+    pub fn report(&self, orbit: &OrbitReport) -> ProofReport {
+        match self.theorem(orbit) {
+            Ok(theorem) => ProofReport {
+                proved: true,
+                statement: statement(&theorem, &self.about),
+                theorem: Some(TheoremReport::of(&theorem)),
+            },
+            Err(reason) => ProofReport {
+                proved: false,
+                statement: format!("not proved: {reason}"),
+                theorem: None,
+            },
+        }
+    }
+}
+
+/// The switches of a recorded orbit, with the states after them.
+pub fn candidate(trajectory: &Trajectory, period: usize) -> Candidate {
+    let transitions = trajectory.system().transitions();
+    let switches = trajectory
+        .events()
+        .iter()
+        .map(|event| Switch {
+            time: event.time,
+            from: event.from,
+            transition: transitions[event.from]
+                .iter()
+                .position(|t| t.target == event.to)
+                .unwrap_or_default(),
+            state: trajectory.state_at(event.time).unwrap_or_default(),
+        })
+        .collect();
+    Candidate {
+        period,
+        regime: trajectory.segments().first().map_or(0, |s| s.regime),
+        switches,
+    }
+}
+
+/// What is proved of an orbit's stability, in a word.
+fn stability(theorem: &Theorem) -> &'static str {
+    match theorem.multipliers.stability() {
+        Stability::Stable => "stable",
+        Stability::Unstable => "unstable",
+        Stability::Undecided => "undecided",
+    }
+}
+
+/// The numbers of a case, and what of it is not as in the paper.
+fn about(case: &Cantilever) -> String {
+    let numbers: Vec<String> = case
+        .parameters()
+        .into_iter()
+        .map(|parameter| format!("{} = {}", parameter.name(), shortest(case.get(parameter))))
+        .collect();
+    let mut text = format!("N = {}, {}", case.modes, numbers.join(", "));
+    if let Some(ratio) = case.tone2_ratio {
+        let _ = write!(text, ", tone2_ratio = {ratio}");
+    }
+    if case.contact != ContactLaw::default() {
+        let _ = write!(text, ", contact = {}", case.contact);
+    }
+    if case.actuation != Actuation::default() {
+        let _ = write!(text, ", actuation = {}", case.actuation);
+    }
+    if case.cosine_term != CosineTerm::default() {
+        let _ = write!(text, ", cosine_term = {}", case.cosine_term.name());
+    }
+    text
+}
+
+/// The theorem in words.
+fn statement(theorem: &Theorem, about: &str) -> String {
+    let radius = |interval: &Interval| interval.radius();
+    let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
+    let state = largest(&mut theorem.states.iter().flatten().map(radius));
+    let mut text = format!(
+        "for {about}, each number standing for every decimal that is read as it, an orbit of minimal period {} \
+         exists; its states at drive phase 0 are known to {state:.1e}",
+        theorem.period
+    );
+    match &theorem.alone {
+        Some(alone) => {
+            let time = largest(&mut theorem.switches.iter().map(|s| s.time.radius()));
+            let _ = write!(
+                text,
+                ", the times of its {} switches between flight and contact to {time:.1e}, and it switches nowhere \
+                 else; no other orbit of that period and that sequence of flights and contacts has all its \
+                 switches within {:.1e} of these times and in states as near as `unique_within` says",
+                theorem.switches.len(),
+                alone.time,
+            );
+        }
+        None => text.push_str(
+            ", and it never switches; no other orbit of that period stays in the same regime",
+        ),
+    }
+    let discs = &theorem.multipliers.discs;
+    let reach = largest(&mut discs.iter().map(|d| d.radius));
+    let _ = match theorem.multipliers.stability() {
+        Stability::Stable => write!(
+            text,
+            "; its multipliers, known to {reach:.1e}, are all inside the unit circle: it is asymptotically stable"
+        ),
+        Stability::Unstable => write!(
+            text,
+            "; of its multipliers, known to {reach:.1e}, at least one is outside the unit circle: it is unstable"
+        ),
+        Stability::Undecided if discs.is_empty() => {
+            write!(text, "; its multipliers could not be enclosed")
+        }
+        Stability::Undecided => write!(
+            text,
+            "; its multipliers are known to {reach:.1e}, which leaves open whether it is stable"
+        ),
+    };
+    text
+}
+
+impl TheoremReport {
+    fn of(theorem: &Theorem) -> Self {
+        let bounds = |x: &Interval| [x.lo(), x.hi()];
+        let first = theorem.states.first();
+        Self {
+            period: theorem.period,
+            state: first.map_or_else(Vec::new, |s| s.iter().map(bounds).collect()),
+            switches: theorem
+                .switches
+                .iter()
+                .map(|switch| SwitchReport {
+                    time: bounds(&switch.time),
+                    begins: switch.to != 0,
+                })
+                .collect(),
+            unique_within: theorem.alone.as_ref().map(|alone| UniqueWithin {
+                time: alone.time,
+                state: alone.state.clone(),
+            }),
+            multipliers: theorem
+                .multipliers
+                .discs
+                .iter()
+                .map(|disc| DiscReport {
+                    center: [disc.center.re, disc.center.im],
+                    radius: disc.radius,
+                    count: disc.count,
+                })
+                .collect(),
+            stability: stability(theorem),
+        }
+    }
+}

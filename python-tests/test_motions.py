@@ -302,3 +302,42 @@ def test_an_orbit_of_a_physical_case_is_seen_in_si():
     assert again.series.equals(orbit.series)
     with pytest.raises(ValueError, match="unit of length"):
         nanotap.orbit(nanotap.Case.paper(omega=3)).series_in_si  # noqa: B018
+
+
+def test_arrays_have_what_single_orbits_have(physical):
+    """Whatever is a number, a word or a vector, under the same name and with the same bits."""
+    keys = {"gap.tip": [17e-9, 18e-9], "drive.free_amplitude": ["20 nm", "21 nm"]}
+    many = nanotap.orbit(physical, **keys)
+    assert many.amplitude.dims == ("gap.tip", "drive.free_amplitude")
+    alone = nanotap.orbit(
+        physical.with_(**{"gap.tip": 18e-9, "drive.free_amplitude": "20 nm"})
+    )
+    one = many.sel({"gap.tip": 18e-9, "drive.free_amplitude": "20 nm"})
+    np.testing.assert_array_equal(one.orbit_state, alone.state)
+    np.testing.assert_array_equal(one.gap_range, alone.gap_range)
+    assert int(one.period) == alone.period and bool(one.stable) is alone.stable
+    assert one.stability.item() == alone.stability and one.failure.item() == ""
+    assert float(one.physical_A) == alone.physical["A"]
+    assert float(one.spectral_radius) == pytest.approx(alone.spectral_radius)
+    assert dict(zip(one.energy.values, one.energy_balance.values, strict=True)) == (
+        alone.energy_balance.to_dict()
+    )
+    assert many.amplitude.attrs["units"] == "g0"
+    assert nanotap.in_si(many).amplitude.attrs["units"] == "m"
+    # The unit of length follows from the distance, which varies here.
+    for name, si in (("amplitude", "amplitude"), ("first_harmonic", "A")):
+        np.testing.assert_array_equal(nanotap.in_si(many)[name], many[f"physical_{si}"])
+    run = nanotap.simulate(physical, periods=2)
+    assert float(nanotap.in_si(run).peak_force) == pytest.approx(
+        float(run.physical_F_max), rel=1e-12
+    )
+
+
+def test_arrays_of_modes_leave_room_for_every_state(regular):
+    many = nanotap.orbit(regular, modes=[1, 2])
+    assert list(many.state.values) == ["a1", "a2", "v1", "v2"]
+    states = many.orbit_state.values
+    np.testing.assert_array_equal(np.isnan(states[0]), [False, True, False, True])
+    alone = nanotap.orbit(regular.with_(modes=1)).state
+    np.testing.assert_array_equal(states[0, [0, 2]], alone)
+    assert not np.isnan(states[1]).any()

@@ -85,16 +85,71 @@ pub fn integral(signal: &Signal, length: f64) -> f64 {
 
 /// `∫₀^length g(s) e^{−iω(start + s)} ds`.
 pub fn fourier_integral(signal: &Signal, start: f64, length: f64, omega: f64) -> Complex {
+    fourier_of_terms(&terms(signal), start, length, omega, &mut Moments::new())
+}
+
+/// Moments of a rate and its conjugate, by rate and power; of one piece at one frequency.
+type Moments = Vec<(Complex, u32, [Complex; 2])>;
+
+fn fourier_of_terms(
+    terms: &[Term],
+    start: f64,
+    length: f64,
+    omega: f64,
+    known: &mut Moments,
+) -> Complex {
     let turn = Complex::new(0.0, -omega);
-    let sum: Complex = terms(signal)
+    let sum: Complex = terms
         .iter()
         .map(|t| {
-            let direct = t.amplitude * moment(t.rate + turn, t.power, length);
-            let mirrored = t.amplitude.conj() * moment(t.rate.conj() + turn, t.power, length);
-            (direct + mirrored) * 0.5
+            let of_term = |(rate, power, _): &&(Complex, u32, [Complex; 2])| {
+                *rate == t.rate && *power == t.power
+            };
+            let [direct, mirrored] = if let Some((_, _, moments)) = known.iter().find(of_term) {
+                *moments
+            } else {
+                let moments =
+                    [t.rate, t.rate.conj()].map(|rate| moment(rate + turn, t.power, length));
+                known.push((t.rate, t.power, moments));
+                moments
+            };
+            (t.amplitude * direct + t.amplitude.conj() * mirrored) * 0.5
         })
         .sum();
     sum * (turn * start).exponential()
+}
+
+/// The Fourier coefficients ([`PiecewiseSignal::fourier`]) of several outputs of one trajectory
+/// (the same pieces), a row a frequency: what depends on the rates alone is computed once.
+pub fn fouriers(signals: &[&PiecewiseSignal], frequencies: &[f64]) -> Vec<Vec<Complex>> {
+    let pieces = signals.first().map_or(0, |signal| signal.pieces.len());
+    let terms: Vec<Vec<Vec<Term>>> = (0..pieces)
+        .map(|k| {
+            let of_piece = signals.iter().map(|signal| terms(&signal.pieces[k].signal));
+            of_piece.collect()
+        })
+        .collect();
+    let duration = signals.first().map_or(0.0, |signal| signal.duration());
+    let mut known = Moments::new();
+    frequencies
+        .iter()
+        .map(|&omega| {
+            let mut sums = vec![Complex::new(0.0, 0.0); signals.len()];
+            for (k, terms) in terms.iter().enumerate() {
+                known.clear();
+                let piece = &signals[0].pieces[k];
+                for (sum, terms) in sums.iter_mut().zip(terms) {
+                    *sum += fourier_of_terms(terms, piece.start, piece.length, omega, &mut known);
+                }
+            }
+            if duration > 0.0 {
+                for sum in &mut sums {
+                    *sum = *sum * 2.0 / duration;
+                }
+            }
+            sums
+        })
+        .collect()
 }
 
 /// `∫₀^length g h ds`.

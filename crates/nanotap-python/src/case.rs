@@ -55,15 +55,26 @@ impl CaseCore {
         Ok(self.at_setpoint.get_or_init(|| (Arc::new(case), report)))
     }
 
+    /// The same case with other values of `keys`.
+    pub(crate) fn variants(&self, keys: &[String]) -> Result<Variants, Failure> {
+        let is_varied = |word: &String| {
+            let key = word.split('=').next().unwrap_or_default();
+            keys.iter().any(|varied| varied == key)
+        };
+        let fixed = self.overrides.iter().filter(|word| !is_varied(word));
+        Ok(Variants {
+            source: self.source.clone(),
+            fixed: fixed.cloned().collect(),
+            catalogue: catalogue_of(&self.catalogues)?,
+        })
+    }
+
     fn make(
         source: Option<Source>,
         overrides: Vec<String>,
         catalogues: Vec<(String, String)>,
     ) -> Result<Self, Failure> {
-        let mut catalogue = Catalogue::shared();
-        for (origin, text) in &catalogues {
-            Arc::make_mut(&mut catalogue).extend(text, origin)?;
-        }
+        let catalogue = catalogue_of(&catalogues)?;
         let case = Case::parse_with(source.clone(), &overrides, &catalogue)?;
         Ok(Self {
             case: Arc::new(case),
@@ -72,6 +83,34 @@ impl CaseCore {
             catalogues,
             at_setpoint: OnceLock::new(),
         })
+    }
+}
+
+/// The built-in catalogue and others beside it.
+fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> {
+    let mut catalogue = Catalogue::shared();
+    for (origin, text) in others {
+        Arc::make_mut(&mut catalogue).extend(text, origin)?;
+    }
+    Ok(catalogue)
+}
+
+/// A case of which some keys vary.
+pub(crate) struct Variants {
+    source: Option<Source>,
+    fixed: Vec<String>,
+    catalogue: Arc<Catalogue>,
+}
+
+impl Variants {
+    /// The case with these `key=value` words.
+    pub(crate) fn with(&self, words: &[String]) -> Result<Case, nanotap::Error> {
+        let all = [self.fixed.as_slice(), words].concat();
+        Ok(Case::parse_with(
+            self.source.clone(),
+            &all,
+            &self.catalogue,
+        )?)
     }
 }
 

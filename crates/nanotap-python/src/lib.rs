@@ -12,6 +12,7 @@
 )]
 
 mod case;
+mod columns;
 mod dataset;
 mod failure;
 mod figure;
@@ -37,6 +38,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(motion::modes, module)?,
         wrap_pyfunction!(motion::simulate, module)?,
         wrap_pyfunction!(motion::orbit, module)?,
+        wrap_pyfunction!(motion::series, module)?,
         wrap_pyfunction!(motion::observe, module)?,
         wrap_pyfunction!(motion::glossary, module)?,
         wrap_pyfunction!(study::study, module)?,

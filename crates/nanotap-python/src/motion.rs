@@ -1,28 +1,30 @@
 //! Single motions: modes, runs, orbits, and what is observed of many cases at once.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nanotap::ErrorKind;
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
-use nanotap::observe::time_series;
+use nanotap::observe::time_series::{self, state_names};
 use nanotap::study::modes::{ModesRequest, ModesStudy};
 use nanotap::study::orbit::{OrbitRequest, OrbitStudy};
-use nanotap::study::registry::{self, Document, Study as _};
+use nanotap::study::registry::{Document, Study as _};
 use nanotap::study::request::read;
+use nanotap::study::setpoint::at_setpoint;
 use nanotap::study::simulate::{SimulateReport, SimulateRequest, SimulateStudy};
 use nanotap::study::threads::install;
+use nanotap::{Error, ErrorKind};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use crate::case::CaseCore;
+use crate::columns::{Column, Entries, columns, entries};
 use crate::failure::Failure;
 use crate::study::json;
-use crate::watch::watched;
+use crate::watch::{watched, watched_alone};
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 type Rows<'py> = Bound<'py, PyArray2<f64>>;
@@ -59,7 +61,7 @@ pub(crate) fn modes<'py>(
     Ok((document, PyArray1::from_vec(py, xi), shapes))
 }
 
-fn series(
+fn rows(
     model: &Model,
     start: &[f64],
     periods: usize,
@@ -72,7 +74,7 @@ fn series(
     Ok(values)
 }
 
-/// One run: its document, and its time series or, of fixed steps, its curve. Of the time
+/// One run: its report, and its time series or, of fixed steps, its curve. Of the time
 /// series `series_periods` are taken.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
@@ -83,14 +85,13 @@ pub(crate) fn simulate<'py>(
 ) -> PyResult<(String, Table<'py>)> {
     let studied = case.studied(py)?;
     let request: SimulateRequest = read(json(request)?).map_err(Failure::from)?;
-    let done = watched(py, None, move |control| {
+    let done = watched_alone(py, None, move |control| {
         let report = SimulateStudy::run(&studied, &request, control)?;
-        let document = serde_json::to_string(&Document::new(&report, &studied))?;
         let (names, values) = match &report {
             SimulateReport::Exact(run) => {
                 let model = studied.model()?;
                 let start = &run.motion.start;
-                let values = series(&model, start, series_periods, request.resolution)?;
+                let values = rows(&model, start, series_periods, request.resolution)?;
                 (time_series::columns(&model), values)
             }
             SimulateReport::FixedStep(run) => {
@@ -98,100 +99,175 @@ pub(crate) fn simulate<'py>(
                 (names, run.curve.concat())
             }
         };
-        Ok((document, names, values))
+        Ok((serde_json::to_string(&report)?, names, values))
     })?;
-    let (document, names, values) = done.result;
-    Ok((document, table(py, names, values)?))
+    let (report, names, values) = done.result;
+    Ok((report, table(py, names, values)?))
 }
 
-/// A periodic orbit: its document and the time series of one repetition.
+/// The report on a periodic orbit.
 #[pyfunction]
-pub(crate) fn orbit<'py>(
-    py: Python<'py>,
-    case: &CaseCore,
-    request: &str,
-) -> PyResult<(String, Table<'py>)> {
+pub(crate) fn orbit(py: Python<'_>, case: &CaseCore, request: &str) -> PyResult<String> {
     let studied = case.studied(py)?;
     let request: OrbitRequest = read(json(request)?).map_err(Failure::from)?;
-    let done = watched(py, None, move |control| {
-        let model = studied.model()?;
+    // An orbit of a given period may have to be searched for from starts all over.
+    let searched = request.period.is_some() && request.state.is_none();
+    let work = move |control: &Control<'_>| {
         let found = OrbitStudy::run(&studied, &request, control)?;
-        let orbit = &found.motion;
-        let values = series(&model, &orbit.state, orbit.period, request.resolution)?;
-        Ok((
-            serde_json::to_string(&Document::new(&found, &studied))?,
-            time_series::columns(&model),
-            values,
-        ))
-    })?;
-    let (document, names, values) = done.result;
-    Ok((document, table(py, names, values)?))
+        Ok(serde_json::to_string(&found)?)
+    };
+    let done = if searched {
+        watched(py, None, work)?
+    } else {
+        watched_alone(py, None, work)?
+    };
+    Ok(done.result)
 }
 
-/// What is observed of one case of many: a document, or why there is none.
-type Observed = Result<String, String>;
-
-/// The same as Python is told.
-type Told = (Option<String>, String);
-
-/// Many cases, each run or brought to its orbit as the study called `name` does, on several
-/// threads; one request for all, or one a case. A document (`None` where there is none) and a reason (empty where there is a
-/// document) each, and whether Ctrl-C stopped it.
+/// The time series of so many periods from a state.
 #[pyfunction]
-#[pyo3(signature = (cases, name, requests, *, threads=None, progress=None))]
+pub(crate) fn series<'py>(
+    py: Python<'py>,
+    case: &CaseCore,
+    state: Vec<f64>,
+    periods: usize,
+    resolution: usize,
+) -> PyResult<Table<'py>> {
+    let studied = case.studied(py)?;
+    let done = watched_alone(py, None, move |_| {
+        let model = studied.model()?;
+        let values = rows(&model, &state, periods, resolution)?;
+        Ok((time_series::columns(&model), values))
+    })?;
+    let (names, values) = done.result;
+    table(py, names, values)
+}
+
+/// The report of one motion of a study that has one.
+fn report(
+    name: &str,
+    case: &Case,
+    request: serde_json::Value,
+    control: &Control<'_>,
+) -> Result<serde_json::Value, Error> {
+    match name {
+        SimulateStudy::NAME => {
+            let report = SimulateStudy::run(case, &read(request)?, control)?;
+            Ok(serde_json::to_value(&report)?)
+        }
+        OrbitStudy::NAME => {
+            // Single results alone show harmonics.
+            let request = OrbitRequest {
+                harmonics: 0,
+                ..read(request)?
+            };
+            Ok(serde_json::to_value(&OrbitStudy::run(
+                case, &request, control,
+            )?)?)
+        }
+        other => Err(Error::input(
+            format!("{other} is no study of single motions"),
+            format!("there are {} and {}", SimulateStudy::NAME, OrbitStudy::NAME),
+        )),
+    }
+}
+
+/// The columns of what was found, why there is nothing (empty where there is something), the
+/// names of entries along `state` and `energy`, and whether Ctrl-C stopped it.
+type Found = (
+    Vec<Column>,
+    Vec<String>,
+    [(&'static str, Vec<String>); 2],
+    bool,
+);
+
+/// Many variants of a case, each run or brought to its orbit as the study called `name` does, on
+/// several threads: `keys` are those that vary, `words` the `key=value` words of each variant, and
+/// `requests` one for all, or one a variant.
+#[pyfunction]
+#[pyo3(signature = (case, keys, words, name, requests, *, threads=None, progress=None))]
 pub(crate) fn observe(
     py: Python<'_>,
-    cases: Vec<PyRef<'_, CaseCore>>,
+    case: &CaseCore,
+    keys: Vec<String>,
+    words: Vec<Vec<String>>,
     name: &str,
     requests: Vec<String>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Vec<Told>, bool)> {
-    let cases: Vec<Arc<Case>> = cases
-        .iter()
-        .map(|case| case.studied(py))
-        .collect::<PyResult<_>>()?;
-    let entry = registry::study(name)
-        .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
+) -> PyResult<Found> {
+    let variants = case.variants(&keys)?;
     let requests = requests
         .iter()
         .map(|request| json(request))
         .collect::<Result<Vec<_>, _>>()?;
-    if requests.len() != 1 && requests.len() != cases.len() {
+    if requests.len() != 1 && requests.len() != words.len() {
         return Err(Failure::input("one request is needed, or one a case").into());
     }
+    let name = name.to_owned();
     let done = watched(py, progress, move |control| {
         let finished = AtomicUsize::new(0);
-        let total = cases.len();
-        let one = |(index, studied): (usize, &Arc<Case>)| -> Result<Observed, Failure> {
-            if control.is_cancelled() {
-                return Ok(Err("stopped before its turn".into()));
-            }
-            let request = requests[index % requests.len()].clone();
-            let observed = match entry.document(studied, request, &Control::default()) {
-                Ok(document) => Ok(document),
-                Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
-                Err(other) => return Err(other.into()),
+        let total = words.len();
+        let one =
+            |(index, words): (usize, &Vec<String>)| -> Result<Result<Entries, String>, Failure> {
+                if control.is_cancelled() {
+                    return Ok(Err("stopped before its turn".into()));
+                }
+                let request = requests[index % requests.len()].clone();
+                let alone = Control::default();
+                let found = variants
+                    .with(words)
+                    .and_then(|case| Ok(at_setpoint(case, &alone)?.0))
+                    .and_then(|case| report(&name, &case, request, &alone));
+                let found = match found {
+                    Ok(report) => Ok(entries(report)),
+                    Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
+                    Err(other) => return Err(other.into()),
+                };
+                let count = finished.fetch_add(1, Ordering::Relaxed) + 1;
+                if let Some(progress) = control.progress {
+                    progress(count, total);
+                }
+                Ok(found)
             };
-            let count = finished.fetch_add(1, Ordering::Relaxed) + 1;
-            if let Some(progress) = control.progress {
-                progress(count, total);
+        let found = install(threads, || {
+            let all = words.par_iter().enumerate().map(one);
+            all.collect::<Result<Vec<_>, _>>()
+        })??;
+        // One state's names for each dimension.
+        let mut names: BTreeMap<usize, Vec<String>> = BTreeMap::new();
+        for (found, words) in found.iter().zip(&words) {
+            if let Ok(entries) = found
+                && !names.contains_key(&entries.dimension)
+            {
+                let case = at_setpoint(variants.with(words)?, &Control::default())?.0;
+                names.insert(entries.dimension, state_names(&case.model()?));
             }
-            Ok(observed)
-        };
-        install(threads, || {
-            cases
-                .par_iter()
-                .enumerate()
-                .map(one)
-                .collect::<Result<Vec<_>, _>>()
-        })?
+        }
+        Ok((found, names))
     })?;
-    let pairs = done.result.into_iter().map(|observed| match observed {
-        Ok(document) => (Some(document), String::new()),
-        Err(reason) => (None, reason),
-    });
-    Ok((pairs.collect(), done.interrupted))
+    let (found, names) = done.result;
+    let widest = names.values().next_back().cloned().unwrap_or_default();
+    let balanced = found.iter().flatten().find(|one| !one.energies.is_empty());
+    let energies = balanced.map_or_else(Vec::new, |one| one.energies.clone());
+    let (mut reports, mut reasons) = (Vec::new(), Vec::new());
+    for one in found {
+        match one {
+            Ok(mut entries) => {
+                if entries.dimension != widest.len() {
+                    entries.among(&names[&entries.dimension], &widest);
+                }
+                reports.push(Some(entries));
+                reasons.push(String::new());
+            }
+            Err(reason) => {
+                reports.push(None);
+                reasons.push(reason);
+            }
+        }
+    }
+    let labels = [("state", widest), ("energy", energies)];
+    Ok((columns(py, &reports)?, reasons, labels, done.interrupted))
 }
 
 /// What the entries of results mean, and their units: JSON.

@@ -31,12 +31,27 @@ pub(crate) struct Watched<R> {
     pub(crate) interrupted: bool,
 }
 
-/// Does `work` with a control that tells `progress(done, total)` and stops at Ctrl-C.
+/// Does `work` with a control that tells `progress(done, total)` and stops at Ctrl-C; its
+/// parallel parts run on the threads of this process.
 ///
 /// # Errors
 /// Those of the work, those that `progress` raises, `KeyboardInterrupt` where the work did
 /// not hear that it was to stop, and `RuntimeError` for a panic.
 pub(crate) fn watched<R: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&Control<'_>) -> Result<R, Failure> + Send + 'static,
+) -> PyResult<Watched<R>> {
+    let work = move |control: &Control<'_>| threads_of_this_process()?.install(|| work(control));
+    watched_alone(py, progress, work)
+}
+
+/// The same for work without parallel parts: to wake the threads of this process would cost more
+/// than many a motion.
+///
+/// # Errors
+/// As [`watched`].
+pub(crate) fn watched_alone<R: Send + 'static>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&Control<'_>) -> Result<R, Failure> + Send + 'static,
@@ -57,9 +72,7 @@ pub(crate) fn watched<R: Send + 'static>(
                 cancel: Some(&cancel),
                 progress: Some(&report),
             };
-            let result = catch_unwind(AssertUnwindSafe(|| {
-                threads_of_this_process()?.install(|| work(&control))
-            }));
+            let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
             // Nobody may be waiting any more.
             let _ = sender.send(result);
         })

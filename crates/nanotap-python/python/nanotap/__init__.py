@@ -31,6 +31,7 @@ from ._results import (
     Paper,
     Record,
 )
+from ._si import in_si
 from ._signatures import (
     approach,
     attractors,
@@ -76,6 +77,7 @@ __all__ = [
     "convergence",
     "export",
     "fit",
+    "in_si",
     "lyapunov",
     "merge",
     "modes",

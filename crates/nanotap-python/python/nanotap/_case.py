@@ -68,7 +68,7 @@ class Case:
 
     def __init__(self, *, catalogue: Path | Iterable[Path] = (), **keys: Value) -> None:
         texts = [(os.fspath(path), _text(path)) for path in _paths(catalogue)]
-        self._make(None, _words(keys), texts)
+        self._make(None, key_words(keys), texts)
 
     @classmethod
     def from_file(
@@ -79,7 +79,7 @@ class Case:
         `catalogue` names files of levers and materials beside the built-in ones.
         """
         case = cls.__new__(cls)
-        case._keys = _words(keys)
+        case._keys = key_words(keys)
         files = [os.fspath(path) for path in _paths(catalogue)]
         case._core = _nanotap.CaseCore.from_file(
             os.fspath(path), list(case._keys.values()), files
@@ -93,7 +93,7 @@ class Case:
         if not isinstance(text, str):
             message = f"text: a TOML text is needed, not {text!r}"
             raise TypeError(message)
-        return _again(cls, (name, text), _words(keys), [])
+        return _again(cls, (name, text), key_words(keys), [])
 
     @classmethod
     def paper(cls, **keys: Value) -> "Case":
@@ -108,14 +108,14 @@ class Case:
             "alpha6": 0.2,
             "omega": 2.6,
         }
-        return _again(cls, None, _words(own) | _words(keys), [])
+        return _again(cls, None, key_words(own) | key_words(keys), [])
 
     def with_(self, **keys: Value) -> "Case":
         """The same case with some keys changed."""
         if not keys:
             return self
         source, _, catalogues = self._core.made_of
-        return _again(type(self), source, self._keys | _words(keys), catalogues)
+        return _again(type(self), source, self._keys | key_words(keys), catalogues)
 
     def _make(
         self,
@@ -300,7 +300,7 @@ def _text(path: Path) -> str:
         raise ValueError(message) from None
 
 
-def _words(keys: Mapping[str, Any]) -> dict[str, str]:
+def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
     """`key=value` words by the one name that each key has."""
     words: dict[str, str] = {}
     typed: dict[str, str] = {}

@@ -3,15 +3,14 @@
 import json
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _arguments, _nanotap
 from ._arguments import Floats, Progress
-from ._case import Case
-from ._describe import case_attributes, describe
+from ._case import Case, key_words
+from ._describe import case_attributes, dataset
 from ._interrupt import Interrupted
 from ._progress import bar
 from ._quantity import in_si, many, si_unit
@@ -68,7 +67,7 @@ def simulate(
     )
     _refuse_rows(shown, _arguments.count("resolution", options["resolution"]))
     text, (names, values) = _nanotap.simulate(case._core, request, shown)
-    document = _document(text)
+    document: dict[str, Any] = json.loads(text)
     if options["method"] == "rk4":
         return _fixed_step(case, document, names, values)
     return _run_dataset(case, document, names, values)
@@ -87,15 +86,17 @@ def orbit(
     if varied or states is not None:
         return _over(case, varied, "orbit", options, states, threads, progress)
     request = _arguments.request("orbit", options)
-    _refuse_rows(1, _arguments.count("resolution", options["resolution"]))
-    document, (names, values) = _nanotap.orbit(case._core, request)
+    resolution = _arguments.count("resolution", options["resolution"])
+    _refuse_rows(1, resolution)
+    document: dict[str, Any] = json.loads(_nanotap.orbit(case._core, request))
+    state, period = document["state"], document["period"]
 
     def series() -> "xr.Dataset":
-        ds = _series(names, values)
-        ds.attrs.update(case_attributes(case, "a periodic orbit"))
-        return ds
+        table = _nanotap.series(case._core, state, period, resolution)
+        variables, coords = _columns(*table)
+        return dataset(variables, coords, case_attributes(case, "a periodic orbit"))
 
-    return Orbit.of(_document(document), made_series=series)
+    return Orbit.of(document, made_series=series)
 
 
 def _document(text: str) -> dict[str, Any]:
@@ -140,13 +141,6 @@ def _split(
         one = isinstance(value, str | Mapping) or np.ndim(in_si(key, value)) == 0
         (fixed if one else varied)[key] = value
     return _cased(case).with_(**fixed), varied
-
-
-def _series(names: list[str], values: Floats) -> "xr.Dataset":
-    """A time series: its columns over `tau`, those of the state together."""
-    import xarray as xr
-
-    return describe(xr.Dataset(*_columns(names, values)))
 
 
 def _columns(names: list[str], values: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -194,15 +188,12 @@ def _recorded(
 def _run_dataset(
     case: Case, document: dict[str, Any], names: list[str], values: Floats
 ) -> "xr.Dataset":
-    import xarray as xr
-
     series, times = _columns(names, values)
-    recorded, coords = _recorded(document, case.state_names)
-    variables, attributes = _variables(document, case.state_names)
-    # At once: every `assign` copies and aligns the whole dataset.
-    ds = xr.Dataset(series | variables | recorded, times | coords)
-    ds.attrs.update(case_attributes(case, "one run"), **attributes)
-    return describe(ds)
+    entries = case.state_names
+    recorded, coords = _recorded(document, entries)
+    variables, attributes = _variables(document, entries)
+    attributes = case_attributes(case, "one run") | attributes
+    return dataset(series | variables | recorded, times | coords, attributes)
 
 
 def _variables(
@@ -253,22 +244,23 @@ def _vector(name: str, value: list[Any], entries: list[str]) -> Any:
 def _fixed_step(
     case: Case, parsed: dict[str, Any], names: list[str], values: Floats
 ) -> "xr.Dataset":
-    import xarray as xr
 
     exact = parsed.pop("exact")
     steps = parsed.pop("steps")
-    recorded, coords = _recorded(parsed, case.state_names)
-    variables, attributes = _variables(parsed, case.state_names)
+    entries = case.state_names
+    recorded, coords = _recorded(parsed, entries)
+    variables, attributes = _variables(parsed, entries)
     series = {name: ("tau", values[:, k]) for k, name in enumerate(names) if k}
-    ds = xr.Dataset(series | variables | recorded, coords | {"tau": values[:, 0]})
-    ds.attrs.update(case_attributes(case, "one run with time steps"), **attributes)
-    ds.attrs.update(
-        steps=steps,
-        exact_classification=exact["classification"],
-        exact_period=exact["period"] or 0,
-        exact_evidence=exact["evidence"],
-    )
-    return describe(ds)
+    attributes = {
+        **case_attributes(case, "one run with time steps"),
+        **attributes,
+        "steps": steps,
+        "exact_classification": exact["classification"],
+        "exact_period": exact["period"] or 0,
+        "exact_evidence": exact["evidence"],
+    }
+    times = {"tau": values[:, 0]}
+    return dataset(series | variables | recorded, coords | times, attributes)
 
 
 def _states(options: Mapping[str, Any]) -> Floats | None:
@@ -311,57 +303,78 @@ def _over(
         requests = [_arguments.request(study, options)]
     broadcast = dict(zip(arrays, xr.broadcast(*arrays.values()), strict=True))
     first = next(iter(broadcast.values()))
-    shape, dims = first.shape, first.dims
-    cases, asked = [], []
-    for index in product(*map(range, shape)):
-        keys = {key: array.values[index] for key, array in broadcast.items()}
-        start = keys.pop("start", None) if states is not None else None
-        cases.append(case.with_(**keys))
-        asked.append(requests[0 if start is None else int(start)])
+    shape, dims = first.shape, tuple(map(str, first.dims))
+    order = broadcast.pop("start").values.ravel() if states is not None else None
+    rows = [array.values.ravel().tolist() for array in broadcast.values()]
+    named = [dict(zip(broadcast, row, strict=True)) for row in zip(*rows, strict=True)]
+    named = named or [{} for _ in range(first.size)]
+    # What is wrong with a key is said of the first.
+    case.with_(**named[0])
+    texts = [key_words(keys) for keys in named]
+    asked = requests if order is None else [requests[k] for k in order]
     most = _arguments.optional_count("threads", threads)
     noun = "orbits" if study == "orbit" else "runs"
     with bar(progress, noun) as show:
-        found, interrupted = _nanotap.observe(
-            [one._core for one in cases],
+        columns, failures, labels, interrupted = _nanotap.observe(
+            case._core,
+            list(texts[0]),
+            [list(one.values()) for one in texts],
             study,
-            requests if states is None else asked,
+            asked,
             threads=most,
             progress=show,
         )
-    coords: dict[str, Any] = {}
-    for key, array in arrays.items():
-        coords.update(
-            {str(name): coord for name, coord in array.coords.items() if name in dims}
-        )
-        if key not in dims:
-            coords[key] = array
-    documents = [None if text is None else _document(text) for text, _ in found]
-    names = [one.state_names for one in cases]
-    entries = max(names, key=len)
-    ds = _stacked(documents, names, entries, shape, tuple(map(str, dims)))
-    ds = ds.assign_coords(coords)
+    names = dict(labels)
+    entries = names["state"]
+    variables: dict[str, Any] = {}
+    for name, along, values in columns:
+        if name == "strobe":
+            values = values.reshape(len(failures), -1, len(entries))
+        inner = ("strobe_period", "state") if name == "strobe" else (along,)
+        array = np.array(values).reshape(shape + np.shape(values)[1:])
+        variables[name] = (dims + inner * bool(along), array)
+    failed = np.array(failures, dtype=str).reshape(shape)
+    why = {"long_name": "why there is none, empty where there is one", "units": "1"}
+    variables["failure"] = (dims, failed, why)
+    coords = _coords(arrays, variables, names, options)
     if states is not None:
-        ds.start.attrs.update(long_name="initial state, from 0", units="1")
+        told = {"long_name": "initial state, from 0", "units": "1"}
+        coords["start"] = ("start", np.arange(len(states)), told)
         if states.shape[1] == len(entries):
-            ds = ds.assign_coords(state=words(entries))
-            ds["initial_state"] = (("start", "state"), states)
-            ds.initial_state.attrs.update(
-                long_name="initial state", units="model units"
-            )
-    failures = np.array([reason for _, reason in found], dtype=object).reshape(shape)
-    ds = ds.assign(failure=(dims, failures.astype(str)))
-    ds.failure.attrs.update(
-        long_name="why there is none, empty where there is one", units="1"
-    )
+            told = {"long_name": "initial state", "units": "model units"}
+            variables["initial_state"] = (("start", "state"), states, told)
+            coords["state"] = words(entries)
     # What the case says of a parameter that varies does not matter.
-    ds.attrs.update(case_attributes(case, noun))
-    ds.attrs["over"] = json.dumps(list(varied))
-    ds = describe(ds)
+    attributes = case_attributes(case, noun) | {"over": json.dumps(list(varied))}
+    ds = dataset(variables, coords, attributes)
     if interrupted:
-        done = sum(document is not None for document in documents)
-        message = f"stopped; {done} of {len(documents)} are done"
+        done = failures.count("")
+        message = f"stopped; {done} of {len(failures)} are done"
         raise Interrupted(message, ds)
     return ds
+
+
+def _coords(
+    arrays: "Mapping[str, xr.DataArray]",
+    variables: Mapping[str, Any],
+    names: Mapping[str, list[str]],
+    options: Mapping[str, Any],
+) -> dict[str, Any]:
+    """The coordinates of results over arrays: those of the arrays, and those within entries."""
+    coords: dict[str, Any] = {}
+    for key, array in arrays.items():
+        for name, coord in array.coords.items():
+            coords[str(name)] = (coord.dims, coord.values, coord.attrs)
+        if key not in array.dims:
+            coords[key] = (array.dims, array.values, array.attrs)
+    for along, entries in names.items():
+        if any(along in dims for dims, *_ in variables.values()):
+            coords[along] = words(entries)
+    if "strobe" in variables:
+        kept = variables["strobe"][1].shape[-2]
+        last = _arguments.count("periods", options["periods"])
+        coords["strobe_period"] = np.arange(last - kept + 1, last + 1)
+    return coords
 
 
 def _as_array(key: str, value: Any) -> "xr.DataArray":
@@ -383,65 +396,3 @@ def _as_array(key: str, value: Any) -> "xr.DataArray":
     if si_unit(key) and array.dtype.kind != "U":
         values[key].attrs["units"] = si_unit(key)
     return values
-
-
-def _among(entries: list[str], own: list[str], dims: Any, values: Any) -> Any:
-    """A variable whose states have the entries `own`, with room for all `entries`."""
-    inner = (dims,) if isinstance(dims, str) else tuple(dims)
-    if own == entries or not inner or inner[-1] != "state":
-        return dims, values
-    room = np.full((*np.shape(values)[:-1], len(entries)), np.nan)
-    room[..., [entries.index(name) for name in own]] = values
-    return dims, room
-
-
-def _stacked(
-    documents: list[dict[str, Any] | None],
-    names_of: list[list[str]],
-    entries: list[str],
-    shape: tuple[int, ...],
-    dims: tuple[str, ...],
-) -> "xr.Dataset":
-    """What is a number, a word or a vector of one length in every document; states among
-    `entries` by the names that each case gives them."""
-    import xarray as xr
-
-    rows: list[dict[str, Any]] = []
-    for document, own in zip(documents, names_of, strict=True):
-        if document is None:
-            rows.append({})
-            continue
-        multipliers = document.pop("multipliers", None)
-        if multipliers:
-            document["spectral_radius"] = max(
-                abs(complex(*pair)) for pair in multipliers
-            )
-        strobe = document.pop("strobe", None)
-        row = _variables(document, own)[0]
-        if strobe:
-            row["strobe"] = (("strobe_period", "state"), np.array(strobe, dtype=float))
-        rows.append({name: _among(entries, own, *row[name]) for name in row})
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    variables: dict[str, Any] = {}
-    coords: dict[str, Any] = {}
-    for name in names:
-        inner_dims, model = next(row[name] for row in rows if name in row)
-        if name == "energy":
-            coords[name] = model
-            continue
-        inner = (inner_dims,) if isinstance(inner_dims, str) else tuple(inner_dims)
-        size = np.shape(model)
-        word = isinstance(model, str)
-        missing: Any = "" if word else np.full(size, np.nan)
-        column = [row[name][1] if name in row else missing for row in rows]
-        if any(np.shape(value) != size for value in column):
-            continue
-        array = np.array(column, dtype=str if word else None).reshape(shape + size)
-        variables[name] = (dims + inner, array)
-    if "strobe" in variables:
-        periods = next(document["periods"] for document in documents if document)
-        kept = variables["strobe"][1].shape[-2]
-        coords["strobe_period"] = np.arange(periods - kept + 1, periods + 1)
-    if any("state" in variable[0] for variable in variables.values()):
-        coords["state"] = words(entries)
-    return xr.Dataset(variables, coords)

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from typing import Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -110,16 +110,23 @@ def modes(case: CaseCore, request: str) -> tuple[str, _Floats, _Floats]: ...
 def simulate(
     case: CaseCore, request: str, series_periods: int
 ) -> tuple[str, _Table]: ...
-def orbit(case: CaseCore, request: str) -> tuple[str, _Table]: ...
+def orbit(case: CaseCore, request: str) -> str: ...
+def series(
+    case: CaseCore, state: list[float], periods: int, resolution: int
+) -> _Table: ...
 def lyapunov(case: CaseCore, request: str) -> tuple[str, _Floats]: ...
 def observe(
-    cases: list[CaseCore],
+    case: CaseCore,
+    keys: list[str],
+    words: list[list[str]],
     name: str,
     requests: list[str],
     *,
     threads: int | None = None,
     progress: _Progress = None,
-) -> tuple[list[tuple[str | None, str]], bool]: ...
+) -> tuple[
+    list[tuple[str, str, Any]], list[str], list[tuple[str, list[str]]], bool
+]: ...
 def glossary() -> str: ...
 def paper(
     *,

@@ -3,6 +3,8 @@
 import json
 from typing import TYPE_CHECKING
 
+from ._describe import name_in_si
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -21,19 +23,28 @@ def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
         "g0 sqrt(EI/(m L^4))": (length / time, "m/s"),
         "EI g0/L^3": (force, "N"),
         "EI g0^2/L^3": (energy, "J"),
+        "EI g0^2/L^3 sqrt(EI/(m L^4))": (energy / time, "W"),
     }
 
 
 def in_si(ds: "xr.Dataset") -> "xr.Dataset":
-    """The same with every variable that has a unit of the model in SI: a run, an orbit's series,
-    what is observed over arrays of parameters. States stay in the model's units.
+    """The same with every variable that has a unit of the model in SI, as sweeps of physical cases
+    have it: a run, an orbit's series, what is observed over arrays of parameters, approach curves,
+    branches. States, which have several units, stay in the model's; so does, where a physical
+    quantity varies and the model's units with it, what has no counterpart in SI.
 
     Raises:
         ValueError: it is not of a physical case.
     """
     units = _units(ds)
+    varies = any("." in key for key in json.loads(ds.attrs.get("over", "[]")))
     changed = {}
     for name, variable in ds.variables.items():
+        si = f"physical_{name_in_si(str(name))}"
+        if varies and si in ds:
+            changed[name] = (variable.dims, ds[si].values, dict(ds[si].attrs))
+        if varies:
+            continue
         factor, unit = units.get(str(variable.attrs.get("units")), (1.0, ""))
         if unit:
             attrs = {**variable.attrs, "units": unit}

@@ -376,6 +376,22 @@ impl Curve {
         }
     }
 
+    /// The same of several curves of one recording, a row a frequency.
+    pub fn fouriers(curves: &[&Self], frequencies: &[f64]) -> Vec<Vec<Complex>> {
+        let exact: Option<Vec<&PiecewiseSignal>> = curves
+            .iter()
+            .map(|curve| match curve {
+                Self::Exact(signal) => Some(signal),
+                Self::Nonlinear(..) => None,
+            })
+            .collect();
+        if let Some(signals) = exact {
+            return nanotap_flow::integral::fouriers(&signals, frequencies);
+        }
+        let row = |omega: &f64| curves.iter().map(|curve| curve.fourier(*omega)).collect();
+        frequencies.iter().map(row).collect()
+    }
+
     /// The Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the duration `D`, so that the
     /// component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, omega: f64) -> Complex {

@@ -16,9 +16,10 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use nanotap_flow::accumulate::{Accumulator, Request};
 use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Complex, FlowError, Output, Trajectory};
+use nanotap_flow::{Complex, Flow, FlowError, Output, Trajectory};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -66,6 +67,8 @@ struct RecordedBeam<'a> {
     model: &'a Model,
     beam: &'a BeamOutputs,
     recording: &'a Recording,
+    /// Least heights at the places of the grid, where they are known.
+    heights: Option<Vec<f64>>,
 }
 
 impl RecordedBeam<'_> {
@@ -77,18 +80,22 @@ impl RecordedBeam<'_> {
     fn lowest(&self, bound: impl Fn(f64) -> f64) -> Option<Clearance> {
         let count = PLACES_PER_MODE * self.beam.modes.count();
         let place = |i: usize| i as f64 / count as f64;
-        let mut best: Option<(usize, Clearance)> = None;
+        let mut best: Option<(usize, f64)> = None;
         for i in (0..=count).rev() {
-            let known = best.map_or(f64::INFINITY, |(_, known)| known.height);
+            let known = best.map_or(f64::INFINITY, |(_, known)| known);
             if bound(place(i)) >= known {
                 continue;
             }
-            let here = self.least_height(place(i))?;
-            if here.height < known {
+            let here = match &self.heights {
+                Some(heights) => heights[i],
+                None => self.least_height(place(i))?.height,
+            };
+            if here < known {
                 best = Some((i, here));
             }
         }
-        let (i, mut best) = best?;
+        let (i, _) = best?;
+        let mut best = self.least_height(place(i))?;
         // At the clamp itself every beam is level.
         let mut low = place(i.saturating_sub(1)).max(1e-6);
         let mut high = place((i + 1).min(count));
@@ -329,6 +336,7 @@ impl ClearanceSearch {
                 model,
                 beam,
                 recording: &Recording::Exact(period),
+                heights: Some(least_heights(model, beam, &state)?),
             };
             let first = beam.beam.modes.iter().next();
             let bound = |xi: f64| {
@@ -347,6 +355,23 @@ impl ClearanceSearch {
         }
         Ok(least)
     }
+}
+
+/// The least heights at the places of the grid over one drive period from a state.
+fn least_heights(model: &Model, beam: &BeamOutputs, state: &[f64]) -> Result<Vec<f64>, FlowError> {
+    let count = PLACES_PER_MODE * beam.modes.count();
+    let mut request = Request::new();
+    let keys: Vec<_> = (0..=count)
+        .map(|i| {
+            let height = request.output(&beam.height(i as f64 / count as f64));
+            request.least(height)
+        })
+        .collect();
+    let mut heights = Accumulator::new(&request.plan(&model.system)?);
+    let mut flow = Flow::new(Arc::clone(&model.system));
+    flow.start(state, 0.0)?;
+    flow.run_period(&mut heights)?;
+    Ok(keys.iter().map(|key| heights.extremum(*key)).collect())
 }
 
 /// Looks for the clearance of motions under a nonlinear force: the places of the beam are
@@ -430,6 +455,7 @@ impl SampledClearance {
             model,
             beam: model.beam.as_ref()?,
             recording: &recording,
+            heights: None,
         };
         let bound = |xi: f64| {
             let place = (xi * last as f64).round() as usize;

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Model;
-use crate::model::recording::Recording;
+use crate::model::recording::{Curve, Recording};
 
 /// One component of a periodic motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -54,18 +54,22 @@ impl Spectrum {
         // Both tones are whole multiples of the whole motion's own frequency.
         let repetition = model.repetition() * period;
         let base = model.frequency() / repetition as f64;
-        let harmonics: Vec<Harmonic> = (1..=orders * repetition)
-            .map(|j| {
-                let omega = base * j as f64;
-                let (t, f) = (tip.fourier(omega), force.fourier(omega));
-                Harmonic {
-                    order: j as f64 / repetition as f64,
-                    tip: t.modulus(),
-                    tip_phase: lag(t),
-                    force: f.modulus(),
-                    force_phase: lag(f),
-                    slope: slope.as_ref().map(|s| s.fourier(omega).modulus()),
-                }
+        let count = orders * repetition;
+        let frequencies: Vec<f64> = (1..=count).map(|j| base * j as f64).collect();
+        let curves: Vec<&Curve> = [Some(&tip), Some(&force), slope.as_ref()]
+            .into_iter()
+            .flatten()
+            .collect();
+        let harmonics = Curve::fouriers(&curves, &frequencies)
+            .into_iter()
+            .enumerate()
+            .map(|(k, of)| Harmonic {
+                order: (k + 1) as f64 / repetition as f64,
+                tip: of[0].modulus(),
+                tip_phase: lag(of[0]),
+                force: of[1].modulus(),
+                force_phase: lag(of[1]),
+                slope: of.get(2).map(|slope| slope.modulus()),
             })
             .collect();
         let first = tip.fourier(model.frequency());

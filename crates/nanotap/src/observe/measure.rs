@@ -81,6 +81,8 @@ pub(super) enum Tone {
     First,
     /// The second tone's.
     Second,
+    /// So many times the drive's.
+    Harmonic(u32),
 }
 
 /// What is gathered.
@@ -241,6 +243,7 @@ pub(super) fn frequency(model: &Model, tone: Tone) -> f64 {
             let second = model.system.drive().frequencies().get(1).copied();
             second.unwrap_or_else(|| model.frequency())
         }
+        Tone::Harmonic(order) => f64::from(order) * model.frequency(),
     }
 }
 

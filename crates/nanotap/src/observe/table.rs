@@ -267,6 +267,46 @@ observables! {
         "phase behind the second tone (°)",
         "lag of the tip deflection behind the second tone",
         |m| m.second_tone().map(Phasor::lag);
+    second_harmonic: f64, Length, rare,
+        "amplitude of the second harmonic",
+        "amplitude of the tip deflection at twice the drive frequency",
+        |m| m.component(Tip, Tone::Harmonic(2)).norm();
+    second_harmonic_phase: f64, Angle, rare,
+        "phase of the second harmonic (°)",
+        "lag of the tip deflection at twice the drive frequency behind sin 2Ωτ",
+        |m| m.component(Tip, Tone::Harmonic(2)).lag();
+    third_harmonic: f64, Length, rare,
+        "amplitude of the third harmonic",
+        "amplitude of the tip deflection at three times the drive frequency",
+        |m| m.component(Tip, Tone::Harmonic(3)).norm();
+    third_harmonic_phase: f64, Angle, rare,
+        "phase of the third harmonic (°)",
+        "lag of the tip deflection at three times the drive frequency behind sin 3Ωτ",
+        |m| m.component(Tip, Tone::Harmonic(3)).lag();
+    fourth_harmonic: f64, Length, rare,
+        "amplitude of the fourth harmonic",
+        "amplitude of the tip deflection at four times the drive frequency",
+        |m| m.component(Tip, Tone::Harmonic(4)).norm();
+    fourth_harmonic_phase: f64, Angle, rare,
+        "phase of the fourth harmonic (°)",
+        "lag of the tip deflection at four times the drive frequency behind sin 4Ωτ",
+        |m| m.component(Tip, Tone::Harmonic(4)).lag();
+    fifth_harmonic: f64, Length, rare,
+        "amplitude of the fifth harmonic",
+        "amplitude of the tip deflection at five times the drive frequency",
+        |m| m.component(Tip, Tone::Harmonic(5)).norm();
+    fifth_harmonic_phase: f64, Angle, rare,
+        "phase of the fifth harmonic (°)",
+        "lag of the tip deflection at five times the drive frequency behind sin 5Ωτ",
+        |m| m.component(Tip, Tone::Harmonic(5)).lag();
+    sixth_harmonic: f64, Length, rare,
+        "amplitude of the sixth harmonic",
+        "amplitude of the tip deflection at six times the drive frequency",
+        |m| m.component(Tip, Tone::Harmonic(6)).norm();
+    sixth_harmonic_phase: f64, Angle, rare,
+        "phase of the sixth harmonic (°)",
+        "lag of the tip deflection at six times the drive frequency behind sin 6Ωτ",
+        |m| m.component(Tip, Tone::Harmonic(6)).lag();
     rms_deflection: f64, Length, rare,
         "root mean square of the tip deflection",
         "root mean square of the tip deflection about its mean",

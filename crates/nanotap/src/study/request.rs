@@ -7,6 +7,10 @@
 //! value in its help), `x-bare` (the value of a flag that is given without one) and
 //! `x-required`; of one with `x-own` the terminal has an option of its own.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
@@ -263,7 +267,7 @@ fn shown(value: &Value) -> String {
 /// An option that there is not, with the nearest name; a value of the wrong type or out of
 /// range, with what would be right.
 pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> {
-    let schema = schema::<R>();
+    let schema = &*known_schema::<R>();
     let Value::Object(given) = given else {
         return Err(Error::input(
             shown(&given),
@@ -273,8 +277,8 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
     // Nothing given is what is left out.
     let given: Map<String, Value> = given.into_iter().filter(|(_, v)| !v.is_null()).collect();
     for (name, value) in &given {
-        let Some(property) = properties(&schema).find(|property| property.name == name) else {
-            let known: Vec<&str> = properties(&schema).map(|property| property.name).collect();
+        let Some(property) = properties(schema).find(|property| property.name == name) else {
+            let known: Vec<&str> = properties(schema).map(|property| property.name).collect();
             let remedy = match near_name(name, known.iter().copied()) {
                 Some(near) => format!("did you mean {{{near}}}?"),
                 None => format!("there are {}", known.join(", ")),
@@ -283,7 +287,7 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
         };
         property.check(value)?;
     }
-    for property in properties(&schema).filter(Property::is_required) {
+    for property in properties(schema).filter(Property::is_required) {
         if !given.contains_key(property.name) {
             return Err(Error::option(
                 property.name,
@@ -292,7 +296,7 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
             ));
         }
     }
-    let given = whole_numbers(&schema, given);
+    let given = whole_numbers(schema, given);
     serde_json::from_value(Value::Object(given.clone())).map_err(|error| {
         // Types of their own say what is wrong with a value, but not where: each is tried alone.
         let culprit = given.iter().find(|(name, value)| {
@@ -305,6 +309,14 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
             None => error,
         }
     })
+}
+
+/// The schema of a request, made once: that takes longer than many a motion.
+fn known_schema<R: JsonSchema>() -> Arc<Schema> {
+    static KNOWN: Mutex<BTreeMap<Cow<'static, str>, Arc<Schema>>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let of = known.entry(R::schema_id());
+    Arc::clone(of.or_insert_with(|| Arc::new(schema::<R>())))
 }
 
 /// The same with whole numbers written as such: 1e3 is one, and 20.0.

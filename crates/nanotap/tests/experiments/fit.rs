@@ -291,6 +291,67 @@ fn data_on_one_branch_are_not_taken_for_the_other() {
 }
 
 #[test]
+fn a_branch_that_no_way_along_the_curve_meets_is_found_from_the_data() {
+    // Beyond the fold of the free motion's branch, which a run from rest stays on at every row.
+    let truth = case(LEVER, &[]);
+    let mut curve = curve(&truth, 22.5, 10.0, 51);
+    curve.retain(|row| row.3 == Way::Retract && row.0 > 20.5);
+    let table = measured(&curve, &mut Noise(13), [0.02, 0.1], true);
+    let start = case(LEVER, &["sample.stiffness=25 N/m"]);
+    let free = ["sample.stiffness", "gap.offset"];
+    let report = fitted(&start, &request(vec![table], &free));
+    assert!(report.fits, "{:?}", report.reason);
+    for (parameter, truth) in report.parameters.iter().zip([30.0, 0.0]) {
+        let error = parameter.standard_error.unwrap();
+        assert!(
+            (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
+    }
+}
+
+#[test]
+fn harmonics_are_columns() {
+    let truth = case(LEVER, &[]);
+    let names = [
+        "second_harmonic (pm)",
+        "third_harmonic (pm)",
+        "third_harmonic_phase (deg)",
+    ];
+    let mut columns = vec![("distance (nm)".to_owned(), Vec::new())];
+    columns.extend(names.map(|name| (name.to_owned(), Vec::new())));
+    for k in 0..8 {
+        let distance = 4.0 + 2.0 * f64::from(k);
+        let at = case(LEVER, &[&format!("gap.tip={distance} nm")]);
+        let model = at.model().unwrap();
+        let found = orbit(&model, &OrbitOptions::default()).unwrap();
+        // The spectrum is computed in another way.
+        let length = at.physical().unwrap().scales.length * 1e12;
+        let [second, third] = [&found.spectrum.harmonics[1], &found.spectrum.harmonics[2]];
+        let row = [
+            distance,
+            second.tip * length,
+            third.tip * length,
+            third.tip_phase,
+        ];
+        for (column, value) in columns.iter_mut().zip(row) {
+            column.1.push(Entry::Number(value));
+        }
+    }
+    let table = Table {
+        columns,
+        ..Table::default()
+    };
+    let start = case(LEVER, &["sample.stiffness=27 N/m"]);
+    let mut request = request(vec![table], &["sample.stiffness", "drive.frequency"]);
+    let frequency = truth.get(truth.key("drive.frequency").unwrap());
+    derivatives_are_right(&truth, &request, &[29.0, frequency], &[0.03, 2.0], 1e-6);
+    request.free.truncate(1);
+    let report = fitted(&start, &request);
+    assert!((report.parameters[0].value / 30.0 - 1.0).abs() < 1e-6);
+}
+
+#[test]
 fn what_only_stands_as_one_number_is_named() {
     // Hertz's stiffness at an indentation: K1 = 2 E* √(R δ), so that E and δ are one number.
     let text = LEVER.replace(

@@ -3,12 +3,14 @@
 //! A motion is followed along the curve as the instrument saw it: from each row's orbit Newton
 //! closes the next one's, in halves of the way where it must; where that fails the branch has
 //! ended, and the motion goes on from where it is to the next attractor. The same is done from
-//! the curve's end to its beginning, which finds the other side of a hysteresis. Orbits of one
-//! period that continue each other are one branch. Of the branches, each row gets one by the
+//! the curve's end to its beginning, which finds the other side of a hysteresis. With other
+//! parameters than those behind the data the motion may stay on a branch that the data have left,
+//! both ways; where no orbit found swings as was measured, one is looked for where it would, and
+//! followed both ways. Orbits of one period that continue each other are one branch. Of the branches, each row gets one by the
 //! least sum of squared residuals and of a price for every change of branch (the shortest path
 //! through the table of rows and branches, found row by row).
 //!
-//! Fails by omission: branches that neither way meets.
+//! Fails by omission: branches that none of these meets.
 
 use nanotap_dynamics::{
     ClassifyOptions, MotionKind, PeriodicOrbit, ShootingOptions, StroboscopicMap as _, classify,
@@ -16,6 +18,7 @@ use nanotap_dynamics::{
 };
 
 use crate::case::Case;
+use crate::model::Model;
 use crate::model::strobe::Strobe;
 
 /// An orbit at a row.
@@ -34,6 +37,8 @@ pub(super) struct Along<'a> {
     pub(super) at: &'a dyn Fn(&[f64]) -> Option<Case>,
     /// Where the rows are.
     pub(super) places: &'a [Vec<f64>],
+    /// A state at drive phase 0 that swings as was measured at a row, if amplitude and phase were.
+    pub(super) measured: &'a dyn Fn(usize, &Model) -> Option<Vec<f64>>,
     /// Longest period looked for.
     pub(super) max_period: usize,
 }
@@ -42,6 +47,11 @@ pub(super) struct Along<'a> {
 const FAR: f64 = 0.3;
 /// Halvings of the way from one row to the next.
 const HALVINGS: usize = 4;
+/// Distance of an orbit from the state that was measured, in parts of that, beyond which it is
+/// another motion.
+const UNLIKE: f64 = 0.2;
+/// Runs from states that were measured, of which none need find anything.
+const RUNS: usize = 6;
 
 impl Along<'_> {
     /// The orbits at every row.
@@ -57,7 +67,81 @@ impl Along<'_> {
             (0..count).rev().collect(),
             last.as_ref(),
         );
+        self.as_measured(&mut rows, &mut branches);
         rows
+    }
+
+    /// Adds the branches of motions that swing as was measured where no orbit does so far.
+    fn as_measured(&self, rows: &mut Rows, branches: &mut usize) {
+        let count = rows.len();
+        // Rows that fail are neighbours: the next one tried is some way off.
+        let apart = count / (2 * RUNS) + 1;
+        let (mut runs, mut row) = (0, 0);
+        while row < count && runs < RUNS {
+            let Some(state) = self.unlike(row, &rows[row]) else {
+                row += 1;
+                continue;
+            };
+            runs += 1;
+            let found = self.settled(row, Some(&state));
+            let new = found.filter(|o| !rows[row].iter().any(|known| same(&known.orbit, o)));
+            let Some(orbit) = new else {
+                row += apart;
+                continue;
+            };
+            let branch = *branches;
+            *branches += 1;
+            let candidate = Candidate { branch, orbit };
+            rows[row].push(candidate.clone());
+            let on: Vec<usize> = (row..count).collect();
+            let back: Vec<usize> = (0..=row).rev().collect();
+            self.along(rows, &candidate, &on);
+            self.along(rows, &candidate, &back);
+        }
+    }
+
+    /// The state that was measured at a row, where none of the orbits there is like it.
+    fn unlike(&self, row: usize, known: &[Candidate]) -> Option<Vec<f64>> {
+        let model = (self.at)(&self.places[row])?.model().ok()?;
+        let state = (self.measured)(row, &model)?;
+        // Rates in parts of the drive's.
+        let modes = (state.len() - model.memory) / 2;
+        let weight = |k: usize| match k / modes {
+            0 => 1.0,
+            1 => 1.0 / model.frequency(),
+            _ => 0.0,
+        };
+        let length = |of: &dyn Fn(usize) -> f64| {
+            let squares = (0..state.len()).map(|k| (of(k) * weight(k)).powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        let size = length(&|k| state[k]);
+        let like = |candidate: &Candidate| {
+            let states = candidate.orbit.states.iter();
+            let mut distances = states.map(|at| length(&|k| at[k] - state[k]));
+            distances.any(|distance| distance <= UNLIKE * size)
+        };
+        (!known.iter().any(like)).then_some(state)
+    }
+
+    /// Follows a new branch over the rows in this order, the first of which has its orbit.
+    fn along(&self, rows: &mut Rows, candidate: &Candidate, order: &[usize]) {
+        let mut last = candidate.orbit.clone();
+        for pair in order.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|k| self.places[k].as_slice());
+            let Some(orbit) = self.follow(a, b, &last, HALVINGS) else {
+                return;
+            };
+            let known = rows[pair[1]].iter().any(|known| same(&known.orbit, &orbit));
+            if known {
+                return;
+            }
+            rows[pair[1]].push(Candidate {
+                branch: candidate.branch,
+                orbit: orbit.clone(),
+            });
+            last = orbit;
+        }
     }
 
     /// Follows the motion over the rows in this order.

@@ -13,7 +13,7 @@ use crate::model::strobe::Strobe;
 use crate::observe::{Derivative, Dimension, Observables, Set, measure};
 
 use super::branches::{Along, Candidate, Rows, continued, path};
-use super::data::{Data, Row};
+use super::data::{Column, Data, Row};
 use super::jumps::{Fold, Jump};
 use super::parameters::{Parameter, Target};
 use super::solve::LeastSquares;
@@ -291,8 +291,11 @@ impl Problem<'_> {
                 let rows = of.rows.iter();
                 let places: Vec<_> = rows.map(|row| self.place(x, curve, row)).collect();
                 let at = |at: &[f64]| Some(self.case_at(&bases[curve], at));
+                let measured =
+                    |row: usize, model: &Model| self.measured(x, curve, &of.rows[row], model);
                 let along = Along {
                     at: &at,
+                    measured: &measured,
                     places: &places,
                     max_period: self.max_period,
                 };
@@ -306,6 +309,31 @@ impl Problem<'_> {
             folds: Vec::new(),
         };
         (point, rows)
+    }
+
+    /// A state at drive phase 0 whose first mode swings as was measured at a row, free of scales
+    /// and offsets: W = A sin(Ωτ − φ).
+    fn measured(&self, x: &[f64], curve: usize, row: &Row, model: &Model) -> Option<Vec<f64>> {
+        let known = |names: [&str; 2]| {
+            let columns = &self.data.columns;
+            let named = |c: &Column| names.contains(&c.observable.name);
+            let column = columns.iter().position(named)?;
+            let zero = self.read(x, curve, column, 0.0);
+            let scale = self.read(x, curve, column, 1.0) - zero;
+            Some((row.values[column]? - zero) / scale)
+        };
+        let amplitude = known(["first_harmonic", "amplitude"])?;
+        let amplitude = match self.case.physical() {
+            Some(view) => amplitude / view.scales.length,
+            None => amplitude,
+        };
+        let (sine, cosine) = nanotap_arithmetic::sin_cos(known(["phase", "phase"])?.to_radians());
+        let mut state = vec![0.0; model.dimension()];
+        let swing = amplitude / model.tip.row[0];
+        let modes = (state.len() - model.memory) / 2;
+        state[0] = -swing * sine;
+        state[modes] = swing * cosine * model.frequency();
+        state.iter().all(|v| v.is_finite()).then_some(state)
     }
 
     /// Where the data jump: neighbouring rows on different branches, both of which describe

@@ -8,7 +8,9 @@ use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Derivative, Observables, PhysicalMotion, Spectrum, time_series};
+use nanotap::observe::{
+    Derivative, Observables, OutOfRange, PhysicalMotion, Spectrum, time_series,
+};
 use nanotap::study::proof::ProofReport;
 use nanotap::study::simulate::Classification;
 
@@ -407,14 +409,19 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
     list.join(", ")
 }
 
-/// Says what puts the motion in doubt, of `which` motion, if there are several: another part of
-/// the beam than the tip would touch, or Hertz's stiffness is that of another depth.
+/// Says what puts the motion in doubt, of `which` motion, if there are several: it leaves the range
+/// of the force law, another part of the beam than the tip would touch, or Hertz's stiffness is that
+/// of another depth.
 pub(crate) fn warn(
     o: &Observables,
     physical: Option<&PhysicalMotion>,
+    out_of_range: &[OutOfRange],
     which: &str,
     output: &Output,
 ) {
+    for beyond in out_of_range {
+        output.warning(&format!("{which}{beyond}"));
+    }
     let setting = physical.and_then(|motion| motion.setting.as_ref());
     if let Some(mismatch) = setting.and_then(|setting| setting.hertz_mismatch) {
         let depth = physical.map_or(f64::NAN, |motion| motion.observables.indentation);

@@ -8,26 +8,16 @@
 mod common;
 #[path = "common/extrapolation.rs"]
 mod extrapolation;
+#[path = "common/random.rs"]
+mod random;
 
 use common::{beam, beam_modes, table_law, value};
 use extrapolation::Plain;
 use nanotap_volterra::laws::{self, TABLE};
 use nanotap_volterra::{Flow, ForceLaw};
+use random::Random;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-
-/// Numbers between −1 and 1, the same in every run (a multiplicative congruence).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
 
 /// The error after `periods` of both, and the switches seen by each.
 fn compare(

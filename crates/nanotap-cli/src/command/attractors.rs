@@ -57,14 +57,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output.warning("stopped before all starts were done: the fractions are of what was done");
     }
     for (k, attractor) in found.attractors.iter().enumerate() {
-        let of_orbit = attractor.orbit.as_ref().map(|orbit| &orbit.observables);
-        let non_periodic = attractor
-            .non_periodic
-            .as_ref()
-            .map(|non_periodic| &non_periodic.observables);
-        for observables in of_orbit.into_iter().chain(non_periodic) {
+        let of_orbit = attractor.orbit.as_ref();
+        let of_orbit = of_orbit.map(|orbit| (&orbit.observables, orbit.out_of_range.as_slice()));
+        let non_periodic = attractor.non_periodic.as_ref();
+        let non_periodic = non_periodic.map(|motion| (&motion.observables, &[][..]));
+        for (observables, beyond) in of_orbit.into_iter().chain(non_periodic) {
             let which = format!("attractor {}: ", k + 1);
-            motion::warn(observables, attractor.physical.as_ref(), &which, output);
+            let physical = attractor.physical.as_ref();
+            motion::warn(observables, physical, beyond, &which, output);
         }
     }
     output.study(&case, &found, |found| text(&case, found))

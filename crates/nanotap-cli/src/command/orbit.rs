@@ -73,7 +73,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| orbit_figure(&model, orbit, &case.units()))?;
-    motion::warn(&orbit.observables, found.physical.as_ref(), "", output);
+    let beyond = &orbit.out_of_range;
+    motion::warn(
+        &orbit.observables,
+        found.physical.as_ref(),
+        beyond,
+        "",
+        output,
+    );
     output.study(&case, found, |found| text(&case, &model, &found.motion))
 }
 

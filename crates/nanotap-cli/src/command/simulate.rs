@@ -55,7 +55,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             arguments
                 .plot
                 .draw(|| simulation_figure(&model, run, &units))?;
-            motion::warn(&run.observables, report.physical.as_ref(), "", output);
+            let (seen, physical) = (&run.observables, report.physical.as_ref());
+            motion::warn(seen, physical, &run.out_of_range, "", output);
         }
         SimulateReport::FixedStep(run) => {
             arguments.out.write(|| curve(run))?;

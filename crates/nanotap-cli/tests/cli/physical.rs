@@ -142,3 +142,39 @@ fn motions_of_a_lever_are_told_in_si() {
     let slope = orbit["harmonics"][1]["slope"].as_f64().unwrap() * 10e-6 / 225e-6;
     assert!((second["slope"].as_f64().unwrap() / slope - 1.0).abs() < 1e-9);
 }
+
+/// Over a sample so soft that the tip sinks in by more than its radius, Hertz's law is beyond what it
+/// was derived for: the terminal says by how much.
+#[test]
+fn a_motion_beyond_its_force_law_is_warned_of() {
+    let folder = Folder::new();
+    folder.write("case.toml", SOFT);
+    let said = folder.run(&["orbit", "case.toml", "--period", "1"]);
+    assert_eq!(said.code, 0, "{}", said.stderr);
+    for words in ["warning: δ/R reaches ", "derived for values up to 1"] {
+        assert!(said.stderr.contains(words), "{}", said.stderr);
+    }
+    let stiff = folder.run(&["orbit", "case.toml", "--set", "sample.modulus=1 GPa"]);
+    assert!(!stiff.stderr.contains("δ/R"), "{}", stiff.stderr);
+}
+
+const SOFT: &str = "\
+[model]
+modes = 1
+[cantilever]
+k = \"0.3 N/m\"
+f0 = \"350 kHz\"
+Q = 2
+[tip]
+radius = \"5 nm\"
+[sample]
+law = \"hertz\"
+modulus = \"1 MPa\"
+poisson = 0.5
+[drive]
+actuation = \"tip\"
+frequency_ratio = 1
+free_amplitude = \"20 nm\"
+[gap]
+tip = \"10 nm\"
+";

@@ -119,6 +119,8 @@ fn no_document_is_left_out() {
         [
             "README.md",
             "approach-curve.md",
+            "bistable.md",
+            "capillary.md",
             "dforce.md",
             "fit.md",
             "fm-lever-on-polystyrene.md",
@@ -147,6 +149,8 @@ macro_rules! follows {
 follows! {
     fit: "fit.md", 5 commands, 27 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
+    the_bistable_lever: "bistable.md", 2 commands, 9 numbers;
+    the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;

@@ -9,4 +9,5 @@ mod common;
 mod derivatives;
 mod reference;
 mod refusals;
+mod studies;
 mod table;

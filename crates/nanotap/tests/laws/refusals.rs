@@ -2,7 +2,7 @@
 
 use nanotap::case::Case;
 
-use crate::common::DMT;
+use crate::common::{DMT, HERTZ};
 
 fn refused(words: &[&str]) -> String {
     let lever = [
@@ -82,4 +82,95 @@ fn the_three_ways_to_say_adhesion_agree() {
     for (a, b) in work.iter().zip(force) {
         assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
     }
+}
+
+/// Of soft rubber the tip sinks in by more than its radius, of a thin film χ = √(Rδ)/h passes 1:
+/// the motion says so, with the number.
+#[test]
+fn a_motion_says_what_range_of_its_law_it_leaves() {
+    use nanotap::study::orbit::{OrbitOptions, orbit};
+    let beyond = |words: &[&str]| {
+        let case = crate::common::air(15.0, 7.5, words);
+        let found = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
+        let depth = found.observables.indentation * case.physical().unwrap().scales.length;
+        (found.out_of_range, depth)
+    };
+    let mut soft = HERTZ;
+    soft[1] = "sample.modulus=1 MPa";
+    let (found, depth) = beyond(&soft);
+    assert_eq!(
+        (found.len(), found[0].ratio, found[0].limit),
+        (1, "δ/R", 1.0)
+    );
+    assert!((found[0].value / (depth / 5e-9) - 1.0).abs() < 1e-9);
+    assert!(
+        found[0]
+            .to_string()
+            .contains(&format!("δ/R reaches {:.3}", found[0].value))
+    );
+    assert!(beyond(&HERTZ).0.is_empty());
+    let film: Vec<&str> = ["sample.law=thin-sphere", "sample.thickness=1 nm"]
+        .into_iter()
+        .chain([HERTZ[1], HERTZ[5]])
+        .collect();
+    let (found, depth) = beyond(&film);
+    let ratio = (5e-9 * depth).sqrt() / 1e-9;
+    assert!(
+        found
+            .iter()
+            .any(|r| r.ratio == "χ" && (r.value / ratio - 1.0).abs() < 1e-9)
+    );
+}
+
+#[test]
+fn a_tip_below_the_size_of_atoms_is_warned_of() {
+    let mut words = DMT.to_vec();
+    words.push("tip.radius=0.16 nm");
+    let case = crate::common::air(20.0, 18.0, &words);
+    let said = case.remarks().into_iter().map(|remark| remark.text);
+    let said: Vec<String> = said
+        .filter(|text| text.contains("intermolecular"))
+        .collect();
+    assert!(
+        said.iter()
+            .any(|text| text.contains("160 pm") && text.contains("169 pm")),
+        "{said:?}"
+    );
+}
+
+/// A lever softer than the attraction at rest snaps in: of H R/(6d²) the gradient passes the
+/// lever's stiffness at d³ = HR/(3k). Outside there are two states of rest and the unstable one
+/// between, near the sample only contact.
+#[test]
+fn the_static_snap_in_is_found() {
+    use nanotap::case::document::equilibria;
+    let (hamaker, radius, k) = (3e-20_f64, 5e-9_f64, 0.02_f64);
+    let snap = (hamaker * radius / (3.0 * k)).cbrt();
+    let at = |gap: f64| {
+        equilibria(&crate::common::lever(
+            (k, 200.0, "20 kHz"),
+            (1.0, gap),
+            &DMT,
+        ))
+    };
+    let far = at(3.0);
+    let stable: Vec<(bool, bool)> = far.iter().map(|e| (e.stable, e.contact)).collect();
+    assert_eq!(stable, [(true, false), (false, false), (true, true)]);
+    let scale = {
+        let case = crate::common::lever((k, 200.0, "20 kHz"), (1.0, 3.0), &DMT);
+        case.physical().unwrap().scales.length
+    };
+    // The unstable state is nearer than where the gradient is the lever's stiffness.
+    assert!(far[0].gap * scale > snap && far[1].gap * scale < snap);
+    // k (d − rest) = F(d).
+    for state in &far[..2] {
+        let d = state.gap * scale;
+        let balance = k * (3e-9 - d) - hamaker * radius / (6.0 * d * d);
+        assert!(balance.abs() < 1e-9 * k * 3e-9, "{balance}");
+    }
+    let near = at(1.0);
+    assert!(
+        near.iter().all(|e| e.contact) && near.iter().any(|e| e.stable),
+        "{near:?}"
+    );
 }

@@ -1,0 +1,200 @@
+//! Setpoints, windows and derivatives of what is observed, under nonlinear laws.
+
+use nanotap::case::{Case, Key};
+use nanotap::control::Control;
+use nanotap::dataset::{Share, Store, Work};
+use nanotap::observe::{Derivative, Observables, Set, Value, measure};
+use nanotap::study::FreeMotion;
+use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap::study::setpoint::solve_setpoint;
+use nanotap::study::value::Axes;
+use nanotap::study::window::{Condition, Window, WindowRequest};
+
+use crate::common::{DMT, EV, lever};
+
+/// A lever that settles in a few tens of periods.
+fn quick(amplitude: f64, gap: f64, sample: &[&str]) -> Case {
+    lever((0.9, 30.0, "100 kHz"), (amplitude, gap), sample)
+}
+
+/// Where an orbit has the setpoint's amplitude, it is run again and has it.
+#[test]
+fn a_setpoint_is_met_at_its_distances() {
+    let mut text = Vec::new();
+    let given = quick(20.0, 18.0, &DMT);
+    for line in given.to_toml().lines() {
+        if line != "[gap]" && !line.starts_with("tip = ") {
+            text.push(line.to_owned());
+        }
+    }
+    let source = nanotap::case::file::Source {
+        name: "case.toml".into(),
+        text: text.join("\n"),
+    };
+    let held = Case::parse(Some(source), &["drive.setpoint=0.91".to_owned()]).unwrap();
+    assert!(held.leaves_distance_to_setpoint());
+    let report = solve_setpoint(&held, &Control::default()).unwrap();
+    assert!((report.amplitude / 18.2e-9 - 1.0).abs() < 1e-12);
+    let mut phases = Vec::new();
+    for solution in report.solutions.iter().filter(|solution| solution.stable) {
+        let here = held.with(held.gap_key(), solution.gap);
+        let options = OrbitOptions {
+            period: Some(solution.period),
+            state: Some(solution.state.clone()),
+            ..OrbitOptions::default()
+        };
+        let found = orbit(&here.model().unwrap(), &options).unwrap();
+        let seen = found.observables.in_si(&here.physical().unwrap().scales);
+        assert!((seen.first_harmonic / 18.2e-9 - 1.0).abs() < 1e-9);
+        phases.push(seen.phase);
+    }
+    // The state that taps lags by less than at resonance.
+    assert!(phases.iter().any(|phase| *phase < 85.0), "{phases:?}");
+}
+
+/// Where the free swing does not reach the attraction there is one motion without contact, near
+/// the sample one that taps; each condition is that of the orbits themselves.
+#[test]
+fn a_window_over_a_sample_that_attracts() {
+    let case = quick(10.0, 9.0, &DMT);
+    let request = WindowRequest {
+        over: Axes(vec![
+            "drive.frequency=99kHz:101kHz:2".to_owned(),
+            "gap.tip=5nm:14nm:4".to_owned(),
+        ]),
+        starts: 4,
+        ..WindowRequest::default()
+    };
+    let sweep = request.sweep(&case).unwrap();
+    let folder = std::env::temp_dir().join(format!("nanotap-window-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
+    let how = Work {
+        share: Share::WHOLE,
+        threads: 2,
+        control: Control::default(),
+    };
+    sweep.compute(&store, &how).unwrap();
+    let window = Window::of(&store).unwrap();
+    let [frequency, gap] = [0, 1].map(|k| sweep.options().over[k].key);
+    let mut seen = Vec::new();
+    for (row, &y) in window.conditions.iter().zip(&window.y) {
+        for (condition, &x) in row.iter().zip(&window.x) {
+            let here = case.with(frequency, x).with(gap, y);
+            let free = FreeMotion::of(&here.model().unwrap()).reach;
+            let distance = y / here.physical().unwrap().scales.length;
+            match condition {
+                Condition::NoContact => assert!(free < distance, "{x} Hz, {y} m"),
+                Condition::OnePeriod1 => assert!(free > 0.9 * distance, "{x} Hz, {y} m"),
+                _ => {}
+            }
+            seen.push(*condition);
+        }
+    }
+    let _ = std::fs::remove_dir_all(&folder);
+    assert!(seen.contains(&Condition::NoContact), "{seen:?}");
+    assert!(seen.contains(&Condition::OnePeriod1), "{seen:?}");
+    assert!(!seen.contains(&Condition::Undecided), "{seen:?}");
+}
+
+fn observed(case: &Case, start: &[f64]) -> (Vec<f64>, Observables) {
+    let model = case.model().unwrap();
+    let options = OrbitOptions {
+        period: Some(1),
+        state: Some(start.to_vec()),
+        ..OrbitOptions::default()
+    };
+    let found = orbit(&model, &options).unwrap();
+    let seen = measure(&model, &found.state, 1, Set::ALL).unwrap();
+    (found.state, seen)
+}
+
+/// By differences of fourth order, to 1e-6 of each one's size.
+#[test]
+fn derivatives_of_what_is_observed() {
+    let dmt = quick(20.0, 15.0, &DMT);
+    let voigt = [
+        "sample.law=voigt-sphere",
+        "sample.modulus=100 MPa",
+        "sample.poisson=0.5",
+        "sample.viscosity=2 Pa s",
+    ];
+    let voigt = lever((0.3, 2.0, "350 kHz"), (10.0, 5.0), &voigt);
+    let jkr = [
+        "sample.law=jkr",
+        "sample.modulus=0.5 GPa",
+        "sample.work_of_adhesion=20 mJ/m^2",
+    ];
+    let jkr = quick(20.0, 15.0, &jkr);
+    let cases = [
+        (
+            dmt,
+            vec![Key::GapTip, Key::SampleModulus, Key::SampleHamaker],
+        ),
+        (voigt, vec![Key::GapTip, Key::SampleViscosity]),
+        (jkr, vec![Key::GapTip, Key::SampleWorkOfAdhesion]),
+    ];
+    let mut compared = 0;
+    for (case, keys) in cases {
+        let start = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
+        let (state, seen) = observed(&case, &start.state);
+        for key in keys {
+            let model = case.model().unwrap();
+            let at = (state.as_slice(), 1);
+            let exact = Derivative::of(&case, &model, key, at, &seen, Set::ALL).unwrap();
+            let value = case.get(key);
+            let h = 1e-4 * value;
+            let moved =
+                [-2.0, -1.0, 1.0, 2.0].map(|k| observed(&case.with(key, value + k * h), &state).1);
+            for (observable, change) in &exact.observables {
+                let number = |of: &Observables| match (observable.of)(of) {
+                    Value::Number(number) => Some(number),
+                    _ => None,
+                };
+                let (Some(here), Some(change)) = (number(&seen), change.number()) else {
+                    continue;
+                };
+                let [a, b, c, d] = moved.map(|of| number(&of).unwrap());
+                let slope = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h);
+                let scale = change.abs().max(here.abs() / value.abs());
+                assert!(
+                    (change - slope).abs() <= 1e-6 * scale,
+                    "d {} / d {key}: {change:e}, by differences {slope:e}",
+                    observable.name
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 100, "{compared}");
+}
+
+/// A bridge that forms at 2h and ruptures at d_r takes 4πγRh ln((1 + d_r/h)/3): its force acts on
+/// the way out alone.
+#[test]
+fn what_a_capillary_bridge_takes() {
+    let words = [
+        "sample.law=hertz + capillary",
+        "sample.modulus=3 GPa",
+        "sample.poisson=0.34",
+        "sample.film_thickness=0.3 nm",
+        "sample.surface_energy=70 mJ/m^2",
+        "sample.surface_tension=72 mJ/m^2",
+    ];
+    let case = quick(20.0, 12.0, &words);
+    let found = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
+    let taken = found.observables.dissipation * case.physical().unwrap().scales.energy;
+    let (r, h, tension, solid, reduced) =
+        (5.0_f64, 0.3_f64, 0.072, 0.07, 3.0 / (1.0 - 0.34 * 0.34));
+    let base = (3.0 * std::f64::consts::PI * solid * r * r / reduced).cbrt();
+    let four_pi = 4.0 * std::f64::consts::PI;
+    let volume = four_pi * r * h * h + four_pi / 3.0 * h.powi(3) + 0.5 * four_pi * base * base * h;
+    let rupture = volume.cbrt() - volume.cbrt().powi(2) / (5.0 * r);
+    let expected = 1e-18 * four_pi * tension * r * h * ((1.0 + rupture / h) / 3.0).ln();
+    assert!(
+        (taken / expected - 1.0).abs() < 1e-9,
+        "{} {}",
+        taken / EV,
+        expected / EV
+    );
+}

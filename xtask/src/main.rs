@@ -5,6 +5,7 @@
 //! run tells everything that is wrong.
 
 mod benches;
+mod book;
 mod peers;
 mod process;
 mod steps;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         }
         Ok(Selection::Run(steps)) => run(&steps),
         Ok(Selection::Bench) => finished(benches::run(&Workspace::find())),
+        Ok(Selection::Book(options)) => finished(book::run(&Workspace::find(), &options)),
         Ok(Selection::Peers(options)) => finished(peers::run(&Workspace::find(), &options)),
         Err(message) => {
             eprintln!("error: {message}\n");
@@ -54,6 +56,8 @@ enum Selection {
     Run(Vec<&'static Step>),
     /// The benches.
     Bench,
+    /// The site of documents, with its own options.
+    Book(Vec<String>),
     /// The comparison with other solvers, with its own options.
     Peers(Vec<String>),
 }
@@ -64,6 +68,7 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
     }
     match (arguments[0].as_str(), &arguments[1..]) {
         ("bench", []) => return Ok(Selection::Bench),
+        ("book", options) => return Ok(Selection::Book(options.to_vec())),
         ("peers", options) => return Ok(Selection::Peers(options.to_vec())),
         _ => {}
     }
@@ -94,6 +99,7 @@ fn usage() -> String {
     for step in BESIDE {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
+    text += "  book         the documents as a site, in target/book/site (--quick: the paper's report too)\n";
     text += "  peers        nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
     text
 }

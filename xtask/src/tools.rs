@@ -84,6 +84,30 @@ impl Workspace {
         let environment = Environment::ensured(&self.root, self.root.join(".venv"), &list)?;
         Ok(environment.program(name))
     }
+
+    /// A program of the registry, built from source into `.tools` if this version is not there yet.
+    ///
+    /// # Errors
+    /// It could not be built.
+    pub(crate) fn cargo_tool(
+        &self,
+        name: &str,
+        version: &str,
+        features: &[&str],
+    ) -> Result<Command, String> {
+        let tools = self.root.join(".tools");
+        let program = tools.join("bin").join(name);
+        let there = process::output(&self.root, Command::new(&program).arg("--version"));
+        if !there.is_some_and(|answer| answer.trim().ends_with(version)) {
+            let mut install = self.cargo(&["install", name, "--locked", "--force"]);
+            install.args(["--version", version, "--no-default-features"]);
+            install.args(features).arg("--root").arg(&tools);
+            if !process::succeeds(&self.root, &mut install)? {
+                return Err(format!("{name} could not be built"));
+            }
+        }
+        Ok(Command::new(program))
+    }
 }
 
 /// A Python environment.

@@ -1,0 +1,51 @@
+//! Lays out the site of documents for mdBook: `nanotap-book ROOT FOLDER [--quick]`.
+//!
+//! With `--quick` the report on the paper is computed from fewer starts.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use nanotap::control::Control;
+use nanotap_book::Site;
+use nanotap_paper::{Options, report};
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match words.as_slice() {
+        [root, folder] => lay_out(Path::new(root), Path::new(folder), false),
+        [root, folder, "--quick"] => lay_out(Path::new(root), Path::new(folder), true),
+        _ => Err("usage: nanotap-book ROOT FOLDER [--quick]".into()),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(reason) => {
+            eprintln!("error: {reason}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn lay_out(root: &Path, folder: &Path, quick: bool) -> Result<(), String> {
+    let options = Options {
+        only: Vec::new(),
+        quick,
+    };
+    let report = report(&options, &Control::default()).map_err(|error| error.to_string())?;
+    let site = Site::read(root, &report).map_err(|trouble| trouble.to_string())?;
+    let troubles = site.troubles();
+    if !troubles.is_empty() {
+        let lines: Vec<String> = troubles.iter().map(ToString::to_string).collect();
+        return Err(lines.join("\n       "));
+    }
+    site.write(folder).map_err(|trouble| trouble.to_string())?;
+    let written = report
+        .write(&folder.join("docs/reference/paper"))
+        .map_err(|error| error.to_string())?;
+    println!(
+        "{} pages, {} pictures of the paper",
+        site.len(),
+        written.pictures.len()
+    );
+    Ok(())
+}

@@ -1,0 +1,38 @@
+//! The observables.
+
+use nanotap::observe::OBSERVABLES;
+
+use super::{code, head, row};
+
+const INTRODUCTION: &str = "\
+# The observables
+
+What is measured of a motion, by the names that JSON, CSV headers, datasets, `--show` and Python
+use. In a document the entries of a motion are in the model's units and those under `physical` in
+SI, where two have the names that experimenters know. *Recorded* are those that sweeps, branches and
+curves keep of every motion; the others are measured where one motion is reported. How each is
+defined is in [what is read off a motion](../theory/observables.md).
+";
+
+pub(super) fn page() -> String {
+    let mut text = INTRODUCTION.to_owned();
+    text.push('\n');
+    text += &head(&["name", "in SI", "what it is", "unit", "SI unit", "recorded"]);
+    for observable in OBSERVABLES {
+        let si_name = if observable.si_name == observable.name {
+            String::new()
+        } else {
+            code(observable.si_name)
+        };
+        let recorded = nanotap::observe::Set::COMMON.contains(observable);
+        text += &row(&[
+            code(observable.name),
+            si_name,
+            observable.words.to_owned(),
+            observable.dimension.model_unit().to_owned(),
+            observable.dimension.si_unit().to_owned(),
+            (if recorded { "yes" } else { "" }).to_owned(),
+        ]);
+    }
+    text
+}

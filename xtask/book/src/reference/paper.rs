@@ -1,0 +1,40 @@
+//! What the paper says, and what holds.
+
+use std::fmt::Write as _;
+
+use nanotap_paper::Report;
+
+use super::{code, head, plain, row};
+
+const INTRODUCTION: &str = "\
+# Every statement of the paper
+
+What `nanotap paper` finds: each figure and number of \"Multi-modal analysis on the intermittent
+contact dynamics of atomic force microscope\" (Journal of Sound and Vibration, 2011) computed again,
+with a verdict, what it rests on, and the command that computes it once more.
+
+";
+
+pub(super) fn page(report: &Report) -> String {
+    let mut text = INTRODUCTION.to_owned();
+    let _ = writeln!(text, "{}.", plain(&report.counts()));
+    if report.quick {
+        text += "\n*Computed with fewer starts than `nanotap paper` takes.*\n";
+    }
+    for section in &report.sections {
+        let _ = write!(text, "\n## {}\n\n", plain(section.title));
+        for paragraph in &section.text {
+            let _ = write!(text, "{}\n\n", plain(paragraph));
+        }
+        text += &head(&["verdict", "the paper", "here", "because"]);
+        for check in &section.checks {
+            text += &row(&[
+                check.verdict.name(),
+                &check.paper,
+                &check.here,
+                &format!("{} {}", check.evidence, code(&check.rerun)),
+            ]);
+        }
+    }
+    text
+}

@@ -1,0 +1,90 @@
+//! What a study is asked for, and what it reports.
+
+use std::fmt::Write as _;
+
+use nanotap::study::registry::StudyEntry;
+use serde_json::Value;
+
+use super::schema::{bare, kind, meaning, range};
+use super::{code, head, row};
+
+pub(super) fn page(entry: &StudyEntry) -> String {
+    let request = (entry.request)().to_value();
+    let report = (entry.report)().to_value();
+    let name = entry.name;
+    let mut text = format!(
+        "# {name}\n\n{}.\n\nIn a terminal `nanotap {name}`, in [Python](../python.md) `nanotap.{}`. This page \
+         is made of the study's own schema, which `nanotap schema {name}` prints; what concerns \
+         the terminal alone is in `nanotap {name} --help`.\n\n## Options\n\n",
+        entry.about,
+        name.replace('-', "_"),
+    );
+    text += &head(&["option", "what it says", "takes", "range", "without it"]);
+    for (name, schema) in request["properties"].as_object().into_iter().flatten() {
+        text += &row(&[
+            code(&format!("--{}", name.replace('_', "-"))),
+            meaning(schema),
+            kind(schema),
+            range(schema),
+            bare(&schema["default"]),
+        ]);
+    }
+    text += "\n## The document\n\nWhat `--json` prints; Python's results carry the same names.\n\n";
+    text += &entries(&report);
+    for part in [&request, &report] {
+        for (name, schema) in part["$defs"].as_object().into_iter().flatten() {
+            text += &definition(name, schema);
+        }
+    }
+    text
+}
+
+/// A table of what an object holds.
+fn entries(schema: &Value) -> String {
+    let required: Vec<&str> = schema["required"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+        .collect();
+    let mut text = head(&["entry", "what it is", "type", "unit", "always"]);
+    for (name, schema) in schema["properties"].as_object().into_iter().flatten() {
+        text += &row(&[
+            code(name),
+            meaning(schema),
+            kind(schema),
+            bare(&schema["x-unit"]),
+            (if required.contains(&name.as_str()) {
+                "yes"
+            } else {
+                ""
+            })
+            .to_owned(),
+        ]);
+    }
+    text
+}
+
+/// A table that entries of others name.
+fn definition(name: &str, schema: &Value) -> String {
+    let mut text = format!("\n### {name}\n\n");
+    let about = meaning(schema);
+    if !about.is_empty() {
+        let _ = write!(text, "{}\n\n", super::plain(&about));
+    }
+    if schema["properties"].is_object() {
+        return text + &entries(schema);
+    }
+    if let Some(choices) = schema["oneOf"].as_array().or(schema["anyOf"].as_array()) {
+        for choice in choices {
+            let _ = writeln!(
+                text,
+                "- {} {}",
+                kind(choice),
+                super::plain(&meaning(choice))
+            );
+        }
+        return text;
+    }
+    text + &format!("{}\n", kind(schema))
+}

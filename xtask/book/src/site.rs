@@ -1,0 +1,253 @@
+//! The pages of the site, what is wrong with them, and how they are laid out for mdBook.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use nanotap_paper::Report;
+
+use crate::page::Page;
+use crate::reference;
+
+/// Pages of the repository's root that belong to the site.
+const AT_ROOT: &[&str] = &[
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+];
+
+/// Something that is wrong with a page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trouble {
+    /// The page, from the repository's root.
+    pub page: String,
+    /// What is wrong with it.
+    pub reason: String,
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}: {}", self.page, self.reason)
+    }
+}
+
+/// The site.
+pub struct Site {
+    root: PathBuf,
+    /// By path from the repository's root, with `/`.
+    pages: BTreeMap<String, Page>,
+    summary: Page,
+}
+
+impl Site {
+    /// The pages of the repository at `root`, and those that are made: of the program's tables,
+    /// and of a report on the paper.
+    ///
+    /// # Errors
+    /// When a page cannot be read.
+    pub fn read(root: &Path, report: &Report) -> Result<Self, Trouble> {
+        let mut pages = BTreeMap::new();
+        let mut names: Vec<String> = AT_ROOT.iter().map(|&name| name.to_owned()).collect();
+        find_pages(root, "docs", &mut names)?;
+        for name in names {
+            pages.insert(name.clone(), Page::read(text(root, &name)?));
+        }
+        let summary = pages.remove("docs/SUMMARY.md").ok_or_else(|| Trouble {
+            page: "docs/SUMMARY.md".into(),
+            reason: "is not there".into(),
+        })?;
+        for (name, text) in reference::pages(report) {
+            pages.insert(format!("docs/reference/{name}"), Page::read(text));
+        }
+        Ok(Self {
+            root: root.to_owned(),
+            pages,
+            summary,
+        })
+    }
+
+    /// How many pages there are.
+    pub fn len(&self) -> usize {
+        self.pages.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.pages.is_empty()
+    }
+
+    /// All that is wrong: pages that the summary lacks or has twice, links and anchors that lead
+    /// nowhere, formulas that cannot be typeset.
+    pub fn troubles(&self) -> Vec<Trouble> {
+        let mut troubles = Vec::new();
+        let mut listed = BTreeSet::new();
+        for target in self.listed() {
+            if !self.pages.contains_key(&target) {
+                troubles.push(wrong(
+                    "docs/SUMMARY.md",
+                    format!("there is no page {target}"),
+                ));
+            }
+            if !listed.insert(target.clone()) {
+                troubles.push(wrong("docs/SUMMARY.md", format!("{target} stands twice")));
+            }
+        }
+        for (name, page) in &self.pages {
+            if !listed.contains(name) {
+                troubles.push(wrong(name, "is not in docs/SUMMARY.md".into()));
+            }
+            for (formula, error) in page.unreadable() {
+                troubles.push(wrong(
+                    name,
+                    format!("${formula}$ cannot be typeset: {error}"),
+                ));
+            }
+            for link in &page.links {
+                if let Some(reason) = self.dead(name, page, &link.target) {
+                    troubles.push(wrong(name, reason));
+                }
+            }
+        }
+        troubles
+    }
+
+    /// Lays the site out below `folder`: `SUMMARY.md`, every page, and every file that one links
+    /// to, by the paths that they have here.
+    ///
+    /// # Errors
+    /// When a file cannot be read or written.
+    pub fn write(&self, folder: &Path) -> Result<(), Trouble> {
+        let summary = self.summary.written(|target| {
+            let target = from_root("docs/SUMMARY.md", target)?;
+            Some(renamed(&target).unwrap_or(target))
+        });
+        put(folder, "SUMMARY.md", summary.as_bytes())?;
+        for (name, page) in &self.pages {
+            let text = page.written(renamed);
+            put(
+                folder,
+                &renamed(name).unwrap_or_else(|| name.clone()),
+                text.as_bytes(),
+            )?;
+            for link in &page.links {
+                let Some(target) = from_root(name, without_anchor(&link.target)) else {
+                    continue;
+                };
+                let file = self.root.join(&target);
+                if !self.pages.contains_key(&target) && file.is_file() {
+                    let bytes =
+                        fs::read(&file).map_err(|error| wrong(&target, error.to_string()))?;
+                    put(folder, &target, &bytes)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The pages in the summary, from the repository's root.
+    fn listed(&self) -> impl Iterator<Item = String> {
+        let links = self.summary.links.iter();
+        links.filter_map(|link| from_root("docs/SUMMARY.md", &link.target))
+    }
+
+    /// Why a link of a page leads nowhere, if it does.
+    fn dead(&self, name: &str, page: &Page, target: &str) -> Option<String> {
+        let (path, anchor) = match target.split_once('#') {
+            Some((path, anchor)) => (path, Some(anchor)),
+            None => (target, None),
+        };
+        if path.contains("://") {
+            return None;
+        }
+        let there = if path.is_empty() {
+            Some(page)
+        } else {
+            let Some(path) = from_root(name, path) else {
+                return Some(format!("{target} leads out of the repository"));
+            };
+            let there = self.pages.get(&path);
+            if there.is_none() && !self.root.join(&path).is_file() {
+                return Some(format!("{target} leads nowhere"));
+            }
+            there
+        };
+        let (there, anchor) = (there?, anchor?);
+        let found = there.anchors.iter().any(|heading| heading == anchor);
+        (!found).then(|| format!("{target} names no heading"))
+    }
+}
+
+fn wrong(page: &str, reason: String) -> Trouble {
+    Trouble {
+        page: page.to_owned(),
+        reason,
+    }
+}
+
+fn text(root: &Path, name: &str) -> Result<String, Trouble> {
+    fs::read_to_string(root.join(name)).map_err(|error| wrong(name, error.to_string()))
+}
+
+/// Every Markdown file below `folder`.
+fn find_pages(root: &Path, folder: &str, names: &mut Vec<String>) -> Result<(), Trouble> {
+    let entries = fs::read_dir(root.join(folder)).map_err(|e| wrong(folder, e.to_string()))?;
+    for entry in entries {
+        let entry = entry.map_err(|e| wrong(folder, e.to_string()))?;
+        let name = format!("{folder}/{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() {
+            find_pages(root, &name, names)?;
+        } else if entry
+            .path()
+            .extension()
+            .is_some_and(|ending| ending == "md")
+        {
+            names.push(name);
+        }
+    }
+    Ok(())
+}
+
+fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Trouble> {
+    let path = folder.join(name);
+    let parent = path.parent().unwrap_or(folder);
+    fs::create_dir_all(parent)
+        .and_then(|()| fs::write(&path, bytes))
+        .map_err(|error| wrong(name, error.to_string()))
+}
+
+fn without_anchor(target: &str) -> &str {
+    target.split_once('#').map_or(target, |(path, _)| path)
+}
+
+/// Where a link in the page `name` leads, from the repository's root; none if out of it, or into
+/// the network.
+fn from_root(name: &str, target: &str) -> Option<String> {
+    if target.is_empty() || target.contains("://") {
+        return None;
+    }
+    let mut parts: Vec<String> = name.split('/').map(str::to_owned).collect();
+    parts.pop();
+    for part in Path::new(target).components() {
+        match part {
+            Component::Normal(part) => parts.push(part.to_string_lossy().into_owned()),
+            Component::ParentDir => {
+                parts.pop()?;
+            }
+            Component::CurDir => {}
+            Component::RootDir | Component::Prefix(_) => return None,
+        }
+    }
+    Some(parts.join("/"))
+}
+
+/// A folder's front page is called `README.md` by hosts and `index.md` by mdBook.
+fn renamed(target: &str) -> Option<String> {
+    if target.contains("://") {
+        return None;
+    }
+    let path = without_anchor(target);
+    let front = path == "README.md" || path.ends_with("/README.md");
+    front.then(|| target.replacen("README.md", "index.md", 1))
+}

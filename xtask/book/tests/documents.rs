@@ -1,0 +1,65 @@
+//! The documents of this repository: every page is in the summary, every link and anchor leads
+//! somewhere, every formula can be typeset.
+
+use std::path::Path;
+
+use nanotap::control::Control;
+use nanotap_book::Site;
+use nanotap_paper::{Options, report};
+
+#[test]
+fn nothing_is_wrong_with_the_documents() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // One section of the report that takes no time stands for all.
+    let options = Options {
+        only: vec!["eq14".into()],
+        quick: true,
+    };
+    let report = report(&options, &Control::default()).unwrap();
+    let site = Site::read(&root, &report).unwrap();
+    let troubles = site.troubles();
+    let lines: Vec<String> = troubles.iter().map(ToString::to_string).collect();
+    assert!(troubles.is_empty(), "{}", lines.join("\n"));
+    assert!(site.len() > 30, "only {} pages were found", site.len());
+}
+
+#[test]
+fn what_is_wrong_is_told() {
+    let root = std::env::temp_dir().join(format!("nanotap-book-{}", std::process::id()));
+    let docs = root.join("docs");
+    std::fs::create_dir_all(&docs).unwrap();
+    for name in ["README", "ARCHITECTURE", "CONTRIBUTING", "CHANGELOG"] {
+        std::fs::write(root.join(name).with_extension("md"), "# A title\n").unwrap();
+    }
+    let summary = "[a](../README.md)\n- [b](../ARCHITECTURE.md)\n- [c](../CONTRIBUTING.md)\n\
+                   - [d](../CHANGELOG.md)\n- [e](gone.md)\n- [f](page.md)\n";
+    std::fs::write(docs.join("SUMMARY.md"), summary).unwrap();
+    let page =
+        "[ok](../README.md#a-title) [no](../README.md#another) [gone](x.svg) $\\nosuchcommand$\n";
+    std::fs::write(docs.join("page.md"), page).unwrap();
+    std::fs::write(docs.join("forgotten.md"), "forgotten\n").unwrap();
+    let options = Options {
+        only: vec!["eq14".into()],
+        quick: true,
+    };
+    let report = report(&options, &Control::default()).unwrap();
+    let site = Site::read(&root, &report).unwrap();
+    let troubles: Vec<String> = site
+        .troubles()
+        .iter()
+        .map(ToString::to_string)
+        .filter(|trouble| !trouble.starts_with("docs/reference/"))
+        .collect();
+    std::fs::remove_dir_all(&root).unwrap();
+    let all = troubles.join("\n");
+    assert_eq!(troubles.len(), 5, "{all}");
+    for words in [
+        "docs/SUMMARY.md: there is no page docs/gone.md",
+        "docs/forgotten.md: is not in docs/SUMMARY.md",
+        "docs/page.md: ../README.md#another names no heading",
+        "docs/page.md: x.svg leads nowhere",
+        "cannot be typeset",
+    ] {
+        assert!(all.contains(words), "{words} is not in\n{all}");
+    }
+}

@@ -1,0 +1,38 @@
+//! The site of documents: laid out by `nanotap-book`, built by mdBook into `target/book/site`.
+
+use std::fs;
+
+use crate::process::succeeds;
+use crate::tools::Workspace;
+
+/// mdBook, built from source into `.tools` where no program of this version is there yet.
+const MDBOOK: &str = "0.5.4";
+
+/// Builds the site; `options` are those of `nanotap-book`.
+///
+/// # Errors
+/// A tool is missing or failed; says which.
+pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), String> {
+    let mut mdbook = workspace.cargo_tool("mdbook", MDBOOK, &["--features", "search"])?;
+    let folder = workspace.target().join("book");
+    let sources = folder.join("src");
+    if sources.exists() {
+        fs::remove_dir_all(&sources)
+            .map_err(|error| format!("cannot empty {}: {error}", sources.display()))?;
+    }
+    fs::create_dir_all(&folder)
+        .map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
+    for name in ["book.toml", "book.css"] {
+        fs::copy(workspace.root.join("docs").join(name), folder.join(name))
+            .map_err(|error| format!("cannot copy docs/{name}: {error}"))?;
+    }
+    let mut lay_out = workspace.cargo(&["run", "--release", "--package", "nanotap-book", "--"]);
+    lay_out.arg(&workspace.root).arg(&sources).args(options);
+    for command in [&mut lay_out, mdbook.arg("build").arg(&folder)] {
+        if !succeeds(&workspace.root, command)? {
+            return Err("the site could not be built".into());
+        }
+    }
+    println!("{}", folder.join("site").join("index.html").display());
+    Ok(())
+}

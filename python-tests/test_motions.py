@@ -57,6 +57,18 @@ def test_a_run_has_the_terminals_numbers(regular, tmp_path):
             assert variable.attrs["long_name"] and variable.attrs["units"], name
 
 
+def test_orbits_are_proved(regular, tmp_path):
+    said = terminal(tmp_path, regular, "orbit", "--prove")
+    proof = nanotap.orbit(regular, prove=True).proof
+    assert proof.to_dict() == said["proof"]
+    assert proof.proved and proof.stability == "stable"
+    orbit = nanotap.orbit(regular)
+    assert orbit.proof is None
+    for (low, high), value in zip(proof.state, orbit.state, strict=True):
+        assert low - 1e-9 < value < high + 1e-9
+    assert nanotap.attractors(regular, starts=4, prove=True)[0].proof.proved
+
+
 def test_a_time_series_fits_its_run(regular):
     ds = nanotap.simulate(regular, periods=4, resolution=500)
     assert ds.sizes["tau"] == 4 * 500 + 1

@@ -305,6 +305,9 @@ class Orbit(_Observed, Result):
         physical: The same in SI, if the case is physical.
         derivatives: Derivatives by the keys that were asked for: `state`, the
             observables, `physical`.
+        proof: The theorem, if one was asked for: `proved`, `statement`, and if it was
+            proved enclosures of `state`, `switches` and `multipliers`, `stability`,
+            `unique_within`.
         made_series: What makes the time series.
 
     Lengths and forces are in the model's units; `physical` has them in SI.
@@ -331,6 +334,7 @@ class Orbit(_Observed, Result):
     first_harmonic: float
     physical: Record | None = None
     derivatives: Record | None = None
+    proof: Record | None = None
     made_series: "Callable[[], xr.Dataset] | xr.Dataset | None" = field(
         default=None, kw_only=True
     )
@@ -435,6 +439,7 @@ class Attractor(Result):
         tip_min: Least tip deflection W (g0).
         amplitude: Half of peak to peak of W (g0).
         contact_fraction: Part of the time in contact.
+        proof: The theorem on an orbit, if one was asked for, as of an `Orbit`.
     """
 
     classification: str
@@ -450,6 +455,7 @@ class Attractor(Result):
     tip_min: float | None = None
     amplitude: float | None = None
     contact_fraction: float | None = None
+    proof: Record | None = None
 
     _arrays = frozenset({"lyapunov", "state", "states"})
     _complex = frozenset({"multipliers"})

@@ -154,7 +154,7 @@ follows! {
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
-    the_liquid: "liquid.md", 2 commands, 4 numbers;
+    the_liquid: "liquid.md", 3 commands, 7 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;

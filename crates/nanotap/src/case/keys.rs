@@ -287,6 +287,10 @@ keys! {
         .feeds(Parameter::Mode3Quality);
     LeverK2 = quantity(Cantilever, "k2", Stiffness, R::POSITIVE, "stiffness of the second mode at the tip")
         .feeds(Parameter::Mode2Stiffness);
+    FluidDensity = quantity(Cantilever, "fluid_density", Density, R::POSITIVE, "density of the fluid around a rectangular lever, with fluid_viscosity in place of Q; a given f0 is then that in vacuum")
+        .feeds(Parameter::Alpha3);
+    FluidViscosity = quantity(Cantilever, "fluid_viscosity", Viscosity, R::POSITIVE, "viscosity of the fluid around the lever")
+        .feeds(Parameter::Alpha3);
     LeverLength = quantity(Cantilever, "length", Length, R::POSITIVE, "length of the beam");
     LeverWidth = quantity(Cantilever, "width", Length, R::POSITIVE, "width of the beam");
     LeverThickness = quantity(Cantilever, "thickness", Length, R::POSITIVE, "thickness in the direction of bending");
@@ -395,6 +399,10 @@ keys! {
 
 /// Quantities that say the same in different ways.
 pub(super) static ALTERNATIVES: &[Alternatives] = &[
+    Alternatives {
+        ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],
+        reason: "the fluid tells the quality factor",
+    },
     Alternatives {
         ways: &[&[Key::DriveFrequency], &[Key::DriveFrequencyRatio]],
         reason: "each gives the frequency",

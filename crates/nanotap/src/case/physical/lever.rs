@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use super::error::PhysicalError;
+use super::fluid::Fluid;
 use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::TipMass;
@@ -49,7 +50,9 @@ pub struct LeverData {
     /// First free resonance in Hz, with the tip, f₀.
     pub f0: Option<f64>,
     /// Quality factor of the first free resonance, Q.
-    pub quality_factor: f64,
+    pub quality_factor: Option<f64>,
+    /// The fluid around it, which tells Q; f₀ and f₂ are then those in vacuum.
+    pub fluid: Option<Fluid>,
     /// Dimensions.
     pub geometry: Option<BeamGeometry>,
     /// Young's modulus along the beam.
@@ -133,13 +136,31 @@ impl Lever {
             }
         };
         let time = (3.0 * beam_mass / k).sqrt();
-        Ok(Self {
+        let lever = Self {
             k,
             beam_mass,
             tip_mass_ratio: ratio,
             f0: data.f0.unwrap_or(first_frequency(ratio)? / (TAU * time)),
-            quality_factor: data.quality_factor,
+            quality_factor: data.quality_factor.unwrap_or(f64::INFINITY),
             length: data.geometry.map(|geometry| geometry.length),
+        };
+        match (data.fluid, data.geometry) {
+            (Some(fluid), Some(geometry)) => fluid.around(&lever, geometry.width, geometry.length),
+            (Some(_), None) => Err(PhysicalError::missing(
+                Key::LeverWidth,
+                "what a fluid adds follows from the lever's width and length",
+            )),
+            (None, _) => Ok(lever),
+        }
+    }
+
+    /// The same beam with a tip of this mass in kg at its end.
+    pub(super) fn with_tip(self, mass: f64) -> Result<Self, PhysicalError> {
+        let ratio = bounded(mass / self.beam_mass)?;
+        Ok(Self {
+            tip_mass_ratio: ratio,
+            f0: first_frequency(ratio)? / (TAU * self.time_unit()),
+            ..self
         })
     }
 
@@ -179,9 +200,12 @@ impl Lever {
                 computed,
             ));
         }
-        if let (Some(_), Some(_), Some(weight)) =
-            (data.k.or(data.bending()), data.f0, data.weight())
-        {
+        if let (Some(_), Some(_), Some(weight), None) = (
+            data.k.or(data.bending()),
+            data.f0,
+            data.weight(),
+            data.fluid,
+        ) {
             remarks.push(comparison("beam mass", Kind::Mass, self.beam_mass, weight));
         }
         if let TipMass::SecondMode(f2) = data.tip_mass {
@@ -202,7 +226,9 @@ impl Lever {
                 Kind::Number.format(self.tip_mass_ratio)
             )));
         }
-        if self.quality_factor < 5.0 {
+        if let (Some(fluid), Some(geometry)) = (data.fluid, data.geometry) {
+            remarks.push(fluid.remark(self, geometry.width));
+        } else if self.quality_factor < 5.0 {
             remarks.push(Remark::warning(
                 "at a quality factor below 5 the free amplitude peaks away from f0, and \
                  damping by a liquid adds mass that this model does not have",
@@ -231,7 +257,7 @@ fn check(data: &LeverData) -> Result<(), PhysicalError> {
     };
     positive(Key::LeverK, data.k)?;
     positive(Key::LeverF0, data.f0)?;
-    positive(Key::LeverQ, Some(data.quality_factor))?;
+    positive(Key::LeverQ, data.quality_factor)?;
     positive(Key::LeverModulus, data.modulus)?;
     positive(Key::LeverDensity, data.density)?;
     if let Some(geometry) = data.geometry {
@@ -412,20 +438,24 @@ impl LeverData {
         tip_mass: Option<TipMass>,
     ) -> Result<Self, PhysicalError> {
         let f2 = reader.number(Key::LeverF2)?.map(TipMass::SecondMode);
+        let fluid = Fluid::read(reader)?;
+        let quality_factor = reader.number(Key::LeverQ)?;
+        if quality_factor.is_none() && fluid.is_none() {
+            return Err(PhysicalError::missing(
+                Key::LeverQ,
+                "it depends on what surrounds the lever: a few hundred in air, a few in \
+                 water, tens of thousands in vacuum; take it from the free resonance",
+            ));
+        }
         Ok(Self {
+            fluid,
+            quality_factor,
             k: reader
                 .number(Key::LeverK)?
                 .or_else(|| lever.map(|lever| lever.k)),
             f0: reader
                 .number(Key::LeverF0)?
                 .or_else(|| lever.map(|lever| lever.f0)),
-            quality_factor: reader.number(Key::LeverQ)?.ok_or_else(|| {
-                PhysicalError::missing(
-                    Key::LeverQ,
-                    "it depends on what surrounds the lever: a few hundred in air, a few in \
-                     water, tens of thousands in vacuum; take it from the free resonance",
-                )
-            })?,
             geometry: read_geometry(reader)?.or_else(|| lever.and_then(|lever| lever.geometry)),
             modulus: reader.number(Key::LeverModulus)?,
             density: reader.number(Key::LeverDensity)?,

@@ -39,6 +39,7 @@
 pub mod catalogue;
 pub mod drive;
 mod error;
+pub mod fluid;
 pub mod force;
 pub mod free_response;
 pub mod lever;

@@ -254,6 +254,7 @@ pub fn census_of<M: StroboscopicMap>(
         done: AtomicUsize::new(0),
         last,
         outcomes: Vec::new(),
+        ends: Vec::new(),
         orbits: Vec::new(),
         neighbourhoods: Vec::new(),
         motions: 0,
@@ -264,9 +265,12 @@ pub fn census_of<M: StroboscopicMap>(
         row: 0,
     };
     let mut size = options.pilots.max(1);
-    while work.outcomes.len() < last && !work.is_enough() {
+    while work.outcomes.len() < last {
         work.batch(size);
         size = BATCH;
+        if work.is_enough() {
+            break;
+        }
     }
     let mut after = Escapes::after(work.relaxation());
     work.watch_chaos(&mut after);
@@ -291,6 +295,8 @@ struct Work<'a, M> {
     /// Starts at most.
     last: usize,
     outcomes: Vec<Outcome>,
+    /// Least and greatest entries of the starts so far.
+    ends: Vec<[f64; 2]>,
     orbits: Vec<PeriodicOrbit>,
     /// Index of an orbit and a neighbourhood of it.
     neighbourhoods: Vec<(usize, Neighbourhood)>,
@@ -310,12 +316,11 @@ struct Work<'a, M> {
 impl<M: StroboscopicMap> Work<'_, M> {
     /// True if the next batch is not wanted.
     fn is_enough(&self) -> bool {
-        if self.starts.len().is_some() {
-            return false;
+        if self.control.is_cancelled() || self.starts.len().is_some() {
+            return self.control.is_cancelled();
         }
         let found = self.orbits.len() + self.chaos.len();
-        self.control.is_cancelled()
-            || Unseen::new(found, self.row).share <= self.options.unseen
+        Unseen::new(found, self.row).share <= self.options.unseen
             || self.outcomes.len() > self.starts.given_count()
                 && self.periods >= self.options.max_periods
     }
@@ -324,6 +329,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
     fn batch(&mut self, size: usize) {
         let first = self.outcomes.len();
         let range: Vec<usize> = (first..self.last.min(first + size)).collect();
+        for start in range.iter().filter_map(|k| self.starts.start(*k)) {
+            extend(&mut self.ends, &start);
+        }
         let arrivals = self.run(&range, true);
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         let mut classified = Vec::new();
@@ -358,7 +366,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
 
     /// Sides of the box around the starts so far.
     fn sides(&self) -> Vec<f64> {
-        sides(&(0..self.outcomes.len()).filter_map(|k| self.starts.start(k)))
+        self.ends.iter().map(|[low, high]| high - low).collect()
     }
 
     fn balls(&self) -> Vec<Neighbourhood> {
@@ -570,18 +578,13 @@ impl<M: StroboscopicMap> Work<'_, M> {
     }
 }
 
-/// Sides of the box around some starts.
-fn sides(starts: &(impl Iterator<Item = Vec<f64>> + Clone)) -> Vec<f64> {
-    let Some(first) = starts.clone().next() else {
-        return Vec::new();
-    };
-    let mut low = first.clone();
-    let mut high = first;
-    for start in starts.clone() {
-        for (v, (l, h)) in start.iter().zip(low.iter_mut().zip(&mut high)) {
-            *l = l.min(*v);
-            *h = h.max(*v);
-        }
+/// Least and greatest entries of some starts, with those of one more.
+fn extend(ends: &mut Vec<[f64; 2]>, start: &[f64]) {
+    if ends.is_empty() {
+        ends.extend(start.iter().map(|v| [*v, *v]));
     }
-    low.iter().zip(&high).map(|(l, h)| h - l).collect()
+    for ([low, high], v) in ends.iter_mut().zip(start) {
+        *low = low.min(*v);
+        *high = high.max(*v);
+    }
 }

@@ -1,7 +1,7 @@
 //! The census, its fractions, its claims about chaos, and the list of unstable orbits.
 
 use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nanotap_dynamics::{
     AttractorKind, Census, CensusOptions, ClassifyOptions, Control, LyapunovOptions, Neighbourhood,
@@ -159,6 +159,18 @@ fn a_cancelled_census_says_so_and_progress_is_heard() {
     );
     assert!(result.cancelled);
     assert_eq!(result.undecided.len(), 10);
+    // Of many starts most are not even laid out.
+    let stop = |_, _| cancel.store(true, Ordering::Relaxed);
+    cancel.store(false, Ordering::Relaxed);
+    let control = Control {
+        cancel: Some(&cancel),
+        progress: Some(&stop),
+    };
+    let many = starts(&[0.0], &[1.0], 100_000);
+    let options = CensusOptions::default();
+    let result = census(&System(Logistic(3.2)), &many, &options, &control);
+    assert!(result.cancelled && result.outcomes_by_start.len() < 10_000);
+    assert!(result.undecided.len() < result.outcomes_by_start.len());
     let heard = Mutex::new(Vec::new());
     let progress = |done, total| heard.lock().unwrap().push((done, total));
     let control = Control {

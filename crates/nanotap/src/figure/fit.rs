@@ -117,6 +117,15 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
         rows.iter().filter_map(point).collect()
     };
     let mut panel = Panel::new(x, Axis::linear(label));
+    for (index, jump) in report.jumps.iter().enumerate() {
+        let fold = Rule::vertical(along * jump.fold);
+        // One entry of the legend for all.
+        panel = panel.with(if index == 0 {
+            fold.label("folds of the fit")
+        } else {
+            fold
+        });
+    }
     let others: Vec<(f64, f64)> = report
         .others
         .iter()

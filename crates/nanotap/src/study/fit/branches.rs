@@ -13,8 +13,8 @@
 //! Fails by omission: branches that none of these meets.
 
 use nanotap_dynamics::{
-    ClassifyOptions, MotionKind, PeriodicOrbit, ShootingOptions, StroboscopicMap as _, classify,
-    close_orbit_from_points,
+    ClassifyOptions, LyapunovOptions, MotionKind, PeriodicOrbit, ShootingOptions,
+    StroboscopicMap as _, classify, close_orbit_from_points,
 };
 
 use crate::case::Case;
@@ -45,6 +45,9 @@ pub(super) struct Along<'a> {
 
 /// Distance of two orbits, in parts of their size, that do not continue each other in one step.
 const FAR: f64 = 0.3;
+/// Drive periods of a motion that has not repeated after the transient, until it is looked at for
+/// the last time.
+const LAST_LOOK: usize = 64;
 /// Halvings of the way from one row to the next.
 const HALVINGS: usize = 4;
 /// Distance of an orbit from the state that was measured, in parts of that, beyond which it is
@@ -232,9 +235,18 @@ impl Along<'_> {
     fn settled(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
         let rest = vec![0.0; model.dimension()];
+        // Only whether it comes to repeat matters: exponents of a motion that does not would take
+        // longer than all the rest of a fit.
         let options = ClassifyOptions {
             max_period: self.max_period,
             long_period: self.max_period,
+            lyapunov: LyapunovOptions {
+                alignment: 0,
+                min_periods: LAST_LOOK,
+                max_periods: LAST_LOOK,
+                ..LyapunovOptions::default()
+            },
+            birkhoff_periods: 0,
             ..ClassifyOptions::default()
         };
         let end = classify(&mut Strobe::new(&model), state.unwrap_or(&rest), &options);

@@ -132,31 +132,34 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
                 &si(Kind::Force, o.peak_force),
                 &format!("mean {}", number::significant(o.mean_force, 4)),
             ]);
-            if o.least_force < 0.0 {
-                table.row([
-                    "pull of the sample",
-                    &format!("up to {}", number::significant(-o.least_force, 6)),
-                    &si(Kind::Force, -o.least_force),
-                    "of its damper, on a tip that leaves",
-                ]);
-            }
             table.row([
                 "indentation",
                 &number::significant(o.indentation, 5),
                 &si(Kind::Length, o.indentation),
                 "greatest depth below the resting surface",
             ]);
-            table.row([
-                "virial ⟨F·W⟩",
-                &number::significant(o.virial, 5),
-                &units
-                    .si(Kind::Energy)
-                    .map_or_else(String::new, |u| format_electronvolts(u * o.virial)),
-                "mean of force times deflection",
-            ]);
         }
     } else {
         table.row(["contact", "none", "", ""]);
+    }
+    // An attraction acts without contact too.
+    if o.least_force < 0.0 {
+        table.row([
+            "pull of the sample",
+            &format!("up to {}", number::significant(-o.least_force, 6)),
+            &si(Kind::Force, -o.least_force),
+            "greatest force on the tip towards the sample",
+        ]);
+    }
+    if o.peak_force > 0.0 || o.least_force < 0.0 {
+        table.row([
+            "virial ⟨F·W⟩",
+            &number::significant(o.virial, 5),
+            &units
+                .si(Kind::Energy)
+                .map_or_else(String::new, |u| format_electronvolts(u * o.virial)),
+            "mean of force times deflection",
+        ]);
     }
     if let Some((height, xi)) = o.beam_clearance.zip(o.beam_clearance_xi) {
         let place = if xi > 0.999 {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use nanotap::model::contact::ContactLaw;
-use nanotap_volterra::laws::TABLE;
+use nanotap_volterra::laws::all;
 
 use super::{code, head, plain, row};
 
@@ -35,7 +35,7 @@ pub(super) fn page() -> String {
         text += &row(&[code(law.name()), law.meaning().to_owned()]);
     }
     text += NONLINEAR;
-    for law in TABLE {
+    for law in all() {
         let entry = law.entry;
         let _ = write!(text, "\n### {}\n\n{}.\n\n", entry.name, plain(entry.words));
         let _ = write!(text, "```text\n{}\n```\n\n", entry.formula);

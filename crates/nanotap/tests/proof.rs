@@ -5,10 +5,11 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::model::Model;
 use nanotap::model::enclosed::{EnclosureError, enclosed};
+use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::proof::{ProofReport, Prover, candidate};
 use nanotap_flow::Trajectory;
-use nanotap_proof::{Interval, ProofError, prove};
+use nanotap_proof::{Interval, ProofError, Stability, prove};
 
 /// A number to twice double precision: the nearest double, and what is left.
 type Long = (f64, f64);
@@ -330,17 +331,47 @@ fn what_is_beyond_reach_says_why() {
     let hertz = read(include_str!("../../../docs/cases/dforce-hertz.toml"));
     let refused = enclosed(hertz.cantilever().unwrap()).unwrap_err();
     assert!(matches!(&refused, EnclosureError::NonlinearLaw { law } if law == "hertz"));
-    // The paper's Fig. 1b.
-    let oscillator = "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0.1\nforcing = 1\n\
-                      omega = 2.5\ngap = 0\nrestitution = 0.8\n";
-    let (orbit, proof) = found(&read(oscillator), &OrbitOptions::default());
-    assert!(orbit.stable && !proof.proved);
-    assert!(
-        proof.statement.contains("oscillator"),
-        "{}",
-        proof.statement
-    );
-    assert!(proof.theorem.is_none());
+}
+
+/// The paper's Fig. 1: ẍ + cẋ + x = cos ωt with a stop. At restitution 0.8, c = 0 and ω = 2.5 the
+/// one-impact orbit hits at 0.6453521784 (the closed form of `physics/impact_oscillator.rs`).
+#[test]
+fn oscillators_with_a_stop_are_proved() {
+    let rigid = Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.0,
+        forcing: 1.0,
+        omega: 2.5,
+        gap: 0.0,
+        stop: Stop::Rigid { restitution: 0.8 },
+    };
+    let options = OrbitOptions {
+        period: Some(1),
+        ..OrbitOptions::default()
+    };
+    let case = Case::from(rigid);
+    let orbit = orbit(&case.model().unwrap(), &options).unwrap();
+    let theorem = Prover::new(&case).theorem(&orbit).unwrap();
+    let speed = theorem.switches[0].state[1];
+    assert!((speed.middle() / -0.8 - 0.645_352_178_4).abs() < 1e-9 && speed.radius() < 1e-12);
+    assert_eq!(theorem.multipliers.stability(), Stability::Stable);
+    let soft = Oscillator {
+        damping: 0.1,
+        stop: Stop::Soft {
+            stiffness: 10.0,
+            damping: 0.5,
+        },
+        ..rigid
+    };
+    let (orbit, proof) = found(&Case::from(soft), &OrbitOptions::default());
+    assert!(proof.proved, "{}", proof.statement);
+    let switches = proof.theorem.unwrap().switches;
+    assert_eq!(switches.len(), orbit.events.len());
+    for (switch, event) in switches.iter().zip(&orbit.events) {
+        let [low, high] = switch.time;
+        assert!(low - 1e-9 < event.tau && event.tau < high + 1e-9);
+    }
 }
 
 /// The plain model's numbers lie in the enclosed ones, which are narrow.

@@ -1,4 +1,4 @@
-//! The cantilever's equations with numbers that are intervals, for proofs.
+//! The equations of cantilevers and oscillators with numbers that are intervals, for proofs.
 //!
 //! Every parameter is the interval of all decimal numbers that are read as its value
 //! ([`Interval::typed`]), wave numbers β_j come from an interval Newton step on
@@ -16,6 +16,7 @@ use crate::model::contact::ContactLaw;
 use crate::model::contact::law::{Answer, Combination};
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::higher_modes::HigherModes;
+use crate::model::oscillator::{Oscillator, Stop};
 
 /// Why a case has no equations in intervals.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,9 +30,6 @@ pub enum EnclosureError {
     /// Modes that were measured.
     #[error("proofs are of uniform beams, and this one has measured higher modes")]
     MeasuredModes,
-    /// Another model.
-    #[error("proofs are of cantilevers, and this is an oscillator")]
-    Oscillator,
     /// A motion that was integrated step by step.
     #[error("the motion is not known in closed form")]
     NotPiecewiseLinear,
@@ -119,6 +117,69 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     let period =
         Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::typed(case.omega);
     Ok(System::new(period, beam.frequencies.clone(), regimes)?)
+}
+
+/// The system of an oscillator in intervals: mẍ + cẋ + kx = F cos ωt before the stop, and
+/// behind a soft one its spring and damper too. A rigid stop has impacts; a mass that sticks to it
+/// has no place here.
+///
+/// # Errors
+/// [`EnclosureError::Flow`] where its flow cannot be enclosed.
+pub fn enclosed_oscillator(oscillator: &Oscillator) -> Result<System, EnclosureError> {
+    let typed = Interval::typed;
+    let (zero, one) = (Interval::ZERO, Interval::ONE);
+    let (mass, wall) = (typed(oscillator.mass), typed(oscillator.gap));
+    let still = HarmonicVector {
+        constant: vec![zero; 2],
+        tones: vec![vec![Rectangle::ZERO; 2]],
+    };
+    let gap = Output {
+        row: vec![-one, zero],
+        constant: wall,
+        tones: vec![Rectangle::ZERO],
+    };
+    let regime = |stiffness: Interval, damping: Interval, exit: Transition| {
+        let k = typed(oscillator.stiffness) + stiffness;
+        let c = typed(oscillator.damping) + damping;
+        let rows = [[zero, one], [-k / mass, -c / mass]];
+        RegimeParts {
+            matrix: Matrix::from_fn(2, 2, |i, j| rows[i][j]),
+            forcing: HarmonicVector {
+                constant: vec![zero, stiffness * wall / mass],
+                tones: vec![vec![
+                    Rectangle::ZERO,
+                    Rectangle::real(typed(oscillator.forcing) / mass),
+                ]],
+            },
+            transitions: vec![exit],
+        }
+    };
+    let exit = |guard: Output, target: usize, reset: Option<Reset>| Transition {
+        guard,
+        target,
+        reset,
+        starts_at_zero: vec![(0, 1)],
+    };
+    let regimes = match oscillator.stop {
+        Stop::Soft { stiffness, damping } => {
+            let back = scaled(&gap, -one);
+            vec![
+                regime(zero, zero, exit(gap, 1, None)),
+                regime(typed(stiffness), typed(damping), exit(back, 0, None)),
+            ]
+        }
+        Stop::Rigid { restitution } => {
+            let rows = [[one, zero], [zero, -typed(restitution)]];
+            let bounce = Reset {
+                matrix: Matrix::from_fn(2, 2, |i, j| rows[i][j]),
+                offset: still,
+            };
+            vec![regime(zero, zero, exit(gap, 0, Some(bounce)))]
+        }
+    };
+    let omega = typed(oscillator.omega);
+    let period = Interval::point(2.0) * Interval::pi() / omega;
+    Ok(System::new(period, vec![omega], regimes)?)
 }
 
 /// β_j: Newton's operator maps an interval around the computed root into itself, so that it

@@ -14,7 +14,8 @@ use crate::case::Case;
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
-use crate::model::enclosed::{EnclosureError, enclosed};
+use crate::model::enclosed::{EnclosureError, enclosed, enclosed_oscillator};
+use crate::model::oscillator::{Oscillator, OscillatorParameter};
 use crate::model::recording::Recording;
 use crate::number::shortest;
 use crate::study::orbit::OrbitReport;
@@ -54,7 +55,7 @@ pub struct TheoremReport {
 pub struct SwitchReport {
     /// Time from drive phase 0 on.
     pub time: [f64; 2],
-    /// Whether contact begins or ends.
+    /// Whether contact begins or ends; an impact on a rigid stop begins one that lasts no time.
     pub begins: bool,
 }
 
@@ -100,11 +101,15 @@ pub struct Prover {
 impl Prover {
     /// Of a case.
     pub fn new(case: &Case) -> Self {
-        let cantilever = case.cantilever().ok_or(EnclosureError::Oscillator);
-        Self {
-            system: cantilever.clone().and_then(enclosed),
-            about: cantilever.map(about).unwrap_or_default(),
-        }
+        let (system, about) = match (case.cantilever(), case.oscillator()) {
+            (Some(cantilever), _) => (enclosed(cantilever), about(cantilever)),
+            (None, Some(oscillator)) => (
+                enclosed_oscillator(oscillator),
+                about_oscillator(oscillator),
+            ),
+            (None, None) => (Err(EnclosureError::NotPiecewiseLinear), String::new()),
+        };
+        Self { system, about }
     }
 
     /// Proves one orbit.
@@ -191,6 +196,15 @@ fn about(case: &Cantilever) -> String {
     text
 }
 
+/// The numbers of an oscillator.
+fn about_oscillator(oscillator: &Oscillator) -> String {
+    let numbers: Vec<String> = OscillatorParameter::ALL
+        .into_iter()
+        .filter_map(|p| Some(format!("{} = {}", p.name(), shortest(oscillator.get(p)?))))
+        .collect();
+    numbers.join(", ")
+}
+
 /// The theorem in words.
 fn statement(theorem: &Theorem, about: &str) -> String {
     let radius = |interval: &Interval| interval.radius();
@@ -251,7 +265,7 @@ impl TheoremReport {
                 .iter()
                 .map(|switch| SwitchReport {
                     time: bounds(&switch.time),
-                    begins: switch.to != 0,
+                    begins: switch.to != 0 || switch.from == switch.to,
                 })
                 .collect(),
             unique_within: theorem.alone.as_ref().map(|alone| UniqueWithin {

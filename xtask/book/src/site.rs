@@ -18,6 +18,9 @@ const AT_ROOT: &[&str] = &[
     "CHANGELOG.md",
 ];
 
+/// Where the pictures of the report on the paper will be.
+const PICTURES: &str = "docs/reference/paper/";
+
 /// Something that is wrong with a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trouble {
@@ -168,7 +171,8 @@ impl Site {
                 return Some(format!("{target} leads out of the repository"));
             };
             let there = self.pages.get(&path);
-            if there.is_none() && !self.root.join(&path).is_file() {
+            let made = path.starts_with(PICTURES);
+            if there.is_none() && !made && !self.root.join(&path).is_file() {
                 return Some(format!("{target} leads nowhere"));
             }
             there

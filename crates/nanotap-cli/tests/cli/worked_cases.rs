@@ -1,5 +1,6 @@
-//! The worked cases of the documentation: every command of `docs/cases/*.md` is run as it
-//! stands there, and every number is compared, so that they cannot rot.
+//! The worked cases and tutorials of the documentation: every command of `docs/cases/*.md` and
+//! `docs/tutorials/*.md` is run as it stands there, and every number is compared, so that they
+//! cannot rot.
 //!
 //! A `console` block has the commands, each a line that begins with `$ nanotap`; the table that
 //! follows has what the last of them says in its JSON document: a JSON pointer, the value, and
@@ -12,15 +13,18 @@ use serde_json::Value;
 
 use crate::util::Folder;
 
-fn documents() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/cases")
+/// Every file of the documents that are followed.
+fn documents() -> Vec<PathBuf> {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+    let files = ["cases", "tutorials"].map(|folder| std::fs::read_dir(docs.join(folder)).unwrap());
+    let files = files.into_iter().flatten();
+    files.map(|entry| entry.unwrap().path()).collect()
 }
 
 /// A folder with the case files and data of the documentation.
 fn with_cases() -> Folder {
     let folder = Folder::new();
-    for entry in std::fs::read_dir(documents()).unwrap() {
-        let path = entry.unwrap().path();
+    for path in documents() {
         if path.extension().is_some_and(|e| e == "toml" || e == "csv") {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             folder.write(&name, std::fs::read(&path).unwrap());
@@ -64,7 +68,8 @@ fn holds(found: &Value, value: &str, within: &str) -> bool {
 
 /// Runs one document; how many commands and numbers it has.
 fn follow(name: &str) -> (usize, usize) {
-    let text = std::fs::read_to_string(documents().join(name)).unwrap();
+    let path = documents().into_iter().find(|path| path.ends_with(name));
+    let text = std::fs::read_to_string(path.unwrap()).unwrap();
     let folder = with_cases();
     let (mut commands, mut numbers) = (0, 0);
     let mut said = Value::Null;
@@ -107,9 +112,8 @@ fn follow(name: &str) -> (usize, usize) {
 /// Every document is followed here: a new one needs its own line.
 #[test]
 fn no_document_is_left_out() {
-    let mut names: Vec<String> = std::fs::read_dir(documents())
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
+    let mut names: Vec<String> = documents()
+        .into_iter()
         .filter(|path| path.extension().is_some_and(|e| e == "md"))
         .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
         .collect();
@@ -122,11 +126,13 @@ fn no_document_is_left_out() {
             "bistable.md",
             "capillary.md",
             "dforce.md",
+            "dynamicist.md",
             "fit.md",
             "fm-lever-on-polystyrene.md",
             "frequency-sweep.md",
             "liquid.md",
             "measured-modes.md",
+            "microscopist.md",
             "period-doubling.md",
             "samples.md",
             "stiff-lever.md",
@@ -161,4 +167,6 @@ follows! {
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 2 commands, 5 numbers;
+    the_tutorial_of_the_dynamicist: "dynamicist.md", 7 commands, 31 numbers;
+    the_tutorial_of_the_microscopist: "microscopist.md", 6 commands, 22 numbers;
 }

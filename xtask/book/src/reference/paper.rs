@@ -11,7 +11,8 @@ const INTRODUCTION: &str = "\
 
 What `nanotap paper` finds: each figure and number of \"Multi-modal analysis on the intermittent
 contact dynamics of atomic force microscope\" (Journal of Sound and Vibration, 2011) computed again,
-with a verdict, what it rests on, and the command that computes it once more.
+with a verdict, what it rests on, and the command that computes it once more. What is to be learnt
+from it is in [what the paper says and what holds](../paper.md).
 
 ";
 
@@ -23,6 +24,11 @@ pub(super) fn page(report: &Report) -> String {
     }
     for section in &report.sections {
         let _ = write!(text, "\n## {}\n\n", plain(section.title));
+        for picture in &section.pictures {
+            let (title, name) = (plain(&picture.title), &picture.name);
+            let _ = write!(text, "![{title}](paper/{name}.svg)\n\n");
+            let _ = write!(text, "{}\n\n", plain(&picture.caption));
+        }
         for paragraph in &section.text {
             let _ = write!(text, "{}\n\n", plain(paragraph));
         }

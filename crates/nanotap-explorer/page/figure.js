@@ -2,48 +2,80 @@
 // here they are put into the page, asked for the values under the pointer, and zoomed.
 
 const SVG = "http://www.w3.org/2000/svg";
+const XLINK = "http://www.w3.org/1999/xlink";
 const DRAG = 6;               // pixels beyond which a press is no click
 
-/** Puts a drawn figure into its place. What is the same as before stays: a curve that follows a
- *  knob costs that curve, not every letter of the figure. */
+/** Puts a drawn figure into its place. It is written an element a line, and lines that are the same
+ *  as before stay: a curve that follows a knob costs that curve, not every letter of the figure. */
 export function put(element, drawn) {
   // Names in the figure carry a prefix that changes with it.
   const text = drawn.svg.replace(/\bf[0-9a-f]{8}-/g, `${element.id}-`);
-  const fresh = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
-  join(fresh);
-  fresh.removeAttribute("width");
-  fresh.removeAttribute("height");
-  fresh.setAttribute("class", "drawn");
-  const old = element.querySelector("svg.drawn");
-  if (old) turn(old, fresh);
-  else element.replaceChildren(document.importNode(fresh, true));
+  const letters = element.letters ??= new Map();
+  const lines = text.split("\n").filter((line) => {
+    const letter = /^<path id="([^"]+)" d="([^"]+)"\/>$/.exec(line);
+    if (letter) letters.set(`#${letter[1]}`, letter[2]);
+    return !letter;
+  });
+  if (!element.querySelector("svg.drawn") || !change(element.lines, lines, letters)) {
+    const fresh = parsed(lines.join("\n"), letters);
+    fresh.removeAttribute("width");
+    fresh.removeAttribute("height");
+    fresh.setAttribute("class", "drawn");
+    element.replaceChildren(fresh);
+    element.lines = numbered(fresh, lines);
+  }
   element.panels = drawn.map;
 }
 
-/** Makes `old` the same as `fresh`. */
-function turn(old, fresh) {
-  for (const { name } of [...old.attributes]) if (!fresh.hasAttribute(name)) old.removeAttribute(name);
-  for (const { name, value } of fresh.attributes) if (old.getAttribute(name) !== value) old.setAttributeNS(name.startsWith("xlink:") ? "http://www.w3.org/1999/xlink" : null, name, value);
-  const olds = [...old.childNodes];
-  const freshes = [...fresh.childNodes];
-  freshes.forEach((next, k) => {
-    const now = olds[k];
-    if (!now) old.append(document.importNode(next, true));
-    else if (now.isEqualNode(next)) return;
-    else if (now.nodeName !== next.nodeName || now.nodeType !== Node.ELEMENT_NODE) now.replaceWith(document.importNode(next, true));
-    else turn(now, next);
+function parsed(svg, letters) {
+  const fresh = document.importNode(new DOMParser().parseFromString(svg, "image/svg+xml").documentElement, true);
+  join(fresh, letters);
+  return fresh;
+}
+
+/** Each line with the element that it stands for, if it begins one. */
+function numbered(svg, lines) {
+  const open = [];              // elements that are not closed yet, and how many children they have so far
+  return lines.map((line) => {
+    if (line.startsWith("</")) open.pop();
+    if (!/^<\w/.test(line)) return { line };
+    const around = open.at(-1);
+    const node = around ? around.node.children[around.count++] : svg;
+    if (!/(\/|<\/\w+)>$/.test(line)) open.push({ node, count: 0 });
+    return { line, node };
   });
-  for (const rest of olds.slice(freshes.length)) rest.remove();
+}
+
+/** Changes the elements whose lines differ; `false` where the figure is another one. */
+function change(old, lines, letters) {
+  if (old?.length !== lines.length) return false;
+  const other = old.flatMap((one, k) => (one.line === lines[k] ? [] : [{ one, line: lines[k] }]));
+  const name = (line) => /^<\w+/.exec(line)?.[0];
+  if (other.some(({ one, line }) => !one.node || line.startsWith("<svg") || name(line) !== name(one.line))) return false;
+  const whole = ({ line }) => /<\/\w+>$/.test(line) || line.includes("&");
+  if (other.some((one) => whole(one) && !/(\/|<\/\w+)>$/.test(one.line))) return false;
+  const anew = other.filter(whole);
+  if (anew.length) {
+    const fresh = parsed(`<svg xmlns="${SVG}" xmlns:xlink="${XLINK}">${anew.map(({ line }) => line).join("")}</svg>`, letters);
+    [...fresh.children].forEach((node, k) => { anew[k].one.node.replaceWith(node); anew[k].one.node = node; });
+  }
+  for (const { one, line } of other) {
+    if (!whole({ line })) attributes(one.node, line);
+    one.line = line;
+  }
+  return true;
+}
+
+/** Gives an element the attributes of a line. */
+function attributes(node, line) {
+  const now = new Map([...line.matchAll(/ ([\w:-]+)="([^"]*)"/g)].map(([, name, value]) => [name, value]));
+  for (const { name } of [...node.attributes]) if (!now.has(name)) node.removeAttribute(name);
+  for (const [name, value] of now) if (node.getAttribute(name) !== value) node.setAttributeNS(name.startsWith("xlink:") ? XLINK : null, name, value);
 }
 
 /** Makes one path of the letters of each word, which is drawn many times faster. A letter is a
  *  path of relative steps, so that it can begin anywhere. */
-function join(svg) {
-  const letters = new Map();
-  for (const path of svg.querySelectorAll("defs > path")) {
-    letters.set(`#${path.id}`, path.getAttribute("d"));
-    path.remove();
-  }
+function join(svg, letters) {
   for (const run of svg.querySelectorAll("g[role=text] > g")) {
     const word = document.createElementNS(SVG, "path");
     word.setAttribute("transform", run.getAttribute("transform"));

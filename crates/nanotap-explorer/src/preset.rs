@@ -1,7 +1,7 @@
 //! The cases that the page offers: the one that was named, the paper's, the worked ones.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use axum::Json;
 use axum::extract::State;
@@ -25,6 +25,8 @@ pub(crate) struct Preset {
     pub(crate) set: Vec<String>,
     /// The path to give at the terminal; empty of a built-in case.
     pub(crate) path: String,
+    /// The case at its setpoint, once somebody has asked for it.
+    pub(crate) solved: OnceLock<Case>,
 }
 
 impl Preset {
@@ -131,6 +133,7 @@ pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, na
             path: source.name,
             text: source.text,
             set,
+            solved: OnceLock::new(),
         });
     }
     presets.extend(BUILT_IN.iter().map(|(name, words, text, set)| Preset {
@@ -139,6 +142,7 @@ pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, na
         text: (*text).into(),
         set: set.iter().map(|word| (*word).to_owned()).collect(),
         path: String::new(),
+        solved: OnceLock::new(),
     }));
     Ok(presets)
 }
@@ -196,11 +200,16 @@ impl Wanted {
 
     /// The case as the preset has it.
     pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+        let solved = &self.preset(app)?.solved;
+        if let Some(case) = solved.get() {
+            return Ok(case.clone());
+        }
         let unchanged = Self {
             preset: self.preset.clone(),
             set: Vec::new(),
         };
-        unchanged.case(app, control)
+        let case = unchanged.case(app, control)?;
+        Ok(solved.get_or_init(|| case).clone())
     }
 }
 

@@ -2,7 +2,7 @@
 //! decaying complex exponentials, with bounds on its derivatives.
 
 use crate::regime::{Kernel, ModalOutput};
-use crate::simd::{self, ComplexVector, Library, Plain, Simd, Vector, layout};
+use crate::simd::{self, ComplexVector, Library, Plain, Simd, Vector, Work, layout};
 use crate::{Complex, Drive, Regime};
 use nanotap_arithmetic::ComplexFunctions as _;
 
@@ -272,7 +272,7 @@ impl Signal {
     /// Value, rate, curvature and third-derivative bound at `s`.
     pub fn jet(&self, s: f64) -> Jet {
         if self.fastest * s.abs() < simd::LARGEST_ANGLE {
-            self.jet_with::<Plain>(s)
+            simd::dispatch(JetAt(self, s))
         } else {
             self.jet_with::<Library>(s)
         }
@@ -596,6 +596,18 @@ impl PowerTerm {
             })
             .sum();
         self.amplitude.modulus() * sum
+    }
+}
+
+/// A signal's jet at an instant, in the arithmetic that this machine is fastest in.
+struct JetAt<'a>(&'a Signal, f64);
+
+impl Work for JetAt<'_> {
+    type Output = Jet;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Jet {
+        self.0.jet_with::<S>(self.1)
     }
 }
 

@@ -60,7 +60,8 @@ pub(crate) struct CaseArguments {
     #[arg(value_name = "CASE")]
     pub(crate) file: Option<PathBuf>,
 
-    /// Set a key of the case, as in omega=20 or sample.stiffness="20 N/m"; may be repeated
+    /// Set a key of the case, as in omega=20 or sample.stiffness="20 N/m", or take it away, as in
+    /// sample.modulus=; may be repeated
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 

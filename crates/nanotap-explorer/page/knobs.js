@@ -122,8 +122,8 @@ function slider(key, field, words) {
 }
 
 function put(key, text, finished) {
-  if (text === "") delete state.set[key.name];
-  else state.set[key.name] = text;
+  // Nothing takes a key away that the preset states.
+  state.set[key.name] = text;
   state.start = state.follow === "yes" ? now : "";
   changed(key.name, finished);
 }

@@ -166,7 +166,7 @@ fn every_bad_number_is_refused_with_key_and_value() {
         ("modes=three", "`modes` = three is text"),
         ("omega", "no `=` in it"),
         ("=2", "no key before the `=`"),
-        ("omega=", "no value after the `=`"),
+        ("omega=", "the case lacks omega"),
         (
             "cosine_term=wrong",
             "is not one of \"corrected\", \"printed\"",

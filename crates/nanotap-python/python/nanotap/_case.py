@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Path: TypeAlias = str | os.PathLike[str]
-Scalar: TypeAlias = "float | str | np.floating[Any] | np.integer[Any]"
+Scalar: TypeAlias = "float | str | np.floating[Any] | np.integer[Any] | None"
 Table: TypeAlias = (
     "pd.DataFrame | Mapping[str, Iterable[float]] | Iterable[Iterable[float | str]]"
 )
@@ -111,7 +111,7 @@ class Case:
         return _again(cls, None, key_words(own) | key_words(keys), [])
 
     def with_(self, **keys: Value) -> "Case":
-        """The same case with some keys changed."""
+        """The same case with some keys changed; `None` takes a key away."""
         if not keys:
             return self
         source, _, catalogues = self._core.made_of
@@ -305,7 +305,7 @@ def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
     words: dict[str, str] = {}
     typed: dict[str, str] = {}
     for key, value in keys.items():
-        if key in _FOLLOWS or (value is None and key == "tone2_ratio"):
+        if key in _FOLLOWS:
             continue
         if isinstance(value, Mapping):
             for inner, quantity in value.items():
@@ -325,6 +325,9 @@ def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _written(name: str, value: Any) -> str:
+    if value is None:
+        # The key is taken away.
+        return ""
     value = in_si(name, value)
     if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:
         value = value.item()

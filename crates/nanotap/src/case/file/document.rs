@@ -37,6 +37,9 @@ impl Value {
     }
 }
 
+/// In place of a value it takes the key away.
+const NOTHING: Value = Value::Other("nothing");
+
 /// One `key = value`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
@@ -63,6 +66,11 @@ impl Entry {
             Value::Number(number) => Some(number.to_string()),
             Value::Rows(_) | Value::Other(_) => None,
         }
+    }
+
+    /// Does it take its key away?
+    pub fn is_nothing(&self) -> bool {
+        self.value == NOTHING
     }
 
     /// Was it set beside the file?
@@ -139,10 +147,11 @@ impl Document {
     }
 
     /// Adds a `key=value` set beside the file; a key without a table belongs to
-    /// `[model]`, and a value that is not TOML is text: `sample.stiffness=20 N/m`.
+    /// `[model]`, and a value that is not TOML is text: `sample.stiffness=20 N/m`. No value
+    /// (`sample.modulus=`) takes the key away.
     ///
     /// # Errors
-    /// There is no `=`, no key or no value.
+    /// There is no `=` or no key.
     pub fn set(&mut self, written: &str) -> Result<(), Problem> {
         let place = Place::Override(written.to_owned());
         let shape = "write a key and a value, as in omega=2.6";
@@ -154,17 +163,21 @@ impl Document {
         if key.is_empty() || table.is_empty() {
             return Err(Problem::new(place, "no key before the `=`").help(shape));
         }
-        if value.is_empty() {
-            return Err(Problem::new(place, "no value after the `=`").help(shape));
-        }
-        let parsed = DeValue::parse(value).map_or_else(
-            // Shorter ways to write a number than TOML's: .1, 1.
-            |_| {
-                let number = value.parse().map(Value::Number);
-                number.unwrap_or_else(|_| Value::Text(value.to_owned()))
-            },
-            |value| judge(value.get_ref()),
-        );
+        let read = |value: &str| {
+            DeValue::parse(value).map_or_else(
+                // Shorter ways to write a number than TOML's: .1, 1.
+                |_| {
+                    let number = value.parse().map(Value::Number);
+                    number.unwrap_or_else(|_| Value::Text(value.to_owned()))
+                },
+                |value| judge(value.get_ref()),
+            )
+        };
+        let parsed = if value.is_empty() {
+            NOTHING
+        } else {
+            read(value)
+        };
         self.entries.push(Entry {
             table: table.trim().to_owned(),
             key: key.trim().to_owned(),
@@ -282,7 +295,7 @@ mod tests {
             .map(|entry| entry.table.as_str())
             .collect();
         assert_eq!(tables, ["model", "sample"]);
-        for bad in ["", "omega", "=3", "omega=", ".x=1", "model.=1", " = "] {
+        for bad in ["", "omega", "=3", ".x=1", "model.=1", " = "] {
             assert!(document.set(bad).is_err(), "{bad:?}");
         }
     }

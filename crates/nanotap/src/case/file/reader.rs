@@ -57,9 +57,10 @@ fn described(document: &Document, problems: &mut Problems) -> Option<Described> 
     refusal::misplaced(document, problems);
     let all_placed = problems.is_empty();
     let kind = kind_of(document, problems);
+    let said = (document.entries.iter()).filter(|entry| !entry.is_nothing());
     let tables = || document.headers.iter().map(|header| &header.name);
     let physical = tables()
-        .chain(document.entries.iter().map(|entry| &entry.table))
+        .chain(said.map(|entry| &entry.table))
         .filter_map(|name| Section::find(name))
         .find(|section| section.is_physical());
     if let Some(section) = physical {
@@ -125,6 +126,10 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
             });
             continue;
         };
+        if entry.is_nothing() {
+            known.remove(&key);
+            continue;
+        }
         if entry.is_override() {
             for (other, _) in key.alternatives() {
                 if known

@@ -10,6 +10,31 @@ use crate::model::parameter::Parameter;
 const PAPER: &str = "[model]\nmodes = 3\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\n\
                      alpha4 = 20.0\nalpha5 = 0.0\nalpha6 = 0.2\nomega = 2.6\n";
 
+#[test]
+fn a_key_that_was_taken_away_makes_room_for_another() {
+    let lever = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"300 kHz\"\nQ = 400\n\
+                 [tip]\nradius = \"10 nm\"\n[drive]\nfrequency_ratio = 1\nfree_amplitude = \"20 nm\"\n\
+                 [gap]\ntip = \"15 nm\"\n[sample]\nlaw = \"hertz\"\n";
+    let rubber = format!("{lever}modulus = \"2 GPa\"\npoisson = 0.45\n");
+    let usual = format!("{lever}modulus = \"2 GPa\"\n");
+    let model = |text: &str, overrides: &[&str]| {
+        parse(text, overrides)
+            .unwrap()
+            .cantilever()
+            .unwrap()
+            .clone()
+    };
+    assert_ne!(model(&rubber, &[]), model(&usual, &[]));
+    assert_eq!(model(&rubber, &["sample.poisson="]), model(&usual, &[]));
+    // Set again it is there again, and of a case without it nothing changes.
+    assert_eq!(
+        model(&usual, &["sample.poisson=", "sample.poisson=0.45"]),
+        model(&rubber, &[])
+    );
+    assert!(parse("[model]\nomega = 2\n", &["sample.modulus="]).is_err());
+    assert!(!parse(PAPER, &["sample.modulus="]).unwrap().is_physical());
+}
+
 fn parse(text: &str, overrides: &[&str]) -> Result<Case, CaseFileError> {
     let source = Source {
         name: "c.toml".into(),

@@ -157,12 +157,14 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         "Convergence",
         "The motion with each number of modes, and a verdict.",
     ),
-    "contact-laws": (
-        (THREADS, PROGRESS),
-        "Record",
-        "`samples`: the motion under each contact law, by the names of the terminal's JSON.",
-    ),
 }
+
+# A study of which Python adds nothing: its document by the names of the terminal's JSON.
+DOCUMENT = (
+    (THREADS, PROGRESS),
+    "Record",
+    "What the terminal's JSON has, by its names.",
+)
 
 # Studies that run over arrays of parameters.
 OVER_ARRAYS = {"simulate", "orbit"}
@@ -210,12 +212,19 @@ def main() -> int:
 
 def written(schemas: dict[str, Any]) -> str:
     """The whole module."""
+    studies = {name: study for name, study in schemas.items() if name != "case"}
     functions = [
         function(name, study["about"], study["request"])
-        for name, study in schemas.items()
-        if name in PYTHON
+        for name, study in studies.items()
     ]
-    return "\n\n".join([HEAD.rstrip("\n"), *functions]) + "\n"
+    names = "".join(f'    "{python_name(name)}",\n' for name in sorted(studies))
+    head = HEAD.rstrip("\n") + f"\n\n__all__ = [\n{names}]"
+    return "\n\n".join([head, *functions]) + "\n"
+
+
+def python_name(study: str) -> str:
+    """The function of a study."""
+    return study.replace("-", "_")
 
 
 def argument_name(option: str) -> str:
@@ -226,7 +235,7 @@ def argument_name(option: str) -> str:
 def function(name: str, about: str, schema: dict[str, Any]) -> str:
     options = schema["properties"]
     required = set(schema.get("required", ()))
-    extra, result, returns = PYTHON[name]
+    extra, result, returns = PYTHON.get(name, DOCUMENT)
     arguments, documents, passed = [], [], []
     for option, declared in options.items():
         argument = argument_name(option)
@@ -240,7 +249,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     for argument, kind, default, text in extra:
         arguments.append(f"    {argument}: {kind} = {default},")
         documents.append((argument, kind, text))
-    python = name.replace("-", "_")
+    python = python_name(name)
     arrays = name in OVER_ARRAYS
     if arrays:
         documents.append(
@@ -267,7 +276,8 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     if extra[:1] == DATASET[:1]:
         module = "_datasets"
     further = "".join(f", {argument}" for argument, *_ in extra)
-    call = f"    return {module}.{python}(case, options{further}"
+    called = f"{python}(" if name in PYTHON else f'document("{name}", '
+    call = f"    return {module}.{called}case, options{further}"
     call += ", parameters)" if arrays else ")"
     body = "\n".join(
         [

@@ -27,9 +27,7 @@ impl<R: JsonSchema + DeserializeOwned> Request<R> {
 
 impl<R: JsonSchema> Args for Request<R> {
     fn augment_args(command: Command) -> Command {
-        let schema = request::schema::<R>();
-        let arguments: Vec<Arg> = flags(&schema).map(argument).collect();
-        command.args(arguments)
+        command.args(arguments(&request::schema::<R>()))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -39,12 +37,8 @@ impl<R: JsonSchema> Args for Request<R> {
 
 impl<R: JsonSchema> FromArgMatches for Request<R> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let schema = request::schema::<R>();
-        let given = flags(&schema)
-            .filter_map(|property| Some((property.name.to_owned(), typed(property, matches)?)))
-            .collect();
         Ok(Self {
-            given,
+            given: given(&request::schema::<R>(), matches),
             of: PhantomData,
         })
     }
@@ -53,6 +47,18 @@ impl<R: JsonSchema> FromArgMatches for Request<R> {
         *self = Self::from_arg_matches(matches)?;
         Ok(())
     }
+}
+
+/// The flags of a request, by its schema.
+pub(crate) fn arguments(schema: &Schema) -> Vec<Arg> {
+    flags(schema).map(argument).collect()
+}
+
+/// What was typed of them.
+pub(crate) fn given(schema: &Schema, matches: &ArgMatches) -> Map<String, Value> {
+    flags(schema)
+        .filter_map(|property| Some((property.name.to_owned(), typed(property, matches)?)))
+        .collect()
 }
 
 /// The options that are flags: of some the terminal has its own.

@@ -188,7 +188,12 @@ impl Wanted {
     pub(crate) fn any_distance(&self, app: &App) -> Result<Case, Refusal> {
         let preset = self.preset(app)?;
         let case = Case::parse(Some(preset.source()), &self.words(preset)).map_err(Refusal::of)?;
-        Ok(case.called(&preset.words))
+        let changes: Vec<String> = self.set.iter().map(|word| changed(word)).collect();
+        Ok(if changes.is_empty() {
+            case.called(&preset.words)
+        } else {
+            case.called(&format!("{}, with {}", preset.words, changes.join(", ")))
+        })
     }
 
     /// The same, at its setpoint.
@@ -210,6 +215,15 @@ impl Wanted {
         };
         let case = unchanged.case(app, control)?;
         Ok(solved.get_or_init(|| case).clone())
+    }
+}
+
+/// `omega = 3` for `omega=3`.
+fn changed(word: &str) -> String {
+    match word.split_once('=') {
+        Some((key, value)) if value.trim().is_empty() => format!("no {}", key.trim()),
+        Some((key, value)) => format!("{} = {}", key.trim(), value.trim()),
+        None => word.to_owned(),
     }
 }
 

@@ -18,6 +18,7 @@ mod orbit;
 mod paper;
 mod schema;
 mod simulate;
+mod study;
 mod sweep;
 mod window;
 
@@ -77,6 +78,8 @@ pub(crate) enum Command {
     Generate(generate::Arguments),
     /// The JSON schema of what a study is asked for
     Schema(schema::Arguments),
+    #[command(flatten)]
+    Study(study::Arguments),
 }
 
 /// Runs `command`.
@@ -102,6 +105,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Command::Catalogue(arguments) => catalogue::run(arguments, output),
         Command::Generate(arguments) => generate::run(arguments, output),
         Command::Schema(arguments) => schema::run(arguments),
+        Command::Study(arguments) => study::run(arguments, output),
     }
 }
 

@@ -15,6 +15,7 @@ objects. A `Map` is the exact stroboscopic map itself, for algorithms of one's o
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from . import _signatures
 from ._case import Case, catalogue
 from ._datasets import merge, open
 from ._interrupt import Interrupted
@@ -32,21 +33,7 @@ from ._results import (
     Record,
 )
 from ._si import in_si
-from ._signatures import (
-    approach,
-    attractors,
-    basin,
-    branch,
-    contact_laws,
-    convergence,
-    fit,
-    lyapunov,
-    modes,
-    orbit,
-    simulate,
-    sweep,
-    window,
-)
+from ._signatures import *
 from ._studies import paper
 
 if TYPE_CHECKING:
@@ -68,27 +55,17 @@ __all__ = [
     "PeriodicOrbit",
     "Record",
     "__version__",
-    "approach",
-    "attractors",
-    "basin",
-    "branch",
     "catalogue",
-    "contact_laws",
-    "convergence",
     "export",
-    "fit",
     "in_si",
-    "lyapunov",
     "merge",
-    "modes",
     "open",
-    "orbit",
     "paper",
     "plot",
-    "simulate",
-    "sweep",
-    "window",
 ]
+
+
+__all__ += _signatures.__all__
 
 
 def __getattr__(name: str) -> object:

@@ -22,6 +22,22 @@ if TYPE_CHECKING:
     import xarray as xr
     from distributed import Client
 
+__all__ = [
+    "approach",
+    "attractors",
+    "basin",
+    "branch",
+    "contact_laws",
+    "convergence",
+    "fit",
+    "lyapunov",
+    "modes",
+    "orbit",
+    "simulate",
+    "sweep",
+    "window",
+]
+
 def modes(
     case: Case,
     *,
@@ -896,8 +912,7 @@ def contact_laws(
 
     Returns
     -------
-    `samples`: the motion under each contact law, by the names of the terminal's
-    JSON.
+    What the terminal's JSON has, by its names.
 
     Raises
     ------
@@ -912,4 +927,4 @@ def contact_laws(
         "from": from_,
         "to": to,
     }
-    return _studies.contact_laws(case, options, threads, progress)
+    return _studies.document("contact-laws", case, options, threads, progress)

@@ -246,12 +246,16 @@ def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:
     return Convergence.of(_run("convergence", case, options)[0])
 
 
-def contact_laws(
-    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+def document(
+    name: str,
+    case: Case,
+    options: Mapping[str, Any],
+    threads: int | None,
+    progress: Progress,
 ) -> Record:
-    """The motion under each contact law."""
-    document, interrupted = _run("contact-laws", case, options, threads, progress)
-    return _finished(Record(document), interrupted)
+    """The document of a study, by the names of the terminal's JSON."""
+    found, interrupted = _run(name, case, options, threads, progress)
+    return _finished(Record(found), interrupted)
 
 
 def fit(

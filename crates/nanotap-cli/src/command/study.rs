@@ -1,0 +1,140 @@
+//! A study that has no text of its own: every study of the registry is a command, with the flags
+//! of its request, and prints its document.
+
+use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
+use nanotap::study::registry::{STUDIES, StudyEntry, study};
+use serde_json::{Map, Value};
+
+use crate::arguments::CaseArguments;
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::{progress, request};
+
+/// Longest list that the text shows.
+const SHOWN: usize = 8;
+
+/// A study by its entry, and what was typed of it.
+#[derive(Debug)]
+pub(crate) struct Arguments {
+    entry: &'static StudyEntry,
+    case: CaseArguments,
+    given: Map<String, Value>,
+}
+
+impl Subcommand for Arguments {
+    fn augment_subcommands(command: Command) -> Command {
+        STUDIES.iter().fold(command, |command, entry| {
+            // Studies with a text of their own have a command already.
+            if command.find_subcommand(entry.name).is_some() {
+                command
+            } else {
+                command.subcommand(command_of(entry))
+            }
+        })
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        study(name).is_some()
+    }
+}
+
+impl FromArgMatches for Arguments {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (name, matches) = matches.subcommand().ok_or_else(missing)?;
+        let entry = study(name).ok_or_else(missing)?;
+        Ok(Self {
+            entry,
+            case: CaseArguments::from_arg_matches(matches)?,
+            given: request::given(&(entry.request)(), matches),
+        })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// The command of a study.
+fn command_of(entry: &StudyEntry) -> Command {
+    let command = Command::new(entry.name).about(entry.about);
+    CaseArguments::augment_args(command).args(request::arguments(&(entry.request)()))
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let entry = arguments.entry;
+    let case = if entry.any_distance {
+        GivenCase::with_any_distance(&arguments.case, output)?
+    } else {
+        GivenCase::of(&arguments.case, output)?
+    };
+    let request = Value::Object(arguments.given.clone());
+    let document = progress::watched(output, entry.counted, |control| {
+        entry.document(&case, request, control)
+    })??;
+    let document: Value = serde_json::from_str(&document)
+        .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
+    output.result(&document, text)
+}
+
+/// A line a field; of the case its own command tells more.
+fn text(document: &Value) -> String {
+    let fields = document.as_object().into_iter().flatten();
+    fields
+        .filter(|(name, _)| !["case", "version"].contains(&name.as_str()))
+        .fold(String::new(), |text, (name, value)| {
+            text + &format!("  {name}: {}\n", shown(value))
+        })
+}
+
+fn shown(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(list) if list.len() > SHOWN => {
+            format!("{} entries, which --json shows", list.len())
+        }
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As for a study that was added to the registry and nowhere else.
+    #[test]
+    fn a_study_of_the_registry_is_a_command() {
+        let whole = Arguments::augment_subcommands(Command::new("nanotap"));
+        for entry in STUDIES {
+            assert!(
+                whole.find_subcommand(entry.name).is_some(),
+                "{}",
+                entry.name
+            );
+        }
+        whole.clone().debug_assert();
+        let words = "nanotap lyapunov --periods 7 --set omega=3 --set alpha4=20";
+        let matches = whole.try_get_matches_from(words.split(' ')).unwrap();
+        let typed = Arguments::from_arg_matches(&matches).unwrap();
+        assert_eq!(typed.entry.name, "lyapunov");
+        assert_eq!(typed.given["periods"], 7);
+        assert_eq!(typed.case.set, ["omega=3", "alpha4=20"]);
+    }
+
+    #[test]
+    fn its_text_is_a_line_a_field() {
+        let document = serde_json::json!({
+            "case": {}, "version": "0", "verdict": "two modes", "modes": [1, 2], "path": vec![0; 9],
+        });
+        assert_eq!(
+            text(&document),
+            "  verdict: two modes\n  modes: [1,2]\n  path: 9 entries, which --json shows\n"
+        );
+    }
+}

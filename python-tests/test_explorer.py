@@ -527,6 +527,20 @@ def test_a_dragged_slider_moves_the_numbers_on_the_way(page: Any, address: str) 
     assert len(met) >= 3
 
 
+def test_an_emptied_knob_takes_its_key_away(page: Any, address: str) -> None:
+    opened(page, address, "preset=soft-sample")
+    damped = value(page, "amplitude")
+    page.fill("[data-key='sample.damping']", "")
+    page.press("[data-key='sample.damping']", "Enter")
+    changes(page, damped)
+    assert "set.sample.damping=" in page.url
+    assert page.input_value("[data-key='sample.damping']") == ""
+    case = {"preset": "soft-sample", "set": ["sample.damping="]}
+    rows = json.loads(asked(address, "/api/motion", {"case": case}))["observables"]
+    undamped = next(row["value"] for row in rows if row["name"] == "amplitude")
+    assert value(page, "amplitude") == undamped
+
+
 def test_a_rectangle_zooms_and_a_double_click_shows_all_again(
     page: Any, address: str
 ) -> None:

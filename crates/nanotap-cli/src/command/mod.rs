@@ -37,6 +37,15 @@ use crate::output::Output;
 /// Every command that there is.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    #[command(flatten)]
+    Own(Own),
+    #[command(flatten)]
+    Study(study::Arguments),
+}
+
+/// The commands with a text of their own.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Own {
     /// Check a case and show it resolved
     Case(case::Arguments),
     /// Mode shapes and frequencies, in free flight and in contact
@@ -78,34 +87,35 @@ pub(crate) enum Command {
     Generate(generate::Arguments),
     /// The JSON schema of what a study is asked for
     Schema(schema::Arguments),
-    #[command(flatten)]
-    Study(study::Arguments),
 }
 
 /// Runs `command`.
 pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
-    match command {
-        Command::Case(arguments) => case::run(arguments, output),
-        Command::Modes(arguments) => modes::run(arguments, output),
-        Command::Simulate(arguments) => simulate::run(arguments, output),
-        Command::Orbit(arguments) => orbit::run(arguments, output),
-        Command::Attractors(arguments) => attractors::run(arguments, output),
-        Command::Branch(arguments) => branch::run(arguments, output),
-        Command::Approach(arguments) => approach::run(arguments, output),
-        Command::Fit(arguments) => fit::run(arguments, output),
-        Command::Sweep(arguments) => sweep::run(arguments, output),
-        Command::Window(arguments) => window::run(arguments, output),
-        Command::Basin(arguments) => basin::run(arguments, output),
-        Command::Merge(arguments) => merge::run(arguments, output),
-        Command::Lyapunov(arguments) => lyapunov::run(arguments, output),
-        Command::Convergence(arguments) => convergence::run(arguments, output),
-        Command::ContactLaws(arguments) => contact_laws::run(arguments, output),
-        Command::Explore(arguments) => explore::run(arguments, output),
-        Command::Paper(arguments) => paper::run(arguments, output),
-        Command::Catalogue(arguments) => catalogue::run(arguments, output),
-        Command::Generate(arguments) => generate::run(arguments, output),
-        Command::Schema(arguments) => schema::run(arguments),
-        Command::Study(arguments) => study::run(arguments, output),
+    let own = match command {
+        Command::Own(own) => own,
+        Command::Study(arguments) => return study::run(arguments, output),
+    };
+    match own {
+        Own::Case(arguments) => case::run(arguments, output),
+        Own::Modes(arguments) => modes::run(arguments, output),
+        Own::Simulate(arguments) => simulate::run(arguments, output),
+        Own::Orbit(arguments) => orbit::run(arguments, output),
+        Own::Attractors(arguments) => attractors::run(arguments, output),
+        Own::Branch(arguments) => branch::run(arguments, output),
+        Own::Approach(arguments) => approach::run(arguments, output),
+        Own::Fit(arguments) => fit::run(arguments, output),
+        Own::Sweep(arguments) => sweep::run(arguments, output),
+        Own::Window(arguments) => window::run(arguments, output),
+        Own::Basin(arguments) => basin::run(arguments, output),
+        Own::Merge(arguments) => merge::run(arguments, output),
+        Own::Lyapunov(arguments) => lyapunov::run(arguments, output),
+        Own::Convergence(arguments) => convergence::run(arguments, output),
+        Own::ContactLaws(arguments) => contact_laws::run(arguments, output),
+        Own::Explore(arguments) => explore::run(arguments, output),
+        Own::Paper(arguments) => paper::run(arguments, output),
+        Own::Catalogue(arguments) => catalogue::run(arguments, output),
+        Own::Generate(arguments) => generate::run(arguments, output),
+        Own::Schema(arguments) => schema::run(arguments),
     }
 }
 

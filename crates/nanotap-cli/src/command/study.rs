@@ -5,6 +5,7 @@ use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use nanotap::study::registry::{STUDIES, StudyEntry, study};
 use serde_json::{Map, Value};
 
+use super::Own;
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -24,14 +25,10 @@ pub(crate) struct Arguments {
 
 impl Subcommand for Arguments {
     fn augment_subcommands(command: Command) -> Command {
-        STUDIES.iter().fold(command, |command, entry| {
-            // Studies with a text of their own have a command already.
-            if command.find_subcommand(entry.name).is_some() {
-                command
-            } else {
-                command.subcommand(command_of(entry))
-            }
-        })
+        let others = STUDIES
+            .iter()
+            .filter(|entry| Self::has_subcommand(entry.name));
+        command.subcommands(others.map(command_of))
     }
 
     fn augment_subcommands_for_update(command: Command) -> Command {
@@ -39,7 +36,7 @@ impl Subcommand for Arguments {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        study(name).is_some()
+        study(name).is_some() && !Own::has_subcommand(name)
     }
 }
 
@@ -110,14 +107,7 @@ mod tests {
     /// As for a study that was added to the registry and nowhere else.
     #[test]
     fn a_study_of_the_registry_is_a_command() {
-        let whole = Arguments::augment_subcommands(Command::new("nanotap"));
-        for entry in STUDIES {
-            assert!(
-                whole.find_subcommand(entry.name).is_some(),
-                "{}",
-                entry.name
-            );
-        }
+        let whole = Command::new("nanotap").subcommands(STUDIES.iter().map(command_of));
         whole.clone().debug_assert();
         let words = "nanotap lyapunov --periods 7 --set omega=3 --set alpha4=20";
         let matches = whole.try_get_matches_from(words.split(' ')).unwrap();

@@ -27,13 +27,13 @@ pub mod key;
 mod keys;
 pub mod near_name;
 pub mod physical;
+mod quantities;
 pub mod quantity;
 pub mod schema;
 mod stated;
 pub(crate) mod under_law;
 pub mod units;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -46,10 +46,10 @@ pub use key::Key;
 pub use stated::{Value, ValueError};
 
 use file::{CaseFileError, Described, Source};
-use key::{ModelKind, Section};
+use key::ModelKind;
 use near_name::near_name;
-use physical::{Catalogue, Kind, Physical, Reader, Remark, Scales};
-use stated::Stated;
+use physical::{Catalogue, Kind, Physical, Remark, Scales};
+use quantities::{Quantities, Slopes};
 use units::Units;
 
 use crate::model::cantilever::Cantilever;
@@ -74,20 +74,6 @@ enum What {
     Cantilever(Cantilever),
     Oscillator(Oscillator),
     Quantities(Box<Quantities>),
-}
-
-/// Physical quantities and what they come to.
-#[derive(Clone, Debug, PartialEq)]
-struct Quantities {
-    stated: Stated,
-    catalogue: Arc<Catalogue>,
-    /// Dimensionless numbers that vary, in place of those mapped.
-    numbers: Vec<(Parameter, f64)>,
-    /// Whether what stays while others vary is said by its own numbers.
-    held: bool,
-    view: Result<Box<Physical>, Box<CaseFileError>>,
-    /// What a study found out about the case.
-    notes: Vec<Remark>,
 }
 
 /// What a key of the dimensionless model is in SI.
@@ -589,150 +575,6 @@ impl Case {
     }
 }
 
-impl Quantities {
-    fn new(stated: Stated, catalogue: Arc<Catalogue>) -> Self {
-        let empty = CaseFileError::one(None, file::Problem::new(file::Place::Whole, ""));
-        let quantities = Self {
-            stated,
-            catalogue,
-            numbers: Vec::new(),
-            held: false,
-            view: Err(Box::new(empty)),
-            notes: Vec::new(),
-        };
-        quantities.mapped(false)
-    }
-
-    fn reader(&self) -> Reader<'_> {
-        Reader {
-            stated: &self.stated,
-            catalogue: &self.catalogue,
-        }
-    }
-
-    /// The same, its quantities mapped; where neither lever nor tip changed, the lever stays.
-    fn mapped(mut self, same_lever: bool) -> Self {
-        let lever = self.view.as_ref().ok().map(|view| view.lever);
-        let lever = lever.filter(|_| same_lever);
-        let view = Physical::map(self.reader(), lever)
-            .and_then(|view| match self.numbers.as_slice() {
-                [] => Ok(view),
-                numbers => view.with_numbers(numbers),
-            })
-            .map(Box::new)
-            .map_err(|error| Box::new(self.stated.refused(error.key(), error.to_string())));
-        self.view = view;
-        self
-    }
-
-    /// The same, if it makes sense.
-    fn possible(self) -> Result<Self, CaseFileError> {
-        match &self.view {
-            Ok(_) => Ok(self),
-            Err(error) => Err((**error).clone()),
-        }
-    }
-
-    fn view(&self) -> Result<&Physical, Box<CaseFileError>> {
-        self.view.as_deref().map_err(Clone::clone)
-    }
-
-    /// A value that is stated or follows from what is.
-    fn get(&self, key: Key) -> Option<f64> {
-        let inferred = || self.view.as_ref().ok()?.value(key);
-        self.stated.number(key).or_else(inferred)
-    }
-
-    fn with(&self, key: Key, value: f64) -> Self {
-        let mut varied = self.clone();
-        if let Some(parameter) = key.parameter() {
-            varied.numbers.retain(|(other, _)| *other != parameter);
-            varied.numbers.push((parameter, value));
-            return varied.mapped(true);
-        }
-        if key == Key::Modes {
-            varied.stated.put(key, Value::Number(value, Kind::Number));
-            return varied.mapped(true);
-        }
-        if let (false, Ok(view)) = (self.held, &self.view) {
-            varied.stated = view.held(&self.stated);
-            varied.held = true;
-        }
-        varied.stated.set(key, value);
-        varied.mapped(!matches!(key.section(), Section::Cantilever | Section::Tip))
-    }
-
-    /// How the numbers of the equations change with a quantity: those that do, each with its
-    /// derivative, and those of the parameters of a nonlinear law, by central differences of the
-    /// mapping, which is a chain of closed forms.
-    fn derivatives(&self, key: Key) -> Result<Slopes, Box<CaseFileError>> {
-        let (low, high, width) = self.beside(key)?;
-        let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
-        let numbers = Parameter::every()
-            .map(|parameter| (parameter, slope(parameter)))
-            .filter(|(_, slope)| *slope != 0.0)
-            .collect();
-        let values = |view: &Physical| {
-            let law = view.cantilever.law.as_ref();
-            law.map_or_else(Vec::new, |law| law.values().to_vec())
-        };
-        let law = values(&high)
-            .iter()
-            .zip(values(&low))
-            // A rigid tip stays rigid.
-            .map(|(high, low)| {
-                if *high == low {
-                    0.0
-                } else {
-                    (high - low) / width
-                }
-            })
-            .collect();
-        Ok((numbers, law))
-    }
-
-    /// What it comes to a little below and a little above the value of a key, and how far
-    /// apart these values are.
-    fn beside(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
-        let here = self.view()?;
-        let value = self.get(key).unwrap_or(f64::NAN);
-        // Where the mapping is smooth its third derivative is of order 1/value³, so that
-        // this step balances truncation and rounding.
-        let size = if value == 0.0 {
-            scale_of(here, key.kind())
-        } else {
-            value.abs()
-        };
-        let step = 1e-5 * size;
-        let (low, high) = (self.with(key, value - step), self.with(key, value + step));
-        match (low.view, high.view) {
-            (Ok(low), Ok(high)) => Ok((*low, *high, 2.0 * step)),
-            // At the edge of what makes sense, on one side.
-            (Err(_), Ok(high)) => Ok((here.clone(), *high, step)),
-            (Ok(low), Err(_)) => Ok((*low, here.clone(), step)),
-            (Err(error), Err(_)) => Err(error),
-        }
-    }
-}
-
-/// Derivatives of the numbers that change, and of a nonlinear law's parameters in order.
-type Slopes = (Vec<(Parameter, f64)>, Vec<f64>);
-
-/// A size of a quantity that is zero.
-fn scale_of(view: &Physical, kind: Kind) -> f64 {
-    let scales = &view.scales;
-    match kind {
-        Kind::Length => view.free_amplitude.max(1e-3 * scales.length),
-        Kind::Mass => scales.mass,
-        Kind::Stiffness => scales.stiffness,
-        Kind::Damping => scales.damping,
-        Kind::Frequency => scales.frequency,
-        Kind::Force => scales.force,
-        Kind::Time => scales.time,
-        _ => 1.0,
-    }
-}
-
 impl Serialize for Case {
     /// The numbers of the equations by key; of a physical case also its quantities as text,
     /// by `section.key`.
@@ -742,29 +584,9 @@ impl Serialize for Case {
             What::Oscillator(oscillator) => return oscillator.serialize(serializer),
             What::Quantities(quantities) => quantities,
         };
-        let stated = quantities.stated.iter();
-        let document = QuantitiesDocument {
-            cantilever: self.cantilever().filter(|_| !quantities.held),
-            modes: quantities.held.then(|| file::modes(&quantities.stated)),
-            quantities: stated
-                .filter(|(key, _)| key.is_physical())
-                .map(|(key, value)| (key.path(), value.text()))
-                .collect(),
-        };
-        document.serialize(serializer)
+        let cantilever = self.cantilever();
+        quantities.document(cantilever).serialize(serializer)
     }
-}
-
-/// A physical case: the numbers that it comes to, unless quantities vary, and what was
-/// stated.
-#[derive(Serialize)]
-struct QuantitiesDocument<'a> {
-    #[serde(flatten)]
-    cantilever: Option<&'a Cantilever>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    modes: Option<usize>,
-    #[serde(flatten)]
-    quantities: BTreeMap<&'static str, String>,
 }
 
 impl NoSuchKey {

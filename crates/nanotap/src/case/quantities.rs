@@ -1,0 +1,201 @@
+//! A physical case: the quantities that were stated, what they come to, and how that changes with
+//! one of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::Key;
+use super::file::{self, CaseFileError};
+use super::key::Section;
+use super::physical::{Catalogue, Kind, Physical, Reader, Remark};
+use super::stated::{Stated, Value};
+use crate::model::cantilever::Cantilever;
+use crate::model::parameter::Parameter;
+
+/// Physical quantities and what they come to.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Quantities {
+    pub(super) stated: Stated,
+    catalogue: Arc<Catalogue>,
+    /// Dimensionless numbers that vary, in place of those mapped.
+    numbers: Vec<(Parameter, f64)>,
+    /// Whether what stays while others vary is said by its own numbers.
+    pub(super) held: bool,
+    pub(super) view: Result<Box<Physical>, Box<CaseFileError>>,
+    /// What a study found out about the case.
+    pub(super) notes: Vec<Remark>,
+}
+
+impl Quantities {
+    pub(super) fn new(stated: Stated, catalogue: Arc<Catalogue>) -> Self {
+        let empty = CaseFileError::one(None, file::Problem::new(file::Place::Whole, ""));
+        let quantities = Self {
+            stated,
+            catalogue,
+            numbers: Vec::new(),
+            held: false,
+            view: Err(Box::new(empty)),
+            notes: Vec::new(),
+        };
+        quantities.mapped(false)
+    }
+
+    pub(super) fn reader(&self) -> Reader<'_> {
+        Reader {
+            stated: &self.stated,
+            catalogue: &self.catalogue,
+        }
+    }
+
+    /// The same, its quantities mapped; where neither lever nor tip changed, the lever stays.
+    pub(super) fn mapped(mut self, same_lever: bool) -> Self {
+        let lever = self.view.as_ref().ok().map(|view| view.lever);
+        let lever = lever.filter(|_| same_lever);
+        let view = Physical::map(self.reader(), lever)
+            .and_then(|view| match self.numbers.as_slice() {
+                [] => Ok(view),
+                numbers => view.with_numbers(numbers),
+            })
+            .map(Box::new)
+            .map_err(|error| Box::new(self.stated.refused(error.key(), error.to_string())));
+        self.view = view;
+        self
+    }
+
+    /// The same, if it makes sense.
+    pub(super) fn possible(self) -> Result<Self, CaseFileError> {
+        match &self.view {
+            Ok(_) => Ok(self),
+            Err(error) => Err((**error).clone()),
+        }
+    }
+
+    pub(super) fn view(&self) -> Result<&Physical, Box<CaseFileError>> {
+        self.view.as_deref().map_err(Clone::clone)
+    }
+
+    /// A value that is stated or follows from what is.
+    pub(super) fn get(&self, key: Key) -> Option<f64> {
+        let inferred = || self.view.as_ref().ok()?.value(key);
+        self.stated.number(key).or_else(inferred)
+    }
+
+    pub(super) fn with(&self, key: Key, value: f64) -> Self {
+        let mut varied = self.clone();
+        if let Some(parameter) = key.parameter() {
+            varied.numbers.retain(|(other, _)| *other != parameter);
+            varied.numbers.push((parameter, value));
+            return varied.mapped(true);
+        }
+        if key == Key::Modes {
+            varied.stated.put(key, Value::Number(value, Kind::Number));
+            return varied.mapped(true);
+        }
+        if let (false, Ok(view)) = (self.held, &self.view) {
+            varied.stated = view.held(&self.stated);
+            varied.held = true;
+        }
+        varied.stated.set(key, value);
+        varied.mapped(!matches!(key.section(), Section::Cantilever | Section::Tip))
+    }
+
+    /// How the numbers of the equations change with a quantity: those that do, each with its
+    /// derivative, and those of the parameters of a nonlinear law, by central differences of the
+    /// mapping, which is a chain of closed forms.
+    pub(super) fn derivatives(&self, key: Key) -> Result<Slopes, Box<CaseFileError>> {
+        let (low, high, width) = self.beside(key)?;
+        let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
+        let numbers = Parameter::every()
+            .map(|parameter| (parameter, slope(parameter)))
+            .filter(|(_, slope)| *slope != 0.0)
+            .collect();
+        let values = |view: &Physical| {
+            let law = view.cantilever.law.as_ref();
+            law.map_or_else(Vec::new, |law| law.values().to_vec())
+        };
+        let law = values(&high)
+            .iter()
+            .zip(values(&low))
+            // A rigid tip stays rigid.
+            .map(|(high, low)| {
+                if *high == low {
+                    0.0
+                } else {
+                    (high - low) / width
+                }
+            })
+            .collect();
+        Ok((numbers, law))
+    }
+
+    /// What it comes to a little below and a little above the value of a key, and how far
+    /// apart these values are.
+    pub(super) fn beside(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
+        let here = self.view()?;
+        let value = self.get(key).unwrap_or(f64::NAN);
+        // Where the mapping is smooth its third derivative is of order 1/value³, so that
+        // this step balances truncation and rounding.
+        let size = if value == 0.0 {
+            scale_of(here, key.kind())
+        } else {
+            value.abs()
+        };
+        let step = 1e-5 * size;
+        let (low, high) = (self.with(key, value - step), self.with(key, value + step));
+        match (low.view, high.view) {
+            (Ok(low), Ok(high)) => Ok((*low, *high, 2.0 * step)),
+            // At the edge of what makes sense, on one side.
+            (Err(_), Ok(high)) => Ok((here.clone(), *high, step)),
+            (Ok(low), Err(_)) => Ok((*low, here.clone(), step)),
+            (Err(error), Err(_)) => Err(error),
+        }
+    }
+
+    /// The numbers that it comes to, unless quantities vary, and what was stated.
+    pub(super) fn document<'a>(
+        &self,
+        cantilever: Option<&'a Cantilever>,
+    ) -> QuantitiesDocument<'a> {
+        let stated = self.stated.iter();
+        QuantitiesDocument {
+            cantilever: cantilever.filter(|_| !self.held),
+            modes: self.held.then(|| file::modes(&self.stated)),
+            quantities: stated
+                .filter(|(key, _)| key.is_physical())
+                .map(|(key, value)| (key.path(), value.text()))
+                .collect(),
+        }
+    }
+}
+
+/// Derivatives of the numbers that change, and of a nonlinear law's parameters in order.
+pub(super) type Slopes = (Vec<(Parameter, f64)>, Vec<f64>);
+
+/// A size of a quantity that is zero.
+fn scale_of(view: &Physical, kind: Kind) -> f64 {
+    let scales = &view.scales;
+    match kind {
+        Kind::Length => view.free_amplitude.max(1e-3 * scales.length),
+        Kind::Mass => scales.mass,
+        Kind::Stiffness => scales.stiffness,
+        Kind::Damping => scales.damping,
+        Kind::Frequency => scales.frequency,
+        Kind::Force => scales.force,
+        Kind::Time => scales.time,
+        _ => 1.0,
+    }
+}
+
+/// A physical case: the numbers that it comes to, unless quantities vary, and what was
+/// stated.
+#[derive(Serialize)]
+pub(super) struct QuantitiesDocument<'a> {
+    #[serde(flatten)]
+    cantilever: Option<&'a Cantilever>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    modes: Option<usize>,
+    #[serde(flatten)]
+    quantities: BTreeMap<&'static str, String>,
+}

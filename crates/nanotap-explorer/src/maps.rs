@@ -2,7 +2,8 @@
 //! coexist.
 
 use nanotap::dataset::{Store, StoreError, Values};
-use nanotap::study::sweep::{figure as sweep_figure, from_neighbours};
+use nanotap::figure::sweep::figure as sweep_figure;
+use nanotap::study::sweep::from_neighbours;
 use nanotap_figures::{Axis, CategoryMap, Colour, Figure, Heatmap, Layer, Legend};
 use serde_json::Value;
 

@@ -12,14 +12,15 @@ use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::figure::approach::approach_figure;
+use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
+use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
 use nanotap::observe::time_series::state_names;
 use nanotap::study::approach::{ApproachRequest, ApproachStudy};
 use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy};
 use nanotap::study::registry::{Study as _, study as study_named};
 use nanotap::study::request::read;
-use nanotap::study::sweep::{figure as sweep_figure, response_figure};
-use nanotap::study::{basin, sweep::Over};
+use nanotap::study::sweep::Over;
 use nanotap_figures::Figure;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -395,7 +396,7 @@ impl Studied<'_> {
                 })
                 .collect();
             let figure = self.dataset(&case, "basin", &request, |store| {
-                basin::figure(store).map_err(Refusal::of)
+                basin_figure(store).map_err(Refusal::of)
             })?;
             self.hand(&Stage {
                 figure,

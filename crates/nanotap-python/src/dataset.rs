@@ -9,6 +9,7 @@ use std::sync::Arc;
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
+use nanotap::figure as figures;
 use nanotap::study::basin;
 use nanotap::study::sweep;
 use nanotap::study::threads::{checked, install};
@@ -221,9 +222,9 @@ pub(crate) fn figure<'py>(
     let done = watched(py, None, move |_| {
         let (store, kind) = opened(&path)?;
         let figure = if kind == "basin" {
-            basin::figure(&store)?
+            figures::basin::figure(&store)?
         } else {
-            sweep::figure(&store)?
+            figures::sweep::figure(&store)?
         };
         drawn(&figure, &format)
     })?;

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::study::basin::{Basin, BasinOptions, BasinRequest, Shares, figure, shares};
+use nanotap::figure::basin::figure;
+use nanotap::study::basin::{Basin, BasinOptions, BasinRequest, Shares, shares};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};

@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use nanotap::control::Control;
+use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
-use nanotap::study::modes::{ModeTable, ModesRequest, ModesStudy, damping_ratio, shapes_figure};
+use nanotap::study::modes::{ModeTable, ModesRequest, ModesStudy, damping_ratio};
 use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};

@@ -5,9 +5,8 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use nanotap::case::Key;
 use nanotap::case::physical::Kind;
-use nanotap::study::sweep::{
-    Follow, Over, Summary, Sweep, SweepRequest, figure, response_figure, summary,
-};
+use nanotap::figure::sweep::{figure, response};
+use nanotap::study::sweep::{Follow, Over, Summary, Sweep, SweepRequest, summary};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -88,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     });
     let drawn = match shown {
         Show::Diagram => figure,
-        Show::Response => response_figure,
+        Show::Response => response,
     };
     let plot = arguments.plot.plot.as_deref();
     let seed = request.seed;

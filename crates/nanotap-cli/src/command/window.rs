@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::Args;
 use nanotap::case::Key;
-use nanotap::dataset::StoreError;
+use nanotap::figure::window::figure;
 use nanotap::study::window::{Condition, Window, WindowRequest};
 
 use crate::arguments::{CaseArguments, PlotArgument};
@@ -57,9 +57,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output,
         |store, work| sweep.compute(store, work),
     )?;
-    let drawn = |store: &_| -> Result<_, StoreError> { Window::of(store)?.figure(store) };
     let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, Window::kept, drawn)?;
+    let done = DatasetReport::of(&store, destination, plot, begun, seed, Window::kept, figure)?;
     output.study(&case, &done, |done| {
         let heading = format!(
             "{}: operating window over {} and {}, {} at each of {} points",

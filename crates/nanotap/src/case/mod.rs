@@ -54,7 +54,6 @@ use units::Units;
 
 use crate::model::cantilever::Cantilever;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
-use crate::model::parameter::Parameter;
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
 

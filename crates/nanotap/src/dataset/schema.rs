@@ -183,6 +183,15 @@ impl Schema {
         self.variables.iter().position(|v| v.name == name)
     }
 
+    /// The values along an axis of the grid; where they are no numbers, these are counted.
+    pub fn axis_values(&self, axis: usize) -> Vec<f64> {
+        let axis = &self.grid.axes[axis];
+        match self.coordinate(&axis.name).map(|c| &c.values) {
+            Some(Values::Real(values)) => values.clone(),
+            _ => (0..axis.length).map(|k| k as f64).collect(),
+        }
+    }
+
     /// The coordinate called `name`.
     pub fn coordinate(&self, name: &str) -> Option<&Coordinate> {
         self.coordinates.iter().find(|c| c.name == name)

@@ -8,8 +8,9 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::dataset::{Store, StoreError};
 use crate::figure::panels::motion_of;
-use crate::study::basin::{FAILED, Known, UNBOUNDED, UNSETTLED};
+use crate::study::basin::{FAILED, Known, UNBOUNDED, UNSETTLED, entries, known, labels};
 
 /// Where motions from the points of a slice of states go.
 #[derive(Clone, Debug, Deserialize)]
@@ -32,6 +33,33 @@ pub struct BasinTable {
     /// negative where there is none.
     #[serde(default)]
     pub labels: Vec<i32>,
+}
+
+/// The figure of a finished dataset.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+pub fn figure(store: &Store) -> Result<Figure, StoreError> {
+    store.require_all()?;
+    let schema = store.schema();
+    let axes = &schema.grid.axes;
+    let columns = axes[1].length;
+    let mut table = BasinTable {
+        x: axes[1].name.clone(),
+        y: axes[0].name.clone(),
+        x_values: schema.axis_values(1),
+        y_values: schema.axis_values(0),
+        attractors: known(store)?,
+        entries: entries(store),
+        labels: vec![FAILED; axes[0].length * columns],
+    };
+    for chunk in 0..store.chunks() {
+        let block = schema.grid.block(chunk);
+        for (entry, label) in block.entries().zip(labels(store, &block)?) {
+            table.labels[entry[0] * columns + entry[1]] = label;
+        }
+    }
+    Ok(table.figure().unwrap_or_default())
 }
 
 impl BasinTable {

@@ -344,6 +344,15 @@ fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
     (factor, unit.clone())
 }
 
+/// The figure of a finished dataset: a bifurcation diagram over one parameter, a map of
+/// classifications over two.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+pub fn figure(store: &Store) -> Result<Figure, StoreError> {
+    Ok(SweepTable::of(store)?.figure().unwrap_or_default())
+}
+
 /// Amplitude and phase at the drive's frequency over one parameter, a colour a direction of
 /// following: resonance curves; over two parameters maps of the motions and of what one measures.
 ///
@@ -488,18 +497,15 @@ impl GridAxis {
     /// Of an axis of a dataset's grid.
     pub(crate) fn of(store: &Store, axis: usize) -> Self {
         let schema = store.schema();
-        let axis = &schema.grid.axes[axis];
-        let coordinate = schema.coordinate(&axis.name);
+        let name = &schema.grid.axes[axis].name;
+        let coordinate = schema.coordinate(name);
         let text = |c: &Coordinate, key: &str| Some(c.attributes.get(key)?.as_str()?.to_owned());
         let said = |key: &str| coordinate.and_then(|c| text(c, key));
         Self {
-            symbol: said("symbol").unwrap_or_else(|| axis.name.clone()),
+            symbol: said("symbol").unwrap_or_else(|| name.clone()),
             units: said("units").unwrap_or_default(),
             log: said("spacing").as_deref() == Some("log"),
-            values: match coordinate.map(|c| &c.values) {
-                Some(Values::Real(values)) => values.clone(),
-                _ => (0..axis.length).map(|k| k as f64).collect(),
-            },
+            values: schema.axis_values(axis),
         }
     }
 

@@ -13,7 +13,6 @@ use nanotap_dynamics::{
     Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, ClassifyOptions,
     Control, Label, LyapunovOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
 };
-use nanotap_figures::Figure;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,7 +26,6 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
-use crate::figure::basin::BasinTable;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
@@ -647,7 +645,7 @@ pub struct AttractorShare {
 }
 
 /// The attractors that a dataset of basins holds.
-fn known(store: &Store) -> Result<Vec<Known>, StoreError> {
+pub(crate) fn known(store: &Store) -> Result<Vec<Known>, StoreError> {
     let text = store
         .schema()
         .attributes
@@ -660,7 +658,8 @@ fn known(store: &Store) -> Result<Vec<Known>, StoreError> {
         })
 }
 
-fn labels(store: &Store, block: &Block) -> Result<Vec<i32>, StoreError> {
+/// Where the points of a block go: numbers of attractors, or why none is known.
+pub(crate) fn labels(store: &Store, block: &Block) -> Result<Vec<i32>, StoreError> {
     match store.read_chunk(block, 0)? {
         Values::Whole(labels) => Ok(labels),
         _ => Err(StoreError::NotAStore {
@@ -710,42 +709,8 @@ pub fn shares(store: &Store) -> Result<Shares, StoreError> {
     })
 }
 
-/// The picture of a finished dataset: a colour an attractor, and where (seen along the
-/// other entries of the state) the attractors' own strobe points lie.
-///
-/// # Errors
-/// When a chunk is missing or damaged.
-pub fn figure(store: &Store) -> Result<Figure, StoreError> {
-    store.require_all()?;
-    let axes = &store.schema().grid.axes;
-    let columns = axes[1].length;
-    let mut table = BasinTable {
-        x: axes[1].name.clone(),
-        y: axes[0].name.clone(),
-        x_values: values(store, &axes[1].name),
-        y_values: values(store, &axes[0].name),
-        attractors: known(store)?,
-        entries: names(store),
-        labels: vec![FAILED; axes[0].length * columns],
-    };
-    for chunk in 0..store.chunks() {
-        let block = store.schema().grid.block(chunk);
-        for (entry, label) in block.entries().zip(labels(store, &block)?) {
-            table.labels[entry[0] * columns + entry[1]] = label;
-        }
-    }
-    Ok(table.figure().unwrap_or_default())
-}
-
-fn values(store: &Store, name: &str) -> Vec<f64> {
-    match store.schema().coordinate(name).map(|c| &c.values) {
-        Some(Values::Real(values)) => values.clone(),
-        _ => vec![0.0, 1.0],
-    }
-}
-
-/// The outer edges of cells around evenly spaced values.
-fn names(store: &Store) -> Vec<String> {
+/// The names of a state's entries.
+pub(crate) fn entries(store: &Store) -> Vec<String> {
     let text = store
         .schema()
         .attributes

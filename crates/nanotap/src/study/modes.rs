@@ -2,7 +2,6 @@
 //! Galerkin equations, those of the beam without truncation, and what damping makes of them.
 
 use nalgebra::Complex;
-use nanotap_figures::{Axis, Figure, Line, Panel, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -111,31 +110,6 @@ pub fn damping_ratio([re, im]: [f64; 2]) -> f64 {
     let size = nanotap_arithmetic::hypot(re, im);
     // An eigenvalue zero belongs to no beam; it would damp nothing.
     if size == 0.0 { 0.0 } else { -re / size }
-}
-
-/// The mode shapes φ_j(ξ) of the bare beam, the paper's Fig. 2e.
-pub fn shapes_figure(beam: &Modes) -> Figure {
-    const POINTS: usize = 401;
-    // Beyond these the lines cannot be told apart.
-    const MOST_NAMED: usize = 8;
-    let mut panel = Panel::new(
-        Axis::linear("position along the beam $ξ = x/L$").range(0.0, 1.0),
-        Axis::linear("mode shape $φ_j(ξ)$"),
-    )
-    .with(Rule::horizontal(0.0));
-    for mode in beam.iter() {
-        let shape = (0..POINTS).map(|point| {
-            let xi = point as f64 / (POINTS - 1) as f64;
-            (xi, mode.shape(xi))
-        });
-        let line = Line::new(shape);
-        panel = panel.with(if beam.count() <= MOST_NAMED {
-            line.label(format!("mode {}", mode.number))
-        } else {
-            line
-        });
-    }
-    Figure::single(panel)
 }
 
 /// What the study of modes is asked for.

@@ -11,14 +11,12 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nanotap_dynamics::Control;
-use nanotap_figures::{Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError, Values};
-use crate::figure::sweep::{GridAxis, GridScale};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::recipe::Recipe;
@@ -76,17 +74,6 @@ impl Condition {
             Self::Subharmonic => "subharmonic",
             Self::Irregular => "chaos or torus",
             Self::Undecided => "undecided",
-        }
-    }
-
-    const fn colour(self) -> Colour {
-        match self {
-            Self::NoContact => Colour::rgb(222, 222, 222),
-            Self::OnePeriod1 => Colour::GREEN,
-            Self::SecondState => Colour::ORANGE,
-            Self::Subharmonic => Colour::BLUE,
-            Self::Irregular => Colour::VERMILLION,
-            Self::Undecided => Colour::GREY,
         }
     }
 }
@@ -221,11 +208,10 @@ impl Window {
                 (wanted.name(), count as f64 / (rows * columns) as f64)
             })
             .collect();
-        let scale = |axis| GridAxis::of(store, axis);
         Ok(Self {
             parameters: [1, 0].map(|axis| schema.grid.axes[axis].name.clone()),
-            x: scale(1).values,
-            y: scale(0).values,
+            x: schema.axis_values(1),
+            y: schema.axis_values(0),
             conditions,
             shares,
         })
@@ -240,44 +226,6 @@ impl Window {
         let text = serde_json::to_string(&window).unwrap_or_default();
         store.write_beside(FILE, text.as_bytes())?;
         Ok(window)
-    }
-
-    /// The map, with the share of each condition in its legend.
-    ///
-    /// # Errors
-    /// As [`Window::of`].
-    pub fn figure(&self, store: &Store) -> Result<Figure, StoreError> {
-        store.require_all()?;
-        let (y, x) = (
-            GridAxis::of(store, 0).shown(),
-            GridAxis::of(store, 1).shown(),
-        );
-        let present: Vec<Condition> = Condition::ALL
-            .into_iter()
-            .filter(|c| self.shares.get(c.name()).is_some_and(|share| *share > 0.0))
-            .collect();
-        let cells: Vec<Option<usize>> = self
-            .conditions
-            .iter()
-            .flatten()
-            .map(|c| present.iter().position(|p| p == c))
-            .collect();
-        let mut layer = GridScale::map(&x, &y, &cells);
-        for condition in present {
-            let share = self.shares.get(condition.name()).copied().unwrap_or(0.0);
-            let percent = 100.0 * share;
-            let part = if percent < 0.5 {
-                "below 1".to_owned()
-            } else {
-                format!("{percent:.0}")
-            };
-            let name = format!("{} ({part} %)", condition.words());
-            layer = layer.category_in(name, condition.colour());
-        }
-        let panel = Panel::new(x.axis(), y.axis())
-            .with(layer)
-            .legend(Legend::Right);
-        Ok(Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS))
     }
 }
 

@@ -157,8 +157,12 @@ fn derivatives_of_what_is_observed() {
                 let [a, b, c, d] = moved.map(|of| number(&of).unwrap());
                 let slope = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h);
                 let scale = change.abs().max(here.abs() / value.abs());
+                // Of a harmonic a hundred times smaller than the motion, differences tell the
+                // phase less well.
+                let faint = observable.name.ends_with("harmonic_phase");
+                let bound = if faint { 1e-5 } else { 1e-6 };
                 assert!(
-                    (change - slope).abs() <= 1e-6 * scale,
+                    (change - slope).abs() <= bound * scale,
                     "d {} / d {key}: {change:e}, by differences {slope:e}",
                     observable.name
                 );

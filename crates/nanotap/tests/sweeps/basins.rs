@@ -2,9 +2,10 @@
 
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
+use nanotap::figure::basin::figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
-use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, figure, shares};
+use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, shares};
 use nanotap_dynamics::{ClassifyOptions, Control, MotionKind, classify};
 use std::sync::atomic::AtomicBool;
 

@@ -2,11 +2,12 @@
 
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
+use nanotap::figure::sweep::figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::study::orbit::OrbitOptions;
 use nanotap::study::sweep::{
-    Follow, Over, Starts, Summary, Sweep, SweepError, SweepOptions, figure, summary,
+    Follow, Over, Starts, Summary, Sweep, SweepError, SweepOptions, summary,
 };
 use nanotap_dynamics::Control;
 

@@ -44,13 +44,11 @@ pub use summary::Summary;
 pub(crate) use summary::{Motions, class_of};
 
 use nanotap_dynamics::{ClassifyOptions, Control, LyapunovOptions};
-use nanotap_figures::Figure;
 
 use crate::case::Case;
 use crate::dataset::{
     Block, Schema, Store, StoreError, Values, Work, WorkError, chunk_files, work,
 };
-use crate::figure::sweep::SweepTable;
 
 /// How to sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,22 +241,4 @@ impl Sweep {
 /// When a chunk is missing or damaged.
 pub fn summary(store: &Store) -> Result<Summary, StoreError> {
     Summary::of(store)
-}
-
-/// The picture of a finished dataset: a bifurcation diagram over one parameter, a map of
-/// classifications over two.
-///
-/// # Errors
-/// When a chunk is missing or damaged.
-pub fn figure(store: &Store) -> Result<Figure, StoreError> {
-    Ok(SweepTable::of(store)?.figure().unwrap_or_default())
-}
-
-/// Amplitude and phase at the drive's frequency over one parameter, up and down in two
-/// colours; over two parameters as [`figure()`].
-///
-/// # Errors
-/// When a chunk is missing or damaged.
-pub fn response_figure(store: &Store) -> Result<Figure, StoreError> {
-    crate::figure::sweep::response(store)
 }

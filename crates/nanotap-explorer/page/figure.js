@@ -14,56 +14,69 @@ export function put(element, drawn) {
   const lines = text.split("\n").filter((line) => {
     const letter = /^<path id="([^"]+)" d="([^"]+)"\/>$/.exec(line);
     if (letter) letters.set(`#${letter[1]}`, letter[2]);
-    return !letter;
+    return !letter && /^<[^!]/.test(line);
   });
-  if (!element.querySelector("svg.drawn") || !change(element.lines, lines, letters)) {
-    const fresh = parsed(lines.join("\n"), letters);
-    fresh.removeAttribute("width");
-    fresh.removeAttribute("height");
-    fresh.setAttribute("class", "drawn");
-    element.replaceChildren(fresh);
-    element.lines = numbered(fresh, lines);
+  const tree = grown(lines);
+  if (element.querySelector("svg.drawn") && element.tree.line === tree.line) {
+    renew(element.tree, tree, letters);
+  } else {
+    plant(tree, parsed(tree, letters));
+    for (const size of ["width", "height"]) tree.node.removeAttribute(size);
+    tree.node.setAttribute("class", "drawn");
+    element.replaceChildren(tree.node);
   }
+  element.tree = tree;
   element.panels = drawn.map;
 }
 
-function parsed(svg, letters) {
-  const fresh = document.importNode(new DOMParser().parseFromString(svg, "image/svg+xml").documentElement, true);
-  join(fresh, letters);
-  return fresh;
-}
+const closed = (line) => /(\/|<\/\w+)>$/.test(line);
 
-/** Each line with the element that it stands for, if it begins one. */
-function numbered(svg, lines) {
-  const open = [];              // elements that are not closed yet, and how many children they have so far
-  return lines.map((line) => {
-    if (line.startsWith("</")) open.pop();
-    if (!/^<\w/.test(line)) return { line };
-    const around = open.at(-1);
-    const node = around ? around.node.children[around.count++] : svg;
-    if (!/(\/|<\/\w+)>$/.test(line)) open.push({ node, count: 0 });
-    return { line, node };
+/** The tree of the elements that begin lines. */
+function grown(lines) {
+  const open = [{ children: [] }];
+  lines.forEach((line, k) => {
+    if (line.startsWith("</")) {
+      const done = open.pop();
+      done.text = lines.slice(done.from, k + 1);
+    } else {
+      const one = { line, from: k, text: [line], children: [], node: null };
+      open.at(-1).children.push(one);
+      if (!closed(line)) open.push(one);
+    }
   });
+  return open[0].children[0];
 }
 
-/** Changes the elements whose lines differ; `false` where the figure is another one. */
-function change(old, lines, letters) {
-  if (old?.length !== lines.length) return false;
-  const other = old.flatMap((one, k) => (one.line === lines[k] ? [] : [{ one, line: lines[k] }]));
-  const name = (line) => /^<\w+/.exec(line)?.[0];
-  if (other.some(({ one, line }) => !one.node || line.startsWith("<svg") || name(line) !== name(one.line))) return false;
-  const whole = ({ line }) => /<\/\w+>$/.test(line) || line.includes("&");
-  if (other.some((one) => whole(one) && !/(\/|<\/\w+)>$/.test(one.line))) return false;
-  const anew = other.filter(whole);
-  if (anew.length) {
-    const fresh = parsed(`<svg xmlns="${SVG}" xmlns:xlink="${XLINK}">${anew.map(({ line }) => line).join("")}</svg>`, letters);
-    [...fresh.children].forEach((node, k) => { anew[k].one.node.replaceWith(node); anew[k].one.node = node; });
+/** Draws one element and what is in it. */
+function parsed(tree, letters) {
+  const text = tree.text.join("");
+  const whole = text.startsWith("<svg") ? text : `<svg xmlns="${SVG}" xmlns:xlink="${XLINK}">${text}</svg>`;
+  const page = document.importNode(new DOMParser().parseFromString(whole, "image/svg+xml").documentElement, true);
+  join(page, letters);
+  return whole === text ? page : page.firstElementChild;
+}
+
+/** Tells a tree which elements its lines stand for. */
+function plant(tree, node) {
+  tree.node = node;
+  tree.children.forEach((child, k) => plant(child, node.children[k]));
+}
+
+/** Makes the elements of an old tree those of a new one. */
+function renew(old, tree, letters) {
+  // A word that only moved is the same word: what stands within its line is compared by itself.
+  const [, head, within] = /^(<\w+[^>&]*>)(.*)$/.exec(tree.line) ?? [];
+  const [, before, had] = /^(<\w+[^>]*>)(.*)$/.exec(old.line) ?? [];
+  const alike = within !== undefined && within === had && old.children.length === tree.children.length
+    && head.split(" ")[0] === before.split(" ")[0];
+  if (!alike) {
+    plant(tree, parsed(tree, letters));
+    old.node.replaceWith(tree.node);
+    return;
   }
-  for (const { one, line } of other) {
-    if (!whole({ line })) attributes(one.node, line);
-    one.line = line;
-  }
-  return true;
+  tree.node = old.node;
+  if (before !== head) attributes(tree.node, head);
+  tree.children.forEach((child, k) => renew(old.children[k], child, letters));
 }
 
 /** Gives an element the attributes of a line. */

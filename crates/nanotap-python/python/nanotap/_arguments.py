@@ -23,7 +23,7 @@ Box: TypeAlias = Mapping[str, tuple[float, float]] | None
 # A key of the case: one value, or many.
 Varied: TypeAlias = (
     "float | str | np.floating[Any] | np.integer[Any] | Mapping[str, Any] | Sequence[float] "
-    "| Sequence[str] | npt.NDArray[Any] | xr.DataArray"
+    "| Sequence[str] | npt.NDArray[Any] | xr.DataArray | None"
 )
 # No machine counts further, and the extension takes no more.
 _MOST = 2**63 - 1

@@ -125,12 +125,17 @@ def test_what_makes_no_sense_is_refused_in_the_terminals_words(keys, words):
         assert problem in shown.stderr, (problem, shown.stderr)
 
 
-@pytest.mark.parametrize(
-    "value", [None, True, 1j, [1], object(), b"2", np.array([1, 2])]
-)
+@pytest.mark.parametrize("value", [True, 1j, [1], object(), b"2", np.array([1, 2])])
 def test_what_is_no_number_is_a_type_error(value):
     with pytest.raises(TypeError, match="omega: a number or a text is needed"):
         nanotap.Case(**(GIVEN | {"omega": value}))
+
+
+def test_none_takes_a_key_away():
+    with pytest.raises(ValueError, match="lacks omega"):
+        nanotap.Case(**(GIVEN | {"omega": None}))
+    case = nanotap.Case(**GIVEN)
+    assert case.with_(alpha5=0.7).with_(gap=None).alpha5 == case.alpha5 == 0
 
 
 def test_numbers_of_numpy_are_numbers():

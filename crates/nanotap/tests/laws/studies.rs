@@ -157,10 +157,11 @@ fn derivatives_of_what_is_observed() {
                 let [a, b, c, d] = moved.map(|of| number(&of).unwrap());
                 let slope = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h);
                 let scale = change.abs().max(here.abs() / value.abs());
-                // Of a harmonic a hundred times smaller than the motion, differences tell the
-                // phase less well.
-                let faint = observable.name.ends_with("harmonic_phase");
-                let bound = if faint { 1e-5 } else { 1e-6 };
+                // Higher harmonics are thousands of times smaller than the motion, whose own error
+                // differences of theirs show.
+                let faint =
+                    observable.name.contains("_harmonic") && observable.name != "first_harmonic";
+                let bound = if faint { 1e-4 } else { 1e-6 };
                 assert!(
                     (change - slope).abs() <= bound * scale,
                     "d {} / d {key}: {change:e}, by differences {slope:e}",

@@ -226,6 +226,22 @@ def test_a_studys_figure_is_saved_and_seen_in_part(address: str) -> None:
         assert json.loads(refused.value.read())["error"]
 
 
+def test_the_first_values_of_a_form_make_sense(address: str) -> None:
+    # Its tip rests on the sample: the form has a range of distances around 0 nm.
+    forms = motion(address, "soft-sample")["forms"]
+    options = {field["name"]: field["value"] for field in forms["map"]}
+    assert options["key1"] == "gap.tip" and "nm" in options["to1"]
+    base, token = address.split("/?token=")
+    client = http.client.HTTPConnection(base.removeprefix("http://"), timeout=120)
+    headers = {"x-nanotap-token": token, "content-type": "application/json"}
+    wanted = {"case": {"preset": "soft-sample"}, "tab": "map", "options": options}
+    client.request("POST", "/api/study", json.dumps(wanted), headers)
+    # The first stage will do.
+    first = json.loads(client.getresponse().readline())
+    client.close()
+    assert "figure" in first, first
+
+
 def test_a_studys_lines_of_python_give_the_same(address: str, tmp_path: Path) -> None:
     study = studied(
         address, tab="resonance", options={"key": "omega", "from": "3", "to": "3.1"}

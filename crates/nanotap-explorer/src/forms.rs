@@ -91,10 +91,11 @@ fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {
     } else {
         key.entry().example
     };
-    let reach = if value == 0.0 {
-        1.0
-    } else {
-        reach * value.abs()
+    let reach = match (key.kind(), base.physical()) {
+        _ if value != 0.0 => reach * value.abs(),
+        (Kind::Length, Some(view)) => view.free_amplitude,
+        (_, Some(_)) => key.entry().example.abs(),
+        (_, None) => 1.0,
     };
     [value - reach, value + reach].map(|value| key.kind().format_digits(value, 5))
 }

@@ -23,7 +23,6 @@ pub mod model;
 pub mod number;
 pub mod observe;
 pub mod study;
-pub mod table;
 
 pub use error::{Error, ErrorKind};
 pub use map::Map;

@@ -12,7 +12,7 @@ use toml::de::DeValue;
 
 use super::quantity::Kind;
 use crate::Error;
-use crate::table::{Entry, Header, Table};
+use crate::case::table::{Entry, Header, Table};
 
 /// How a table is written.
 const SHAPE: &str = "write rows as in [[\"gap (nm)\", \"force (nN)\"], [-1, 8.5], [0, 0], [9, 0]]";

@@ -31,6 +31,7 @@ mod quantities;
 pub mod quantity;
 pub mod schema;
 mod stated;
+pub mod table;
 pub(crate) mod under_law;
 pub mod units;
 

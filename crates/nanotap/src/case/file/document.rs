@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
 use crate::case::force_table::table_of;
-use crate::table::Table;
+use crate::case::table::Table;
 
 use super::problem::{CaseFileError, Place, Problem, Source};
 

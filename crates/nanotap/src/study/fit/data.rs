@@ -14,7 +14,7 @@ use crate::case::{Case, Key};
 use crate::observe::{Dimension, OBSERVABLES, Observable};
 use crate::study::approach::Way;
 
-use crate::table::{Entry, Header, Table};
+use crate::case::table::{Entry, Header, Table};
 
 /// All curves, and what their columns are.
 #[derive(Clone, Debug)]

@@ -33,7 +33,7 @@ use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::table::{Entry, MOST_ROWS, Table};
+pub use crate::case::table::{Entry, MOST_ROWS, Table};
 pub use data::{Column, Curve, Data, Row, Swept};
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,

@@ -10,6 +10,7 @@ use nanotap::observe::time_series;
 use nanotap::study::attractors::{
     AttractorReport, Attractors, AttractorsRequest, AttractorsStudy, UnseenReport,
 };
+use nanotap::study::proof::ProofReport;
 use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -125,8 +126,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         )));
         let proof = attractor.orbit.as_ref().and_then(|o| o.proof.as_ref());
         if let Some(proof) = proof {
-            let word = if proof.proved { "theorem: " } else { "" };
-            text.push_str(&motion::paragraph(&format!("{word}{}", proof.statement)));
+            text.push_str(&motion::paragraph(&statement(proof)));
         }
         if attractor.orbit.is_none() {
             text.push_str(&motion::paragraph(&format!(
@@ -197,11 +197,10 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         text.push_str(&table.render());
         for (k, orbit) in orbits.iter().enumerate() {
             if let Some(proof) = &orbit.proof {
-                let word = if proof.proved { "theorem: " } else { "" };
                 text.push_str(&motion::paragraph(&format!(
-                    "unstable orbit {}: {word}{}",
+                    "unstable orbit {}: {}",
                     k + 1,
-                    proof.statement
+                    statement(proof)
                 )));
             }
         }
@@ -336,4 +335,10 @@ fn undecided(text: &mut String, found: &Attractors) {
             found.undecided.len() - SHOWN
         )));
     }
+}
+
+/// A theorem, or why there is none.
+fn statement(proof: &ProofReport) -> String {
+    let word = if proof.proved { "theorem: " } else { "" };
+    format!("{word}{}", proof.statement)
 }

@@ -197,6 +197,9 @@ const fn formula(law: ContactLaw) -> &'static str {
         ContactLaw::StandardLinearSolid => {
             "−K1 h + Fm, Fm + τm dFm/dt = −km τm dh/dt, while this pushes, then none"
         }
+        ContactLaw::MovingSurface => {
+            "−Fad − K1 (h − s) − C1 d(h − s)/dt at heights h < s, none above; ηs ds/dt + ks s = −F"
+        }
     }
 }
 

@@ -483,13 +483,11 @@ impl Motion {
             reverse.map(|reverse| {
                 let start = if description.release {
                     Start::Release
-                } else if description.reset.is_none() && crossing.refined {
-                    // The rate is continuous and here known better than from the sums.
-                    Start::Surface {
-                        rate: Some(-crossing.rate),
-                    }
                 } else {
-                    Start::Surface { rate: None }
+                    // Of a state that is continuous, known better than from the sums.
+                    let rate = switch.rate_after.filter(|_| crossing.refined);
+                    let rate = rate.map(|after| -after.of(crossing.rate));
+                    Start::Surface { rate }
                 };
                 (reverse, start)
             })

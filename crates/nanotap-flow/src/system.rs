@@ -175,10 +175,51 @@ pub struct Switch {
     pub(crate) saltation: Option<DVector<f64>>,
     /// `matrix` with the constant saltation in it: the switch of a Jacobian.
     pub(crate) tangent: Option<DMatrix<f64>>,
+    /// Where the state is continuous: the guard's rate after the switch from that before it,
+    /// `factor · rate + constant`, where it follows from it alone.
+    pub(crate) rate_after: Option<RateAfter>,
     /// State from `[Re q⁻; Im q⁻]`, `n × 2m⁻`.
     pub(crate) from_modal: DMatrix<f64>,
     /// `[Re q⁺; Im q⁺]` from the state, `2m⁺ × n`.
     pub(crate) to_modal: DMatrix<f64>,
+}
+
+/// `factor · rate + constant`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RateAfter {
+    pub(crate) factor: f64,
+    pub(crate) constant: f64,
+}
+
+impl RateAfter {
+    const SAME: Self = Self {
+        factor: 1.0,
+        constant: 0.0,
+    };
+
+    pub(crate) fn of(self, rate: f64) -> f64 {
+        self.factor * rate + self.constant
+    }
+}
+
+impl Switch {
+    /// log|det| of the saltation matrix of a switch without a reset at which the guard has this
+    /// rate: by the lemma on determinants that of the guard's rate after it over that before.
+    /// `None` where the rate after it does not follow from that before.
+    pub fn log_determinant(&self, rate: f64) -> Option<f64> {
+        self.rate_after.map(|after| {
+            if after.constant == 0.0 {
+                nanotap_arithmetic::ln(after.factor.abs())
+            } else {
+                nanotap_arithmetic::ln((after.of(rate) / rate).abs())
+            }
+        })
+    }
+
+    /// Whether it leaves volumes as they are, whatever the rate.
+    pub fn keeps_volume(&self) -> bool {
+        self.rate_after == Some(RateAfter::SAME)
+    }
 }
 
 /// The switch of packed coordinates: modal coordinates first, then phasors.
@@ -378,6 +419,12 @@ impl System {
         self.reaches[regime]
     }
 
+    /// The switch of a transition.
+    pub fn switch_of(&self, regime: usize, transition: usize) -> Option<&Switch> {
+        let prepared = self.switches.get(regime)?.get(transition)?;
+        Some(&prepared.switch)
+    }
+
     pub(crate) fn prepared(&self, regime: usize) -> &[PreparedTransition] {
         &self.switches[regime]
     }
@@ -570,18 +617,23 @@ impl System {
         let guard = self.regimes[from].project(&transition.guard);
         let kernel = Kernel::new(&self.regimes[from], &self.drive, &guard);
         let clustered = !self.regimes[from].basis().clusters.is_empty();
+        let mut switch = self.switch(
+            from,
+            transition.target,
+            transition.reset.as_ref(),
+            &transition.guard,
+        );
+        if transition.release {
+            // What stuck goes on as it was, with guard, rate and acceleration zero.
+            switch.rate_after = Some(RateAfter::SAME);
+        }
         PreparedTransition {
             table: (!clustered)
                 .then(|| Table::new(&kernel, self.drive.period()))
                 .flatten(),
             kernel,
             guard,
-            switch: self.switch(
-                from,
-                transition.target,
-                transition.reset.as_ref(),
-                &transition.guard,
-            ),
+            switch,
             sticking: transition
                 .sticking
                 .as_ref()
@@ -654,6 +706,10 @@ impl System {
             packed,
             saltation,
             tangent,
+            rate_after: match reset {
+                None => self.rate_after(from, to, guard),
+                Some(_) => None,
+            },
             from_modal,
             to_modal,
         }
@@ -697,6 +753,48 @@ impl System {
             u[i] = along / across;
         }
         Some(u)
+    }
+
+    /// The guard's rate in `to` as a function of that in `from`, on the guard's zero set.
+    fn rate_after(&self, from: usize, to: usize, guard: &Output) -> Option<RateAfter> {
+        let rate = |r: usize| {
+            let regime = &self.regimes[r];
+            let rate = guard.rate(regime.matrix(), regime.forcing(), &self.drive);
+            flat(rate.row.iter(), rate.constant, rate.tones.iter())
+        };
+        let (before, after) = (rate(from), rate(to));
+        let size = before.norm() + after.norm();
+        let mut jump = after - &before;
+        // Along the guard itself, which is zero, it may differ.
+        let mut zero = flat(guard.row.iter(), guard.constant, guard.tones.iter());
+        zero /= zero.norm();
+        jump.axpy(-zero.dot(&jump), &zero, 1.0);
+        if jump.norm() <= NEGLIGIBLE * size {
+            return Some(RateAfter::SAME);
+        }
+        // The jump is α ġ + β: solved as the nearest such sum, which must be the jump itself.
+        let mut rest = before;
+        rest.axpy(-zero.dot(&rest), &zero, 1.0);
+        let mut one = DVector::zeros(jump.len());
+        one[self.dimension] = 1.0;
+        one.axpy(-zero.dot(&one), &zero, 1.0);
+        let (rr, ro, oo) = (rest.norm_squared(), rest.dot(&one), one.norm_squared());
+        let (rj, oj) = (rest.dot(&jump), one.dot(&jump));
+        let determinant = rr * oo - ro * ro;
+        if determinant <= NEGLIGIBLE * rr * oo {
+            return None;
+        }
+        let mut alpha = (rj * oo - oj * ro) / determinant;
+        let mut beta = (oj * rr - rj * ro) / determinant;
+        if beta.abs() * oo.sqrt() <= NEGLIGIBLE * size {
+            (alpha, beta) = (rj / rr, 0.0);
+        }
+        jump.axpy(-alpha, &rest, 1.0);
+        jump.axpy(-beta, &one, 1.0);
+        (jump.norm() <= NEGLIGIBLE * size).then_some(RateAfter {
+            factor: 1.0 + alpha,
+            constant: beta,
+        })
     }
 
     /// `f⁺(Rx + ρ, t) − R f⁻(x, t) − ρ̇` as an affine function of the state.
@@ -765,6 +863,9 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
         .collect();
     layout::list(&rates)
 }
+
+/// What counts as rounding beside the numbers that a difference is made of.
+const NEGLIGIBLE: f64 = 1e-13;
 
 /// Oscillations of a mode in one drive period that are followed.
 const MOST_TURNS: f64 = 1e7;

@@ -34,6 +34,8 @@ pub struct Event {
     pub rate: f64,
     /// Whether the guard only grazed zero within rounding.
     pub grazing: bool,
+    /// log|det| of the saltation of a switch without a reset, where it follows from `rate`.
+    pub log_determinant: Option<f64>,
 }
 
 /// A recorded motion; between its switches everything is known in closed form.
@@ -102,6 +104,7 @@ impl Observer for Recorder {
             to: switch.switch.to,
             rate: switch.rate,
             grazing: switch.grazing,
+            log_determinant: switch.switch.log_determinant(switch.rate),
         });
     }
 

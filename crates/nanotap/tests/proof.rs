@@ -253,6 +253,26 @@ fn every_piecewise_linear_lever_is_within_reach() {
     assert!(proof.proved, "{}", proof.statement);
 }
 
+/// A force that jumps has no place in the proofs, which say so.
+#[test]
+fn a_moving_surface_is_not_proved() {
+    let surface = [
+        "omega=20",
+        "alpha5=0.05",
+        "contact=moving-surface",
+        "surface_stiffness=60",
+        "surface_damping=8",
+        "adhesion_force=0.4",
+    ];
+    let proof = settled(&surface);
+    assert!(!proof.proved);
+    assert!(
+        proof.statement.contains("moving-surface"),
+        "{}",
+        proof.statement
+    );
+}
+
 /// An orbit of 30 drive periods amid chaos, with some 70 switches.
 #[test]
 fn long_unstable_orbits_are_proved() {

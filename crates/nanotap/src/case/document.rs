@@ -8,6 +8,8 @@ use serde::Serialize;
 use crate::case::Case;
 use crate::case::physical::{MappingRow, Physical};
 use crate::model::cantilever::Cantilever;
+use crate::model::contact::ContactLaw;
+use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::nonlinear::Equilibrium;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 
@@ -31,7 +33,7 @@ pub struct CantileverDocument {
     pub case: Cantilever,
     /// Drive period 2π/Ω.
     pub period: f64,
-    /// Where the undriven lever can rest under a nonlinear force law.
+    /// Where the undriven lever can rest over a sample that attracts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equilibria: Vec<Equilibrium>,
     /// What is known of it in SI.
@@ -82,6 +84,9 @@ pub struct PhysicalSummary {
     pub relaxation_stiffness: f64,
     /// Its relaxation time, s.
     pub relaxation_time: f64,
+    /// What a moving surface has of its own, N/m, N s/m and N.
+    #[serde(flatten)]
+    pub surface: MovingSurface,
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_law: Vec<LawParameterDocument>,
@@ -144,6 +149,7 @@ impl PhysicalSummary {
             contact_damping: parameters.contact_damping,
             relaxation_stiffness: parameters.relaxation_stiffness,
             relaxation_time: parameters.relaxation_time,
+            surface: parameters.surface,
             force_law: view.sample.force.as_ref().map_or_else(Vec::new, |force| {
                 let rows = force.parameters();
                 rows.map(|(parameter, key, value)| LawParameterDocument {
@@ -223,14 +229,16 @@ impl CantileverDocument {
     }
 }
 
-/// The equilibria of a case with a nonlinear force law.
+/// The equilibria of a case whose sample attracts: one with a nonlinear force law, or with a
+/// moving surface.
 pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
-    let law = case
-        .cantilever()
-        .and_then(|cantilever| cantilever.law.as_ref());
-    let model = law.and_then(|_| case.model().ok());
-    let nonlinear = model.and_then(|model| model.nonlinear);
-    nonlinear.map_or_else(Vec::new, |nonlinear| nonlinear.equilibria())
+    let attracts =
+        |case: &Cantilever| case.law.is_some() || case.contact == ContactLaw::MovingSurface;
+    if !case.cantilever().is_some_and(attracts) {
+        return Vec::new();
+    }
+    let model = case.model();
+    model.map_or_else(|_| Vec::new(), |model| model.equilibria())
 }
 
 /// One parameter between the two worlds, as a document.

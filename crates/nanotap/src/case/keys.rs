@@ -216,6 +216,15 @@ keys! {
     RelaxationTime = number(
         Parameter::RelaxationTime, "τₘ", "time in which the arm's force decays, over √(mL⁴/(EI))",
     ).such_as(0.1);
+    SurfaceStiffness = number(
+        Parameter::SurfaceStiffness, "kₛ", "a moving surface's own stiffness over bending stiffness, ks·L³/(EI)",
+    ).such_as(10.0);
+    SurfaceDamping = number(
+        Parameter::SurfaceDamping, "ηₛ", "a moving surface's own damping, (ηs/L)·√(L⁴/(m·EI))",
+    ).such_as(1.0);
+    AdhesionForce = number(
+        Parameter::AdhesionForce, "F", "force that pulls a touching tip to a moving surface, F·L³/(EI·g0)",
+    ).or(0.0);
     Tone2Amplitude = number(
         Parameter::Tone2Amplitude, "A₂", "amplitude of the second tone, measured as alpha2",
     ).also("second_tone_amplitude").or(0.0);
@@ -336,6 +345,12 @@ keys! {
     SampleRelaxationTime = quantity(
         Sample, "relaxation_time", Time, R::NOT_NEGATIVE, "time in which the arm's force decays",
     ).feeds(Parameter::RelaxationTime);
+    SampleSurfaceStiffness = quantity(
+        Sample, "surface_stiffness", Stiffness, R::POSITIVE, "a moving surface's own stiffness",
+    ).feeds(Parameter::SurfaceStiffness);
+    SampleSurfaceDamping = quantity(
+        Sample, "surface_damping", Damping, R::POSITIVE, "a moving surface's own damping",
+    ).feeds(Parameter::SurfaceDamping);
     SampleModulus = quantity(Sample, "modulus", Pressure, R::POSITIVE, "Young's modulus of the sample")
         .feeds(Parameter::Alpha4);
     SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample");
@@ -348,7 +363,8 @@ keys! {
     SampleWorkOfRetraction = quantity(
         Sample, "work_of_retraction", Stiffness, R::NOT_NEGATIVE, "work of adhesion on retraction (adhesion-hysteresis)",
     );
-    SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off");
+    SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off")
+        .feeds(Parameter::AdhesionForce);
     SampleIntermolecularDistance = quantity(
         Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
     );

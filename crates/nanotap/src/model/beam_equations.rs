@@ -14,7 +14,7 @@ use nanotap_flow::{
 
 use crate::model::cantilever::CosineTerm;
 use crate::model::contact::dual::Dual;
-use crate::model::contact::law::{Answer, Combination, Law, Square};
+use crate::model::contact::law::{Answer, Bilinear, Combination, Law, Square};
 use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Forcing, Galerkin, Gap, Regime};
 use crate::model::higher_modes::Correction;
@@ -212,6 +212,7 @@ impl<'a> Beam<'a> {
             .scaled(number(combination.height))
             .plus(number(combination.rate), &self.height_rate)
             .plus(1.0, &self.layout.memory(number(combination.memory)))
+            .with_constant(number(combination.constant))
     }
 
     /// One regime. `known` says that its spectrum is that of a beam with spring and damper
@@ -414,7 +415,7 @@ impl<'a> Beam<'a> {
         stored.extend(
             (0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))),
         );
-        stored.extend(self.squares(&answer.stored));
+        stored.extend(self.products(answer.stored.iter().copied()));
         let mut beam: Vec<Product> = weighted(case.alpha3).collect();
         for (each, speed) in corrections.iter().zip(&speeds) {
             let bent = self.layout.row(&each.row, 0);
@@ -425,7 +426,9 @@ impl<'a> Beam<'a> {
         Powers {
             drive,
             beam,
-            sample: self.squares(&answer.dissipated).collect(),
+            sample: self
+                .products(answer.dissipated.iter().copied().map(Square::into))
+                .collect(),
             stored,
         }
     }
@@ -436,14 +439,14 @@ impl<'a> Beam<'a> {
         own.plus(of.base.value, base_rate)
     }
 
-    fn squares<'b>(&'b self, squares: &'b [Square]) -> impl Iterator<Item = Product> + 'b {
-        squares.iter().map(|square| {
-            let of = self.combined(&square.of);
-            Product {
-                weight: square.weight,
-                a: of.clone(),
-                b: of,
-            }
+    fn products<'b>(
+        &'b self,
+        terms: impl Iterator<Item = Bilinear> + 'b,
+    ) -> impl Iterator<Item = Product> + 'b {
+        terms.map(|term| Product {
+            weight: term.weight,
+            a: self.combined(&term.one),
+            b: self.combined(&term.other),
         })
     }
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::model::beam::{MAX_MODES, ModeCountError};
 use crate::model::contact::ContactLaw;
+use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::higher_modes::HigherModes;
 use crate::model::parameter::Parameter;
@@ -69,6 +70,9 @@ pub struct Cantilever {
     pub relaxation_stiffness: f64,
     /// Time in which that arm's force decays, ≥ 0; 0 with every other law.
     pub relaxation_time: f64,
+    /// What a moving surface has of its own.
+    #[serde(flatten)]
+    pub surface: MovingSurface,
     /// Where the drive acts; α2 is an amplitude of motion or of force accordingly, see
     /// [`drive_form`](crate::model::drive_form).
     pub actuation: Actuation,
@@ -86,6 +90,8 @@ pub struct Cantilever {
 /// Largest size of α1 … α6. Beyond it a number is a slip (a value in SI units, say),
 /// and products of parameters would no longer leave enough digits.
 const LARGEST_ALPHA: f64 = 1e9;
+/// Least damping of a moving surface, and its least part of the surface's stiffness.
+const LEAST_SURFACE_DAMPING: f64 = 1e-15;
 /// Range of Ω. The 50th mode is at 24,350 and the first at 3.5.
 const OMEGA_RANGE: (f64, f64) = (1e-6, 1e6);
 
@@ -106,6 +112,7 @@ impl Cantilever {
             law: None,
             relaxation_stiffness: 0.0,
             relaxation_time: 0.0,
+            surface: MovingSurface::NONE,
             actuation: Actuation::Base,
             tone2_ratio: None,
             tone2_amplitude: 0.0,
@@ -130,6 +137,7 @@ impl Cantilever {
             law: None,
             relaxation_stiffness: 0.0,
             relaxation_time: 0.0,
+            surface: MovingSurface::NONE,
             actuation: Actuation::Base,
             tone2_ratio: None,
             tone2_amplitude: 0.0,
@@ -150,6 +158,9 @@ impl Cantilever {
             Parameter::Omega => self.omega,
             Parameter::RelaxationStiffness => self.relaxation_stiffness,
             Parameter::RelaxationTime => self.relaxation_time,
+            Parameter::SurfaceStiffness => self.surface.stiffness,
+            Parameter::SurfaceDamping => self.surface.damping,
+            Parameter::AdhesionForce => self.surface.adhesion,
             Parameter::Tone2Amplitude => self.tone2_amplitude,
             Parameter::Tone2Phase => self.tone2_phase,
             Parameter::Mode2Frequency => self.higher_modes.frequency[0],
@@ -173,6 +184,9 @@ impl Cantilever {
             Parameter::Omega => &mut self.omega,
             Parameter::RelaxationStiffness => &mut self.relaxation_stiffness,
             Parameter::RelaxationTime => &mut self.relaxation_time,
+            Parameter::SurfaceStiffness => &mut self.surface.stiffness,
+            Parameter::SurfaceDamping => &mut self.surface.damping,
+            Parameter::AdhesionForce => &mut self.surface.adhesion,
             Parameter::Tone2Amplitude => &mut self.tone2_amplitude,
             Parameter::Tone2Phase => &mut self.tone2_phase,
             Parameter::Mode2Frequency => &mut self.higher_modes.frequency[0],
@@ -195,12 +209,16 @@ impl Cantilever {
     /// relaxing arm's) and those of its contact law, its second tone and its measured modes.
     pub fn parameters(&self) -> Vec<Parameter> {
         let of_solid = self.contact == ContactLaw::StandardLinearSolid;
+        let of_surface = self.contact == ContactLaw::MovingSurface;
         let of_law = self.law.is_some();
         Parameter::every()
             .filter(|parameter| match parameter {
                 Parameter::Alpha4 | Parameter::Alpha6 if of_law => false,
                 Parameter::Alpha6 => !of_solid,
                 Parameter::RelaxationStiffness | Parameter::RelaxationTime => of_solid,
+                Parameter::SurfaceStiffness
+                | Parameter::SurfaceDamping
+                | Parameter::AdhesionForce => of_surface && !of_law,
                 Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
                 Parameter::Mode2Frequency
                 | Parameter::Mode3Frequency
@@ -219,15 +237,28 @@ impl Cantilever {
         f64::from(repetition) * std::f64::consts::TAU / self.omega
     }
 
-    /// What is wrong with a value of a parameter that this case does not have.
+    /// What is wrong with the value of a parameter beside this case's law and drive: one that it
+    /// does not have, or one that it cannot do without.
     pub(crate) fn misplaced(&self, parameter: Parameter) -> Option<Reason> {
-        if self.get(parameter) == 0.0 || self.parameters().contains(&parameter) {
+        let there = self.parameters().contains(&parameter);
+        let own = [Parameter::SurfaceStiffness, Parameter::SurfaceDamping];
+        if there && own.contains(&parameter) && self.get(parameter) == 0.0 {
+            return Some(Reason::BareSurface);
+        }
+        let slowest = LEAST_SURFACE_DAMPING * self.surface.stiffness.max(1.0);
+        if there && parameter == Parameter::SurfaceDamping && self.surface.damping < slowest {
+            return Some(Reason::FastSurface);
+        }
+        if there || self.get(parameter) == 0.0 {
             return None;
         }
         Some(match parameter {
             Parameter::Alpha4 | Parameter::Alpha6 if self.law.is_some() => Reason::SpringOfLaw,
             Parameter::Alpha6 => Reason::DamperOfSolid,
             Parameter::Tone2Amplitude | Parameter::Tone2Phase => Reason::NoSecondTone,
+            Parameter::SurfaceStiffness | Parameter::SurfaceDamping | Parameter::AdhesionForce => {
+                Reason::NoMovingSurface
+            }
             _ => Reason::NoSolid,
         })
     }
@@ -343,6 +374,12 @@ pub enum Reason {
     SpringOfLaw,
     /// A relaxing arm of another law.
     NoSolid,
+    /// A surface of its own under another law.
+    NoMovingSurface,
+    /// A moving surface without a spring or a damper of its own.
+    BareSurface,
+    /// A moving surface that recovers in no time that counts.
+    FastSurface,
     /// A second tone without a frequency.
     NoSecondTone,
 }
@@ -383,6 +420,18 @@ impl fmt::Display for Reason {
             ),
             Self::NoSolid => formatter.write_str(
                 "belongs to contact = \"standard-linear-solid\"; leave it out with any other",
+            ),
+            Self::NoMovingSurface => formatter
+                .write_str("belongs to contact = \"moving-surface\"; leave it out with any other"),
+            Self::BareSurface => formatter.write_str(
+                "must be above 0 with contact = \"moving-surface\": the surface has a spring and a \
+                 damper of its own, and without one it is a \"kelvin-voigt\" or \"spring-damper\" \
+                 sample",
+            ),
+            Self::FastSurface => write!(
+                formatter,
+                "must be at least {LEAST_SURFACE_DAMPING:e}, and that part of surface_stiffness: \
+                 such a surface recovers at once"
             ),
         }
     }

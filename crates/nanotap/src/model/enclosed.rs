@@ -30,6 +30,12 @@ pub enum EnclosureError {
     /// Modes that were measured.
     #[error("proofs are of uniform beams, and this one has measured higher modes")]
     MeasuredModes,
+    /// A force that jumps where contact begins.
+    #[error(
+        "proofs are of contact forces that begin at zero or with a damper, and that of a \
+         \"moving-surface\" jumps by its adhesion"
+    )]
+    MovingSurface,
     /// A motion that was integrated step by step.
     #[error("the motion is not known in closed form")]
     NotPiecewiseLinear,
@@ -82,6 +88,9 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     }
     if case.higher_modes != HigherModes::NONE {
         return Err(EnclosureError::MeasuredModes);
+    }
+    if case.contact == ContactLaw::MovingSurface {
+        return Err(EnclosureError::MovingSurface);
     }
     let law = ContactLaw::law(case, None);
     let beam = EnclosedBeam::new(case, law.has_memory)?;

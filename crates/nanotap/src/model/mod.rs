@@ -41,7 +41,7 @@ use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::contact::ContactLaw;
 use crate::model::galerkin::{Galerkin, Regime};
-use crate::model::nonlinear::{Nonlinear, Variation};
+use crate::model::nonlinear::{Equilibrium, Nonlinear, Variation};
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
 
@@ -278,6 +278,32 @@ impl Model {
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
+    }
+
+    /// Where the undriven system can rest, the tip farthest away first: of a piecewise-linear one
+    /// at the constant part of each regime's response, where no guard of that regime is passed.
+    pub fn equilibria(&self) -> Vec<Equilibrium> {
+        if let Some(nonlinear) = &self.nonlinear {
+            return nonlinear.equilibria();
+        }
+        let (regimes, transitions) = (self.system.regimes(), self.system.transitions());
+        let mut found = Vec::new();
+        for (r, regime) in regimes.iter().enumerate() {
+            let state = &regime.response().constant;
+            let at = |output: &Output| (&output.row * state)[0] + output.constant;
+            if !transitions[r].iter().all(|out| at(&out.guard) > 0.0) {
+                continue;
+            }
+            found.push(Equilibrium {
+                gap: at(&self.height),
+                deflection: at(&self.tip),
+                force: at(&self.force[r]),
+                contact: self.contact[r],
+                stable: regime.basis().eigenvalues.iter().all(|z| z.re < 0.0),
+            });
+        }
+        found.sort_by(|a, b| b.gap.total_cmp(&a.gap));
+        found
     }
 
     /// Dimension of the state.

@@ -28,6 +28,12 @@ pub enum Parameter {
     /// Time in which the force of that arm decays at constant indentation, in the model's
     /// unit of time √(mL⁴/(EI)).
     RelaxationTime,
+    /// k_s L³/(EI): a moving surface's own stiffness over bending stiffness.
+    SurfaceStiffness,
+    /// Its own damping, as α6.
+    SurfaceDamping,
+    /// F L³/(EI g₀): force that pulls a touching tip to a moving surface.
+    AdhesionForce,
     /// Amplitude of the second tone, measured as α2.
     Tone2Amplitude,
     /// Phase θ of the second tone in degrees: it is sin(ρΩτ + θ), ρ the ratio of frequencies.
@@ -57,9 +63,12 @@ impl Parameter {
     ];
 
     /// Parameters that only some samples, drives and levers have; 0 where they are not said.
-    pub const FURTHER: [Self; 9] = [
+    pub const FURTHER: [Self; 12] = [
         Self::RelaxationStiffness,
         Self::RelaxationTime,
+        Self::SurfaceStiffness,
+        Self::SurfaceDamping,
+        Self::AdhesionForce,
         Self::Tone2Amplitude,
         Self::Tone2Phase,
         Self::Mode2Frequency,
@@ -86,6 +95,9 @@ impl Parameter {
             Self::Omega => "omega",
             Self::RelaxationStiffness => "relaxation_stiffness",
             Self::RelaxationTime => "relaxation_time",
+            Self::SurfaceStiffness => "surface_stiffness",
+            Self::SurfaceDamping => "surface_damping",
+            Self::AdhesionForce => "adhesion_force",
             Self::Tone2Amplitude => "tone2_amplitude",
             Self::Tone2Phase => "tone2_phase",
             Self::Mode2Frequency => "mode2_frequency",

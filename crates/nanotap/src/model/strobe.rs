@@ -10,7 +10,7 @@ use nanotap_flow::jacobian::Jacobian;
 use nanotap_flow::search::sign_changes;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::signal::Signal;
-use nanotap_flow::system::Transition;
+use nanotap_flow::system::{Switch, Transition};
 use nanotap_flow::{Flow, FlowError, Output, System};
 
 use crate::model::nonlinear::NonlinearStrobe;
@@ -127,8 +127,8 @@ impl StroboscopicMap for Strobe {
         }
     }
 
-    /// From the trace of the equations and the time in each regime, and of a rigid stop
-    /// from its impacts.
+    /// From the trace of the equations and the time in each regime, and from switches at which
+    /// the motion jumps or turns.
     fn advance_with_jacobian_and_determinant(
         &mut self,
         state: &mut [f64],
@@ -137,7 +137,7 @@ impl StroboscopicMap for Strobe {
         match &mut self.0 {
             Engine::Exact(map) => {
                 let determinant = map.advance_with_jacobian_and_determinant(state, jacobian)?;
-                Ok(Some(determinant))
+                Ok(Some(determinant).filter(|log| !log.is_nan()))
             }
             Engine::Nonlinear(map) => {
                 map.advance_with_derivatives(state, jacobian, None)?;
@@ -270,8 +270,8 @@ impl ExactStrobe {
         Ok(())
     }
 
-    /// The determinant is from the trace of the equations and the time in each regime, and of
-    /// a rigid stop from its impacts.
+    /// The determinant is from the trace of the equations and the time in each regime, and from
+    /// the switches; not a number where one of them does not tell it.
     fn advance_with_jacobian_and_determinant(
         &mut self,
         state: &mut [f64],
@@ -286,12 +286,22 @@ impl ExactStrobe {
 
     fn log_determinant_bound(&self) -> f64 {
         let system = self.flow.system();
-        let expands = system
+        let mut transitions = system
             .transitions()
             .iter()
-            .flatten()
-            .any(|transition| log_impact(transition) > 0.0);
-        if expands {
+            .enumerate()
+            .flat_map(|(r, out)| {
+                let all = 0..out.len();
+                all.map(move |transition| (r, transition, &out[transition]))
+            });
+        let expands = |(r, transition, taken): (usize, usize, &Transition)| {
+            let keeps = || {
+                let switch = system.switch_of(r, transition);
+                switch.is_some_and(Switch::keeps_volume)
+            };
+            log_impact(taken).map_or_else(|| !keeps(), |log| log > 0.0)
+        };
+        if transitions.any(expands) {
             return f64::INFINITY;
         }
         // Where nothing moves the motion sticks, and its volume is gone.
@@ -323,14 +333,13 @@ impl ExactStrobe {
 }
 
 /// log|det| of what an impact does to volumes: the reset itself, and once more as much
-/// for the times at which neighbouring motions meet the stop.
-fn log_impact(transition: &Transition) -> f64 {
-    transition.reset.as_ref().map_or(0.0, |r| {
-        2.0 * nanotap_arithmetic::ln(r.matrix.determinant().abs())
-    })
+/// for the times at which neighbouring motions meet the stop. `None` of a continuous switch.
+fn log_impact(transition: &Transition) -> Option<f64> {
+    let reset = transition.reset.as_ref()?;
+    Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))
 }
 
-/// Sums log|det| over a period: tr A · t in every regime, and the impacts.
+/// Sums log|det| over a period: tr A · t in every regime, and the switches.
 struct LogDeterminant(f64);
 
 impl Observer for LogDeterminant {
@@ -340,7 +349,9 @@ impl Observer for LogDeterminant {
 
     fn switch(&mut self, switch: &SwitchView<'_>) {
         let transitions = &switch.system.transitions()[switch.switch.from];
-        self.0 += transitions.get(switch.transition).map_or(0.0, log_impact);
+        let impact = transitions.get(switch.transition).and_then(log_impact);
+        let continuous = || switch.switch.log_determinant(switch.rate);
+        self.0 += impact.or_else(continuous).unwrap_or(f64::NAN);
     }
 }
 

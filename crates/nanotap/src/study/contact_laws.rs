@@ -2,7 +2,7 @@
 //!
 //! The samples share spring α4 and damper; the standard linear solid has the damper in series
 //! with an arm of a given stiffness, so that with an ever stiffer arm it becomes the
-//! Kelvin–Voigt surface. Compared are the periodic orbit of one period on each, stable or
+//! Kelvin–Voigt surface. A moving surface is compared where the case has one. Compared are the periodic orbit of one period on each, stable or
 //! not, and how it goes on with the drive frequency.
 
 use nanotap_dynamics::{ClassifyOptions, Control, ShootingOptions, classify, close_orbit};
@@ -18,6 +18,7 @@ use crate::case::{CaseError, Key};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
+use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
 use crate::model::strobe::Strobe;
@@ -127,7 +128,7 @@ pub struct Comparison {
     pub samples: Vec<SampleMotion>,
 }
 
-/// The case with each law, spring and damper the same.
+/// The case with each law, spring and damper the same; a moving surface only where it has one.
 ///
 /// # Errors
 /// [`ComparisonError::Arm`] when the arm's stiffness is not positive.
@@ -143,8 +144,11 @@ pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Com
     } else {
         case.alpha6
     };
+    // What a surface of its own would be, only a case that has one says.
+    let moves = case.contact == ContactLaw::MovingSurface;
     Ok(ContactLaw::ALL
         .into_iter()
+        .filter(|contact| moves || *contact != ContactLaw::MovingSurface)
         .map(|contact| {
             let solid = contact == ContactLaw::StandardLinearSolid;
             Cantilever {
@@ -152,6 +156,11 @@ pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Com
                 alpha6: if solid { 0.0 } else { damper },
                 relaxation_stiffness: if solid { arm } else { 0.0 },
                 relaxation_time: if solid { damper / arm } else { 0.0 },
+                surface: if contact == ContactLaw::MovingSurface {
+                    case.surface
+                } else {
+                    MovingSurface::NONE
+                },
                 ..case.clone()
             }
         })

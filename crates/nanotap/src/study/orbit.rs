@@ -391,8 +391,8 @@ fn flights(model: &Model, trajectory: &Trajectory) -> impl Iterator<Item = f64> 
         .into_iter()
 }
 
-/// log|det DPⁿ| from Liouville's formula: every switch has determinant ±(product of
-/// the resets), every segment e^{tr A · length}.
+/// log|det DPⁿ| from Liouville's formula: every impact has determinant ±(product of the
+/// resets), every other switch that of its saltation, every segment e^{tr A · length}.
 fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
     // A memory that is forgotten is left out, and its jump with it.
     let forgets = model.forgetting.as_ref();
@@ -415,8 +415,11 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
             let transition = model.system.transitions()[e.from]
                 .iter()
                 .find(|x| x.target == e.to)?;
-            let reset = transition.reset.as_ref().filter(|_| forgets.is_none())?;
-            Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))
+            let Some(reset) = &transition.reset else {
+                return Some(e.log_determinant.unwrap_or(f64::NAN));
+            };
+            let impact = || 2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs());
+            forgets.is_none().then(impact)
         })
         .sum();
     flow + impacts

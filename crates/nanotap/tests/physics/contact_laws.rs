@@ -4,6 +4,7 @@ use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::{Set, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
@@ -20,15 +21,22 @@ pub(crate) fn on(law: ContactLaw, omega: f64) -> Cantilever {
         omega,
         ..Cantilever::paper()
     };
-    if law == ContactLaw::StandardLinearSolid {
-        Cantilever {
+    match law {
+        ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => case,
+        ContactLaw::StandardLinearSolid => Cantilever {
             alpha6: 0.0,
             relaxation_stiffness: 40.0,
             relaxation_time: 0.05,
             ..case
-        }
-    } else {
-        case
+        },
+        ContactLaw::MovingSurface => Cantilever {
+            surface: MovingSurface {
+                stiffness: 60.0,
+                damping: 8.0,
+                adhesion: 0.4,
+            },
+            ..case
+        },
     }
 }
 
@@ -75,7 +83,8 @@ fn every_law_agrees_with_located_runge_kutta() {
                 "{law}: {}",
                 seen.least_force
             );
-            assert_eq!(pulls, law == ContactLaw::SpringDamper);
+            let may_pull = [ContactLaw::SpringDamper, ContactLaw::MovingSurface];
+            assert_eq!(pulls, may_pull.contains(&law));
             assert!(seen.energy_balance.residual.abs() < 1e-11);
         }
     }
@@ -142,7 +151,7 @@ proptest! {
     /// recovers never pulls, and only contact ends contact.
     #[test]
     fn samples_are_passive(
-        law in 0..3_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
+        law in 0..4_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
         stiffness in 0.0..200.0_f64, damping in 1e-6..20.0_f64, gap in -0.2..0.3_f64,
         a in -0.3..0.3_f64, v in -3.0..3.0_f64, memory in -0.3..0.3_f64,
     ) {
@@ -156,6 +165,10 @@ proptest! {
         } else {
             case.alpha6 = damping;
         }
+        if law == ContactLaw::MovingSurface {
+            let adhesion = 3.0 * gap.max(0.0);
+            case.surface = MovingSurface { stiffness: 1.0 + 0.5 * stiffness, damping, adhesion };
+        }
         let model = Model::cantilever(&case).unwrap();
         let mut state = vec![0.0; model.dimension()];
         (state[0], state[modes]) = (a, v);
@@ -165,7 +178,7 @@ proptest! {
         let run = Trajectory::record(&model.system, &state, 8).unwrap();
         let seen = measure(&model, &state, 8, Set::ALL).unwrap();
         prop_assert!(seen.energy_balance.sample_damping >= 0.0);
-        if law != ContactLaw::SpringDamper {
+        if ![ContactLaw::SpringDamper, ContactLaw::MovingSurface].contains(&law) {
             let scale = seen.peak_force.max(stiffness * (a.abs() + memory.abs())) + 1e-3;
             // A start in the sample may be given that pulls for no time at all.
             prop_assert!(seen.least_force >= -1e-10 * scale, "{}", seen.least_force);

@@ -120,6 +120,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
                 alpha6: sample.alpha6,
                 relaxation_stiffness: sample.relaxation_stiffness,
                 relaxation_time: sample.relaxation_time,
+                surface: sample.surface,
                 ..two_tones(actuation)
             };
             let subject = Case::from(case);

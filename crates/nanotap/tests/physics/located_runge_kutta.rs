@@ -52,13 +52,29 @@ impl Independent {
     }
 
     /// Force of the touched sample on the tip at height `h` and speed `v`.
-    fn pressed(&self, h: f64, v: f64, damper: f64) -> f64 {
-        let c = &self.case;
+    fn pressed(&self, h: f64, v: f64, m: &Motion) -> f64 {
+        let (c, damper) = (&self.case, m.damper);
         match c.contact {
             ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => -c.alpha4 * h - c.alpha6 * v,
             ContactLaw::StandardLinearSolid => {
                 -c.alpha4 * h + c.relaxation_stiffness * (-h - damper)
             }
+            ContactLaw::MovingSurface => {
+                let rate = v - self.surface_speed(h, v, m);
+                -c.surface.adhesion - c.alpha4 * (h - m.surface) - c.alpha6 * rate
+            }
+        }
+    }
+
+    /// Speed of a moving surface, at which the two dampers and springs balance.
+    fn surface_speed(&self, h: f64, v: f64, m: &Motion) -> f64 {
+        let (c, own) = (&self.case, self.case.surface);
+        let springs = -own.stiffness * m.surface;
+        if m.touching {
+            let held = own.adhesion + c.alpha4 * (h - m.surface) + c.alpha6 * v;
+            (springs + held) / (own.damping + c.alpha6)
+        } else {
+            springs / own.damping
         }
     }
 
@@ -67,7 +83,7 @@ impl Independent {
         let c = &self.case;
         match c.contact {
             ContactLaw::SpringDamper => 0.0,
-            ContactLaw::KelvinVoigt => m.surface,
+            ContactLaw::KelvinVoigt | ContactLaw::MovingSurface => m.surface,
             // α4 u + k (u + w) = 0
             ContactLaw::StandardLinearSolid => {
                 -c.relaxation_stiffness * m.damper / (c.alpha4 + c.relaxation_stiffness)
@@ -80,7 +96,7 @@ impl Independent {
         let n = c.modes;
         let [h, v] = self.height(t, &m.beam);
         let force = if m.touching {
-            self.pressed(h, v, m.damper)
+            self.pressed(h, v, m)
         } else {
             0.0
         };
@@ -109,6 +125,12 @@ impl Independent {
                 let speed = (-at - m.damper) / c.relaxation_time;
                 let viscosity = c.relaxation_stiffness * c.relaxation_time;
                 (0.0, speed, viscosity * speed * speed)
+            }
+            ContactLaw::MovingSurface => {
+                let speed = self.surface_speed(h, v, m);
+                let rate = if m.touching { v - speed } else { 0.0 };
+                let lost = c.surface.damping * speed * speed + c.alpha6 * rate * rate;
+                (speed, 0.0, lost)
             }
         };
         (beam, [surface, damper, lost])
@@ -143,7 +165,8 @@ impl Independent {
         match (m.touching, self.case.contact) {
             (false, _) => h - self.free_surface(m),
             (true, ContactLaw::SpringDamper) => -h,
-            (true, _) => self.pressed(h, v, m.damper),
+            (true, ContactLaw::MovingSurface) => m.surface - h,
+            (true, _) => self.pressed(h, v, m),
         }
     }
 
@@ -182,7 +205,7 @@ impl Independent {
                 m.touching = !m.touching;
                 m.contacts += usize::from(m.touching);
                 let [height, _] = self.height(t, &m.beam);
-                if m.touching {
+                if m.touching && self.case.contact != ContactLaw::MovingSurface {
                     m.surface = height;
                 }
                 // A small step on, where the guard that is zero here has become positive.
@@ -192,7 +215,7 @@ impl Independent {
             }
             if m.touching {
                 let [height, speed] = self.height(k as f64 * h + h, &m.beam);
-                let force = self.pressed(height, speed, m.damper);
+                let force = self.pressed(height, speed, &m);
                 m.force = [m.force[0].min(force), m.force[1].max(force)];
             }
         }

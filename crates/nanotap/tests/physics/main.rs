@@ -15,6 +15,7 @@ mod kelvin_voigt;
 mod located_runge_kutta;
 mod map;
 mod motions;
+mod moving_surface;
 mod observables;
 mod orbit_derivatives;
 mod references;

@@ -5,6 +5,7 @@ use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::strobe::Strobe;
@@ -152,7 +153,16 @@ fn of_surfaces_with_a_memory() {
         relaxation_time: 0.05,
         ..kelvin_voigt.clone()
     };
-    for (case, step) in [(kelvin_voigt, 5e-4), (solid, 1e-4)] {
+    let moving = Cantilever {
+        contact: ContactLaw::MovingSurface,
+        surface: MovingSurface {
+            stiffness: 60.0,
+            damping: 8.0,
+            adhesion: 0.4,
+        },
+        ..kelvin_voigt.clone()
+    };
+    for (case, step) in [(kelvin_voigt, 5e-4), (solid, 1e-4), (moving, 2e-4)] {
         let case = Case::from(case);
         let mut keys = case.keys();
         // A solid takes no damper beside it.

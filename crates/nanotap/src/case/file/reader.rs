@@ -289,9 +289,11 @@ pub(crate) fn modes(stated: &Stated) -> usize {
 /// The value of a key that need not be written, with a sample of this law.
 pub(super) fn default_of(key: Key, law: ContactLaw) -> Option<f64> {
     let solid = law == ContactLaw::StandardLinearSolid;
+    let moves = law == ContactLaw::MovingSurface;
     match (key, key.entry().default) {
         (Key::Alpha6, _) if solid => Some(0.0),
         (Key::RelaxationStiffness | Key::RelaxationTime, _) if !solid => Some(0.0),
+        (Key::SurfaceStiffness | Key::SurfaceDamping, _) if !moves => Some(0.0),
         (_, Default::Number(value)) => Some(value),
         _ => None,
     }

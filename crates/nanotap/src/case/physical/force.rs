@@ -46,7 +46,7 @@ const OF_LAWS: [Key; 20] = [
 ];
 
 /// Keys of a linear sample that a nonlinear law may take too, or not.
-const OF_SAMPLES: [Key; 9] = [
+const OF_SAMPLES: [Key; 11] = [
     Key::SampleMaterial,
     Key::SampleModulus,
     Key::SamplePoisson,
@@ -56,6 +56,8 @@ const OF_SAMPLES: [Key; 9] = [
     Key::SampleIndentation,
     Key::SampleRelaxationStiffness,
     Key::SampleRelaxationTime,
+    Key::SampleSurfaceStiffness,
+    Key::SampleSurfaceDamping,
 ];
 
 /// A law, or a sum of laws, with its parameters in SI.
@@ -92,7 +94,9 @@ pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
 /// Whether a linear contact takes a key of [`keys_of_contacts`].
 pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
     let solid = law == ContactLaw::StandardLinearSolid;
+    let moves = law == ContactLaw::MovingSurface;
     match key {
+        Key::SampleSurfaceStiffness | Key::SampleSurfaceDamping | Key::SampleAdhesionForce => moves,
         Key::SampleDamping | Key::SampleLossTangent => !solid,
         Key::SampleRelaxationStiffness | Key::SampleRelaxationTime => solid,
         _ => OF_SAMPLES.contains(&key),
@@ -144,9 +148,15 @@ impl SampleForce {
     /// What `[sample]` says, if its law is nonlinear.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Option<Self>, PhysicalError> {
         let Some(name) = reader.name(Key::SampleLaw) else {
-            let stated = OF_LAWS.into_iter().find(|key| reader.has(*key));
-            return stated.map_or(Ok(None), |key| {
-                let reason = "it belongs to a nonlinear force law, as in sample.law = \"dmt\"";
+            let law = crate::case::file::word(reader.stated, Key::SampleLaw).unwrap_or_default();
+            let strange = |key: &Key| reader.has(*key) && !linear_takes(law, *key);
+            return OF_LAWS.into_iter().find(strange).map_or(Ok(None), |key| {
+                let reason = if key == Key::SampleAdhesionForce {
+                    "it belongs to a law with adhesion, as sample.law = \"dmt\" or \
+                     \"moving-surface\""
+                } else {
+                    "it belongs to a nonlinear force law, as in sample.law = \"dmt\""
+                };
                 Err(reader.impossible(key, reason))
             });
         };

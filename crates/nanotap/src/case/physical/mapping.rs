@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::lever::Lever;
 use crate::case::quantity::Kind;
 use crate::model::cantilever::Cantilever;
+use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::drive_form::Actuation;
 use crate::model::higher_modes::HigherModes;
 use crate::model::parameter::Parameter;
@@ -74,10 +75,12 @@ impl Scales {
             Parameter::Alpha5 => self.length,
             Parameter::Tone2Phase => 1_f64.to_radians(),
             Parameter::Mode2Quality | Parameter::Mode3Quality => 1.0,
-            Parameter::Alpha3 | Parameter::Alpha6 => self.damping,
-            Parameter::Alpha4 | Parameter::RelaxationStiffness | Parameter::Mode2Stiffness => {
-                self.stiffness
-            }
+            Parameter::Alpha3 | Parameter::Alpha6 | Parameter::SurfaceDamping => self.damping,
+            Parameter::Alpha4
+            | Parameter::RelaxationStiffness
+            | Parameter::SurfaceStiffness
+            | Parameter::Mode2Stiffness => self.stiffness,
+            Parameter::AdhesionForce => self.force,
             Parameter::Omega | Parameter::Mode2Frequency | Parameter::Mode3Frequency => {
                 self.frequency
             }
@@ -107,6 +110,9 @@ pub struct PhysicalParameters {
     pub relaxation_stiffness: f64,
     /// Its relaxation time, in s.
     pub relaxation_time: f64,
+    /// What a moving surface has of its own, in N/m, N s/m and N.
+    #[serde(flatten)]
+    pub surface: MovingSurface,
     /// Amplitude of the second tone, in m or N; 0 without one.
     pub tone2_amplitude: f64,
     /// Its phase in rad.
@@ -130,6 +136,11 @@ impl PhysicalParameters {
             drive_frequency: value(Parameter::Omega),
             relaxation_stiffness: value(Parameter::RelaxationStiffness),
             relaxation_time: value(Parameter::RelaxationTime),
+            surface: MovingSurface {
+                stiffness: value(Parameter::SurfaceStiffness),
+                damping: value(Parameter::SurfaceDamping),
+                adhesion: value(Parameter::AdhesionForce),
+            },
             tone2_amplitude: value(Parameter::Tone2Amplitude),
             tone2_phase: value(Parameter::Tone2Phase),
             higher_modes: HigherModes {
@@ -161,6 +172,9 @@ impl PhysicalParameters {
             Parameter::Omega => self.drive_frequency,
             Parameter::RelaxationStiffness => self.relaxation_stiffness,
             Parameter::RelaxationTime => self.relaxation_time,
+            Parameter::SurfaceStiffness => self.surface.stiffness,
+            Parameter::SurfaceDamping => self.surface.damping,
+            Parameter::AdhesionForce => self.surface.adhesion,
             Parameter::Tone2Amplitude => self.tone2_amplitude,
             Parameter::Tone2Phase => self.tone2_phase,
             Parameter::Mode2Frequency => self.higher_modes.frequency[0],
@@ -255,6 +269,21 @@ const fn description(
             Kind::Stiffness,
         ),
         Parameter::RelaxationTime => ("time/T", "relaxation time of the arm", Kind::Time),
+        Parameter::SurfaceStiffness => (
+            "ks L^3/(EI) = 3 ks/k",
+            "the surface's own stiffness ks",
+            Kind::Stiffness,
+        ),
+        Parameter::SurfaceDamping => (
+            "(etas/L) sqrt(L^4/(m EI)) = etas T/(m L)",
+            "the surface's own damping etas",
+            Kind::Damping,
+        ),
+        Parameter::AdhesionForce => (
+            "F L^3/(EI g0) = 3 F/(k g0)",
+            "adhesion force F",
+            Kind::Force,
+        ),
         Parameter::Mode2Frequency => ("2 pi f2 T", "frequency of the second mode", Kind::Frequency),
         Parameter::Mode3Frequency => ("2 pi f3 T", "frequency of the third mode", Kind::Frequency),
         Parameter::Mode2Quality => ("Q2", "quality factor of the second mode", Kind::Number),

@@ -13,6 +13,7 @@ use super::tip::Tip;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
+use crate::model::contact::moving_surface::MovingSurface;
 
 /// Elastic constants of an isotropic solid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -149,6 +150,8 @@ pub struct Sample {
     pub relaxation_stiffness: f64,
     /// Its relaxation time in s.
     pub relaxation_time: f64,
+    /// What a moving surface has of its own, in N/m, N s/m and N.
+    pub surface: MovingSurface,
     /// Its elastic constants, where they are known.
     pub elastic: Option<Elastic>,
     /// A nonlinear force law in place of all these.
@@ -166,6 +169,7 @@ impl Sample {
                 law: ContactLaw::default(),
                 relaxation_stiffness: 0.0,
                 relaxation_time: 0.0,
+                surface: MovingSurface::NONE,
                 elastic: None,
                 force: Some(force),
             });
@@ -191,6 +195,7 @@ impl Sample {
             law,
             relaxation_stiffness,
             relaxation_time,
+            surface: read_surface(reader, law)?,
             elastic,
             force: None,
         })
@@ -233,9 +238,11 @@ impl Sample {
             }));
         }
         if self.damping.is_none() && self.law != ContactLaw::StandardLinearSolid {
-            remarks.push(Remark::note(
-                "sample.damping is not given: the contact dissipates nothing",
-            ));
+            remarks.push(Remark::note(if self.law == ContactLaw::MovingSurface {
+                "sample.damping is not given: only the surface's own motion dissipates"
+            } else {
+                "sample.damping is not given: the contact dissipates nothing"
+            }));
         }
         remarks
     }
@@ -248,6 +255,31 @@ impl Sample {
             Some(SampleDamping::LossTangent(tangent)) => tangent * self.stiffness / omega,
         }
     }
+}
+
+/// What a moving surface has of its own, and no other linear sample.
+fn read_surface(reader: Reader<'_>, law: ContactLaw) -> Result<MovingSurface, PhysicalError> {
+    let own = [Key::SampleSurfaceStiffness, Key::SampleSurfaceDamping];
+    if law != ContactLaw::MovingSurface {
+        let given = own.into_iter().find(|key| reader.has(*key));
+        return given.map_or(Ok(MovingSurface::NONE), |key| {
+            Err(reader.impossible(key, "it belongs to sample.law = \"moving-surface\""))
+        });
+    }
+    let needed = |key: Key| {
+        reader.number(key)?.ok_or_else(|| {
+            PhysicalError::missing(
+                key,
+                "a moving surface has a spring and a damper of its own, as in \
+                 surface_stiffness = \"2 N/m\" and surface_damping = \"1e-6 N s/m\"",
+            )
+        })
+    };
+    Ok(MovingSurface {
+        stiffness: needed(own[0])?,
+        damping: needed(own[1])?,
+        adhesion: reader.number(Key::SampleAdhesionForce)?.unwrap_or(0.0),
+    })
 }
 
 /// Stiffness and time of the relaxing arm, which the standard linear solid has in place of

@@ -14,6 +14,7 @@ use crate::case::file::{CaseFileError, Place};
 use crate::case::key::{Key, Section};
 use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
+use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::exact_beam;
 use crate::model::higher_modes::HigherModes;
 
@@ -364,6 +365,7 @@ fn units_are_those_of_the_beam_equation() {
         drive_frequency: 65.7e3,
         relaxation_stiffness: 0.0,
         relaxation_time: 0.0,
+        surface: MovingSurface::NONE,
         tone2_amplitude: 0.0,
         tone2_phase: 0.0,
         higher_modes: HigherModes::NONE,

@@ -18,6 +18,7 @@ use crate::case::key::{Key, ModelKind};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
 use crate::model::cantilever::Cantilever;
+use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
 use crate::model::higher_modes::HigherModes;
@@ -139,6 +140,8 @@ impl Physical {
             | Key::SampleLossTangent
             | Key::SampleRelaxationStiffness
             | Key::SampleRelaxationTime
+            | Key::SampleSurfaceStiffness
+            | Key::SampleSurfaceDamping
                 if self.sample.force.is_some() =>
             {
                 return None;
@@ -150,6 +153,11 @@ impl Physical {
             }
             Key::SampleRelaxationStiffness => parameters.relaxation_stiffness,
             Key::SampleRelaxationTime => parameters.relaxation_time,
+            Key::SampleSurfaceStiffness => parameters.surface.stiffness,
+            Key::SampleSurfaceDamping => parameters.surface.damping,
+            Key::SampleAdhesionForce if self.cantilever.contact == ContactLaw::MovingSurface => {
+                parameters.surface.adhesion
+            }
             Key::SampleModulus => self.sample.elastic?.modulus,
             Key::SamplePoisson => self.sample.elastic?.poisson,
             Key::SampleIndentation => self.sample.hertz?.indentation,
@@ -295,6 +303,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         drive_frequency: frequency,
         relaxation_stiffness: sample.relaxation_stiffness,
         relaxation_time: sample.relaxation_time,
+        surface: sample.surface,
         tone2_amplitude: second.map_or(0.0, |(_, (applied, _))| applied),
         tone2_phase: second.map_or(0.0, |(phase, _)| phase),
         higher_modes: measured,

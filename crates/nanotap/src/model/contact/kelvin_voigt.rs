@@ -59,10 +59,13 @@ pub(super) fn law(stiffness: Dual, damping: Dual) -> Law {
                 weight: damping.value,
                 of: recovers,
             }],
-            stored: vec![Square {
-                weight: 0.5 * stiffness.value,
-                of: Combination::memory(one),
-            }],
+            stored: vec![
+                Square {
+                    weight: 0.5 * stiffness.value,
+                    of: Combination::memory(one),
+                }
+                .into(),
+            ],
         },
         contact: Answer {
             memory_rate: recovers,

@@ -4,12 +4,13 @@ use nanotap_flow::Onset;
 
 use super::dual::Dual;
 
-/// `height · V_T + rate · V̇_T + memory · s`.
+/// `height · V_T + rate · V̇_T + memory · s + constant`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Combination {
     pub(crate) height: Dual,
     pub(crate) rate: Dual,
     pub(crate) memory: Dual,
+    pub(crate) constant: Dual,
 }
 
 impl Combination {
@@ -34,11 +35,19 @@ impl Combination {
         }
     }
 
+    pub(crate) fn constant(constant: Dual) -> Self {
+        Self {
+            constant,
+            ..Self::default()
+        }
+    }
+
     pub(crate) fn plus(self, other: Self) -> Self {
         Self {
             height: self.height + other.height,
             rate: self.rate + other.rate,
             memory: self.memory + other.memory,
+            constant: self.constant + other.constant,
         }
     }
 
@@ -47,6 +56,7 @@ impl Combination {
             height: self.height * factor,
             rate: self.rate * factor,
             memory: self.memory * factor,
+            constant: self.constant * factor,
         }
     }
 }
@@ -56,6 +66,24 @@ impl Combination {
 pub(crate) struct Square {
     pub(crate) weight: f64,
     pub(crate) of: Combination,
+}
+
+/// `weight · one · other`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bilinear {
+    pub(crate) weight: f64,
+    pub(crate) one: Combination,
+    pub(crate) other: Combination,
+}
+
+impl From<Square> for Bilinear {
+    fn from(square: Square) -> Self {
+        Self {
+            weight: square.weight,
+            one: square.of,
+            other: square.of,
+        }
+    }
 }
 
 /// What the sample does while the tip is away, or while it touches.
@@ -68,7 +96,7 @@ pub(crate) struct Answer {
     /// Power that the sample takes.
     pub(crate) dissipated: Vec<Square>,
     /// Energy that it stores.
-    pub(crate) stored: Vec<Square>,
+    pub(crate) stored: Vec<Bilinear>,
 }
 
 /// A contact law.

@@ -2,15 +2,17 @@
 //!
 //! A law says in numbers only what the beam need know: the force in contact, what the free
 //! surface does meanwhile, when contact begins and ends, and where energy goes. All are sums
-//! `h V_T + r V̇_T + m s` of the height V_T of the tip over the undeformed surface, its rate,
-//! and the one number `s` that a surface with a memory carries; see `law::Law`. The model
+//! `h V_T + r V̇_T + m s + c` of the height V_T of the tip over the undeformed surface, its rate,
+//! the one number `s` that a surface with a memory carries, and a constant; see `law::Law`. The model
 //! joins them with the beam to a piecewise-linear system.
 //!
 //! - `spring_damper`: the paper's; contact is where V_T ≤ 0, and its damper pulls on a tip
 //!   that leaves;
 //! - `kelvin_voigt`: the same spring and damper as a surface of its own; contact ends when
 //!   the force is zero, and the surface recovers until the tip meets it again;
-//! - `standard_linear_solid`: a spring beside a spring and damper in series.
+//! - `standard_linear_solid`: a spring beside a spring and damper in series;
+//! - `moving_surface`: spring, damper and adhesion to a surface with a spring and a damper of its
+//!   own.
 //!
 //! A law that is not linear (Hertz, DMT, JKR) has no place here, since its flow has no closed
 //! form: see [`nonlinear`](crate::model::nonlinear).
@@ -18,6 +20,7 @@
 pub(crate) mod dual;
 mod kelvin_voigt;
 pub(crate) mod law;
+pub mod moving_surface;
 mod spring_damper;
 mod standard_linear_solid;
 
@@ -44,14 +47,18 @@ pub enum ContactLaw {
     KelvinVoigt,
     /// A surface of a spring α4 beside a relaxing arm: a spring and a damper in series.
     StandardLinearSolid,
+    /// A surface with a spring and a damper of its own, which the tip touches through spring α4
+    /// and damper α6 and which holds it by a constant adhesion.
+    MovingSurface,
 }
 
 impl ContactLaw {
     /// Every law.
-    pub const ALL: [Self; 3] = [
+    pub const ALL: [Self; 4] = [
         Self::SpringDamper,
         Self::KelvinVoigt,
         Self::StandardLinearSolid,
+        Self::MovingSurface,
     ];
 
     /// Its name in case files.
@@ -60,6 +67,7 @@ impl ContactLaw {
             Self::SpringDamper => "spring-damper",
             Self::KelvinVoigt => "kelvin-voigt",
             Self::StandardLinearSolid => "standard-linear-solid",
+            Self::MovingSurface => "moving-surface",
         }
     }
 
@@ -69,6 +77,7 @@ impl ContactLaw {
             Self::SpringDamper => "spring and damper where the tip is below the surface",
             Self::KelvinVoigt => "spring and damper as a surface that recovers by itself",
             Self::StandardLinearSolid => "spring beside a relaxing arm, as a surface that recovers",
+            Self::MovingSurface => "spring, damper and adhesion to a surface that moves by itself",
         }
     }
 
@@ -83,6 +92,15 @@ impl ContactLaw {
                 stiffness,
                 dual(Parameter::RelaxationStiffness),
                 dual(Parameter::RelaxationTime),
+            ),
+            Self::MovingSurface => moving_surface::law(
+                [stiffness, dual(Parameter::Alpha6)],
+                [
+                    Parameter::SurfaceStiffness,
+                    Parameter::SurfaceDamping,
+                    Parameter::AdhesionForce,
+                ]
+                .map(dual),
             ),
         }
     }

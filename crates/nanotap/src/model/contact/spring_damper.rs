@@ -23,10 +23,13 @@ pub(super) fn law(stiffness: Dual, damping: Dual) -> Law {
                 weight: damping.value,
                 of: Combination::rate(one),
             }],
-            stored: vec![Square {
-                weight: 0.5 * stiffness.value,
-                of: Combination::height(one),
-            }],
+            stored: vec![
+                Square {
+                    weight: 0.5 * stiffness.value,
+                    of: Combination::height(one),
+                }
+                .into(),
+            ],
         },
         plain_contact: true,
     }

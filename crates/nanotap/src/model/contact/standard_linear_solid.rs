@@ -41,11 +41,13 @@ pub(super) fn law(stiffness: Dual, arm: Dual, time: Dual) -> Law {
             Square {
                 weight: 0.5 * stiffness.value,
                 of: indentation,
-            },
+            }
+            .into(),
             Square {
                 weight: 0.5 * arm.value,
                 of: elongation,
-            },
+            }
+            .into(),
         ],
     };
     let recovered = Combination::memory(arm / instantaneous);

@@ -1,0 +1,463 @@
+//! The moving surface with adhesion: against an integration by Taylor series that shares nothing
+//! with the engine, limits, similarity, and what a force that jumps does to orbits.
+
+use nalgebra::{DMatrix, DVector};
+use nanotap::case::document::equilibria;
+use nanotap::case::{Case, Key};
+use nanotap::model::Model;
+use nanotap::model::cantilever::Cantilever;
+use nanotap::model::contact::ContactLaw;
+use nanotap::model::contact::moving_surface::MovingSurface;
+use nanotap::model::galerkin::Galerkin;
+use nanotap::model::parameter::Parameter;
+use nanotap::model::strobe::Strobe;
+use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap_dynamics::StroboscopicMap;
+use proptest::prelude::*;
+
+use crate::derivatives::{advance, worst};
+
+/// A lever on a moving surface, driven as in the paper.
+fn lever(modes: usize, omega: f64, surface: MovingSurface) -> Cantilever {
+    Cantilever {
+        modes,
+        omega,
+        alpha5: 0.05,
+        contact: ContactLaw::MovingSurface,
+        surface,
+        ..Cantilever::paper()
+    }
+}
+
+const SURFACE: MovingSurface = MovingSurface {
+    stiffness: 60.0,
+    damping: 8.0,
+    adhesion: 0.4,
+};
+
+/// The equations ẏ = B y in flight and in contact, y = (a, ȧ, s, sin Ωτ, cos Ωτ, 1), written
+/// down from the mechanics, with the row of the gap; solved by Taylor series of order 24 in steps
+/// whose switches are zeros of the gap's series.
+struct Taylor {
+    flight: DMatrix<f64>,
+    contact: DMatrix<f64>,
+    gap: DVector<f64>,
+    /// Largest step.
+    step: f64,
+    period: f64,
+}
+
+const ORDER: usize = 24;
+/// Points of a step at which the sign of the gap is looked at.
+const PARTS: i32 = 64;
+
+impl Taylor {
+    fn new(case: &Cantilever) -> Self {
+        let galerkin = Galerkin::new(case).unwrap();
+        let n = case.modes;
+        let (sine, cosine, one) = (2 * n + 1, 2 * n + 2, 2 * n + 3);
+        let size = 2 * n + 4;
+        let give = galerkin.mass.clone().try_inverse().unwrap();
+        let p = galerkin.modes.tip.clone();
+        let free = &galerkin.forcing[0];
+        let mut flight = DMatrix::zeros(size, size);
+        flight.view_mut((0, n), (n, n)).fill_with_identity();
+        let put = |matrix: &mut DMatrix<f64>, column: usize, of: &DVector<f64>| {
+            matrix
+                .view_mut((n, column), (n, 1))
+                .copy_from(&(&give * of));
+        };
+        flight
+            .view_mut((n, 0), (n, n))
+            .copy_from(&-(&give * &galerkin.stiffness[0]));
+        flight
+            .view_mut((n, n), (n, n))
+            .copy_from(&-(&give * &galerkin.damping[0]));
+        put(&mut flight, sine, &free.sine);
+        put(&mut flight, cosine, &free.cosine);
+        put(&mut flight, one, &free.constant);
+        (flight[(sine, cosine)], flight[(cosine, sine)]) = (case.omega, -case.omega);
+        // V_T and its rate as rows.
+        let mut height = DVector::zeros(size);
+        height.rows_mut(0, n).copy_from(&p);
+        (height[sine], height[one]) = (case.alpha2, case.alpha5);
+        let mut rate = DVector::zeros(size);
+        rate.rows_mut(n, n).copy_from(&p);
+        rate[cosine] = case.alpha2 * case.omega;
+        let own = case.surface;
+        let mut gap = height;
+        gap[2 * n] -= 1.0;
+        // In contact η_s ṡ + k_s s = F + k_v g + η_v (V̇ − ṡ) = −f.
+        let mut unit = DVector::zeros(size);
+        unit[one] = own.adhesion;
+        let mut surface =
+            (&gap * case.alpha4 + &rate * case.alpha6 + unit) / (own.damping + case.alpha6);
+        surface[2 * n] -= own.stiffness / (own.damping + case.alpha6);
+        let mut force = &surface * -own.damping;
+        force[2 * n] -= own.stiffness;
+        let mut contact = flight.clone();
+        contact.row_mut(2 * n).tr_copy_from(&surface);
+        let push = &give * &p * force.transpose();
+        let mut rows = contact.view_mut((n, 0), (n, size));
+        rows += push;
+        flight[(2 * n, 2 * n)] = -own.stiffness / own.damping;
+        let fastest = flight.norm().max(contact.norm());
+        Self {
+            flight,
+            contact,
+            gap,
+            // ‖B‖ is far above the spectral radius √‖K‖ of a stiff beam.
+            step: 1.0 / fastest.sqrt().max(own.stiffness / own.damping),
+            period: case.period(),
+        }
+    }
+
+    /// Taylor coefficients of the motion.
+    fn series(matrix: &DMatrix<f64>, y: &DVector<f64>) -> Vec<DVector<f64>> {
+        let mut terms = vec![y.clone()];
+        for k in 0..ORDER {
+            terms.push(matrix * &terms[k] / (k as f64 + 1.0));
+        }
+        terms
+    }
+
+    fn at(series: &[DVector<f64>], t: f64) -> DVector<f64> {
+        let zero = DVector::zeros(series[0].len());
+        series.iter().rev().fold(zero, |sum, term| sum * t + term)
+    }
+
+    /// One period from `state` at drive phase 0, and how many switches it had.
+    fn period(&self, state: &[f64]) -> (Vec<f64>, usize) {
+        let size = self.gap.len();
+        let mut y = DVector::zeros(size);
+        y.rows_mut(0, state.len()).copy_from_slice(state);
+        (y[size - 2], y[size - 1]) = (1.0, 1.0);
+        let (mut t, mut switches) = (0.0, 0);
+        let mut touching = self.gap.dot(&y) < 0.0;
+        while t < self.period {
+            let matrix = if touching {
+                &self.contact
+            } else {
+                &self.flight
+            };
+            let length = self.step.min(self.period - t);
+            let series = Self::series(matrix, &y);
+            let sign = if touching { -1.0 } else { 1.0 };
+            let along: Vec<f64> = series
+                .iter()
+                .map(|term| sign * self.gap.dot(term))
+                .collect();
+            let guard = |s: f64| along.iter().rev().fold(0.0, |sum, c| sum * s + c);
+            // Its first zero after the start, at which it may be zero too.
+            let found = (1..=PARTS)
+                .map(|k| length * f64::from(k) / f64::from(PARTS))
+                .find(|s| guard(*s) < 0.0);
+            let Some(beyond) = found else {
+                y = Self::at(&series, length);
+                t += length;
+                continue;
+            };
+            let (mut low, mut high) = (beyond - length / f64::from(PARTS), beyond);
+            for _ in 0..100 {
+                let middle = 0.5 * (low + high);
+                if guard(middle) < 0.0 {
+                    high = middle;
+                } else {
+                    low = middle;
+                }
+            }
+            y = Self::at(&series, high);
+            t += high;
+            touching = !touching;
+            switches += 1;
+        }
+        (y.as_slice()[..state.len()].to_vec(), switches)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// Levers of one to ten modes over any surface, from any state, against Taylor series.
+    #[test]
+    fn motions_agree_with_taylor_series(
+        modes in 1..=10_usize, omega in 3.0..25.0_f64,
+        stiffness in 1.0..100.0_f64, damping in 0.0..2.0_f64,
+        own_stiffness in 1.0..100.0_f64, own_damping in 0.5..10.0_f64,
+        adhesion in 0.0..2.0_f64, gap in -0.1..0.2_f64,
+        a in -0.2..0.2_f64, v in -1.0..1.0_f64, s in -0.2..0.05_f64,
+    ) {
+        let surface = MovingSurface { stiffness: own_stiffness, damping: own_damping, adhesion };
+        let case = Cantilever {
+            alpha4: stiffness,
+            alpha5: gap,
+            alpha6: damping,
+            ..lever(modes, omega, surface)
+        };
+        let mut map = Strobe::new(&Model::cantilever(&case).unwrap());
+        let independent = Taylor::new(&case);
+        let mut state = vec![0.0; 2 * modes + 1];
+        (state[0], state[modes], state[2 * modes]) = (a, v, s);
+        let mut expected = state.clone();
+        // Errors grow where motions part; one period after the other does not let them.
+        for _ in 0..3 {
+            expected = independent.period(&expected).0;
+            map.advance(&mut state).unwrap();
+            for (found, expected) in state.iter().zip(&expected) {
+                prop_assert!((found - expected).abs() < 1e-9, "{state:?}\n{expected:?}");
+            }
+            state.clone_from(&expected);
+        }
+    }
+
+    /// Jacobians and derivatives to every key, with contacts under way, against differences.
+    #[test]
+    fn derivatives_agree_with_differences(
+        modes in 1..5_usize, omega in 3.0..25.0_f64, adhesion in 0.1..1.0_f64,
+        damping in 0.0..1.0_f64, own_damping in 2.0..10.0_f64, v in -2.0..-1.0_f64,
+    ) {
+        let surface = MovingSurface { damping: own_damping, adhesion, ..SURFACE };
+        let case = Cantilever { alpha6: damping.max(0.05), ..lever(modes, omega, surface) };
+        let mut state = vec![0.0; 2 * modes + 1];
+        (state[0], state[modes]) = (0.05, v);
+        // A switch near a grazing or near the period's end bends the map within the difference.
+        let run = nanotap_flow::Trajectory::record(
+            &Model::cantilever(&case).unwrap().system, &state, 1,
+        ).unwrap();
+        prop_assume!(!run.events().is_empty());
+        prop_assume!(run.events().iter().all(|e| e.rate.abs() > 0.3
+            && run.end() - e.time > 0.01 && e.time > 0.01));
+        let error = worst(&Case::from(case), &state);
+        prop_assert!(error < 1e-6, "{error:e}");
+    }
+
+    /// Lengths ten times as large are forces ten times as large: the same motion.
+    #[test]
+    fn the_motion_scales_with_lengths_and_forces(factor in 0.01..100.0_f64, v in -1.0..1.0_f64) {
+        let case = lever(3, 20.0, SURFACE);
+        let scaled = Cantilever {
+            alpha2: factor * case.alpha2,
+            alpha5: factor * case.alpha5,
+            surface: MovingSurface { adhesion: factor * SURFACE.adhesion, ..SURFACE },
+            ..case.clone()
+        };
+        let start = [0.05, 0.0, 0.0, v, 0.0, 0.0, 0.0];
+        let large = start.map(|x| factor * x);
+        let (one, other) = (advance(&case.into(), &start), advance(&scaled.into(), &large));
+        for (one, other) in one.iter().zip(&other) {
+            prop_assert!((factor * one - other).abs() < 1e-11 * factor);
+        }
+    }
+
+    /// Whatever is given, a case is a model or is refused with the name of a key, and a model runs
+    /// or says why not.
+    #[test]
+    fn any_numbers_are_run_or_refused(
+        numbers in prop::array::uniform5(prop_oneof![
+            3 => 1e-6..1e3_f64,
+            1 => prop_oneof![Just(0.0), Just(-1.0), Just(1e9), Just(2e9), Just(1e-300), Just(f64::NAN), Just(f64::INFINITY)],
+        ]),
+        v in -3.0..3.0_f64, s in -1.0..1.0_f64,
+    ) {
+        let [alpha4, alpha6, stiffness, damping, adhesion] = numbers;
+        let surface = MovingSurface { stiffness, damping, adhesion };
+        let case = Cantilever { alpha4, alpha6, ..lever(2, 3.0, surface) };
+        let keys = ["alpha4", "alpha6", "surface_stiffness", "surface_damping", "adhesion_force"];
+        match Model::cantilever(&case) {
+            Err(error) => {
+                let words = error.to_string();
+                let slow = damping >= 1e-15 * stiffness.max(1.0);
+                let sound = numbers.iter().all(|x| (0.0..=1e9).contains(x)) && stiffness > 0.0 && slow;
+                prop_assert!(sound || keys.iter().any(|key| words.contains(key)), "{words}");
+            }
+            Ok(model) => {
+                prop_assert!(stiffness > 0.0 && damping >= 1e-15 && adhesion >= 0.0);
+                let mut state = vec![0.1, 0.0, v, 0.0, s];
+                if Strobe::new(&model).advance(&mut state).is_ok() {
+                    prop_assert!(state.iter().all(|x| x.is_finite()), "{state:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Ever stiffer and faster, the surface no longer moves: the paper's sample, whose pull the tip
+/// feels besides; to first order in 1/k_s.
+#[test]
+fn a_stiff_surface_is_the_papers_sample() {
+    let paper = Cantilever {
+        alpha5: 0.05,
+        omega: 20.0,
+        ..Cantilever::paper()
+    };
+    let start = [0.05, 0.0, 0.0, -0.5, 0.0, 0.0];
+    let run = |case: Cantilever, start: &[f64]| {
+        let case = Case::from(case);
+        (0..5).fold(start.to_vec(), |state, _| advance(&case, &state))
+    };
+    let expected = run(paper.clone(), &start);
+    let distance = |stiffness: f64| {
+        let surface = MovingSurface {
+            stiffness,
+            damping: 1e-3 * stiffness,
+            adhesion: 0.0,
+        };
+        let found = run(lever(3, 20.0, surface), &[&start[..], &[0.0]].concat());
+        let pairs = found.iter().zip(&expected);
+        pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+    };
+    let far = [1e4, 1e5, 1e6].map(distance);
+    for pair in far.windows(2) {
+        assert!((pair[0] / pair[1] - 10.0).abs() < 1.0, "{far:?}");
+    }
+    assert!(far[2] < 1e-3, "{far:?}");
+}
+
+/// The volume of states changes by ġ⁺/ġ⁻ at every switch, which the product of the multipliers,
+/// computed from the Jacobian alone, must show; work is what the
+/// dampers take.
+#[test]
+fn orbits_keep_their_volumes_and_energies() {
+    let mut contacts = 0.0;
+    for (adhesion, omega) in [
+        (0.0, 20.0),
+        (0.4, 20.0),
+        (2.0, 20.0),
+        (0.4, 3.0),
+        (0.4, 24.0),
+    ] {
+        let surface = MovingSurface {
+            adhesion,
+            ..SURFACE
+        };
+        let model = Model::cantilever(&lever(3, omega, surface)).unwrap();
+        let options = OrbitOptions {
+            period: Some(1),
+            ..OrbitOptions::default()
+        };
+        let found = orbit(&model, &options).unwrap();
+        let seen = &found.observables;
+        contacts += seen.contacts_per_period;
+        assert!(seen.energy_balance.residual.abs() < 1e-11);
+        assert!(
+            found.determinant_defect < 1e-8,
+            "{:e}",
+            found.determinant_defect
+        );
+        let mut map = Strobe::new(&model);
+        let mut jacobian = DMatrix::zeros(7, 7);
+        let mut state = found.state.clone();
+        let told = map.advance_with_jacobian_and_determinant(&mut state, &mut jacobian);
+        let plain = jacobian.determinant().abs().ln();
+        assert!((told.unwrap().unwrap() - plain).abs() < 1e-8 * plain.abs());
+        assert_eq!(map.log_determinant_bound(), f64::INFINITY);
+    }
+    assert!(contacts > 2.0);
+}
+
+/// A soft touch is pulled in by a force that does not begin at zero: the map departs from free
+/// flight by the square root of the depth, not by its power 3/2.
+#[test]
+fn grazing_is_of_the_square_root_type() {
+    let far = Cantilever {
+        alpha5: 1.0,
+        ..lever(3, 3.1, SURFACE)
+    };
+    let start = [0.03, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0];
+    let model = Model::cantilever(&far).unwrap();
+    let run = nanotap_flow::Trajectory::record(&model.system, &start, 1).unwrap();
+    let (lowest, _) = run.signal(&model.gap).range().unwrap();
+    let unhindered = run.state_at(run.end()).unwrap();
+    let after = |depth: f64| {
+        let case = Cantilever {
+            alpha5: 1.0 - lowest.value - depth,
+            ..far.clone()
+        };
+        advance(&case.into(), &start)
+    };
+    for (missed, free) in after(-1e-9).iter().zip(&unhindered) {
+        assert!((missed - free).abs() < 1e-13);
+    }
+    // What a touch leaves behind even at depth zero.
+    let touched = after(1e-15);
+    let jump = (touched[0] - unhindered[0]).abs();
+    assert!(jump > 1e-4, "{jump}");
+    let beyond = |depth: f64| {
+        let state = after(depth);
+        let pairs = state.iter().zip(&touched);
+        pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    };
+    for decade in 6..11 {
+        let depth = 10.0_f64.powi(-decade);
+        let slope = (beyond(depth) / beyond(0.25 * depth)).ln() / 4.0_f64.ln();
+        assert!((slope - 0.5).abs() < 0.05, "depth {depth:e}: slope {slope}");
+    }
+}
+
+/// At rest the springs of lever, contact and surface are in series: the tip hangs free above the
+/// sample, or is held by the adhesion as long as F (1/k + 1/k_s) is more than the gap.
+#[test]
+fn the_tip_rests_where_the_springs_in_series_say() {
+    for (gap, adhesion, count) in [(0.05, 0.4, 2), (0.05, 0.02, 1), (-0.05, 0.4, 1)] {
+        let surface = MovingSurface {
+            adhesion,
+            ..SURFACE
+        };
+        let case = Cantilever {
+            alpha5: gap,
+            ..lever(3, 3.0, surface)
+        };
+        let galerkin = Galerkin::new(&case).unwrap();
+        let (p, k) = (&galerkin.modes.tip, &galerkin.stiffness[0]);
+        let give = p.dot(&k.clone().try_inverse().map(|inverse| inverse * p).unwrap());
+        let both = give + 1.0 / surface.stiffness;
+        let rests = equilibria(&Case::from(case.clone()));
+        assert_eq!(rests.len(), count, "{rests:?}");
+        let held = rests.last().unwrap();
+        assert_eq!(
+            (held.contact, rests[0].contact),
+            (count == 2 || gap < 0.0, gap < 0.0)
+        );
+        assert!(rests.iter().all(|rest| rest.stable));
+        if !held.contact {
+            assert!((held.gap - gap).abs() < 1e-14 && held.force.abs() < 1e-14);
+            continue;
+        }
+        // g (1 + k_v C) = d − C F, f = −F − k_v g, V_T = d + c f.
+        let depth = (gap - both * adhesion) / (1.0 + case.alpha4 * both);
+        let force = -adhesion - case.alpha4 * depth;
+        assert!((held.force - force).abs() < 1e-12, "{held:?}");
+        assert!((held.gap - gap - give * force).abs() < 1e-12);
+        assert!((held.deflection - give * force).abs() < 1e-12);
+    }
+}
+
+/// Numbers that make no such surface are refused by their names, and another law's are.
+#[test]
+fn what_is_no_moving_surface_is_refused() {
+    let refused = |case: Cantilever| Model::cantilever(&case).unwrap_err().to_string();
+    for (parameter, value) in [
+        (Parameter::SurfaceStiffness, 0.0),
+        (Parameter::SurfaceStiffness, -1.0),
+        (Parameter::SurfaceDamping, 0.0),
+        (Parameter::AdhesionForce, -0.1),
+        (Parameter::AdhesionForce, f64::NAN),
+    ] {
+        let words = refused(lever(2, 3.0, SURFACE).with(parameter, value));
+        assert!(words.contains(parameter.name()), "{words}");
+    }
+    let words = refused(Cantilever::paper().with(Parameter::AdhesionForce, 0.1));
+    assert!(words.contains("moving-surface"), "{words}");
+    let case = Case::from(lever(2, 3.0, SURFACE));
+    let keys: Vec<&str> = case.keys().iter().map(|key| key.name()).collect();
+    for key in [
+        "alpha6",
+        "surface_stiffness",
+        "surface_damping",
+        "adhesion_force",
+    ] {
+        assert!(keys.contains(&key), "{key}");
+    }
+    assert!(!keys.contains(&"relaxation_time"));
+    assert_eq!(case.get(Key::AdhesionForce), 0.4);
+}

@@ -169,7 +169,7 @@ def interrupt():
 
 threading.Thread(target=interrupt, daemon=True).start()
 try:
-    nanotap.lyapunov(nanotap.Case.paper(omega=3), periods=100_000_000, points=0)
+    nanotap.simulate(nanotap.Case.paper(omega=3), transient=100_000_000)
 except KeyboardInterrupt:
     print("interrupted at work" if at_work() else "interrupted after it", flush=True)
 os._exit(0)

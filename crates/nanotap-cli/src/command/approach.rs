@@ -7,11 +7,13 @@ use std::path::PathBuf;
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
+use nanotap::case::units::Units;
 use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};
 use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
+use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
 use nanotap::study::registry::Study as _;
 use serde::Serialize;
 
@@ -70,7 +72,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
              sample: the model does not hold there",
         );
     }
-    arguments.out.write(|| csv(&report))?;
+    arguments.out.write(|| csv(&report, &case.units()))?;
     arguments
         .plot
         .draw(|| approach_figure(&report, &case.units()))?;
@@ -83,7 +85,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 
 /// A row a distance, there and back, then what coexists; of a physical case the SI columns
 /// follow.
-fn csv(report: &ApproachReport) -> String {
+fn csv(report: &ApproachReport, units: &Units) -> String {
     let physical = report.table.iter().any(|p| p.zc.is_some());
     let mut header: Vec<String> = [
         "way",
@@ -98,6 +100,12 @@ fn csv(report: &ApproachReport) -> String {
     if physical {
         header.push("zc (m)".to_owned());
     }
+    if report.modulation.is_some() {
+        header.extend(COLUMNS.iter().map(|column| match si_of(column, units) {
+            Some((kind, _)) => format!("{} ({})", column.name, kind.si_unit()),
+            None => column.name.to_owned(),
+        }));
+    }
     let mut csv = header.join(",") + "\n";
     for p in report.table.iter().chain(&report.coexisting) {
         let si = physical.then_some(p.physical.as_ref());
@@ -105,6 +113,12 @@ fn csv(report: &ApproachReport) -> String {
         row.extend(columns::cells(Set::COMMON, p.observables.as_ref(), si));
         if physical {
             row.push(p.zc);
+        }
+        if report.modulation.is_some() {
+            row.extend(COLUMNS.iter().map(|column| {
+                let unit = si_of(column, units).map_or(1.0, |(_, unit)| unit);
+                Some(unit * (column.of)(p.modulation.as_ref()?)?)
+            }));
         }
         let period = p.period.map_or_else(String::new, |n| n.to_string());
         let _ = write!(
@@ -120,6 +134,11 @@ fn csv(report: &ApproachReport) -> String {
         csv.push('\n');
     }
     csv
+}
+
+/// What a column measures and its SI unit, where it has one.
+fn si_of(column: &ModulatedColumn, units: &Units) -> Option<(Kind, f64)> {
+    column.kind.and_then(|kind| Some((kind, units.si(kind)?)))
 }
 
 /// Rows of the table that a terminal shows of each way.
@@ -141,6 +160,10 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         shown(Kind::Length, report.to)
     );
     let mut text = format!("{}\n\n", style::bold(&heading));
+    if let Some(modulation) = &report.modulation {
+        text.push_str(&modulated(report, modulation, &shown, &units));
+        return text;
+    }
     text.push_str(&motion::paragraph(&format!(
         "free: amplitude {}, {}; it touches from {} on",
         shown(Kind::Length, report.free_amplitude),
@@ -174,12 +197,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
             of(&|s| shown(Kind::Length, s.first_harmonic)),
             of(&|s| number::significant(s.first_harmonic / report.free_amplitude, 4)),
             of(&|s| number::significant(shown_phase(s.phase), 4)),
-            of(&|s| {
-                units.si(Kind::Energy).map_or_else(
-                    || number::significant(s.dissipation, 4),
-                    |unit| format_electronvolts(unit * s.dissipation),
-                )
-            }),
+            of(&|s| energy(s.dissipation, &units)),
             of(&|s| shown(Kind::Force, s.peak_force)),
             of(&|s| number::significant(100.0 * s.contact_fraction, 3)),
         ]
@@ -255,4 +273,96 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         )));
     }
     text
+}
+
+/// What is held and what was found of it.
+fn modulated(
+    report: &ApproachReport,
+    modulation: &ModulationReport,
+    shown: &dyn Fn(Kind, f64) -> String,
+    units: &Units,
+) -> String {
+    let mut text = motion::paragraph(&format!(
+        "frequency modulation: amplitude {}, {} are held; free: {}, {} lost in a period",
+        shown(Kind::Length, modulation.amplitude),
+        motion::lag(modulation.phase, "the drive", 4),
+        shown(Kind::Frequency, modulation.free_frequency),
+        energy(modulation.free_loss, units),
+    ));
+    let mut table = Table::new([
+        ("way", Align::Left),
+        ("distance", Align::Right),
+        ("Δf", Align::Right),
+        ("Δf/f0", Align::Right),
+        ("first order", Align::Right),
+        ("drive/free", Align::Point),
+        ("E_dis", Align::Right),
+        ("F_max", Align::Right),
+        ("contact (%)", Align::Point),
+        ("open loop", Align::Left),
+    ]);
+    let step = (report.table.len() / (2 * SHOWN)).max(1);
+    for p in report.table.iter().step_by(step) {
+        let (Some(found), Some(seen)) = (&p.modulation, &p.observables) else {
+            continue;
+        };
+        table.row([
+            p.way.name().to_owned(),
+            shown(Kind::Length, p.gap),
+            shown(Kind::Frequency, found.frequency_shift),
+            number::significant(found.relative_shift, 5),
+            found
+                .first_order_shift
+                .map_or_else(String::new, |shift| number::significant(shift, 5)),
+            number::significant(found.drive_ratio, 5),
+            energy(seen.dissipation, units),
+            shown(Kind::Force, seen.peak_force),
+            number::significant(100.0 * seen.contact_fraction, 3),
+            p.orbit
+                .as_ref()
+                .map_or_else(String::new, |orbit| orbit.stability.name().to_owned()),
+        ]);
+    }
+    text.push_str(&table.render());
+    if step > 1 {
+        let _ = writeln!(
+            text,
+            "  every {step}th of {} (--out writes all)",
+            report.table.len()
+        );
+    }
+    text.push('\n');
+    text.push_str(&motion::paragraph(modulation.multipliers));
+    for jump in &modulation.jumps {
+        text.push_str(&motion::paragraph(&format!(
+            "on {} no orbit could be followed between {} and {}: the next is another one",
+            jump.way.name(),
+            shown(Kind::Length, jump.from),
+            shown(Kind::Length, jump.to)
+        )));
+    }
+    for ended in &modulation.ended {
+        text.push_str(&motion::paragraph(&format!(
+            "{} ends at {}: {}",
+            ended.way.name(),
+            shown(Kind::Length, ended.gap),
+            ended.reason
+        )));
+    }
+    for interval in &report.hysteresis {
+        text.push_str(&motion::paragraph(&format!(
+            "hysteresis from {} to {}: Δf/f0 of the two ways differs by up to {}",
+            shown(Kind::Length, interval.near),
+            shown(Kind::Length, interval.far),
+            number::significant(interval.difference, 4)
+        )));
+    }
+    text
+}
+
+fn energy(value: f64, units: &Units) -> String {
+    units.si(Kind::Energy).map_or_else(
+        || number::significant(value, 4),
+        |unit| format_electronvolts(unit * value),
+    )
 }

@@ -416,6 +416,8 @@ def approach(
     branches: bool = True,
     switch: int = 1,
     max_period: int = 32,
+    fm: bool = False,
+    phase: float = 90.0,
     threads: int | None = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
@@ -439,6 +441,11 @@ def approach(
         Doublings of branches to follow (0 to 12).
     max_period : int
         Longest period looked for (1 to 10000).
+    fm : bool
+        Frequency modulation: hold amplitude (the case's free amplitude) and phase
+        by frequency and strength of the drive, and tell the frequency shift.
+    phase : float
+        Phase behind the drive that frequency modulation holds, in degrees.
     threads : int | None
         Threads; without it, one a core.
     progress : Progress
@@ -450,7 +457,9 @@ def approach(
     What is observed over `way` (approach, retract) and the distance (by the name of
     its parameter, with `zc` in metres for a physical case): `first_harmonic`,
     `phase`, `peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`,
-    `physical_E_dis` …; the branches over `branch_point`.
+    `physical_E_dis` …; the branches over `branch_point`. With `fm=True` also
+    `relative_shift`, `drive_ratio`, `sader_jarvis_force` … and in SI
+    `physical_frequency_shift` …, with what is held in the attribute `modulation`.
 
     Raises
     ------
@@ -466,6 +475,8 @@ def approach(
         "branches": branches,
         "switch": switch,
         "max_period": max_period,
+        "fm": fm,
+        "phase": phase,
     }
     return _studies.approach(case, options, threads, progress)
 

@@ -167,7 +167,9 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ways = ["approach", "retract"]
     rows: dict[tuple[str, float], dict[str, Any]] = {}
     for entry in report["table"]:
+        entry |= entry.pop("modulation", None) or {}
         physical = entry.pop("physical", None) or {}
+        physical |= entry.pop("modulation_si", None) or {}
         entry |= {f"physical_{key}": value for key, value in physical.items()}
         rows[entry["way"], entry["gap"]] = entry
     gaps = sorted({gap for _, gap in rows})
@@ -207,6 +209,8 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         hysteresis=json.dumps(report["hysteresis"]),
         returned=int(report["returned"]),
     )
+    if "modulation" in report:
+        ds.attrs["modulation"] = json.dumps(report["modulation"])
     unit = report.get("parameter_unit")
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)

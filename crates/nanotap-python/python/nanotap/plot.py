@@ -436,7 +436,11 @@ def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]
 
 
 def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
-    """Amplitude, phase, dissipated energy and peak force against the distance, both ways."""
+    """Amplitude, phase, dissipated energy and peak force against the distance, both ways.
+
+    Under frequency modulation its shift, the drive, the dissipated energy and the force that
+    the shifts tell.
+    """
     name = ds.attrs["parameter"]
     physical = "physical_A" in ds
     distance = ds.zc.values if physical else ds[name].values
@@ -448,6 +452,14 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
         ("dissipation", "physical_E_dis", "dissipation $E_{dis}$", "eV", electronvolts),
         ("peak_force", "physical_F_max", "greatest force $F_{max}$", "N", 1.0),
     )
+    if "modulation" in ds.attrs:
+        shift, force = "frequency_shift", "sader_jarvis_force"
+        rows = (
+            (shift, f"physical_{shift}", "frequency shift $Δf$", "Hz", 1.0),
+            ("drive_ratio", "drive_ratio", "drive over free drive", "", 1.0),
+            rows[2],
+            (force, f"physical_{force}", "force after Sader, Jarvis", "N", 1.0),
+        )
     # How many of the unit a model's number is: its ratio where it is largest.
     x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
     panels = []

@@ -506,6 +506,14 @@ impl Case {
         }
     }
 
+    /// The keys of the drive's frequency and strength among the numbers of the equations.
+    pub const fn drive_keys(&self) -> [Key; 2] {
+        match self.what {
+            What::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
+            _ => [Key::Omega, Key::Alpha2],
+        }
+    }
+
     /// Drive frequency, in the model's unit; NaN where physical quantities make no sense.
     pub fn omega(&self) -> f64 {
         match &self.what {

@@ -12,9 +12,10 @@ use crate::figure::branch::{
 };
 use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
+use crate::study::frequency_modulation::{COLUMNS, Modulated, ModulatedColumn};
 
-/// Amplitude, phase, dissipation and greatest force against the distance: what was met on the
-/// way there and back as marks in two colours, what coexists in a third, the branches as lines, dashed where unstable,
+/// Amplitude, phase, dissipation and greatest force against the distance, under frequency
+/// modulation its shift, the drive, dissipation and the force that the shifts tell: what was met on the way there and back as marks in two colours, what coexists in a third, the branches as lines, dashed where unstable,
 /// with their bifurcations.
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
@@ -26,14 +27,29 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     } else {
         "distance $α₅$"
     };
+    // Amplitude and phase that are held are no news: frequency shift and drive stand for them.
+    let modulated = report.modulation.is_some();
+    let of_drive = |names: &[&str]| -> Vec<ApproachPanel> {
+        let columns = COLUMNS
+            .iter()
+            .filter(|c| modulated && names.contains(&c.name));
+        let panel = |column| ApproachPanel::of_drive(report, column, units, x_factor);
+        columns.map(panel).collect()
+    };
+    let shown = SHOWN.into_iter();
+    let shown = shown.filter(|name| !modulated || *name == "dissipation");
+    let panels = of_drive(&["frequency_shift", "drive_ratio"])
+        .into_iter()
+        .chain(
+            shown
+                .filter_map(Shown::named)
+                .map(|shown| ApproachPanel::of(report, shown, units, x_factor)),
+        )
+        .chain(of_drive(&["sader_jarvis_force"]));
     ApproachCurves {
         x_label: format!("{symbol}{x_unit}"),
         x_range: [report.to, report.from].map(|gap| x_factor * gap),
-        panels: SHOWN
-            .into_iter()
-            .filter_map(Shown::named)
-            .map(|shown| ApproachPanel::of(report, shown, units, x_factor))
-            .collect(),
+        panels: panels.collect(),
     }
     .figure()
 }
@@ -65,6 +81,10 @@ pub struct ApproachPanel {
     pub retract: Vec<(f64, f64)>,
     /// What neither way met, but coexists.
     pub coexisting: Vec<(f64, f64)>,
+    /// What else is known of it, as a line.
+    pub compared: Vec<(f64, f64)>,
+    /// What that is.
+    pub comparison: String,
     /// The branches.
     pub branches: Vec<BranchPoint>,
     /// Their bifurcations.
@@ -84,7 +104,7 @@ impl ApproachCurves {
             let x = Axis::linear(&self.x_label).range(from, to);
             let panel = one.panel(x);
             // One legend is enough.
-            figure = figure.with(if k == 0 {
+            figure = figure.with(if k == 0 || !one.comparison.is_empty() {
                 panel.legend(Legend::Above)
             } else {
                 panel.legend(Legend::Hidden)
@@ -94,7 +114,52 @@ impl ApproachCurves {
     }
 }
 
+/// An approximation is drawn as far as it is no greater than this many times what was found.
+const BEYOND: f64 = 1.2;
+
 impl ApproachPanel {
+    /// What frequency modulation tells; the frequency shift with the first-order one as a line.
+    fn of_drive(
+        report: &ApproachReport,
+        column: &ModulatedColumn,
+        units: &Units,
+        x_factor: f64,
+    ) -> Self {
+        let values = |way: Way, of: &dyn Fn(&Modulated) -> Option<f64>| -> Vec<(f64, f64)> {
+            let met = report.table.iter().filter(|p| p.way == way);
+            met.filter_map(|p| Some((x_factor * p.gap, of(p.modulation.as_ref()?)?)))
+                .collect()
+        };
+        let [approach, retract] = [Way::Approach, Way::Retract].map(|way| values(way, &column.of));
+        let met = approach.iter().chain(&retract);
+        let size = met.fold(0.0, |m: f64, (_, y)| m.max(y.abs()));
+        let (factor, unit) = match column.kind {
+            Some(kind) => units.axis(kind, size),
+            None => (1.0, String::new()),
+        };
+        let scaled = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+            points.into_iter().map(|(x, y)| (x, factor * y)).collect()
+        };
+        let free = report.modulation.as_ref();
+        let free = free.map_or(f64::NAN, |m| m.free_frequency);
+        let near = |value: &f64| value.abs() <= BEYOND * size;
+        let first = |m: &Modulated| Some(free * m.first_order_shift?).filter(near);
+        let law = |m: &Modulated| m.static_force.filter(near);
+        let (compared, comparison) = match column.name {
+            "frequency_shift" => (values(Way::Approach, &first), "first order"),
+            "sader_jarvis_force" => (values(Way::Approach, &law), "the law's force"),
+            _ => (Vec::new(), ""),
+        };
+        Self {
+            label: format!("{}{unit}", column.label),
+            approach: scaled(approach),
+            retract: scaled(retract),
+            compared: scaled(compared),
+            comparison: comparison.to_owned(),
+            ..Self::default()
+        }
+    }
+
     fn of(report: &ApproachReport, shown: Shown, units: &Units, x_factor: f64) -> Self {
         let of = |shown: Shown, observables: &Observables| shown.of(observables, &[]);
         let met = report.table.iter().filter_map(|p| p.observables.as_ref());
@@ -137,6 +202,8 @@ impl ApproachPanel {
                     }
                 })
                 .collect(),
+            compared: Vec::new(),
+            comparison: String::new(),
             bifurcations: bifurcations
                 .map(|b| {
                     let (x, y) = place(b.parameter, &b.observables);
@@ -179,6 +246,9 @@ impl ApproachPanel {
         }
         if self.branches.iter().any(|p| !p.stable) {
             panel = panel.with(nowhere().dash(Dash::Dashed).label("unstable"));
+        }
+        if !self.compared.is_empty() {
+            panel = panel.with(grey(self.compared.clone()).label(&self.comparison));
         }
         let ways = [
             (&self.approach, Colour::BLUE, 1.3, Way::Approach),

@@ -226,6 +226,75 @@ impl JsonSchema for Derivative {
     }
 }
 
+/// How amplitude and phase (degrees) of the tip's first harmonic change over one drive period that
+/// starts in `state`, closed or not: a column a number of the state, then one a key, `2 × (n + k)`.
+/// `sizes` are those of the numbers of the state, `by` (`n × k`) how the end of the period changes
+/// with the keys. Under a nonlinear force by central differences.
+///
+/// # Errors
+/// When the flow fails, or the case makes no sense beside the value of a key.
+pub(crate) fn first_harmonic_changes(
+    case: &Case,
+    model: &Model,
+    keys: &[Key],
+    state: &[f64],
+    sizes: &[f64],
+    by: &DMatrix<f64>,
+) -> Result<DMatrix<f64>, DerivativeError> {
+    let n = state.len();
+    let set = Set::FIRST_HARMONIC;
+    let mut rows = DMatrix::zeros(2, n + keys.len());
+    if model.nonlinear.is_none() {
+        let mut of = |column: usize, tangent: &ModelTangent, start: &[f64]| {
+            let mut followed = Followed::new(model, tangent, set, None);
+            followed.run(state, start, 1).map_err(MotionError::from)?;
+            for (row, (_, change)) in followed.changes(set).iter().enumerate().take(2) {
+                rows[(row, column)] = change.number().unwrap_or(f64::NAN);
+            }
+            Ok::<_, DerivativeError>(())
+        };
+        let still = ModelTangent::zeros(model);
+        for k in 0..n {
+            let mut start = vec![0.0; n];
+            start[k] = 1.0;
+            of(k, &still, &start)?;
+        }
+        for (k, key) in keys.iter().enumerate() {
+            of(n + k, &case.model_tangent(model, *key)?, &vec![0.0; n])?;
+        }
+        return Ok(rows);
+    }
+    let mut difference = |column: usize, step: f64, low: Observables, high: Observables| {
+        let turn = (high.phase - low.phase + 180.0).rem_euclid(360.0) - 180.0;
+        rows[(0, column)] = (high.first_harmonic - low.first_harmonic) / (2.0 * step);
+        rows[(1, column)] = turn / (2.0 * step);
+    };
+    for k in 0..n - model.memory {
+        let step = BESIDE * sizes[k];
+        let beside = |side: f64| {
+            let mut from = state.to_vec();
+            from[k] += side * step;
+            measure(model, &from, 1, set)
+        };
+        difference(k, step, beside(-1.0)?, beside(1.0)?);
+    }
+    for (k, key) in keys.iter().enumerate() {
+        // The same change of the motion, if the key may change so far.
+        let change = (0..n).fold(0.0, |m: f64, i| m.max(by[(i, k)].abs() / sizes[i]));
+        let value = case.get(*key);
+        let step = (BESIDE / change).min(0.1 * value.abs());
+        let beside = |side: f64| -> Result<Observables, DerivativeError> {
+            let there = case.with(*key, value + side * step).model()?;
+            Ok(measure(&there, state, 1, set)?)
+        };
+        difference(n + k, step, beside(-1.0)?, beside(1.0)?);
+    }
+    Ok(rows)
+}
+
+/// Part of the amplitude by which a motion changes where its first harmonic is differenced.
+const BESIDE: f64 = 1e-4;
+
 /// Part of an orbit by which it changes where what is observed is differenced.
 const STEP: f64 = 2e-4;
 

@@ -23,6 +23,7 @@ mod watch;
 
 pub use clearance::Clearance;
 pub use contact_event::{ContactEvent, ContactEventKind, Contacts};
+pub(crate) use derivative::first_harmonic_changes;
 pub use derivative::{Derivative, DerivativeError};
 pub use dimension::Dimension;
 pub use energy::EnergyBalance;

@@ -197,6 +197,10 @@ macro_rules! observables {
             /// What sweeps, branches and curves record of every motion.
             pub const COMMON: Self = Self($(observables!(@$where $name))|*);
 
+            /// What a lock-in amplifier reads: amplitude and phase at the drive's frequency.
+            pub const FIRST_HARMONIC: Self =
+                Self(1 << Row::first_harmonic as usize | 1 << Row::phase as usize);
+
             /// Where and when the beam is lowest.
             pub(super) const CLEARANCE: Self = Self(
                 1 << Row::beam_clearance as usize

@@ -14,6 +14,10 @@
 //! length stays that of the case: the beam's own gap changes with the tip's, but only whether
 //! the beam touches depends on it.
 //!
+//! With [`ApproachOptions::phase`] amplitude and phase are held by frequency and strength of the
+//! drive, as in frequency modulation: see [`frequency_modulation`](super::frequency_modulation).
+//! Orbits are then continued from distance to distance.
+//!
 //! Fails: a jump is located to a step of the distance only (the fold behind it exactly, where
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
 
@@ -25,6 +29,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::FreeMotion;
+use super::frequency_modulation::{
+    HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
+};
 use crate::Error;
 use crate::case::{Case, CaseError, Key, ParameterUnit};
 use crate::model::Model;
@@ -54,6 +61,9 @@ pub struct ApproachOptions {
     pub max_period: usize,
     /// Periods recorded of a motion that is not periodic.
     pub periods: usize,
+    /// The phase in degrees that is held together with the case's free amplitude, by frequency
+    /// and strength of the drive; `None`: the drive stays as it is.
+    pub phase: Option<f64>,
 }
 
 impl Default for ApproachOptions {
@@ -66,6 +76,7 @@ impl Default for ApproachOptions {
             doublings: 1,
             max_period: 32,
             periods: 256,
+            phase: None,
         }
     }
 }
@@ -112,6 +123,9 @@ pub enum ApproachError {
     /// The branches could not be followed.
     #[error(transparent)]
     Branch(#[from] BranchError),
+    /// No orbit has the amplitude and phase that are to be held.
+    #[error(transparent)]
+    Held(#[from] HeldError),
 }
 
 /// Which way the sample moves.
@@ -162,6 +176,12 @@ pub struct ApproachPoint {
     /// Why it is undecided, if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// What frequency modulation tells, where amplitude and phase are held.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modulation: Option<Modulated>,
+    /// The same in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modulation_si: Option<ModulatedInSi>,
     /// The orbit.
     #[serde(skip)]
     pub orbit: Option<PeriodicOrbit>,
@@ -174,7 +194,8 @@ pub struct Hysteresis {
     pub near: f64,
     /// Farthest distance.
     pub far: f64,
-    /// Greatest difference of the amplitude at the drive's frequency within it.
+    /// Greatest difference of the amplitude at the drive's frequency within it; of the relative
+    /// frequency shift where the amplitude is held.
     pub difference: f64,
 }
 
@@ -214,6 +235,9 @@ pub struct ApproachReport {
     /// Of a physical case: what a distance is to be multiplied with for SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
+    /// Frequency modulation, where amplitude and phase are held.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modulation: Option<ModulationReport>,
 }
 
 /// Brings the sample near and takes it away.
@@ -225,6 +249,9 @@ pub fn approach(
     options: &ApproachOptions,
     control: &Control<'_>,
 ) -> Result<ApproachReport, ApproachError> {
+    if let Some(phase) = options.phase {
+        return modulated_approach(case, options, phase, control);
+    }
     let key = case.gap_key();
     let free = FreeMotion::of(&case.model()?);
     let distances = distances(&free, options)?;
@@ -274,11 +301,15 @@ pub fn approach(
         branches,
         cancelled: control.is_cancelled(),
         parameter_unit: case.parameter_unit(key),
+        modulation: None,
     })
 }
 
 /// The distances from far to near.
-fn distances(free: &FreeMotion, options: &ApproachOptions) -> Result<Vec<f64>, ApproachError> {
+pub(super) fn distances(
+    free: &FreeMotion,
+    options: &ApproachOptions,
+) -> Result<Vec<f64>, ApproachError> {
     if options.points < 2 {
         return Err(ApproachError::Points {
             given: options.points,
@@ -440,6 +471,8 @@ impl Walk<'_> {
                 .map(|(seen, view)| PhysicalMotion::of(seen, view)),
             observables,
             reason,
+            modulation: None,
+            modulation_si: None,
             orbit: met.orbit,
         }
     }
@@ -511,10 +544,17 @@ fn hysteresis(table: &[ApproachPoint], free_amplitude: f64) -> Vec<Hysteresis> {
 }
 
 /// The beam's clearance at the nearest distance on the way there.
-fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> Option<f64> {
+pub(super) fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> Option<f64> {
     let nearest = table.iter().rfind(|p| p.way == Way::Approach)?;
     let orbit = nearest.orbit.as_ref()?;
-    let model = case.with(case.gap_key(), nearest.gap).model().ok()?;
+    let mut there = case.with(case.gap_key(), nearest.gap);
+    if let Some(modulation) = &nearest.modulation {
+        let [frequency, strength] = case.drive_keys();
+        there = there
+            .with(frequency, modulation.drive_frequency)
+            .with(strength, modulation.drive_strength);
+    }
+    let model = there.model().ok()?;
     let start = orbit.states.first()?;
     let clearance = Clearance::of(&model, start, orbit.period).ok()??;
     // The sample moves towards the whole lever; the model's beam stands where the case has it.
@@ -567,6 +607,12 @@ pub struct ApproachRequest {
     /// Longest period looked for
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
     pub max_period: usize,
+    /// Frequency modulation: hold amplitude (the case's free amplitude) and phase by frequency and
+    /// strength of the drive, and tell the frequency shift
+    pub fm: bool,
+    /// Phase behind the drive that frequency modulation holds, in degrees
+    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+    pub phase: f64,
 }
 
 impl Default for ApproachRequest {
@@ -579,6 +625,8 @@ impl Default for ApproachRequest {
             branches: options.branches,
             switch: options.doublings,
             max_period: options.max_period,
+            fm: false,
+            phase: 90.0,
         }
     }
 }
@@ -602,6 +650,7 @@ impl ApproachRequest {
             branches: self.branches,
             doublings: self.switch,
             max_period: self.max_period,
+            phase: self.fm.then_some(self.phase),
             ..ApproachOptions::default()
         })
     }
@@ -640,6 +689,7 @@ impl From<ApproachError> for crate::Error {
             ApproachError::NoPeriods => input("give 1 or more {periods}"),
             ApproachError::Model(error) => error.clone().into(),
             ApproachError::Branch(error) => error.clone().into(),
+            ApproachError::Held(error) => error.clone().into(),
         }
     }
 }

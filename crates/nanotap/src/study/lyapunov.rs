@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::RowDVector;
-use nanotap_dynamics::{ClassifyOptions, StroboscopicMap, classify, lyapunov_spectrum};
+use nalgebra::{DMatrix, RowDVector};
+use nanotap_dynamics::{ClassifyOptions, StroboscopicMap, Tangency, classify, lyapunov_spectrum};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Output, Trajectory};
 use schemars::JsonSchema;
@@ -110,26 +110,133 @@ pub struct LyapunovReport {
     pub section_at: Section,
 }
 
+/// A map that goes no further once the work is to stop.
+#[derive(Clone)]
+struct Stoppable<'a> {
+    map: Strobe,
+    control: Control<'a>,
+}
+
+/// Why a period was not computed.
+#[derive(Debug, thiserror::Error)]
+enum Unfinished {
+    #[error("stopped")]
+    Stopped,
+    #[error(transparent)]
+    Flow(#[from] MotionError),
+}
+
+/// Drive periods between two looks at whether the work is to stop.
+const UNINTERRUPTED: usize = 1024;
+
+impl Stoppable<'_> {
+    fn goes_on(&self) -> Result<(), Unfinished> {
+        if self.control.is_cancelled() {
+            return Err(Unfinished::Stopped);
+        }
+        Ok(())
+    }
+}
+
+impl StroboscopicMap for Stoppable<'_> {
+    type Error = Unfinished;
+
+    fn dimension(&self) -> usize {
+        self.map.dimension()
+    }
+
+    fn period(&self) -> f64 {
+        self.map.period()
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Unfinished> {
+        self.goes_on()?;
+        Ok(self.map.advance(state)?)
+    }
+
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), Unfinished> {
+        let mut left = periods;
+        while left > 0 {
+            self.goes_on()?;
+            let next = left.min(UNINTERRUPTED);
+            self.map.advance_by(state, next)?;
+            left -= next;
+        }
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Unfinished> {
+        self.goes_on()?;
+        Ok(self.map.advance_with_jacobian(state, jacobian)?)
+    }
+
+    fn advance_with_jacobian_and_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<Option<f64>, Unfinished> {
+        self.goes_on()?;
+        let map = &mut self.map;
+        Ok(map.advance_with_jacobian_and_determinant(state, jacobian)?)
+    }
+
+    fn log_determinant_bound(&self) -> f64 {
+        self.map.log_determinant_bound()
+    }
+
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), Unfinished> {
+        self.goes_on()?;
+        Ok(self.map.advance_with_tangencies(state, tangencies)?)
+    }
+}
+
+impl From<Unfinished> for SimulateError {
+    fn from(error: Unfinished) -> Self {
+        match error {
+            Unfinished::Stopped => Self::Stopped,
+            Unfinished::Flow(error) => Self::Flow(error),
+        }
+    }
+}
+
 /// Measures the spectrum of `model`'s motion and cuts it.
 ///
 /// # Errors
-/// When the start makes no sense or the flow fails.
-pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovReport, SimulateError> {
+/// When the start makes no sense, the flow fails, or the work was stopped.
+pub fn lyapunov(
+    model: &Model,
+    options: &LyapunovOptions,
+    control: &Control<'_>,
+) -> Result<LyapunovReport, SimulateError> {
     let mut state = starting_state(model, options.state.as_deref())?;
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods);
     }
-    let mut map = Strobe::new(model);
+    let mut map = Stoppable {
+        map: Strobe::new(model),
+        control: *control,
+    };
+    let stopped = |error| {
+        if control.is_cancelled() {
+            SimulateError::Stopped
+        } else {
+            error
+        }
+    };
     let defaults = SpectrumOptions::default();
     // The tangent vectors align themselves during the last periods of the transient.
     let alignment = defaults.alignment.min(options.transient);
-    for _ in 0..options.transient - alignment {
-        map.advance(&mut state)?;
-    }
+    map.advance_by(&mut state, options.transient - alignment)?;
     let mut start = state.clone();
-    for _ in 0..alignment {
-        map.advance(&mut start)?;
-    }
+    map.advance_by(&mut start, alignment)?;
     let fixed = SpectrumOptions {
         alignment,
         min_periods: options.periods,
@@ -137,11 +244,15 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
         ..defaults
     };
     let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
-        SimulateError::Flow(MotionError::Flow(FlowError::NotFinite {
-            what: "the tangent vectors of the motion",
-        }))
+        stopped(SimulateError::Flow(MotionError::Flow(
+            FlowError::NotFinite {
+                what: "the tangent vectors of the motion",
+            },
+        )))
     })?;
     let named = Named::of(&classify(&mut map, &start, &options.classify).kind);
+    map.goes_on()?;
+    let section = cut(model, &start, options.section, options.points, control)?;
     Ok(LyapunovReport {
         classification: named.classification,
         period: named.orbit.map(|o| o.period),
@@ -154,7 +265,7 @@ pub fn lyapunov(model: &Model, options: &LyapunovOptions) -> Result<LyapunovRepo
         exponents: spectrum.exponents,
         errors: spectrum.errors,
         mean: spectrum.mean,
-        section: section(model, &start, options.section, options.points)?,
+        section,
         section_at: options.section,
     })
 }
@@ -170,6 +281,20 @@ pub fn section(
     at: Section,
     points: usize,
 ) -> Result<Vec<SectionPoint>, MotionError> {
+    match cut(model, start, at, points, &Control::default()) {
+        Ok(points) => Ok(points),
+        Err(Unfinished::Flow(error)) => Err(error),
+        Err(Unfinished::Stopped) => Ok(Vec::new()),
+    }
+}
+
+fn cut(
+    model: &Model,
+    start: &[f64],
+    at: Section,
+    points: usize,
+    control: &Control<'_>,
+) -> Result<Vec<SectionPoint>, Unfinished> {
     /// Periods watched for each point.
     const RAREST: usize = 8;
     let tip_rate = model.tip_rate();
@@ -193,6 +318,9 @@ pub fn section(
             if found.len() >= points {
                 break;
             }
+            if control.is_cancelled() {
+                return Err(Unfinished::Stopped);
+            }
             each_period(nonlinear, &mut state, 1, |_, recorded| {
                 let times: Vec<f64> = match at {
                     Section::Phase(phase) => vec![phase.rem_euclid(1.0) * period],
@@ -215,13 +343,16 @@ pub fn section(
         return Ok(found);
     }
     let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(start, 0.0)?;
+    flow.start(start, 0.0).map_err(MotionError::from)?;
     for _ in 0..points.saturating_mul(RAREST) {
         if found.len() >= points {
             break;
         }
+        if control.is_cancelled() {
+            return Err(Unfinished::Stopped);
+        }
         let mut recorder = Recorder::default();
-        flow.run_period(&mut recorder)?;
+        flow.run_period(&mut recorder).map_err(MotionError::from)?;
         let trajectory = recorder.finish(Arc::clone(&model.system));
         match at {
             Section::Phase(phase) => {
@@ -340,8 +471,8 @@ impl Study for LyapunovStudy {
     fn run(
         case: &Case,
         request: &LyapunovRequest,
-        _: &Control<'_>,
+        control: &Control<'_>,
     ) -> Result<LyapunovReport, Error> {
-        Ok(lyapunov(&case.model()?, &request.options())?)
+        Ok(lyapunov(&case.model()?, &request.options(), control)?)
     }
 }

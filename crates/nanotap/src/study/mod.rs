@@ -9,6 +9,7 @@ pub mod convergence;
 pub mod fit;
 pub mod fixed_step;
 mod free_motion;
+pub mod frequency_modulation;
 pub mod in_si;
 pub mod limits;
 pub mod lyapunov;

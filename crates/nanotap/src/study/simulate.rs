@@ -81,6 +81,9 @@ pub enum SimulateError {
     /// The flow failed.
     #[error(transparent)]
     Flow(#[from] MotionError),
+    /// The work was stopped.
+    #[error("stopped before the end")]
+    Stopped,
 }
 
 /// What a motion was found to be.
@@ -580,6 +583,7 @@ impl From<SimulateError> for crate::Error {
             }
             SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
             SimulateError::Flow(error) => error.into(),
+            SimulateError::Stopped => Self::numerics(error.to_string()),
         }
     }
 }

@@ -7,6 +7,7 @@
 
 mod common;
 mod derivatives;
+mod frequency_modulation;
 mod reference;
 mod refusals;
 mod studies;

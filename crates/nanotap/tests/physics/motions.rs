@@ -11,7 +11,7 @@ use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::lyapunov::{LyapunovOptions, Section, lyapunov, section};
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
+use nanotap::study::simulate::{Classification, SimulateError, SimulateOptions, simulate};
 use nanotap::study::start_box::default_box;
 use nanotap_dynamics::TwoParameterFamily as _;
 use nanotap_dynamics::{DMatrix, StroboscopicMap as _};
@@ -175,7 +175,7 @@ fn exponents_sum_to_the_trace() {
         points: 0,
         ..LyapunovOptions::default()
     };
-    let report = lyapunov(&model, &options).unwrap();
+    let report = lyapunov(&model, &options, &Control::default()).unwrap();
     assert!(
         (report.sum - report.sum_by_trace).abs() < 1e-10,
         "{} {}",
@@ -206,6 +206,7 @@ fn exponents_sum_to_the_trace() {
             points: 0,
             ..LyapunovOptions::default()
         },
+        &Control::default(),
     )
     .unwrap();
     assert!(
@@ -214,6 +215,28 @@ fn exponents_sum_to_the_trace() {
         report.sum,
         report.sum_by_trace
     );
+}
+
+/// Work that is to stop before it begins ends with that and no numbers, whatever of it is left: the
+/// transient, the average, the section.
+#[test]
+fn exponents_stop_when_they_are_to() {
+    let model = Model::cantilever(&at(3.0)).unwrap();
+    let stop = std::sync::atomic::AtomicBool::new(true);
+    let control = Control {
+        cancel: Some(&stop),
+        ..Control::default()
+    };
+    for (transient, periods, points) in [(1 << 40, 1, 0), (0, 1 << 40, 0), (0, 1, 1 << 30)] {
+        let options = LyapunovOptions {
+            transient,
+            periods,
+            points,
+            ..LyapunovOptions::default()
+        };
+        let stopped = lyapunov(&model, &options, &control);
+        assert!(matches!(stopped, Err(SimulateError::Stopped)));
+    }
 }
 
 /// The memory of a standard linear solid fades by e^{−t/τ} with τ far below a drive period: its
@@ -234,7 +257,12 @@ fn the_last_exponent_of_a_standard_linear_solid_is_what_the_trace_leaves() {
             points: 0,
             ..LyapunovOptions::default()
         };
-        let report = lyapunov(&Model::cantilever(&case).unwrap(), &options).unwrap();
+        let report = lyapunov(
+            &Model::cantilever(&case).unwrap(),
+            &options,
+            &Control::default(),
+        )
+        .unwrap();
         assert!((report.sum / report.sum_by_trace - 1.0).abs() < 1e-9);
         // In contact it relaxes, in flight it recovers at half that rate (both springs alike).
         let last = report.exponents.last().unwrap();

@@ -1,0 +1,273 @@
+//! Approach and retract curves under frequency modulation.
+
+use nanotap_dynamics::Control;
+
+use super::average::sader_jarvis;
+use super::walk::{HeldWalk, Stepped};
+use super::{
+    Averages, Ended, FreeOscillation, Held, HeldOrbit, Jump, Modulated, ModulationReport, OPEN_LOOP,
+};
+use crate::case::{Case, Key};
+use crate::model::contact::ContactLaw;
+use crate::observe::{PhysicalMotion, Set, measure};
+use crate::study::FreeMotion;
+use crate::study::approach::{
+    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Hysteresis, Way, beam_clearance,
+    distances,
+};
+use crate::study::simulate::Classification;
+
+/// How far beyond the first distance the free oscillation is put, if Newton needs a way there.
+const BEYOND: f64 = 8.0;
+
+/// Brings the sample near and takes it away while amplitude and `phase` are held.
+///
+/// # Errors
+/// [`ApproachError`] when the options make no sense for the case, or there is no orbit where the
+/// curve begins.
+pub fn modulated_approach(
+    case: &Case,
+    options: &ApproachOptions,
+    phase: f64,
+    control: &Control<'_>,
+) -> Result<ApproachReport, ApproachError> {
+    let held = Held {
+        amplitude: FreeMotion::of(&case.model()?).amplitude,
+        phase,
+    }
+    .check()?;
+    let free = FreeOscillation::of(case, held)?;
+    let far = FreeMotion {
+        amplitude: held.amplitude,
+        phase,
+        reach: free.reach,
+    };
+    let distances = distances(&far, options)?;
+    let (from, to) = (distances[0], distances[distances.len() - 1]);
+    let curve = Curve {
+        case,
+        free: &free,
+        model: case.model()?,
+    };
+    let averages = curve.averages();
+    let beyond = from + BEYOND * from.abs().max(held.amplitude);
+    let mut walk = HeldWalk::new(case, held, free.driven(), beyond);
+    let mut table: Vec<ApproachPoint> = Vec::new();
+    let (mut jumps, mut ended): (Vec<Jump>, Vec<Ended>) = (Vec::new(), Vec::new());
+    let total = 2 * distances.len();
+    let mut done = 0;
+    for way in [Way::Approach, Way::Retract] {
+        let reached = table.last().map_or(f64::NEG_INFINITY, |p| p.gap);
+        let mut gaps: Vec<f64> = distances.clone();
+        if way == Way::Retract {
+            gaps.reverse();
+            gaps.retain(|gap| *gap >= reached);
+            walk.turn();
+        }
+        let mut failed: Option<Ended> = None;
+        let mut missed = 0;
+        for gap in gaps {
+            if control.is_cancelled() {
+                break;
+            }
+            let stepped = match walk.step(gap, control) {
+                Err(error) if table.is_empty() => return Err(error.into()),
+                stepped => stepped,
+            };
+            let orbit = match stepped {
+                Ok(Stepped::On(orbit)) => orbit,
+                Ok(Stepped::Jumped(orbit, from)) => {
+                    jumps.push(Jump { way, from, to: gap });
+                    orbit
+                }
+                Err(error) => {
+                    failed.get_or_insert_with(|| Ended {
+                        way,
+                        gap: walk.gap(),
+                        reason: error.to_string(),
+                    });
+                    missed += 1;
+                    if missed > MISSED {
+                        break;
+                    }
+                    continue;
+                }
+            };
+            if let Some(before) = failed.take() {
+                jumps.push(Jump {
+                    way,
+                    from: before.gap,
+                    to: gap,
+                });
+                missed = 0;
+            }
+            table.push(curve.point(way, gap, orbit, &averages)?);
+            done += 1;
+            if let Some(report) = control.progress {
+                report(done, total);
+            }
+        }
+        ended.extend(failed);
+    }
+    if let Some(report) = control.progress {
+        report(total, total);
+    }
+    invert(&mut table, &free);
+    if let Some(view) = case.physical() {
+        for point in &mut table {
+            point.modulation_si = point.modulation.map(|m| m.in_si(&view.scales));
+        }
+    }
+    Ok(ApproachReport {
+        parameter: case.gap_key().path(),
+        from,
+        to,
+        free_amplitude: free.amplitude,
+        free_phase: free.phase,
+        free_reach: free.reach,
+        beam_clearance: beam_clearance(case, &table),
+        hysteresis: hysteresis(&table),
+        returned: returned(&table),
+        table,
+        coexisting: Vec::new(),
+        branches: None,
+        cancelled: control.is_cancelled(),
+        parameter_unit: case.parameter_unit(case.gap_key()),
+        modulation: Some(ModulationReport {
+            amplitude: free.amplitude,
+            phase,
+            free_frequency: free.frequency,
+            free_frequency_hz: case
+                .physical()
+                .map(|view| free.frequency * view.scales.frequency),
+            free_strength: free.strength,
+            stiffness: free.stiffness,
+            free_loss: free.loss,
+            multipliers: OPEN_LOOP,
+            jumps,
+            ended,
+        }),
+    })
+}
+
+/// Distances at which no orbit may be found before a way ends.
+const MISSED: usize = 3;
+
+struct Curve<'a> {
+    case: &'a Case,
+    free: &'a FreeOscillation,
+    model: crate::model::Model,
+}
+
+impl Curve<'_> {
+    fn averages(&self) -> Averages<'_> {
+        let spring = match self.case.oscillator() {
+            Some(_) => self.case.get(Key::StopStiffness),
+            None => self.case.get(Key::Alpha4),
+        };
+        Averages::new(
+            &self.model,
+            spring,
+            self.free.amplitude,
+            self.free.stiffness,
+        )
+    }
+
+    fn point(
+        &self,
+        way: Way,
+        gap: f64,
+        orbit: HeldOrbit,
+        averages: &Averages<'_>,
+    ) -> Result<ApproachPoint, ApproachError> {
+        let view = self.case.physical();
+        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)
+            .map_err(super::HeldError::from)?;
+        // A rigid stop has no static force, and a moving surface one of its own height.
+        let moves = self
+            .case
+            .cantilever()
+            .is_some_and(|c| c.contact == ContactLaw::MovingSurface && c.law.is_none());
+        let averages = (!self.case.has_rigid_stop() && !moves).then_some(averages);
+        Ok(ApproachPoint {
+            way,
+            gap,
+            zc: view.map(|view| gap * view.scales.length),
+            classification: Classification::Periodic,
+            period: Some(1),
+            spectral_radius: Some(orbit.orbit.spectral_radius()),
+            physical: view.map(|view| PhysicalMotion::of(&observables, view)),
+            observables: Some(observables),
+            reason: None,
+            modulation: Some(Modulated::of(&orbit, self.free, averages, gap)),
+            modulation_si: None,
+            orbit: Some(orbit.orbit),
+        })
+    }
+}
+
+/// Adds the force that each way's shifts tell.
+fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
+    for way in [Way::Approach, Way::Retract] {
+        let of_way = |p: &&mut ApproachPoint| p.way == way;
+        let curve: Vec<(f64, f64)> = table
+            .iter_mut()
+            .filter(of_way)
+            .filter_map(|p| p.modulation.map(|m| (m.closest, m.relative_shift)))
+            .collect();
+        if curve.len() < 3 {
+            continue;
+        }
+        let forces = sader_jarvis(&curve, free.amplitude, free.stiffness);
+        for (point, force) in table.iter_mut().filter(of_way).zip(forces) {
+            if let Some(modulation) = &mut point.modulation {
+                modulation.sader_jarvis_force = Some(force);
+            }
+        }
+    }
+}
+
+/// Difference of relative shifts that is no longer rounding.
+const DIFFERENT: f64 = 1e-9;
+
+fn shift(point: &ApproachPoint) -> f64 {
+    point.modulation.map_or(f64::NAN, |m| m.relative_shift)
+}
+
+/// Where the shifts of both ways differ.
+fn hysteresis(table: &[ApproachPoint]) -> Vec<Hysteresis> {
+    let mut intervals: Vec<Hysteresis> = Vec::new();
+    let mut open = false;
+    for there in table.iter().filter(|p| p.way == Way::Approach) {
+        let back = table
+            .iter()
+            .find(|p| p.way == Way::Retract && p.gap.to_bits() == there.gap.to_bits());
+        let difference = back.map_or(0.0, |back| (shift(there) - shift(back)).abs());
+        let differs = difference > DIFFERENT;
+        if differs {
+            match intervals.last_mut().filter(|_| open) {
+                Some(interval) => {
+                    interval.near = there.gap;
+                    interval.difference = interval.difference.max(difference);
+                }
+                None => intervals.push(Hysteresis {
+                    near: there.gap,
+                    far: there.gap,
+                    difference,
+                }),
+            }
+        }
+        open = differs;
+    }
+    intervals
+}
+
+fn returned(table: &[ApproachPoint]) -> bool {
+    table
+        .first()
+        .zip(table.last())
+        .is_some_and(|(first, last)| {
+            first.gap.to_bits() == last.gap.to_bits()
+                && (shift(first) - shift(last)).abs() <= DIFFERENT
+        })
+}

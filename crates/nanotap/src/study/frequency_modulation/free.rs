@@ -1,0 +1,194 @@
+//! The lever far from the sample, oscillating with a given amplitude and phase.
+
+use nalgebra::{DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_flow::Complex;
+
+use super::held::{Driven, Held, HeldError, equations_of};
+use crate::case::{Case, Key};
+use crate::model::Model;
+use crate::model::cantilever::Cantilever;
+use crate::model::contact::ContactLaw;
+use crate::model::contact::moving_surface::MovingSurface;
+use crate::model::drive_form::Actuation;
+use crate::model::strobe::Strobe;
+use crate::observe::{Set, measure};
+use crate::study::FreeMotion;
+
+/// The free lever at the amplitude and phase that are held; in the model's units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeOscillation {
+    /// Amplitude of the tip's deflection at the drive's frequency.
+    pub amplitude: f64,
+    /// Its phase behind the drive, degrees.
+    pub phase: f64,
+    /// The frequency at which the lever lags by that phase.
+    pub frequency: f64,
+    /// Strength of the drive that gives the amplitude there.
+    pub strength: f64,
+    /// How far the tip swings towards the sample.
+    pub reach: f64,
+    /// What the lever's own damping takes in a period.
+    pub loss: f64,
+    /// Stiffness of the mode at the tip: −(ω/2) ∂Re(1/G)/∂ω of the answer G to a force at the
+    /// tip, half of what a change of it would change the frequency by.
+    pub stiffness: f64,
+    /// State at drive phase 0.
+    pub state: Vec<f64>,
+}
+
+/// Steps of the secant method.
+const STEPS: usize = 60;
+
+impl FreeOscillation {
+    /// Of the lever of `case`, near the resonance that is nearest to the case's own frequency.
+    ///
+    /// # Errors
+    /// When the case makes no sense, or the lever has no such phase there.
+    pub fn of(case: &Case, held: Held) -> Result<Self, HeldError> {
+        let alone = alone(&equations_of(case), held);
+        let [frequency_key, strength_key] = alone.drive_keys();
+        let own = alone.omega();
+        let start = nearest_resonance(&alone.model()?, own);
+        // 1/G is nearly a parabola in the frequency, so that the secant method finds where its
+        // part across the phase vanishes.
+        let turned = |frequency: f64| -> Result<Complex, HeldError> {
+            let inverse = inverse_response(&alone, frequency)?;
+            let (sin, cos) = nanotap_arithmetic::sin_cos(held.phase.to_radians());
+            Ok(inverse * Complex::new(cos, -sin))
+        };
+        let none = || HeldError::NoPhase {
+            phase: held.phase,
+            near: alone.shown(frequency_key, start),
+        };
+        let (mut a, mut b) = (start, start * (1.0 + 1e-6));
+        let (mut fa, mut fb) = (turned(a)?.im, turned(b)?.im);
+        for _ in 0..STEPS {
+            if fb == 0.0 || fb == fa {
+                break;
+            }
+            let next = b - fb * (b - a) / (fb - fa);
+            if !(next > 0.3 * start && next < 3.0 * start) {
+                return Err(none());
+            }
+            let moved = (next - b).abs();
+            (a, fa) = (b, fb);
+            b = next;
+            fb = turned(b)?.im;
+            if moved <= 2.0 * f64::EPSILON * b {
+                break;
+            }
+        }
+        let there = turned(b)?;
+        if !(there.re > 0.0 && there.im.abs() <= 1e-6 * there.re) {
+            return Err(none());
+        }
+        let strength = held.amplitude * there.re;
+        let driven = alone.with(frequency_key, b).with(strength_key, strength);
+        let model = driven.model()?;
+        let state = steady_state(&model)?;
+        let closed = held.close(
+            &alone,
+            &Driven {
+                frequency: b,
+                strength,
+                state,
+            },
+        )?;
+        let seen = measure(&closed.model, &closed.orbit.states[0], 1, Set::ALL)?;
+        let mut state = closed.orbit.states[0].clone();
+        // A sample's memory is at rest.
+        state.resize(case.model()?.dimension(), 0.0);
+        Ok(Self {
+            amplitude: held.amplitude,
+            phase: held.phase,
+            frequency: b,
+            strength,
+            reach: FreeMotion::of(&model).reach,
+            loss: seen.energy_balance.drive_work,
+            stiffness: stiffness(&alone, b)?,
+            state,
+        })
+    }
+}
+
+impl FreeOscillation {
+    /// Its drive and state.
+    pub fn driven(&self) -> Driven {
+        Driven {
+            frequency: self.frequency,
+            strength: self.strength,
+            state: self.state.clone(),
+        }
+    }
+}
+
+/// The lever of `case` without a sample, in the exact engine.
+fn alone(case: &Case, held: Held) -> Case {
+    let far = 1e3 * held.amplitude;
+    match case.cantilever() {
+        Some(cantilever) => Case::from(Cantilever {
+            law: None,
+            contact: ContactLaw::SpringDamper,
+            alpha4: 0.0,
+            alpha5: far,
+            alpha6: 0.0,
+            relaxation_stiffness: 0.0,
+            relaxation_time: 0.0,
+            surface: MovingSurface::NONE,
+            ..cantilever.clone()
+        }),
+        None => case.with(Key::OscillatorGap, far),
+    }
+}
+
+/// The free resonance nearest to a frequency.
+fn nearest_resonance(model: &Model, frequency: f64) -> f64 {
+    let free = model.system.regimes().first();
+    let rates = free.map_or(&[][..], |free| &free.basis().eigenvalues);
+    let found = rates
+        .iter()
+        .map(|rate| rate.modulus())
+        .filter(|w| *w > 0.0)
+        .min_by(|a, b| {
+            let off = |w: f64| nanotap_arithmetic::ln(w / frequency).abs();
+            off(*a).total_cmp(&off(*b))
+        });
+    found.unwrap_or(frequency)
+}
+
+/// Strength of the drive over the amplitude of the free tip, with its phase.
+fn inverse_response(case: &Case, frequency: f64) -> Result<Complex, HeldError> {
+    let [frequency_key, strength_key] = case.drive_keys();
+    let there = case.with(frequency_key, frequency).with(strength_key, 1.0);
+    let free = FreeMotion::of(&there.model()?);
+    let (sin, cos) = nanotap_arithmetic::sin_cos(free.phase.to_radians());
+    Ok(Complex::new(cos, sin) / free.amplitude)
+}
+
+fn stiffness(case: &Case, frequency: f64) -> Result<f64, HeldError> {
+    let case = match case.cantilever() {
+        Some(cantilever) => Case::from(Cantilever {
+            actuation: Actuation::Tip,
+            ..cantilever.clone()
+        }),
+        None => case.clone(),
+    };
+    let step = 1e-5;
+    let high = inverse_response(&case, frequency * (1.0 + step))?;
+    let low = inverse_response(&case, frequency * (1.0 - step))?;
+    Ok(-0.25 * (high.re - low.re) / step)
+}
+
+/// The steady motion of a linear system, at drive phase 0.
+fn steady_state(model: &Model) -> Result<Vec<f64>, HeldError> {
+    let n = model.dimension();
+    let mut map = Strobe::new(model);
+    let mut at = vec![0.0; n];
+    let mut jacobian = DMatrix::zeros(n, n);
+    nanotap_dynamics::StroboscopicMap::advance_with_jacobian(&mut map, &mut at, &mut jacobian)?;
+    let solved = (DMatrix::identity(n, n) - jacobian)
+        .lu()
+        .solve(&DVector::from_vec(at));
+    Ok(solved.map_or_else(|| vec![0.0; n], |state| state.as_slice().to_vec()))
+}

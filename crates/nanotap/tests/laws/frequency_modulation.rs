@@ -1,0 +1,257 @@
+//! Frequency modulation: orbits of a given amplitude and phase.
+
+use nanotap::case::{Case, Key};
+use nanotap::control::Control;
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way, approach};
+use nanotap::study::frequency_modulation::{Driven, FreeOscillation, Held, Modulated};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+
+use crate::common::{DMT, HERTZ, air, lever};
+
+/// The lever of the reference: 40 N/m, a tip of 10 nm under van der Waals' force.
+fn reference(q: f64, amplitude: f64, gap: f64) -> Case {
+    let sample = [
+        "sample.law=van-der-waals",
+        "sample.hamaker=2e-19 J",
+        "tip.radius=10 nm",
+    ];
+    lever((40.0, q, "100 kHz"), (amplitude, gap), &sample)
+}
+
+/// A curve between distances in nm.
+fn modulated(case: &Case, (from, to): (f64, f64), points: usize) -> ApproachReport {
+    let unit = 1e-9 / case.physical().unwrap().scales.length;
+    let options = ApproachOptions {
+        from: Some(from * unit),
+        to: Some(to * unit),
+        points,
+        phase: Some(90.0),
+        ..ApproachOptions::default()
+    };
+    approach(case, &options, &Control::default()).unwrap()
+}
+
+fn nearest(report: &ApproachReport) -> (&ApproachPoint, Modulated) {
+    let point = report.table.iter().rfind(|p| p.way == Way::Approach);
+    let point = point.unwrap();
+    (point, point.modulation.unwrap())
+}
+
+/// The orbit study on the drive that was found, from the orbit's state.
+fn again(case: &Case, point: &ApproachPoint) -> OrbitReport {
+    let found = point.modulation.unwrap();
+    let case = case
+        .with(case.gap_key(), point.gap)
+        .with(Key::Omega, found.drive_frequency)
+        .with(Key::Alpha2, found.drive_strength);
+    let options = OrbitOptions {
+        period: Some(1),
+        state: Some(point.orbit.as_ref().unwrap().states[0].clone()),
+        harmonics: 24,
+        ..OrbitOptions::default()
+    };
+    orbit(&case.model().unwrap(), &options).unwrap()
+}
+
+/// The lever of mass, spring and van der Waals' force alone: released 10 nm towards the sample
+/// from a distance of 11 nm it has the period of the energy integral, −8.661882e-5 of the
+/// frequency (by quadrature to 30 digits; its swing is 9.99960316 nm). The two formulas are for
+/// an amplitude of 10 nm.
+#[test]
+fn shifts_under_van_der_waals_are_those_of_the_reference() {
+    let near = |value: f64, reference: f64| (value / reference - 1.0).abs();
+    let at = |q: f64, amplitude: f64| {
+        let report = modulated(&reference(q, amplitude, 11.0), (12.0, 11.0), 2);
+        let (point, found) = nearest(&report);
+        let swing = point.physical.as_ref().unwrap().observables.tip_min * 1e9;
+        (found, swing)
+    };
+    for q in [1e6, 1e9] {
+        let (found, swing) = at(q, 10.0);
+        assert!(near(found.first_order_shift.unwrap(), -8.659440e-5) < 1e-6);
+        assert!(near(found.giessibl_shift.unwrap(), -9.316950e-5) < 1e-6);
+        // The amplitude with which the tip comes just as near.
+        let (_, other) = at(q, 9.9996);
+        let amplitude = 10.0 + (-10.0 - swing) * (9.9996 - 10.0) / (other - swing);
+        let (found, swing) = at(q, amplitude);
+        assert!((swing + 10.0).abs() < 1e-8, "{swing}");
+        assert!(
+            near(found.relative_shift, -8.661_882_202_775_e-5) < 1e-7,
+            "Q = {q}: {}",
+            found.relative_shift
+        );
+    }
+}
+
+/// A conservative force takes nothing, and the drive makes up for the lever's own damping alone:
+/// as the frequency where there are no harmonics, in all what the energy balance of the same
+/// orbit, found again by its drive, says.
+#[test]
+fn a_conservative_law_takes_no_drive() {
+    let case = air(10.0, 11.0, &DMT);
+    let report = modulated(&case, (12.0, 9.5), 6);
+    let free = report.modulation.as_ref().unwrap();
+    assert!(free.ended.is_empty() && free.jumps.is_empty());
+    assert!(report.returned && report.hysteresis.is_empty());
+    let mut signs = [false; 2];
+    for point in &report.table {
+        let found = point.modulation.unwrap();
+        assert_eq!(point.observables.unwrap().dissipation, 0.0);
+        let balance = again(&case, point).observables.energy_balance;
+        let told = free.free_loss * found.drive_ratio;
+        assert!((balance.drive_work / told - 1.0).abs() < 1e-9);
+        assert!((balance.beam_damping / told - 1.0).abs() < 1e-9);
+        if point.observables.unwrap().contact_fraction == 0.0 {
+            let harmonics = found.drive_ratio - 1.0 - found.relative_shift;
+            assert!(
+                harmonics.abs() < 0.01 * found.relative_shift.abs(),
+                "{found:?}"
+            );
+        }
+        signs[usize::from(found.relative_shift > 0.0)] = true;
+    }
+    // Attraction lowers the frequency, repulsion raises it.
+    assert_eq!(signs, [true, true]);
+}
+
+/// Σ n² A_n²/A₁² over n ≥ 2: what harmonics add to the damping of one mode.
+fn harmonics(orbit: &OrbitReport) -> f64 {
+    let harmonics = orbit.spectrum.harmonics.iter();
+    let first = orbit.observables.first_harmonic;
+    let parts = harmonics.filter(|h| h.order > 1.0);
+    parts.map(|h| (h.order * h.tip / first).powi(2)).sum()
+}
+
+/// With one mode, driven at its tip, the energy that the sample takes is what the drive gives,
+/// E₀ F/F₀, less the damping of all harmonics, E₀ (f/f₀) (1 + Σ n² A_n²/A₁²): of the orbit found
+/// again by its frequency and drive.
+#[test]
+fn the_drive_tells_what_a_viscous_sample_takes() {
+    let mut sample = HERTZ.to_vec();
+    sample[0] = "sample.law=voigt-sphere-pulling";
+    sample.push("sample.viscosity=2 Pa s");
+    let case = air(10.0, 10.0, &sample);
+    let report = modulated(&case, (11.0, 5.0), 5);
+    let free = report.modulation.as_ref().unwrap();
+    assert!(free.ended.is_empty(), "{:?}", free.ended);
+    let mut most = 0_f64;
+    for point in &report.table {
+        let found = point.modulation.unwrap();
+        let orbit = again(&case, point);
+        assert!((orbit.observables.phase - 90.0).abs() < 1e-8);
+        let amplitude = orbit.observables.first_harmonic / free.amplitude;
+        assert!((amplitude - 1.0).abs() < 1e-9, "{amplitude}");
+        let taken = orbit.observables.dissipation;
+        let balance = orbit.observables.energy_balance;
+        let told = free.free_loss * found.drive_ratio - balance.beam_damping;
+        assert!(
+            (told - taken).abs() < 1e-9 * free.free_loss,
+            "{told} {taken}"
+        );
+        // With the first twenty-four harmonics.
+        let damping = (1.0 + found.relative_shift) * (1.0 + harmonics(&orbit));
+        let told = free.free_loss * (found.drive_ratio - damping);
+        assert!(
+            (told - taken).abs() < 1e-7 * free.free_loss,
+            "{told} {taken}"
+        );
+        most = most.max(taken / free.free_loss);
+    }
+    assert!(most > 0.3, "{most}");
+}
+
+/// Linear contact in the exact engine, driven at the base and at the tip, several modes: the
+/// orbit has the amplitude and the phase that were asked for.
+#[test]
+fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
+    for actuation in ["base", "tip", "distributed"] {
+        let words = [
+            "cantilever.k=2 N/m",
+            "cantilever.f0=70 kHz",
+            "cantilever.Q=150",
+            "tip.mass_ratio=0.05",
+            "sample.stiffness=5 N/m",
+            "sample.damping=1e-7 N s/m",
+            "drive.frequency=70 kHz",
+            "drive.free_amplitude=20 nm",
+            "gap.tip=15 nm",
+        ];
+        let mut words = words.map(str::to_owned).to_vec();
+        words.push(format!("drive.actuation={actuation}"));
+        let case = Case::parse(None, &words).unwrap();
+        for phase in [60.0, 90.0, 110.0] {
+            let options = ApproachOptions {
+                points: 6,
+                to: Some(10e-9 / case.physical().unwrap().scales.length),
+                phase: Some(phase),
+                ..ApproachOptions::default()
+            };
+            let report = approach(&case, &options, &Control::default()).unwrap();
+            let free = report.modulation.as_ref().unwrap();
+            assert!(
+                free.ended.is_empty(),
+                "{actuation} {phase}: {:?}",
+                free.ended
+            );
+            // Nothing is met at first.
+            let first = report.table[0].modulation.unwrap();
+            assert!(first.relative_shift.abs() < 1e-12);
+            assert!((first.drive_ratio - 1.0).abs() < 1e-9);
+            let (point, found) = nearest(&report);
+            assert!(found.relative_shift > 1e-3);
+            let orbit = again(&case, point);
+            assert!((orbit.observables.phase - phase).abs() < 1e-8);
+            let amplitude = orbit.observables.first_harmonic / free.amplitude;
+            assert!((amplitude - 1.0).abs() < 1e-9, "{amplitude}");
+            let radius = orbit.multipliers[0];
+            let radius = radius[0].hypot(radius[1]);
+            assert!((radius / point.spectral_radius.unwrap() - 1.0).abs() < 1e-7);
+        }
+    }
+}
+
+/// The force that Sader and Jarvis find from the shifts is the law's to the 5 % that their
+/// kernel is good to.
+#[test]
+fn the_force_comes_back_from_the_shifts() {
+    let case = reference(1e6, 10.0, 11.0);
+    let report = modulated(&case, (20.0, 10.6), 120);
+    let mut compared = 0;
+    for point in report.table.iter().filter(|p| p.way == Way::Approach) {
+        let found = point.modulation.unwrap();
+        if found.closest * 1e9 * case.physical().unwrap().scales.length > 3.0 {
+            continue;
+        }
+        let share = found.sader_jarvis_force.unwrap() / found.static_force.unwrap();
+        assert!((share - 1.0).abs() < 0.05, "{found:?}");
+        compared += 1;
+    }
+    assert!(compared > 20, "{compared}");
+}
+
+/// The free lever: no orbit without amplitude, none with a phase that a lever never has.
+#[test]
+fn what_cannot_be_held_is_refused() {
+    let case = air(10.0, 11.0, &DMT);
+    for (amplitude, phase) in [(0.0, 90.0), (f64::NAN, 90.0), (1e-3, 0.0), (1e-3, 200.0)] {
+        let held = Held { amplitude, phase };
+        let guess = Driven {
+            frequency: case.omega(),
+            strength: 1e-6,
+            state: vec![0.0; 2],
+        };
+        assert!(held.close(&case, &guess).is_err());
+    }
+    let held = Held {
+        amplitude: 1e-3,
+        phase: 90.0,
+    };
+    let free = FreeOscillation::of(&case, held).unwrap();
+    // One mode at its tip lags by 90° at its own frequency, and the mode is the spring.
+    assert!((free.frequency / case.omega() - 1.0).abs() < 1e-12);
+    let stiffness = free.stiffness * case.physical().unwrap().scales.stiffness;
+    assert!((stiffness / 0.9 - 1.0).abs() < 1e-9, "{stiffness}");
+    // A viscous force loses π c ω A² = πkA²/Q in a period.
+    let loss = std::f64::consts::PI * free.stiffness * 1e-6 / 200.0;
+    assert!((free.loss / loss - 1.0).abs() < 1e-9);
+}

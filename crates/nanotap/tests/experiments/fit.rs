@@ -671,3 +671,68 @@ fn laws_are_refused_in_words() {
         );
     }
 }
+
+/// A table with the columns that `approach --out` writes: the observables in the model's units and
+/// in SI, and rows of motions that neither way met. Those are left out and counted, and the
+/// stiffness comes back as from the curve itself.
+#[test]
+fn a_curve_that_approach_wrote_is_fitted_as_it_is() {
+    let lever = case(LEVER, &[]);
+    let length = lever.physical().unwrap().scales.length;
+    let met = curve(&lever, 25.0, 12.0, 14);
+    let mut names = vec![
+        "way",
+        "alpha5",
+        "classification",
+        "period",
+        "spectral_radius",
+    ];
+    names.extend(["first_harmonic", "phase", "A (m)", "A_ratio", "zc (m)"]);
+    let mut columns: Vec<(String, Vec<Entry>)> = names
+        .into_iter()
+        .map(|name| (name.to_owned(), Vec::new()))
+        .collect();
+    let mut add = |(distance, amplitude, phase, _): (f64, f64, f64, Way), way: &str| {
+        let (distance, amplitude) = (distance * 1e-9, amplitude * 1e-9);
+        let row = [
+            Entry::Text(way.to_owned()),
+            Entry::Number(distance / length),
+            Entry::Text("periodic".to_owned()),
+            Entry::Number(1.0),
+            Entry::Number(0.99),
+            Entry::Number(amplitude / length),
+            Entry::Number(phase),
+            Entry::Number(amplitude),
+            Entry::Number(amplitude / 20e-9),
+            Entry::Number(distance),
+        ];
+        for ((_, column), entry) in columns.iter_mut().zip(row) {
+            column.push(entry);
+        }
+    };
+    for point in &met {
+        add(*point, point.3.name());
+    }
+    // An orbit of one way, where the other one has been.
+    for point in &met[3..6] {
+        add(*point, "neither");
+    }
+    let table = Table {
+        name: "curve".to_owned(),
+        columns,
+        lines: Vec::new(),
+    };
+    let start = case(LEVER, &["sample.stiffness=25 N/m"]);
+    let mut asked = request(vec![table], &["sample.stiffness"]);
+    asked.profile = false;
+    let report = fitted(&start, &asked);
+    let found = report.parameters[0].value;
+    assert!((found / 30.0 - 1.0).abs() < 1e-6, "{found}");
+    let names: Vec<&str> = report.columns.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["phase", "A"]);
+    let counted = report
+        .remarks
+        .iter()
+        .any(|r| r.starts_with("3 rows of neither way"));
+    assert!(counted, "{:?}", report.remarks);
+}

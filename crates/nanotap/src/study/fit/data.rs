@@ -7,6 +7,11 @@
 //! the table has that under a name of its own (then it is, as everywhere, half of peak to peak).
 //! `NAME error (unit)` holds standard errors, `direction` which way the abscissa went, `curve`
 //! to which curve a row belongs.
+//!
+//! A table that `approach` wrote is read as it is. It has most observables twice, in the model's
+//! units and in SI: of a physical case those in SI count, and amplitude and phase alone unless
+//! others are named. What its rows of neither way show is no part of either curve; they are left
+//! out and counted.
 
 use crate::Error;
 use crate::case::near_name::near_name;
@@ -25,6 +30,8 @@ pub struct Data {
     pub columns: Vec<Column>,
     /// The keys that rows set, the one that varies along the curves first.
     pub swept: Vec<Swept>,
+    /// Rows that belong to neither way and are left out.
+    pub left_out: usize,
 }
 
 /// An observable that was measured.
@@ -99,6 +106,7 @@ impl Data {
             curves: Vec::new(),
             columns: Vec::new(),
             swept: Vec::new(),
+            left_out: 0,
         };
         for table in tables {
             data.add(case, table, only)?;
@@ -147,7 +155,12 @@ impl Data {
         let own_amplitude = has("first_harmonic") || has("A");
         let mut roles: Vec<Role> = Vec::new();
         for (index, header) in headers.iter().enumerate() {
-            let role = if chosen(header, &table.columns[index].0) {
+            let counts = if of_approach(&headers) {
+                counts_of_approach(&headers, index, case, only)
+            } else {
+                chosen(header, &table.columns[index].0)
+            };
+            let role = if counts {
                 header
                     .role(case, own_amplitude)
                     .map_err(|error| error.context(table.place(None, index)))?
@@ -185,7 +198,12 @@ impl Data {
         }
         let mut rows: Vec<(String, Row)> = Vec::new();
         for row in 0..table.rows() {
-            rows.push(self.row(table, &roles, &places, row)?);
+            let (curve, row) = self.row(table, &roles, &places, row)?;
+            if row.way == Some(Way::Neither) {
+                self.left_out += 1;
+            } else {
+                rows.push((curve, row));
+            }
         }
         for (curve, row) in rows {
             match self.curves.iter_mut().find(|known| known.name == curve) {
@@ -381,8 +399,48 @@ fn way(word: &str) -> Option<Way> {
     match word.to_lowercase().as_str() {
         "approach" | "extend" | "trace" | "up" => Some(Way::Approach),
         "retract" | "retrace" | "down" => Some(Way::Retract),
+        "neither" => Some(Way::Neither),
         _ => None,
     }
+}
+
+/// Whether a table is one that `approach` wrote.
+fn of_approach(headers: &[Header]) -> bool {
+    let names: Vec<&str> = headers.iter().map(|h| h.name.as_str()).take(5).collect();
+    matches!(
+        names[..],
+        ["way", _, "classification", "period", "spectral_radius"]
+    )
+}
+
+/// Whether a column of such a table counts: see the module's documentation.
+fn counts_of_approach(headers: &[Header], index: usize, case: &Case, only: &[String]) -> bool {
+    let header = &headers[index];
+    let physical = case.is_physical();
+    let has_zc = headers.iter().any(|h| h.name == "zc");
+    match header.name.as_str() {
+        "way" => return true,
+        "zc" => return physical,
+        _ if index == 1 => return !(physical && has_zc),
+        _ => {}
+    }
+    let Some(observable) = measured(&header.name, true) else {
+        return false;
+    };
+    let wanted = if only.is_empty() {
+        matches!(observable.name, "first_harmonic" | "phase")
+    } else {
+        let named = |name: &String| {
+            let name = Header::of(name).name;
+            name == header.name || name == observable.name || name == observable.si_name
+        };
+        only.iter().any(named)
+    };
+    let same = |other: &&Header| measured(&other.name, true) == Some(observable);
+    let mut all = headers.iter().filter(same);
+    let in_si = all.clone().find(|other| physical && !other.unit.is_empty());
+    let first = in_si.or_else(|| all.next());
+    wanted && first.is_some_and(|first| std::ptr::eq(first, header))
 }
 
 /// What a column is, with the size of its unit.

@@ -193,6 +193,13 @@ impl Search<'_> {
         let data = self.problem.data;
         let point = &found.solution.point;
         let mut remarks = Vec::new();
+        if data.left_out > 0 {
+            remarks.push(format!(
+                "{} rows of neither way are left out: which motion a curve shows is told by its \
+                 own rows",
+                data.left_out
+            ));
+        }
         let lost = point.iter().filter(|row| row.lost).count();
         if lost > 0 {
             remarks.push(format!(

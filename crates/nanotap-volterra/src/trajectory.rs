@@ -14,6 +14,9 @@ use std::sync::Arc;
 const POINTS: usize = 24;
 /// How far the fastest mode may turn within a panel.
 const REACH: f64 = 6.0;
+/// By how much the phase of a factor may turn in a panel: Gauss's rule of [`POINTS`] points is
+/// right to rounding up to here.
+const OSCILLATION: f64 = 36.0;
 /// The largest number of steps a trajectory keeps.
 pub const MAX_RECORDED_STEPS: usize = 4_000_000;
 
@@ -297,10 +300,15 @@ impl Trajectory {
     /// The nodes of a quadrature of the whole motion and the ends of its steps, in order of
     /// time: what integrals and extrema are read from.
     pub fn nodes(&self) -> Vec<Node> {
+        self.nodes_resolving(0.0)
+    }
+
+    /// The same, dense enough for a factor that oscillates with the angular frequency `omega`.
+    pub fn nodes_resolving(&self, omega: f64) -> Vec<Node> {
         let (places, weights) = gauss_legendre(POINTS);
         let mut all = Vec::new();
         for (index, piece) in self.pieces.iter().enumerate() {
-            let panels = self.panels(piece);
+            let panels = self.panels(piece, omega);
             let width = piece.end / panels as f64;
             let inner = (0..panels).flat_map(|panel| {
                 let nodes = places.iter().zip(&weights);
@@ -362,13 +370,13 @@ impl Trajectory {
     /// component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, output: &Output, omega: f64) -> Complex {
         let (start, end) = self.span();
-        let sums = self.integrate(2, |s, out| {
-            let value = self.read(output, s).0;
-            let (sin, cos) = nanotap_arithmetic::sin_cos(omega * s.time);
-            out[0] = value * cos;
-            out[1] = -value * sin;
+        let nodes = self.nodes_resolving(omega);
+        let parts = nodes.iter().filter(|node| node.weight != 0.0).map(|node| {
+            let value = node.weight * self.read(output, &node.sample).0;
+            let (sin, cos) = nanotap_arithmetic::sin_cos(omega * node.sample.time);
+            Complex::new(value * cos, -value * sin)
         });
-        Complex::new(sums[0], sums[1]) * (2.0 / (end - start))
+        parts.sum::<Complex>() * (2.0 / (end - start))
     }
 
     /// `∫ F ḋ dt`, the work of the law's force on the gap: what it stores and (below zero over
@@ -453,8 +461,10 @@ impl Trajectory {
         }
     }
 
-    fn panels(&self, piece: &Piece) -> usize {
-        let fastest = self.fastest();
+    fn panels(&self, piece: &Piece, omega: f64) -> usize {
+        let fastest = self
+            .fastest()
+            .max((self.fastest() + omega) * REACH / OSCILLATION);
         let steepest = piece
             .map
             .rate(piece.length, 0.0)

@@ -224,16 +224,41 @@ impl NonlinearRecording {
     /// The samples of a quadrature over everything, with their weights; times are counted from
     /// the beginning of the recording.
     fn samples(&self) -> &[(f64, Sample)] {
-        self.samples.get_or_init(|| {
-            let mut all = Vec::new();
-            for (k, period) in self.periods.iter().enumerate() {
-                for mut node in period.nodes() {
-                    node.sample.time += self.offset(k);
-                    all.push((node.weight, node.sample));
+        self.samples.get_or_init(|| self.samples_resolving(0.0))
+    }
+
+    /// The same, dense enough for a factor that oscillates with the angular frequency `omega`.
+    fn samples_resolving(&self, omega: f64) -> Vec<(f64, Sample)> {
+        let mut all = Vec::new();
+        for (k, period) in self.periods.iter().enumerate() {
+            for mut node in period.nodes_resolving(omega) {
+                node.sample.time += self.offset(k);
+                all.push((node.weight, node.sample));
+            }
+        }
+        all
+    }
+
+    /// The Fourier coefficients of outputs, a row a frequency.
+    fn fouriers(
+        &self,
+        outputs: &[&nanotap_volterra::Output],
+        frequencies: &[f64],
+    ) -> Vec<Vec<Complex>> {
+        let fastest = frequencies.iter().fold(0.0, |m: f64, omega| m.max(*omega));
+        let samples = self.samples_resolving(fastest);
+        let scale = 2.0 / self.end().max(f64::MIN_POSITIVE);
+        let mut rows = vec![vec![Complex::new(0.0, 0.0); outputs.len()]; frequencies.len()];
+        for (weight, sample) in samples.iter().filter(|(weight, _)| *weight != 0.0) {
+            let values: Vec<f64> = outputs.iter().map(|o| self.read(o, sample)).collect();
+            for (row, omega) in rows.iter_mut().zip(frequencies) {
+                let (sin, cos) = nanotap_arithmetic::sin_cos(omega * sample.time);
+                for (sum, value) in row.iter_mut().zip(&values) {
+                    *sum += Complex::new(cos, -sin) * (scale * weight * value);
                 }
             }
-            all
-        })
+        }
+        rows
     }
 
     /// The value of an output at a sample.
@@ -388,8 +413,15 @@ impl Curve {
         if let Some(signals) = exact {
             return nanotap_flow::integral::fouriers(&signals, frequencies);
         }
-        let row = |omega: &f64| curves.iter().map(|curve| curve.fourier(*omega)).collect();
-        frequencies.iter().map(row).collect()
+        let nonlinear = curves.iter().filter_map(|curve| match curve {
+            Self::Exact(_) => None,
+            Self::Nonlinear(recording, output) => Some((recording, output)),
+        });
+        let outputs: Vec<_> = nonlinear.clone().map(|(_, output)| output).collect();
+        match nonlinear.clone().next() {
+            Some((recording, _)) => recording.fouriers(&outputs, frequencies),
+            None => Vec::new(),
+        }
     }
 
     /// The Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the duration `D`, so that the
@@ -397,13 +429,7 @@ impl Curve {
     pub fn fourier(&self, omega: f64) -> Complex {
         match self {
             Self::Exact(signal) => signal.fourier(omega),
-            Self::Nonlinear(recording, output) => {
-                let sum = recording.integral(|s| {
-                    let (sin, cos) = nanotap_arithmetic::sin_cos(omega * s.time);
-                    Complex::new(cos, -sin) * recording.read(output, s)
-                });
-                sum * (2.0 / recording.end().max(f64::MIN_POSITIVE))
-            }
+            Self::Nonlinear(recording, output) => recording.fouriers(&[output], &[omega])[0][0],
         }
     }
 

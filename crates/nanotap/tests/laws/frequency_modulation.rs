@@ -47,7 +47,7 @@ fn again(case: &Case, point: &ApproachPoint) -> OrbitReport {
     let options = OrbitOptions {
         period: Some(1),
         state: Some(point.orbit.as_ref().unwrap().states[0].clone()),
-        harmonics: 24,
+        harmonics: 200,
         ..OrbitOptions::default()
     };
     orbit(&case.model().unwrap(), &options).unwrap()
@@ -148,7 +148,6 @@ fn the_drive_tells_what_a_viscous_sample_takes() {
             (told - taken).abs() < 1e-9 * free.free_loss,
             "{told} {taken}"
         );
-        // With the first twenty-four harmonics.
         let damping = (1.0 + found.relative_shift) * (1.0 + harmonics(&orbit));
         let told = free.free_loss * (found.drive_ratio - damping);
         assert!(

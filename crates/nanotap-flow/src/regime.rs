@@ -172,49 +172,64 @@ pub(crate) struct KernelVectors {
     pub(crate) masks: ComplexVector,
 }
 
-impl Kernel {
-    /// Packs `output` of `regime`.
-    pub(crate) fn new(regime: &Regime, drive: &Drive, output: &ModalOutput) -> Self {
-        let modal = regime
+/// What the kernels of all outputs of a regime have in common: the rates of their terms.
+pub(crate) struct KernelFrame {
+    kernel: Kernel,
+    /// |λ| by term.
+    sizes: Vec<f64>,
+}
+
+impl KernelFrame {
+    /// Packs the rates of `regime` and of the drive.
+    pub(crate) fn new(regime: &Regime, drive: &Drive) -> Self {
+        let tones = drive.frequencies().iter();
+        let tones = tones.map(|&w| Complex::new(0.0, w));
+        let rates: Vec<Complex> = regime
             .basis
             .eigenvalues
             .iter()
             .copied()
-            .zip(output.modal.iter().copied());
-        let tones = drive
-            .frequencies()
-            .iter()
-            .map(|&w| Complex::new(0.0, w))
-            .zip(output.tones.iter().copied());
-        let terms: Vec<(Complex, Complex)> = modal.chain(tones).collect();
-        let mut kernel = Self {
-            vectors: vec![KernelVectors::default(); layout::vectors_for(terms.len())],
-            count: terms.len(),
-            constant: output.constant,
-            ..Self::default()
+            .chain(tones)
+            .collect();
+        let mut kernel = Kernel {
+            vectors: vec![KernelVectors::default(); layout::vectors_for(rates.len())],
+            count: rates.len(),
+            ..Kernel::default()
         };
-        let rates: Vec<Complex> = terms.iter().map(|t| t.0).collect();
+        let sizes: Vec<f64> = rates.iter().map(|rate| rate.modulus()).collect();
         let masks = relaxation_masks(&rates);
-        for (k, (rate, weight)) in terms.into_iter().enumerate() {
+        for (k, rate) in rates.into_iter().enumerate() {
             let (vector, i) = layout::place(k);
             let vector = &mut kernel.vectors[vector];
             for (lanes, mask) in vector.masks.iter_mut().zip(masks[k]) {
                 lanes[i] = mask;
             }
-            let norm = rate.modulus();
             vector.decay[i] = rate.re;
             vector.frequency[i] = rate.im;
+            vector.cube[i] = sizes[k].powi(3);
+        }
+        Self { kernel, sizes }
+    }
+
+    /// With the weights of `output`.
+    pub(crate) fn kernel(&self, output: &ModalOutput) -> Kernel {
+        let mut kernel = self.kernel.clone();
+        kernel.constant = output.constant;
+        for (k, weight) in output.modal.iter().chain(&output.tones).enumerate() {
+            let (vector, i) = layout::place(k);
+            let vector = &mut kernel.vectors[vector];
             vector.weight[0][i] = weight.re;
             vector.weight[1][i] = weight.im;
-            vector.cube[i] = norm.powi(3);
-            if weight.modulus() > 0.0 {
-                kernel.fastest = kernel.fastest.max(norm);
-                kernel.grows |= rate.re > 0.0;
+            if weight.re != 0.0 || weight.im != 0.0 {
+                kernel.fastest = kernel.fastest.max(self.sizes[k]);
+                kernel.grows |= vector.decay[i] > 0.0;
             }
         }
         kernel
     }
+}
 
+impl Kernel {
     /// The rate `λ` of term `k`.
     pub(crate) fn rate(&self, k: usize) -> Complex {
         let (vector, lane) = layout::place(k);

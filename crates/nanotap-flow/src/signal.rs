@@ -82,8 +82,9 @@ fn followed(count: usize) -> [usize; RELAXATIONS] {
 
 /// For each of the terms' rates, 1 in the lower bounds that follow it and 0 elsewhere.
 pub(crate) fn relaxation_masks(rates: &[Complex]) -> Vec<[f64; RELAXATIONS]> {
+    let sizes: Vec<f64> = rates.iter().map(|rate| rate.modulus()).collect();
     let mut order: Vec<usize> = (0..rates.len()).collect();
-    order.sort_by(|&a, &b| rates[a].modulus().total_cmp(&rates[b].modulus()));
+    order.sort_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
     let mut masks = vec![[0.0; RELAXATIONS]; rates.len()];
     for (rank, &k) in order.iter().enumerate() {
         masks[k] = followed(rates.len()).map(|n| if rank < n { 1.0 } else { 0.0 });

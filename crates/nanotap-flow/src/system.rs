@@ -1,7 +1,7 @@
 //! A piecewise-linear system: its regimes and the transitions between them.
 
 use crate::harmonic::{HarmonicVector, Output};
-use crate::regime::{Kernel, ModalOutput, Regime};
+use crate::regime::{Kernel, KernelFrame, ModalOutput, Regime};
 use crate::search::Start;
 use crate::search::table::Table;
 use crate::simd::affine::AffineMap;
@@ -615,7 +615,7 @@ impl System {
                 .rate(target.matrix(), target.forcing(), &self.drive)
         });
         let guard = self.regimes[from].project(&transition.guard);
-        let kernel = Kernel::new(&self.regimes[from], &self.drive, &guard);
+        let kernel = KernelFrame::new(&self.regimes[from], &self.drive).kernel(&guard);
         let clustered = !self.regimes[from].basis().clusters.is_empty();
         let mut switch = self.switch(
             from,

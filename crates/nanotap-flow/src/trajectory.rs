@@ -1,6 +1,7 @@
 //! A recorded motion with closed-form dense output.
 
 use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::regime::ModalOutput;
 use crate::signal::Signal;
 use crate::system::System;
 use crate::{Complex, Flow, FlowError, Output};
@@ -190,6 +191,30 @@ impl Trajectory {
         Some(x)
     }
 
+    /// The piece of the signal of `output` at time `t`.
+    pub fn piece_at(&self, output: &Output, t: f64) -> Option<Piece> {
+        let segment = self.segment_at(t)?;
+        let modal = self.system.regimes()[segment.regime].project(output);
+        Some(self.piece(segment, &modal))
+    }
+
+    fn piece(&self, segment: &Segment, output: &ModalOutput) -> Piece {
+        let regime = &self.system.regimes()[segment.regime];
+        let (phase, length) = (segment.phase, segment.length);
+        Piece {
+            start: segment.start,
+            length,
+            signal: Signal::of(
+                regime,
+                self.system.drive(),
+                output,
+                &segment.modal,
+                phase,
+                length,
+            ),
+        }
+    }
+
     /// How long the motion stays in `regime`.
     pub fn time_in(&self, regime: usize) -> f64 {
         self.segments
@@ -210,29 +235,10 @@ impl Trajectory {
     /// # Panics
     /// When there are fewer outputs than regimes.
     pub fn signal_by_regime(&self, outputs: &[Output]) -> PiecewiseSignal {
-        let drive = self.system.drive();
-        let regimes = self.system.regimes();
-        let modal: Vec<_> = regimes
-            .iter()
-            .zip(outputs)
-            .map(|(r, o)| r.project(o))
-            .collect();
-        let pieces = self
-            .segments
-            .iter()
-            .map(|s| Piece {
-                start: s.start,
-                length: s.length,
-                signal: Signal::of(
-                    &regimes[s.regime],
-                    drive,
-                    &modal[s.regime],
-                    &s.modal,
-                    s.phase,
-                    s.length,
-                ),
-            })
-            .collect();
+        let regimes = self.system.regimes().iter().zip(outputs);
+        let modal: Vec<_> = regimes.map(|(r, o)| r.project(o)).collect();
+        let segments = self.segments.iter();
+        let pieces = segments.map(|s| self.piece(s, &modal[s.regime])).collect();
         PiecewiseSignal { pieces }
     }
 }

@@ -1,10 +1,11 @@
 //! Work on a thread of its own, watched: progress is told, signals are heard, panics are
 //! caught, and the interpreter is free meanwhile.
 
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use nanotap::control::Control;
@@ -60,23 +61,23 @@ pub(crate) fn watched_alone<R: Send + 'static>(
     let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
     let (sender, receiver) = channel();
     let inside = (Arc::clone(&cancel), Arc::clone(&counts));
-    std::thread::Builder::new()
-        .name("nanotap".into())
-        .spawn(move || {
-            let (cancel, counts) = inside;
-            let report = |done: usize, total: usize| {
-                counts[0].fetch_max(done, Ordering::Relaxed);
-                counts[1].store(total, Ordering::Relaxed);
-            };
-            let control = Control {
-                cancel: Some(&cancel),
-                progress: Some(&report),
-            };
-            let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
+    elsewhere(Box::new(move || {
+        let (cancel, counts) = inside;
+        let report = |done: usize, total: usize| {
+            counts[0].fetch_max(done, Ordering::Relaxed);
+            counts[1].store(total, Ordering::Relaxed);
+        };
+        let control = Control {
+            cancel: Some(&cancel),
+            progress: Some(&report),
+        };
+        let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
+        Box::new(move || {
             // Nobody may be waiting any more.
             let _ = sender.send(result);
         })
-        .map_err(|error| PyRuntimeError::new_err(format!("cannot start a thread: {error}")))?;
+    }))
+    .map_err(|error| PyRuntimeError::new_err(format!("cannot start a thread: {error}")))?;
     py.detach(move || {
         let mut stopped: Option<(Instant, PyErr)> = None;
         let mut told = (0, 0);
@@ -153,24 +154,85 @@ fn ended<R>(done: Outcome<R>, stopped: Option<PyErr>) -> PyResult<Watched<R>> {
     }
 }
 
-/// One thread a core. Threads do not survive a fork: a child of this process that waited for
-/// those of its parent would wait for ever, so it starts its own.
-fn threads_of_this_process() -> Result<Arc<ThreadPool>, Failure> {
-    static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
-    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    let process = std::process::id();
-    if let Some((owner, threads)) = &*pool
-        && *owner == process
-    {
-        return Ok(Arc::clone(threads));
+/// Work that ends in the message that it is done.
+type Job = Box<dyn FnOnce() -> Box<dyn FnOnce()> + Send>;
+
+/// Does `job` on a thread that waits for work, or on a new one: to start a thread costs more than
+/// many a motion.
+fn elsewhere(job: Job) -> io::Result<()> {
+    static IDLE: Mutex<OfThisProcess<Vec<Sender<Job>>>> = Mutex::new(OfThisProcess(None));
+    const MOST_IDLE: usize = 8;
+    let idle = lock(&IDLE).get_or_make(|| Ok(Vec::new()))?.pop();
+    let mut job = match idle {
+        Some(thread) => match thread.send(job) {
+            Ok(()) => return Ok(()),
+            Err(unsent) => unsent.0,
+        },
+        None => job,
+    };
+    let (sender, jobs) = channel();
+    let work = move || {
+        loop {
+            let tell = job();
+            // Before anybody hears of the result: a process that forks then must not find the
+            // list locked.
+            let stays = lock(&IDLE)
+                .get_or_make(|| Ok(Vec::new()))
+                .is_ok_and(|idle| {
+                    let stays = idle.len() < MOST_IDLE;
+                    idle.extend(stays.then(|| sender.clone()));
+                    stays
+                });
+            tell();
+            if !stays {
+                return;
+            }
+            match jobs.recv() {
+                Ok(next) => job = next,
+                Err(_) => return,
+            }
+        }
+    };
+    std::thread::Builder::new()
+        .name("nanotap".into())
+        .spawn(work)?;
+    Ok(())
+}
+
+/// What belongs to the threads of one process. They do not survive a fork: a child that waited
+/// for those of its parent would wait for ever, so it makes its own.
+struct OfThisProcess<T>(Option<(u32, T)>);
+
+impl<T> OfThisProcess<T> {
+    fn get_or_make(&mut self, make: impl FnOnce() -> io::Result<T>) -> io::Result<&mut T> {
+        let process = std::process::id();
+        if self.0.as_ref().is_none_or(|(owner, _)| *owner != process) {
+            // The parent's can be neither used nor joined.
+            std::mem::forget(self.0.replace((process, make()?)));
+        }
+        self.0
+            .as_mut()
+            .map(|(_, one)| one)
+            .ok_or_else(|| io::ErrorKind::NotFound.into())
     }
-    let threads = ThreadPoolBuilder::new().build().map_err(|error| {
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// One thread a core.
+fn threads_of_this_process() -> Result<Arc<ThreadPool>, Failure> {
+    static POOL: Mutex<OfThisProcess<Arc<ThreadPool>>> = Mutex::new(OfThisProcess(None));
+    let make = || {
+        let pool = ThreadPoolBuilder::new().build();
+        pool.map(Arc::new).map_err(io::Error::other)
+    };
+    let mut pool = lock(&POOL);
+    let pool = pool.get_or_make(make).map_err(|error| {
         Failure(nanotap::Error::numerics(format!(
             "cannot start a thread a core: {error}"
         )))
     })?;
-    let threads = Arc::new(threads);
-    // The parent's can be neither used nor joined.
-    std::mem::forget(pool.replace((process, Arc::clone(&threads))));
-    Ok(threads)
+    Ok(Arc::clone(pool))
 }

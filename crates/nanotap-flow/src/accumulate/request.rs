@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::stretch::{Rate, Rates, pair_weights};
-use crate::regime::{Kernel, ModalOutput};
+use crate::regime::{Kernel, KernelFrame, ModalOutput};
 use crate::search::table::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};
 
@@ -260,8 +260,8 @@ impl RegimePlan {
         let weights: Vec<Vec<Complex>> = outputs.iter().map(weights).collect();
         let product = |&(g, h): &(usize, usize)| pair_weights(&weights[g], &weights[h]);
         let pairs = products.iter().map(product).collect();
-        let kernel = |output| Kernel::new(regime, drive, output);
-        let kernels: Vec<Kernel> = outputs.iter().map(kernel).collect();
+        let frame = KernelFrame::new(regime, drive);
+        let kernels: Vec<Kernel> = outputs.iter().map(|o| frame.kernel(o)).collect();
         let rates = Rates::new(&regime.basis().eigenvalues, drive, !products.is_empty());
         let turned = frequencies
             .iter()

@@ -3,7 +3,7 @@
 use super::on_table;
 use super::table::{Followed, Table};
 use super::{Crossing, Start, Statistics, first_crossing};
-use crate::regime::Kernel;
+use crate::regime::KernelFrame;
 use crate::signal::Signal;
 use crate::simd::{Plain, WIDTH, layout};
 use crate::{Complex, Drive, HarmonicVector, Output, Regime};
@@ -40,7 +40,7 @@ fn example(oscillators: &Oscillators, tone: f64, constant: f64) -> (Table, Signa
         1.0
     };
     let regime = Regime::new(0, matrix, HarmonicVector::zeros(2 * n, 1), &drive).unwrap();
-    let kernel = Kernel::new(&regime, &drive, &regime.project(&output.scaled(side)));
+    let kernel = KernelFrame::new(&regime, &drive).kernel(&regime.project(&output.scaled(side)));
     let mut modal = vec![Complex::new(0.0, 0.0); n];
     let mut rest = vec![0.0; 2 * n];
     regime.to_modal(&drive, state.as_slice(), 0.0, &mut rest, &mut modal);

@@ -173,6 +173,10 @@ def slice_axis(name: str, value: str | Mapping[str, Any]) -> str:
     return words[0]
 
 
+# Made once: a new one a request takes longer than the request.
+_written = json.JSONEncoder(allow_nan=False).encode
+
+
 @cache
 def _studies() -> dict[str, tuple[str, dict[str, Any]]]:
     """What the progress of each study counts, and the schemas of its options."""
@@ -199,7 +203,7 @@ def request(study: str, options: Mapping[str, Any]) -> str:
         # Only a number cannot be nothing.
         if value is not None or _kinds(schemas[name]) <= {"integer", "number"}
     }
-    return json.dumps(given, allow_nan=False)
+    return _written(given)
 
 
 def _kinds(schema: Mapping[str, Any]) -> set[str]:

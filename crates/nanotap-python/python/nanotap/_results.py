@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
@@ -130,9 +131,10 @@ def _of_curve(parameter: Mapping[str, Any]) -> str:
 
 
 def _wrapped(value: Any) -> Any:
-    if isinstance(value, Mapping) and not isinstance(value, Record):
+    # JSON has no other kinds, and whether something is a Mapping takes long to ask.
+    if type(value) is dict:
         return Record(value)
-    if isinstance(value, list) and value and not isinstance(value[0], float | int):
+    if type(value) is list and value and type(value[0]) not in (float, int, str):
         return [_wrapped(entry) for entry in value]
     return value
 
@@ -156,6 +158,11 @@ def pairs(value: Sequence[Sequence[float]]) -> npt.NDArray[np.complex128]:
     return numbers[:, 0] + 1j * numbers[:, 1]
 
 
+@cache
+def _names(kind: "type[Result]") -> tuple[str, ...]:
+    return tuple(entry.name for entry in fields(kind))
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Result:
     """A result: its chief entries are fields, the others are found by their names too.
@@ -174,15 +181,15 @@ class Result:
         """The result that a document tells of; `beside` is what no document holds."""
         record = document if isinstance(document, Record) else Record(document)
         values: dict[str, Any] = {"document": record, **beside}
-        for entry in fields(cls):
-            if entry.name in values or entry.name not in record:
+        for name in _names(cls):
+            if name in values or name not in record._entries:
                 continue
-            value = record[entry.name]
-            if value is not None and entry.name in cls._arrays:
-                value = floats(value)
-            elif value is not None and entry.name in cls._complex:
-                value = pairs(value)
-            values[entry.name] = value
+            if name in cls._arrays or name in cls._complex:
+                value = record._entries[name]
+                made = floats if name in cls._arrays else pairs
+                values[name] = None if value is None else made(value)
+            else:
+                values[name] = record[name]
         return cls(**values)
 
     if not TYPE_CHECKING:
@@ -193,8 +200,8 @@ class Result:
             return getattr(self.document, name)
 
     def __getitem__(self, name: str) -> Any:
-        own = {entry.name for entry in fields(self)} | {"series"}
-        return getattr(self, name) if name in own else self.document[name]
+        own = name in _names(type(self)) or name == "series"
+        return getattr(self, name) if own else self.document[name]
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self.document})

@@ -45,6 +45,12 @@ pub struct Clearance<D = f64> {
 const PLACES_PER_MODE: usize = 8;
 /// Width of the interval of places in which the beam is lowest.
 const PLACE: f64 = 1e-9;
+/// Newton's steps to the moment of a least height, …
+const MOST_STEPS: usize = 12;
+/// … the last of which is shorter than this part of a drive period.
+const SAME_MOMENT: f64 = 1e-9;
+/// A least height that was followed is the least over all time where both agree as well as this.
+const FOLLOWED: f64 = 1e-11;
 
 impl Clearance {
     /// Over `periods` drive periods from `state` at drive phase 0; `None` if the model is no
@@ -95,12 +101,41 @@ impl RecordedBeam<'_> {
             }
         }
         let (i, _) = best?;
-        let mut best = self.least_height(place(i))?;
+        let best = self.least_height(place(i))?;
         // At the clamp itself every beam is level.
-        let mut low = place(i.saturating_sub(1)).max(1e-6);
-        let mut high = place((i + 1).min(count));
+        let (low, high) = (
+            place(i.saturating_sub(1)).max(1e-6),
+            place((i + 1).min(count)),
+        );
+        // The moment of the least height is followed from place to place; at the end it is
+        // searched for over the whole motion.
+        if let Some(near) = self.level(best, low, high, |xi, from| self.least_near(xi, from)) {
+            let known = near.xi == best.xi;
+            let certain = if known {
+                best
+            } else {
+                self.least_height(near.xi)?
+            };
+            if (certain.height - near.height).abs() <= FOLLOWED * (1.0 + near.height.abs()) {
+                return Some(certain);
+            }
+        }
+        self.level(best, low, high, |xi, _| self.least_height(xi))
+    }
+
+    /// Where between `low` and `high` the beam is level at the moment when it is lowest there;
+    /// `least` finds the least height of a place, given a moment near it. `best` where the
+    /// beam's slopes at both ends say that it is lowest at an end.
+    fn level(
+        &self,
+        mut best: Clearance,
+        mut low: f64,
+        mut high: f64,
+        least: impl Fn(f64, f64) -> Option<Clearance>,
+    ) -> Option<Clearance> {
         // The slopes there point away from each other, or the beam is lowest at an end.
-        let (mut falls, mut rises) = (self.slope_at(low)?, self.slope_at(high)?);
+        let mut falls = self.slope(&least(low, best.period)?)?;
+        let mut rises = self.slope(&least(high, best.period)?)?;
         if falls >= 0.0 || rises <= 0.0 {
             return Some(best);
         }
@@ -115,7 +150,7 @@ impl RecordedBeam<'_> {
             } else {
                 0.5 * (low + high)
             };
-            let here = self.least_height(xi)?;
+            let here = least(xi, best.period)?;
             if here.height < best.height {
                 best = here;
             }
@@ -130,6 +165,39 @@ impl RecordedBeam<'_> {
             }
         }
         Some(best)
+    }
+
+    /// The least height of one place near the moment `from`, in drive periods: Newton's method
+    /// on its rate. Only of an exact motion.
+    fn least_near(&self, xi: f64, from: f64) -> Option<Clearance> {
+        let Recording::Exact(trajectory) = self.recording else {
+            return None;
+        };
+        let height = self.beam.height(xi);
+        let mut time = from * self.model.period();
+        let mut piece = trajectory.piece_at(&height, time)?;
+        for _ in 0..MOST_STEPS {
+            let jet = piece.signal.jet(time - piece.start);
+            if jet.curvature <= 0.0 {
+                return None;
+            }
+            let step = -jet.rate / jet.curvature;
+            if step.abs() <= SAME_MOMENT * self.model.period() {
+                return Some(Clearance {
+                    height: jet.value,
+                    xi,
+                    period: time / self.model.period(),
+                });
+            }
+            time += step;
+            if time < 0.0 || time > trajectory.end() {
+                return None;
+            }
+            if time < piece.start || time > piece.start + piece.length {
+                piece = trajectory.piece_at(&height, time)?;
+            }
+        }
+        None
     }
 
     /// The least height of one place.
@@ -148,10 +216,6 @@ impl RecordedBeam<'_> {
         let state = self.recording.state_at(time)?;
         let slopes = self.beam.modes.iter().map(|mode| mode.slope(lowest.xi));
         Some(slopes.zip(&state).map(|(slope, a)| slope * a).sum())
-    }
-
-    fn slope_at(&self, xi: f64) -> Option<f64> {
-        self.slope(&self.least_height(xi)?)
     }
 }
 

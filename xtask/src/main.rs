@@ -6,6 +6,7 @@
 
 mod benches;
 mod book;
+mod package;
 mod peers;
 mod process;
 mod steps;

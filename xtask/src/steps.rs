@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+use crate::package;
 use crate::process::{shown_and_kept, succeeds};
 use crate::tally::Tally;
 use crate::tools::Workspace;
@@ -60,6 +61,11 @@ pub(crate) static STEPS: &[Step] = &[
         name: "doc",
         about: "the documentation builds without a warning",
         run: doc,
+    },
+    Step {
+        name: "package",
+        about: "every crate and the Python package, built from what would be published",
+        run: package,
     },
 ];
 
@@ -190,6 +196,12 @@ fn test_doc(workspace: &Workspace) -> Result<Tally, String> {
     ]);
     let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
     Ok(Tally::of_tests(&lines, succeeded))
+}
+
+fn package(workspace: &Workspace) -> Result<Tally, String> {
+    let mut tally = package::crates(workspace)?;
+    tally += package::python(workspace)?;
+    Ok(tally)
 }
 
 fn doc(workspace: &Workspace) -> Result<Tally, String> {

@@ -128,15 +128,7 @@ impl Environment {
         if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
             return Ok(environment);
         }
-        let created = process::succeeds(
-            root,
-            Command::new(PYTHON)
-                .args(["-m", "venv", "--clear"])
-                .arg(&environment.folder),
-        )?;
-        if !created {
-            return Err("python3 -m venv failed".into());
-        }
+        let environment = Self::empty(root, environment.folder)?;
         let pip = [
             "-m",
             "pip",
@@ -155,6 +147,19 @@ impl Environment {
         fs::write(&stamp, wanted)
             .map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
         Ok(environment)
+    }
+
+    /// A new one in `folder`, with nothing but Python itself.
+    ///
+    /// # Errors
+    /// Python failed.
+    pub(crate) fn empty(root: &Path, folder: PathBuf) -> Result<Self, String> {
+        let mut venv = Command::new(PYTHON);
+        if process::succeeds(root, venv.args(["-m", "venv", "--clear"]).arg(&folder))? {
+            Ok(Self { folder })
+        } else {
+            Err(format!("{PYTHON} -m venv failed"))
+        }
     }
 
     /// One of its programs.

@@ -71,6 +71,24 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
     Ok(ending)
 }
 
+/// The same for every file in `folder` with one of the `endings` whose name before it is one that
+/// a command `writes`, where that is known only afterwards.
+pub(crate) fn claim_in(
+    folder: &Path,
+    endings: &[&str],
+    writes: impl Fn(&str) -> bool,
+) -> Result<(), Failure> {
+    let entries = fs::read_dir(folder).map_err(|error| refused(folder, error))?;
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy());
+        if stem.is_some_and(|stem| writes(&stem)) && ending(&path, endings).is_ok() {
+            claim(&path, endings)?;
+        }
+    }
+    Ok(())
+}
+
 /// Whether nanotap wrote a file of that ending which holds these bytes.
 fn is_ours(ending: &str, bytes: &[u8]) -> bool {
     let first = bytes

@@ -70,6 +70,19 @@ pub struct Error {
     pub problems: Vec<ErrorProblem>,
 }
 
+/// A text of any length as it may stand in a message: what was given is quoted there.
+fn cut(text: String) -> String {
+    const LONGEST: usize = 2000;
+    const ENDS: [usize; 2] = [1500, 300];
+    let count = text.chars().count();
+    if count <= LONGEST {
+        return text;
+    }
+    let start = text.chars().take(ENDS[0]);
+    let end = text.chars().skip(count - ENDS[1]);
+    start.chain(" … ".chars()).chain(end).collect()
+}
+
 impl Error {
     /// An error of one problem.
     pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
@@ -78,7 +91,7 @@ impl Error {
             source: None,
             problems: vec![ErrorProblem {
                 place: ErrorPlace::Whole,
-                message: message.into(),
+                message: cut(message.into()),
                 label: String::new(),
                 remedy: None,
             }],
@@ -109,7 +122,7 @@ impl Error {
     #[must_use]
     pub fn at(mut self, option: &str) -> Self {
         for problem in &mut self.problems {
-            problem.place = ErrorPlace::Option(option.to_owned());
+            problem.place = ErrorPlace::Option(cut(option.to_owned()));
         }
         self
     }

@@ -8,6 +8,7 @@ use clap_mangen::Man;
 use serde::Serialize;
 
 use crate::failure::Failure;
+use crate::file;
 use crate::output::Output;
 
 /// Shell completions and manual pages.
@@ -120,9 +121,13 @@ fn pages(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     std::iter::once(&whole)
         .chain(shown)
         .map(|command| {
-            Man::new(command.clone())
-                .generate_to(folder)
-                .map_err(refuse)
+            let page = Man::new(command.clone());
+            file::claim(&folder.join(page.get_filename()), &["1"])?;
+            Ok(page)
         })
+        // None is written before all of them may be.
+        .collect::<Result<Vec<_>, Failure>>()?
+        .into_iter()
+        .map(|page| page.generate_to(folder).map_err(refuse))
         .collect()
 }

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use nanotap_paper::{About, Check, Options, Report, Verdict, Written, report};
+use nanotap_paper::{About, Check, Options, Report, Verdict, Written, report, section_names};
 use serde::Serialize;
 
 use crate::failure::Failure;
+use crate::file;
 use crate::output::Output;
 use crate::threads::ThreadsArgument;
 use crate::{progress, style};
@@ -31,6 +32,10 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     threads: ThreadsArgument,
 }
+
+/// The names of the report's own files, and the endings of all that it may write.
+const REPORT: [&str; 2] = ["report", "checks"];
+const ENDINGS: [&str; 5] = ["html", "md", "json", "svg", "png"];
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -56,6 +61,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     // Before the work, not after it.
     std::fs::create_dir_all(&arguments.out).map_err(|error| {
         Failure::files(format!("cannot make {}: {error}", arguments.out.display()))
+    })?;
+    let pictures = section_names().collect::<Vec<_>>();
+    file::claim_in(&arguments.out, &ENDINGS, |stem| {
+        REPORT.contains(&stem) || pictures.iter().any(|section| stem.starts_with(section))
     })?;
     let options = Options {
         only: arguments.only.clone(),

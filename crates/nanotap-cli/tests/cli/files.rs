@@ -120,6 +120,44 @@ fn what_somebody_else_wrote_is_replaced_only_by_force() {
     assert_eq!(folder.run(&["case", "m.toml"]).code, 0);
 }
 
+/// Commands that write many files look at all of them first.
+#[test]
+fn what_somebody_else_wrote_in_a_folder_is_replaced_only_by_force() {
+    let folder = Folder::with_paper_case();
+    for (name, arguments) in [
+        (
+            "man/nanotap-orbit.1",
+            &["generate", "man", "--out", "man"][..],
+        ),
+        (
+            "here/report.html",
+            &["paper", "--only", "eq23", "--out", "here"],
+        ),
+        (
+            "here/fig4-mine.png",
+            &["paper", "--only", "eq23", "--out", "here"],
+        ),
+    ] {
+        let (inside, _) = name.split_once('/').unwrap();
+        std::fs::create_dir_all(folder.path().join(inside)).unwrap();
+        folder.write(name, "somebody's own");
+        let outcome = folder.run(arguments);
+        outcome.refused(&["was not written by nanotap", "--force", name]);
+        let files = std::fs::read_dir(folder.path().join(inside)).unwrap();
+        assert_eq!(files.count(), 1, "{name}");
+        assert_eq!(folder.read(name), "somebody's own");
+        // The second time the files are nanotap's own.
+        for force in [&["--force"][..], &[]] {
+            let outcome = folder.run(&[arguments, force].concat());
+            assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+            if name.ends_with("mine.png") {
+                break;
+            }
+        }
+        std::fs::remove_dir_all(folder.path().join(inside)).unwrap();
+    }
+}
+
 #[test]
 fn two_outputs_do_not_share_a_file() {
     let folder = Folder::with_paper_case();

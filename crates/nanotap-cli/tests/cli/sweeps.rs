@@ -146,10 +146,18 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
     assert!(bytes(&whole) == bytes(&killed));
 }
 
-/// Ctrl-C leaves what is finished, says how to go on, and exits with 1.
+/// Ctrl-C leaves what is finished, says how to go on, and exits with 1; so does SIGTERM, by which
+/// clusters end what has run too long.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_sweep_says_how_to_go_on() {
+    for signal in ["-INT", "-TERM"] {
+        interrupted_by(signal);
+    }
+}
+
+#[cfg(unix)]
+fn interrupted_by(signal: &str) {
     let folder = Folder::with_paper_case();
     let arguments = [
         "sweep",
@@ -176,7 +184,7 @@ fn an_interrupted_sweep_says_how_to_go_on() {
     }
     assert!(marker.exists(), "no chunk in two minutes");
     let interrupt = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
+        .args([signal, &child.id().to_string()])
         .status()
         .unwrap();
     assert!(interrupt.success());

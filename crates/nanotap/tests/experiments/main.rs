@@ -12,4 +12,5 @@ mod fit;
 mod identities;
 mod modes_that_matter;
 mod physical_quantities;
+mod requests;
 mod setpoint;

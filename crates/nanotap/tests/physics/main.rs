@@ -8,6 +8,7 @@
 
 mod contact_laws;
 mod derivatives;
+mod differential;
 mod drive;
 mod facts;
 mod impact_oscillator;
@@ -21,3 +22,4 @@ mod orbit_derivatives;
 mod references;
 mod short_contacts;
 mod standard_linear_solid;
+mod taylor;

@@ -6,6 +6,7 @@
 )]
 
 mod basins;
+mod damaged;
 mod datasets;
 mod folder;
 mod neighbours;

@@ -1,0 +1,161 @@
+//! Headers and chunks that somebody or something has changed: whatever stands in them, a dataset
+//! opens, is refused with a reason, or reads as what is left of it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use nanotap::case::Case;
+use nanotap::dataset::{Share, Store, Work, table};
+use nanotap::model::cantilever::Cantilever;
+use nanotap::study::sweep::{Over, Sweep, SweepOptions, summary};
+use nanotap_dynamics::Control;
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+use crate::folder::{Folder, bytes};
+
+/// Two frequencies, a run each.
+fn small(path: &Path) {
+    let subject = Case::from(Cantilever {
+        modes: 1,
+        ..Cantilever::paper()
+    });
+    let over = vec![Over::parse("omega=18:20:2", &subject).unwrap()];
+    let sweep = Sweep::new(subject, SweepOptions::new(over)).unwrap();
+    let store = Store::create_or_resume(path, sweep.schema().clone()).unwrap();
+    let work = Work {
+        share: Share::WHOLE,
+        threads: 1,
+        control: Control::default(),
+    };
+    sweep.compute(&store, &work).unwrap();
+}
+
+/// Everything that reads a dataset; merging opens it in the same way.
+fn read(path: &Path) {
+    let Ok(store) = Store::open(path) else {
+        return;
+    };
+    let variables = store.schema().variables.len();
+    for chunk in 0..store.chunks().min(64) {
+        let block = store.schema().grid.block(chunk);
+        for variable in 0..variables {
+            let _ = store.read_chunk(&block, variable);
+        }
+    }
+    let _ = summary(&store);
+    let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
+}
+
+/// What somebody may write in place of a value.
+fn hostile() -> impl Strategy<Value = Value> {
+    prop::sample::select(vec![
+        json!(null),
+        json!(true),
+        json!(0),
+        json!(-1),
+        json!(3),
+        json!(1e18),
+        json!(u64::MAX),
+        json!(-1e308),
+        json!(0.5),
+        json!(""),
+        json!("../../elsewhere"),
+        json!("<f4"),
+        json!("nan"),
+        json!([]),
+        json!([0]),
+        json!([u64::MAX, u64::MAX]),
+        json!({}),
+        json!({"": []}),
+    ])
+}
+
+/// Puts `put` in place of the value that comes `at` many values after the first; `None` takes a
+/// whole entry away.
+fn change(value: &mut Value, at: &mut usize, put: Option<&Value>) -> bool {
+    if *at == 0 {
+        *value = put.cloned().unwrap_or_default();
+        return true;
+    }
+    *at -= 1;
+    match value {
+        Value::Array(entries) => entries.iter_mut().any(|entry| change(entry, at, put)),
+        Value::Object(entries) => {
+            if put.is_none() && *at < entries.len() {
+                let name = entries.keys().nth(*at).cloned();
+                name.is_some_and(|name| entries.remove(&name).is_some())
+            } else {
+                entries.values_mut().any(|entry| change(entry, at, put))
+            }
+        }
+        _ => false,
+    }
+}
+
+/// A whole dataset, made once a process.
+fn whole() -> &'static (Folder, BTreeMap<PathBuf, Vec<u8>>) {
+    static WHOLE: OnceLock<(Folder, BTreeMap<PathBuf, Vec<u8>>)> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let folder = Folder::new();
+        small(&folder.join("data"));
+        let files = bytes(&folder.join("data"));
+        (folder, files)
+    })
+}
+
+/// Reads it with one file changed by `damage`, and puts the file back.
+fn damaged(file: &Path, damage: impl FnOnce(Vec<u8>) -> Vec<u8>) {
+    let (folder, files) = whole();
+    let path = folder.join("data");
+    let content = &files[file];
+    std::fs::write(path.join(file), damage(content.clone())).unwrap();
+    read(&path);
+    std::fs::write(path.join(file), content).unwrap();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn headers_with_hostile_values(
+        mut at in 0..400_usize, put in prop::option::weighted(0.8, hostile()),
+    ) {
+        damaged(Path::new(".zmetadata"), |content| {
+            let mut header: Value = serde_json::from_slice(&content).unwrap();
+            change(&mut header, &mut at, put.as_ref());
+            header.to_string().into_bytes()
+        });
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    #[test]
+    fn files_with_bytes_changed(
+        file in prop::sample::select(whole().1.keys().cloned().collect::<Vec<_>>()),
+        at in 0.0..1.0_f64,
+        bytes in prop::collection::vec(any::<u8>(), 0..6),
+        cut in 0..8_usize,
+    ) {
+        damaged(&file, |mut content| {
+            let at = (at * content.len() as f64) as usize;
+            let end = (at + cut).min(content.len());
+            content.splice(at..end, bytes);
+            content
+        });
+    }
+}
+
+/// An untouched one is read: what the others meet is no mistake of theirs.
+#[test]
+fn the_whole_one_is_read() {
+    let (folder, files) = whole();
+    let path = folder.join("data");
+    let store = Store::open(&path).unwrap();
+    store.require_all().unwrap();
+    assert_eq!(summary(&store).unwrap().runs % 2, 0);
+    assert!(files.contains_key(Path::new(".zmetadata")));
+}

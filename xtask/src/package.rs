@@ -1,0 +1,85 @@
+//! What would be published: every crate and the Python package, each built from its own archive
+//! alone and tried in an empty environment.
+
+use std::fs;
+use std::path::PathBuf;
+
+use crate::process::{output, succeeds};
+use crate::tally::Tally;
+use crate::tools::{Environment, Workspace};
+
+/// What is asked of the installed Python package.
+const TRIAL: &str = "\
+import nanotap
+found = nanotap.orbit(nanotap.Case.paper(omega=20.0))
+assert found.period == 1 and found.stable, found
+print('nanotap', nanotap.__version__, 'from its source archive:', found)";
+
+/// Packs every crate that is published and compiles what was packed.
+///
+/// # Errors
+/// When cargo cannot be started.
+pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.cargo(&["package", "--workspace", "--locked"]);
+    for own in ["xtask", "nanotap-book", "nanotap-python"] {
+        command.args(["--exclude", own]);
+    }
+    // Whether it compiles, not how fast it runs; uncommitted work is packed as it stands.
+    command.args(["--allow-dirty", "--config", "profile.dev.opt-level=0"]);
+    command.args(["--config", "profile.dev.debug=0"]);
+    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+/// Packs the Python package's sources, installs that archive into an empty environment, and
+/// computes an orbit there.
+///
+/// # Errors
+/// When Python or maturin is missing.
+pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
+    let folder = workspace.target().join("sdist");
+    // An archive of another version would be installed in its place.
+    let _ = fs::remove_dir_all(&folder);
+    let mut pack = workspace.python_tool("maturin")?;
+    pack.args([
+        "sdist",
+        "--manifest-path",
+        "crates/nanotap-python/Cargo.toml",
+    ]);
+    pack.arg("--out").arg(&folder);
+    if !succeeds(&workspace.root, &mut pack)? {
+        return Ok(Tally::check(false));
+    }
+    let archive = archive(&folder)?;
+    let environment = Environment::empty(&workspace.root, folder.join("environment"))?;
+    let mut install = environment.program("python");
+    install.args([
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    ]);
+    // Dependencies of ours that were compiled for the wheel are the same.
+    install
+        .arg(archive)
+        .env("CARGO_TARGET_DIR", workspace.target());
+    if !succeeds(&workspace.root, &mut install)? {
+        return Ok(Tally::check(false));
+    }
+    let mut trial = environment.program("python");
+    // Away from the checkout, whose own package would be found first.
+    let said = output(&folder, trial.args(["-c", TRIAL]));
+    println!(
+        "{}",
+        said.as_deref().unwrap_or("the package does not run").trim()
+    );
+    Ok(Tally::check(said.is_some()))
+}
+
+fn archive(folder: &PathBuf) -> Result<PathBuf, String> {
+    let listing = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut paths = listing.flatten().map(|entry| entry.path());
+    paths
+        .find(|path| path.extension().is_some_and(|ending| ending == "gz"))
+        .ok_or_else(|| format!("no archive in {}", folder.display()))
+}

@@ -5,9 +5,10 @@ A run that was stopped goes on where it was; nanotap itself is measured anew eve
 
 import argparse
 import os
+from dataclasses import asdict
 from pathlib import Path
 
-from driver import build, machine, report
+from driver import build, law, machine, report
 from driver.compare import row_of
 from driver.measure import Measurements
 from driver.roster import PEERS
@@ -54,7 +55,10 @@ def main() -> None:
         if peer.program in programs
         and (row := row_of(peer, take, asked.quick, threads)) is not None
     ]
+    # A nonlinear law is a comparison of its own.
+    laws = [] if asked.only else law.rows(0.3 if asked.quick else 2.0)
     result = {
+        "laws": [asdict(row) for row in laws],
         "machine": machine.description(),
         "versions": build.versions(),
         "missing": missing,

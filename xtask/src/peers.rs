@@ -30,12 +30,15 @@ pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), Strin
         .arg(target.join("peers"))
         .args(options)
         .env("CARGO", workspace.cargo_program())
-        .env("NANOTAP_PEER", target.join("release/examples/peer"));
+        .env("NANOTAP_PEER", target.join("release/examples/peer"))
+        .env("NANOTAP_LAW_PEER", target.join("release/examples/dmt_peer"));
     if !asks_for_help {
-        let mut build = workspace.cargo(&["build", "--release", "--quiet"]);
-        build.args(["--package", "nanotap", "--example", "peer"]);
-        if !succeeds(&workspace.root, &mut build)? {
-            return Err("nanotap's own part could not be built".into());
+        for (package, example) in [("nanotap", "peer"), ("nanotap-volterra", "dmt_peer")] {
+            let mut build = workspace.cargo(&["build", "--release", "--quiet"]);
+            build.args(["--package", package, "--example", example]);
+            if !succeeds(&workspace.root, &mut build)? {
+                return Err("nanotap's own part could not be built".into());
+            }
         }
     }
     if succeeds(&workspace.root, &mut command)? {

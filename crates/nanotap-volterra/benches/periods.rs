@@ -8,7 +8,7 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use nanotap_volterra::{Flow, laws};
+use nanotap_volterra::Flow;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -17,20 +17,7 @@ fn main() {
 }
 
 fn flow(modes: usize, nodes: usize) -> (Flow, Vec<f64>) {
-    let law = laws::build(
-        "dmt",
-        &[
-            ("modulus", 1.0),
-            ("poisson", 0.3),
-            ("tip_modulus", 160.0),
-            ("tip_poisson", 0.3),
-            ("radius", 5.0),
-            ("contact_distance", 0.169),
-            ("hamaker", 0.03),
-        ],
-    )
-    .unwrap();
-    let system = common::beam(law, modes, 0.9, 200.0, 20.0, 18.0, nodes);
+    let system = common::beam(common::dmt(), modes, 0.9, 200.0, 20.0, 18.0, nodes);
     let mut flow = Flow::new(Arc::new(system));
     // Near the repulsive orbit, and settled for a while.
     let mut state = vec![0.0; 2 * modes];

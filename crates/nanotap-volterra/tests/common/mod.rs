@@ -63,6 +63,23 @@ impl StroboscopicMap for Strobe {
     }
 }
 
+/// DMT with van der Waals attraction, as in CONTACT's reference orbits.
+pub(crate) fn dmt() -> Arc<dyn ForceLaw> {
+    laws::build(
+        "dmt",
+        &[
+            ("modulus", 1.0),
+            ("poisson", 0.3),
+            ("tip_modulus", 160.0),
+            ("tip_poisson", 0.3),
+            ("radius", 5.0),
+            ("contact_distance", 0.169),
+            ("hamaker", 0.03),
+        ],
+    )
+    .unwrap()
+}
+
 /// One mode, `z̈ + ż/Q + z = (A₀/Q) cos t + F/k`, gap `z + zc`; lengths in nm, forces in nN,
 /// times in units of `1/ω₀`.
 pub(crate) struct Lever {
@@ -119,6 +136,19 @@ pub(crate) fn beam(
     zc: f64,
     nodes: usize,
 ) -> System {
+    beam_at(law, count, k, q, amplitude, zc, nodes, 1e-13)
+}
+
+pub(crate) fn beam_at(
+    law: Arc<dyn ForceLaw>,
+    count: usize,
+    k: f64,
+    q: f64,
+    amplitude: f64,
+    zc: f64,
+    nodes: usize,
+    tolerance: f64,
+) -> System {
     let oscillators: Vec<(f64, f64)> = beam_modes(count, q)
         .into_iter()
         .map(|(stiffness, damping, _)| (stiffness, damping))
@@ -143,7 +173,7 @@ pub(crate) fn beam(
             gap: Complex::new(0.0, 0.0),
         }],
     };
-    System::new(kernel, law, drive, Options::new(1e-13)).unwrap()
+    System::new(kernel, law, drive, Options::new(tolerance)).unwrap()
 }
 
 /// Values in nm, nN and 1/ω0 for the parameters of the table of laws.

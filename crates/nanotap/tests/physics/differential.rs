@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap_flow::{System, Trajectory};
 
 use crate::taylor;
@@ -71,6 +72,15 @@ fn beam(random: &mut Random, number: usize) -> Cantilever {
         },
         relaxation_time: if solid { random.log(1e-2, 1.0) } else { 0.0 },
         contact,
+        surface: if contact == ContactLaw::MovingSurface {
+            MovingSurface {
+                stiffness: alpha4 * random.log(0.1, 10.0),
+                damping: alpha4.sqrt() * random.log(0.05, 1.0),
+                adhesion: alpha4 * random.log(1e-4, 1e-1),
+            }
+        } else {
+            MovingSurface::NONE
+        },
         ..Cantilever::paper()
     }
 }

@@ -34,7 +34,10 @@ pub(crate) fn run(
         let mut first: Option<(f64, usize)> = None;
         for (k, transition) in system.transitions()[regime].iter().enumerate() {
             let guard = guard(system, &transition.guard, &series, time, step);
-            let root = first_root(&guard, switched)?;
+            // What rounding of the state makes of the guard.
+            let row = transition.guard.row.transpose();
+            let noise = 1e-13 * (row.abs().dot(&state.abs()) + transition.guard.constant.abs());
+            let root = first_root(&guard, noise, switched)?;
             if root < first.map_or(f64::INFINITY, |(s, _)| s) {
                 first = Some((root, k));
             }
@@ -133,12 +136,12 @@ fn horner(coefficients: &[f64], s: f64) -> f64 {
 /// The first s in [0, 1] at which the polynomial falls below zero, infinity if none; `None` where
 /// it cannot be told from touching. Just after a switch powers that rounding alone has left are
 /// no part of it.
-fn first_root(coefficients: &[f64], switched: bool) -> Option<f64> {
+fn first_root(coefficients: &[f64], noise: f64, switched: bool) -> Option<f64> {
     let size = coefficients.iter().map(|c| c.abs()).sum::<f64>();
     if size == 0.0 {
         return Some(f64::INFINITY);
     }
-    let tiny = 1e-11 * size;
+    let tiny = noise.max(1e-11 * size);
     let skipped = if switched {
         coefficients.iter().take_while(|c| c.abs() <= tiny).count()
     } else {
@@ -146,11 +149,7 @@ fn first_root(coefficients: &[f64], switched: bool) -> Option<f64> {
     };
     let rest = &coefficients[skipped..];
     if rest.first().is_none_or(|c| *c < 0.0) {
-        return if skipped > 0 || rest.is_empty() {
-            None
-        } else {
-            Some(0.0)
-        };
+        return (!switched && !rest.is_empty()).then_some(0.0);
     }
     let degree = rest.len() - 1;
     let mut binomials = vec![1.0; degree + 1];
@@ -166,7 +165,7 @@ fn first_root(coefficients: &[f64], switched: bool) -> Option<f64> {
             ratio *= (j - i) as f64 / (degree - i).max(1) as f64;
         }
     }
-    isolated(&below, 0.0, 1.0, 1e-15 * size).map(|found| {
+    isolated(&below, 0.0, 1.0, noise.max(1e-15 * size)).map(|found| {
         found.map_or(f64::INFINITY, |(mut low, mut high)| {
             while high - low > f64::EPSILON * high {
                 let middle = 0.5 * (low + high);

@@ -644,7 +644,12 @@ impl Flow {
                 _ if fresh => RESOLVED_FRESH * (c[0].abs() + rest),
                 Guard::Falls(_) | Guard::Rises(_) => ROUNDING * gap,
                 Guard::Turns => ROUNDING * rate,
-                Guard::Own(_) => 0.0,
+                // A guard of the law's own is a difference of what gap and rate make.
+                Guard::Own(index) => {
+                    let (at, moving) = (self.step.gap[0], self.step.rate[0]);
+                    let own = system.law().guard(index, at, moving);
+                    ROUNDING * (own.by_gap.abs() * gap + own.by_rate.abs() * rate)
+                }
             };
             if tail > rounding.max(RESOLVED * (c[0].abs() + rest)) {
                 return Err(Refusal::Switch);

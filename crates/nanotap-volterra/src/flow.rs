@@ -438,7 +438,7 @@ impl Flow {
                 let growth = if quality.rounding {
                     2
                 } else {
-                    (2.0 * nanotap_arithmetic::log2(0.5 / quality.error) / degree)
+                    (2.0 * nanotap_arithmetic::log2(0.5 / quality.truncation) / degree)
                         .floor()
                         .clamp(0.0, 2.0) as usize
                 };

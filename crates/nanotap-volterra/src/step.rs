@@ -10,6 +10,8 @@ use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Newton steps before a shorter step is tried.
 const MAX_ITERATIONS: usize = 20;
+/// Part of the allowed error that the iteration may leave.
+const LEFT: f64 = 0.05;
 /// Below this contraction number plain iteration is cheaper than a factorisation.
 const CONTRACTION: f64 = 0.1;
 /// How much the force may amplify an error on one step, as `∫|G| |∂F|`: by `cosh √(2κ)`, 27.
@@ -134,6 +136,8 @@ pub(crate) struct Quality {
     /// The larger of the force's tail and its defect between the nodes, as a fraction of
     /// what is allowed.
     pub(crate) error: f64,
+    /// The part of it that a longer step would make larger: what the iteration left is none.
+    pub(crate) truncation: f64,
     /// Whether the error is at the level of rounding.
     pub(crate) rounding: bool,
 }
@@ -322,6 +326,7 @@ impl Solver {
             }
             return Ok(Quality {
                 error: 0.0,
+                truncation: 0.0,
                 rounding: true,
             });
         }
@@ -352,6 +357,7 @@ impl Solver {
                 if error > HOPELESS {
                     return Ok(Quality {
                         error,
+                        truncation: error,
                         rounding: false,
                     });
                 }
@@ -379,7 +385,7 @@ impl Solver {
             };
             last = size;
             self.add_residual(step);
-            if left <= 0.05 * allowed {
+            if left <= LEFT * allowed {
                 return self.assess(system, table, step, allowed, rounding);
             }
         }
@@ -559,8 +565,15 @@ impl Solver {
             return Err(Refusal::Steep);
         }
         let error = tail.max(0.25 * defect);
+        // The iteration stops with so much left of what the law says between the nodes.
+        let truncation = if 0.25 * defect <= LEFT * allowed {
+            tail
+        } else {
+            error
+        };
         Ok(Quality {
             error: error / allowed,
+            truncation: truncation / allowed,
             rounding: error <= 2.0 * rounding,
         })
     }

@@ -223,3 +223,33 @@ fn kelvin_voigt_in_liquid() {
         assert!(seen.energy_balance.residual.abs() < 1e-10);
     }
 }
+
+/// A damping that stops the tip and lets it creep through a contact. What the iteration leaves of
+/// the forces is no reason for short steps: 20,240 were taken in some of these periods once, and
+/// eight minutes over an orbit.
+#[test]
+fn strong_damping_near_the_sample_needs_few_steps() {
+    let case = air(
+        15.0,
+        11.25,
+        &[
+            "sample.law=hertz + exponential-damping",
+            "sample.modulus=100 MPa",
+            "sample.poisson=0.3",
+            "tip.modulus=160 GPa",
+            "tip.poisson=0.3",
+            "sample.intermolecular_distance=0.169 nm",
+            "sample.damping=1e-6 N s/m",
+            "sample.decay_length=0.3 nm",
+        ],
+    );
+    let model = case.model().unwrap();
+    let nonlinear = model.nonlinear.as_ref().unwrap();
+    let mut flow = nanotap_volterra::Flow::new(nonlinear.system.clone());
+    for period in 1..=250 {
+        let before = flow.statistics().steps;
+        flow.run_until(f64::from(period) * model.period()).unwrap();
+        let steps = flow.statistics().steps - before;
+        assert!(steps < 500, "{steps} steps in period {period}");
+    }
+}

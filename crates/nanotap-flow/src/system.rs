@@ -216,6 +216,12 @@ impl Switch {
         })
     }
 
+    /// Whether the guard's rate jumps however slowly the guard falls: what only grazes is not near
+    /// what just misses.
+    pub fn breaks_grazing(&self) -> bool {
+        self.rate_after.is_some_and(|after| after.constant != 0.0)
+    }
+
     /// Whether it leaves volumes as they are, whatever the rate.
     pub fn keeps_volume(&self) -> bool {
         self.rate_after == Some(RateAfter::SAME)

@@ -237,7 +237,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             let before = residual;
             residual = self.evaluate(parameter)?;
             let stalled = residual > 0.5 * before;
-            let small = before <= self.tolerance * scale;
+            // A step that leaves a solution behind where the map jumps is no rounding.
+            let small = before.max(residual) <= self.tolerance * scale;
             if stalled && small {
                 break;
             }

@@ -396,7 +396,38 @@ impl Observer for GapExtrema<'_> {
         }
     }
 
-    fn switch(&mut self, _: &SwitchView<'_>) {
+    /// Where what only grazes breaks off, no extremum is left beyond a grazing: in its place is the
+    /// one that the gap would have had without the switch, ġ²/(2|g̈|) behind it.
+    fn switch(&mut self, switch: &SwitchView<'_>) {
         self.switched = true;
+        if !switch.switch.breaks_grazing() {
+            return;
+        }
+        let system = switch.system;
+        let (regime, period) = (
+            &system.regimes()[switch.switch.from],
+            system.drive().period(),
+        );
+        let rate_of =
+            |output: &Output| output.rate(regime.matrix(), regime.forcing(), system.drive());
+        let at = |output: &Output| {
+            let own = regime.project(output);
+            let modal = own.modal.iter().zip(switch.modal).map(|(w, q)| (w * q).re);
+            let tones = own.tones.iter().enumerate();
+            let forced = tones.map(|(k, z)| (z * system.drive().phasor(k, switch.phase)).re);
+            own.constant + modal.chain(forced).sum::<f64>()
+        };
+        let rate = rate_of(self.gap);
+        let (speed, turn) = (at(&rate), at(&rate_of(&rate)));
+        let ahead = -speed / turn;
+        if ahead >= 0.0 && ahead < NEARBY * period {
+            self.tangencies.push(Tangency {
+                phase: switch.phase / period,
+                value: 0.5 * speed * ahead,
+            });
+        }
     }
 }
+
+/// Farther ahead, in drive periods, there is no telling what the gap would have done.
+const NEARBY: f64 = 0.1;

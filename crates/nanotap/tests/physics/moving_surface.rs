@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use nanotap::case::document::equilibria;
+use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
@@ -11,8 +12,9 @@ use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::galerkin::Galerkin;
 use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
+use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{Control, StroboscopicMap};
 use proptest::prelude::*;
 
 use crate::derivatives::{advance, worst};
@@ -392,6 +394,44 @@ fn grazing_is_of_the_square_root_type() {
         let slope = (beyond(depth) / beyond(0.25 * depth)).ln() / 4.0_f64.ln();
         assert!((slope - 0.5).abs() < 0.05, "depth {depth:e}: slope {slope}");
     }
+}
+
+/// The lever of docs/cases/moving-surface.md. Backing off, its orbit jumps between two folds and
+/// then ends where it only grazes, with a multiplier beyond bounds; from far away the free orbit
+/// ends where the tip reaches the surface, as far as its free swing reaches.
+#[test]
+fn branches_end_where_their_orbits_graze() {
+    let source = Source {
+        name: "moving-surface.toml".into(),
+        text: include_str!("../../../../docs/cases/moving-surface.toml").into(),
+    };
+    let case = Case::parse(Some(source), &[]).unwrap();
+    let key = case.key("gap.tip").unwrap();
+    let followed = |from: f64, to: f64| {
+        let options = BranchOptions::over(key, from, to);
+        branch(&case, &options, &Control::default()).unwrap()
+    };
+    let grazes = |found: &BranchReport| {
+        assert!(found.branches[0].complete, "{}", found.branches[0].end);
+        let mut kinds = found.bifurcations.iter().filter(|b| b.kind == "grazing");
+        let grazing = kinds.next_back().unwrap().parameter;
+        let beyond = found.points.last().unwrap().parameter - grazing;
+        assert!(beyond.abs() < 1e-15, "{beyond:e}");
+        grazing
+    };
+    let touching = followed(25e-9, 31e-9);
+    let at = grazes(&touching);
+    assert!((at - 29.2595e-9).abs() < 1e-13, "{at:e}");
+    let last = touching.points.last().unwrap();
+    assert!(last.multipliers[0][0] > 1e3 && last.observables.contacts_per_period == 1.0);
+    let folds = touching.bifurcations.iter().filter(|b| b.kind == "fold");
+    assert_eq!(folds.count(), 2);
+
+    let at = grazes(&followed(40e-9, 25e-9));
+    let view = case.physical().unwrap();
+    // The base moves by the drive's amplitude, 90° behind which the tip swings.
+    let base = view.parameters.drive_amplitude * view.free_phase.to_radians().cos();
+    assert!((at - view.free_amplitude - base).abs() < 1e-13, "{at:e}");
 }
 
 /// At rest the springs of lever, contact and surface are in series: the tip hangs free above the

@@ -134,6 +134,7 @@ fn no_document_is_left_out() {
             "liquid.md",
             "measured-modes.md",
             "microscopist.md",
+            "moving-surface.md",
             "period-doubling.md",
             "samples.md",
             "stiff-lever.md",
@@ -164,6 +165,7 @@ follows! {
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_liquid: "liquid.md", 3 commands, 7 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
+    the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;

@@ -333,6 +333,19 @@ fn modulated(
     }
     text.push('\n');
     text.push_str(&motion::paragraph(modulation.multipliers));
+    for setpoint in modulation.setpoints.iter().flatten() {
+        text.push_str(&motion::paragraph(&format!(
+            "Δf = {} on {} at {}",
+            shown(Kind::Frequency, setpoint.modulation.frequency_shift),
+            setpoint.way.name(),
+            shown(Kind::Length, setpoint.gap)
+        )));
+    }
+    if modulation.setpoints.as_ref().is_some_and(Vec::is_empty) {
+        text.push_str(&motion::paragraph(
+            "no distance of the curve has the frequency shift that was asked for",
+        ));
+    }
     for jump in &modulation.jumps {
         text.push_str(&motion::paragraph(&format!(
             "on {} no orbit could be followed between {} and {}: the next is another one",

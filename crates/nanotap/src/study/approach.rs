@@ -64,6 +64,9 @@ pub struct ApproachOptions {
     /// The phase in degrees that is held together with the case's free amplitude, by frequency
     /// and strength of the drive; `None`: the drive stays as it is.
     pub phase: Option<f64>,
+    /// The frequency shift, in the model's unit, whose distances are to be found where amplitude
+    /// and phase are held.
+    pub shift: Option<f64>,
 }
 
 impl Default for ApproachOptions {
@@ -77,6 +80,7 @@ impl Default for ApproachOptions {
             max_period: 32,
             periods: 256,
             phase: None,
+            shift: None,
         }
     }
 }
@@ -613,6 +617,10 @@ pub struct ApproachRequest {
     /// Phase behind the drive that frequency modulation holds, in degrees
     #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
     pub phase: f64,
+    /// Frequency shift of frequency modulation whose distances are to be found, in units of the
+    /// case ("-50 Hz") or as omega
+    #[schemars(extend("x-value" = "SHIFT"))]
+    pub shift: Option<Amount>,
 }
 
 impl Default for ApproachRequest {
@@ -627,6 +635,7 @@ impl Default for ApproachRequest {
             max_period: options.max_period,
             fm: false,
             phase: 90.0,
+            shift: None,
         }
     }
 }
@@ -643,7 +652,11 @@ impl ApproachRequest {
             let read = given.as_ref().map(read).transpose();
             read.map_err(|error| Error::from(error).at(option))
         };
+        let [frequency, _] = case.drive_keys();
+        let read = |amount: &Amount| case.value(frequency, amount.text());
+        let shift = self.shift.as_ref().map(read).transpose();
         Ok(ApproachOptions {
+            shift: shift.map_err(|error| Error::from(error).at("shift"))?,
             from: distance("from", &self.from)?,
             to: distance("to", &self.to)?,
             points: self.points,

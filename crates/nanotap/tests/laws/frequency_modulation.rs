@@ -209,6 +209,37 @@ fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
     }
 }
 
+/// A shift that the attraction gives is met twice on approach, outside and inside of the deepest
+/// one, and twice on the way back at the same distances; a deeper one nowhere.
+#[test]
+fn a_shift_tells_its_distances() {
+    let case = air(10.0, 11.0, &DMT);
+    let scales = case.physical().unwrap().scales;
+    let unit = 1e-9 / scales.length;
+    let at = |shift: f64| {
+        let options = ApproachOptions {
+            from: Some(12.0 * unit),
+            to: Some(9.5 * unit),
+            points: 12,
+            phase: Some(90.0),
+            shift: Some(shift / scales.frequency),
+            ..ApproachOptions::default()
+        };
+        let report = approach(&case, &options, &Control::default()).unwrap();
+        report.modulation.unwrap().setpoints.unwrap()
+    };
+    let found = at(-50.0);
+    assert_eq!(found.len(), 4, "{found:?}");
+    for (k, one) in found.iter().enumerate() {
+        let shift = one.modulation_si.unwrap().frequency_shift;
+        assert!((shift / -50.0 - 1.0).abs() < 1e-8, "{shift}");
+        assert!((one.gap / found[3 - k].gap - 1.0).abs() < 1e-9);
+        assert_eq!(one.way, [Way::Approach, Way::Retract][k / 2]);
+    }
+    assert!(found[0].gap > found[1].gap);
+    assert!(at(-5e4).is_empty());
+}
+
 /// The force that Sader and Jarvis find from the shifts is the law's to the 5 % that their
 /// kernel is good to.
 #[test]

@@ -5,7 +5,8 @@ use nanotap_dynamics::Control;
 use super::average::sader_jarvis;
 use super::walk::{HeldWalk, Stepped};
 use super::{
-    Averages, Ended, FreeOscillation, Held, HeldOrbit, Jump, Modulated, ModulationReport, OPEN_LOOP,
+    Averages, Driven, Ended, FreeOscillation, Held, HeldOrbit, Jump, Modulated, ModulationReport,
+    OPEN_LOOP, ShiftSetpoint,
 };
 use crate::case::{Case, Key};
 use crate::model::contact::ContactLaw;
@@ -118,6 +119,9 @@ pub fn modulated_approach(
             point.modulation_si = point.modulation.map(|m| m.in_si(&view.scales));
         }
     }
+    let setpoints = options
+        .shift
+        .map(|shift| curve.setpoints(held, shift, &table, &averages, control));
     Ok(ApproachReport {
         parameter: case.gap_key().path(),
         from,
@@ -144,6 +148,7 @@ pub fn modulated_approach(
             stiffness: free.stiffness,
             free_loss: free.loss,
             multipliers: OPEN_LOOP,
+            setpoints,
             jumps,
             ended,
         }),
@@ -159,7 +164,89 @@ struct Curve<'a> {
     model: crate::model::Model,
 }
 
+/// Steps of regula falsi at most.
+const STEPS: usize = 60;
+
 impl Curve<'_> {
+    /// Where the shift has a value, between the points of each way.
+    fn setpoints(
+        &self,
+        held: Held,
+        shift: f64,
+        table: &[ApproachPoint],
+        averages: &Averages<'_>,
+        control: &Control<'_>,
+    ) -> Vec<ShiftSetpoint> {
+        let excess =
+            |p: &ApproachPoint| p.modulation.map_or(f64::NAN, |m| m.frequency_shift) - shift;
+        let pairs = table.windows(2).filter(|pair| pair[0].way == pair[1].way);
+        let crossed = pairs.filter(|pair| (excess(&pair[0]) > 0.0) != (excess(&pair[1]) > 0.0));
+        let found = crossed.filter_map(|pair| {
+            let way = pair[0].way;
+            let (gap, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
+            let averages = pair[0].modulation?.first_order_shift.map(|_| averages);
+            let modulation = Modulated::of(&orbit, self.free, averages, gap);
+            let view = self.case.physical();
+            Some(ShiftSetpoint {
+                way,
+                gap,
+                zc: view.map(|view| gap * view.scales.length),
+                modulation,
+                modulation_si: view.map(|view| modulation.in_si(&view.scales)),
+            })
+        });
+        found.collect()
+    }
+
+    /// The orbit between two points of a way that has the shift.
+    fn crossing(
+        &self,
+        held: Held,
+        shift: f64,
+        points: [&ApproachPoint; 2],
+        control: &Control<'_>,
+    ) -> Option<(f64, HeldOrbit)> {
+        let [a, b] = points;
+        let driven = |p: &ApproachPoint| {
+            let modulation = p.modulation?;
+            Some(Driven {
+                frequency: modulation.drive_frequency,
+                strength: modulation.drive_strength,
+                state: p.orbit.as_ref()?.states.first()?.clone(),
+            })
+        };
+        let value =
+            |p: &ApproachPoint| p.modulation.map_or(f64::NAN, |m| m.frequency_shift - shift);
+        let (mut low, mut high) = ((a.gap, value(a)), (b.gap, value(b)));
+        let mut walk = HeldWalk::new(self.case, held, driven(a)?, a.gap);
+        let mut closed = None;
+        for step in 0..STEPS {
+            let straight = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
+            // Now and then a halving, where the curve bends.
+            let gap = if step % 3 == 2 {
+                0.5 * (low.0 + high.0)
+            } else {
+                straight
+            };
+            let (Stepped::On(orbit) | Stepped::Jumped(orbit, _)) = walk.step(gap, control).ok()?;
+            let off = orbit.frequency - self.free.frequency - shift;
+            let near =
+                off.abs() <= 1e-11 * shift.abs() || (high.0 - low.0).abs() <= 1e-13 * gap.abs();
+            closed = Some((gap, off, orbit));
+            if near {
+                break;
+            }
+            if (off > 0.0) == (low.1 > 0.0) {
+                low = (gap, off);
+            } else {
+                high = (gap, off);
+            }
+        }
+        let (gap, off, orbit) = closed?;
+        // Where the curve jumps past the value, none has it.
+        (off.abs() <= 1e-6 * shift.abs()).then_some((gap, orbit))
+    }
+
     fn averages(&self) -> Averages<'_> {
         let spring = match self.case.oscillator() {
             Some(_) => self.case.get(Key::StopStiffness),

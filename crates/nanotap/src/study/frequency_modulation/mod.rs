@@ -209,7 +209,11 @@ pub struct ModulationReport {
     pub free_loss: f64,
     /// What the multipliers are of.
     pub multipliers: &'static str,
-    /// Where the orbit changed by a jump.
+    /// The distances at which the frequency shift has the asked value, on each way in the order
+    /// in which they are met: the first is where a loop that holds the shift stops.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setpoints: Option<Vec<ShiftSetpoint>>,
+    /// Where it changed by a jump.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jumps: Vec<Jump>,
     /// Where a way ended before its time, and why.
@@ -231,6 +235,23 @@ pub struct Jump {
     pub from: f64,
     /// The first behind it.
     pub to: f64,
+}
+
+/// A distance at which the frequency shift has the asked value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ShiftSetpoint {
+    /// On which way.
+    pub way: Way,
+    /// The distance, in the model's unit of length.
+    pub gap: f64,
+    /// The distance in m, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zc: Option<f64>,
+    /// What frequency modulation tells there.
+    pub modulation: Modulated,
+    /// The same in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modulation_si: Option<ModulatedInSi>,
 }
 
 /// Where a curve ended.

@@ -156,7 +156,7 @@ macro_rules! follows {
 
 follows! {
     fit: "fit.md", 6 commands, 32 numbers;
-    frequency_modulation: "frequency-modulation.md", 1 commands, 10 numbers;
+    frequency_modulation: "frequency-modulation.md", 2 commands, 13 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_bistable_lever: "bistable.md", 2 commands, 9 numbers;
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;

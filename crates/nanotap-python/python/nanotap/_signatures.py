@@ -418,6 +418,7 @@ def approach(
     max_period: int = 32,
     fm: bool = False,
     phase: float = 90.0,
+    shift: float | str | None = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
@@ -446,6 +447,9 @@ def approach(
         by frequency and strength of the drive, and tell the frequency shift.
     phase : float
         Phase behind the drive that frequency modulation holds, in degrees.
+    shift : float | str | None
+        Frequency shift of frequency modulation whose distances are to be found, in
+        units of the case ("-50 Hz") or as omega.
     threads : int | None
         Threads; without it, one a core.
     progress : Progress
@@ -477,6 +481,7 @@ def approach(
         "max_period": max_period,
         "fm": fm,
         "phase": phase,
+        "shift": shift,
     }
     return _studies.approach(case, options, threads, progress)
 

@@ -655,6 +655,13 @@ impl ApproachRequest {
         let [frequency, _] = case.drive_keys();
         let read = |amount: &Amount| case.value(frequency, amount.text());
         let shift = self.shift.as_ref().map(read).transpose();
+        if self.shift.is_some() && !self.fm {
+            return Err(Error::option(
+                "shift",
+                "the frequency does not shift where the drive holds it",
+                "add {fm}, which holds amplitude and phase instead",
+            ));
+        }
         Ok(ApproachOptions {
             shift: shift.map_err(|error| Error::from(error).at("shift"))?,
             from: distance("from", &self.from)?,

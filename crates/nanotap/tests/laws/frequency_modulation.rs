@@ -2,9 +2,12 @@
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
-use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way, approach};
+use nanotap::study::approach::{
+    ApproachOptions, ApproachPoint, ApproachReport, ApproachRequest, Way, approach,
+};
 use nanotap::study::frequency_modulation::{Driven, FreeOscillation, Held, Modulated};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::study::request::read;
 
 use crate::common::{DMT, HERTZ, air, lever};
 
@@ -276,6 +279,10 @@ fn what_cannot_be_held_is_refused() {
         amplitude: 1e-3,
         phase: 90.0,
     };
+    let request = serde_json::json!({"shift": "-50 Hz"});
+    let request: ApproachRequest = read(request).unwrap();
+    let refused = request.options(&case).unwrap_err().to_string();
+    assert!(refused.contains("add fm"), "{refused}");
     let free = FreeOscillation::of(&case, held).unwrap();
     // One mode at its tip lags by 90° at its own frequency, and the mode is the spring.
     assert!((free.frequency / case.omega() - 1.0).abs() < 1e-12);

@@ -25,7 +25,7 @@ LAWS = {
     "dmt": {**ELASTIC, "hamaker": "3e-20 J"},
     "jkr": {**ELASTIC, "work_of_adhesion": 0.02},
     "voigt-sphere": {**ELASTIC, "viscosity": 10.0},
-    "lennard-jones": {"attraction": 3e-20, "repulsion": 2e-74},
+    "lennard-jones": {"hamaker": "3e-20 J", "repulsion": 1e-76},
     "exponential-damping + hertz": {
         **ELASTIC,
         "damping": 1e-8,

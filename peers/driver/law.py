@@ -66,9 +66,7 @@ def rows(seconds: float) -> list[Row]:
                     continue
                 error = max(
                     abs(a - b)
-                    for one, other in zip(
-                        found["states"], truth["states"], strict=True
-                    )
+                    for one, other in zip(found["states"], truth["states"], strict=True)
                     for a, b in zip(one, other, strict=True)
                 )
                 tried.append(Row(modes, name, setting, error, found["rate"]))

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from functools import cache
+from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
@@ -158,11 +157,6 @@ def pairs(value: Sequence[Sequence[float]]) -> npt.NDArray[np.complex128]:
     return numbers[:, 0] + 1j * numbers[:, 1]
 
 
-@cache
-def _names(kind: "type[Result]") -> tuple[str, ...]:
-    return tuple(entry.name for entry in fields(kind))
-
-
 @dataclass(frozen=True, repr=False, eq=False)
 class Result:
     """A result: its chief entries are fields, the others are found by their names too.
@@ -181,7 +175,7 @@ class Result:
         """The result that a document tells of; `beside` is what no document holds."""
         record = document if isinstance(document, Record) else Record(document)
         values: dict[str, Any] = {"document": record, **beside}
-        for name in _names(cls):
+        for name in cls.__dataclass_fields__:
             if name in values or name not in record._entries:
                 continue
             if name in cls._arrays or name in cls._complex:
@@ -200,7 +194,7 @@ class Result:
             return getattr(self.document, name)
 
     def __getitem__(self, name: str) -> Any:
-        own = name in _names(type(self)) or name == "series"
+        own = name in self.__dataclass_fields__ or name == "series"
         return getattr(self, name) if own else self.document[name]
 
     def __dir__(self) -> list[str]:

@@ -7,7 +7,7 @@
 //!
 //! with the stroboscopic map P and the first harmonic c of the tip's deflection over one period.
 //! Newton needs ∂P, which the engines give exactly, and ∂c, which
-//! [`first_harmonic_changes`] does. The system stays regular where the map's own, 1 − ∂P, does
+//! `first_harmonic_changes` does. The system stays regular where the map's own, 1 − ∂P, does
 //! not: at a lever's resonance without damping, and at folds of the resonance curve.
 
 use nalgebra::{DMatrix, DVector};

@@ -59,10 +59,13 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
         "--quiet",
         "--disable-pip-version-check",
     ]);
-    // Dependencies of ours that were compiled for the wheel are the same.
+    // Into a folder of its own: files of an archive all have one time, by which cargo would take
+    // what the checkout has built for them.
     install
         .arg(archive)
-        .env("CARGO_TARGET_DIR", workspace.target());
+        .env("CARGO_TARGET_DIR", folder.join("build"))
+        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0")
+        .env("CARGO_PROFILE_RELEASE_DEBUG", "false");
     if !succeeds(&workspace.root, &mut install)? {
         return Ok(Tally::check(false));
     }

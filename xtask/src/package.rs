@@ -2,11 +2,11 @@
 //! alone and tried in an empty environment.
 
 use std::fs;
-use std::path::PathBuf;
 
 use crate::process::{output, succeeds};
 use crate::tally::Tally;
 use crate::tools::{Environment, Workspace};
+use crate::wheel::with_extension;
 
 /// What is asked of the installed Python package.
 const TRIAL: &str = "\
@@ -49,7 +49,10 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     if !succeeds(&workspace.root, &mut pack)? {
         return Ok(Tally::check(false));
     }
-    let archive = archive(&folder)?;
+    let archives = with_extension(&folder, "gz");
+    let Some(archive) = archives.first() else {
+        return Err(format!("no archive in {}", folder.display()));
+    };
     let environment = Environment::empty(&workspace.root, folder.join("environment"))?;
     let mut install = environment.program("python");
     install.args([
@@ -77,12 +80,4 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
         said.as_deref().unwrap_or("the package does not run").trim()
     );
     Ok(Tally::check(said.is_some()))
-}
-
-fn archive(folder: &PathBuf) -> Result<PathBuf, String> {
-    let listing = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let mut paths = listing.flatten().map(|entry| entry.path());
-    paths
-        .find(|path| path.extension().is_some_and(|ending| ending == "gz"))
-        .ok_or_else(|| format!("no archive in {}", folder.display()))
 }

@@ -15,7 +15,7 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
     let folder = workspace.root.join("target").join("wheels");
     fs::create_dir_all(&folder)
         .map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
-    for old in wheels(&folder) {
+    for old in with_extension(&folder, "whl") {
         // One that cannot be removed shows itself below.
         let _ = fs::remove_file(old);
     }
@@ -28,7 +28,7 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
     if !succeeds(&workspace.root, &mut command)? {
         return Err("the wheel could not be built".into());
     }
-    match wheels(&folder).as_slice() {
+    match with_extension(&folder, "whl").as_slice() {
         [wheel] => Ok(wheel.clone()),
         found => Err(format!(
             "{} wheels in {} where one is expected",
@@ -38,14 +38,15 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
     }
 }
 
-fn wheels(folder: &Path) -> Vec<PathBuf> {
+/// The files in `folder` whose names end in `.extension`.
+pub(crate) fn with_extension(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let Ok(listing) = fs::read_dir(folder) else {
         return Vec::new();
     };
     listing
         .flatten()
         .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|ending| ending == "whl"))
+        .filter(|path| path.extension().is_some_and(|ending| ending == extension))
         .collect()
 }
 

@@ -197,7 +197,7 @@ impl KernelFrame {
             ..Kernel::default()
         };
         let sizes: Vec<f64> = rates.iter().map(|rate| rate.modulus()).collect();
-        let masks = relaxation_masks(&rates);
+        let masks = relaxation_masks(&sizes);
         for (k, rate) in rates.into_iter().enumerate() {
             let (vector, i) = layout::place(k);
             let vector = &mut kernel.vectors[vector];

@@ -80,14 +80,14 @@ fn followed(count: usize) -> [usize; RELAXATIONS] {
     [2, if count <= 5 { 3 } else { 4 }]
 }
 
-/// For each of the terms' rates, 1 in the lower bounds that follow it and 0 elsewhere.
-pub(crate) fn relaxation_masks(rates: &[Complex]) -> Vec<[f64; RELAXATIONS]> {
-    let sizes: Vec<f64> = rates.iter().map(|rate| rate.modulus()).collect();
-    let mut order: Vec<usize> = (0..rates.len()).collect();
+/// For each of the terms, whose rates have these sizes, 1 in the lower bounds that follow it and
+/// 0 elsewhere.
+pub(crate) fn relaxation_masks(sizes: &[f64]) -> Vec<[f64; RELAXATIONS]> {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
-    let mut masks = vec![[0.0; RELAXATIONS]; rates.len()];
+    let mut masks = vec![[0.0; RELAXATIONS]; sizes.len()];
     for (rank, &k) in order.iter().enumerate() {
-        masks[k] = followed(rates.len()).map(|n| if rank < n { 1.0 } else { 0.0 });
+        masks[k] = followed(sizes.len()).map(|n| if rank < n { 1.0 } else { 0.0 });
     }
     masks
 }
@@ -127,13 +127,13 @@ impl Signal {
             .vectors
             .resize(layout::vectors_for(terms.len()), TermVectors::default());
         signal.size = constant.abs();
-        let rates: Vec<Complex> = terms.iter().map(|t| t.0).collect();
-        let masks = relaxation_masks(&rates);
-        signal.relaxes = signal.powers.is_empty() && rates.iter().all(|r| r.re <= 0.0);
+        let sizes: Vec<f64> = terms.iter().map(|(rate, _)| rate.modulus()).collect();
+        let masks = relaxation_masks(&sizes);
+        signal.relaxes = signal.powers.is_empty() && terms.iter().all(|(r, _)| r.re <= 0.0);
         for (k, &(rate, a)) in terms.iter().enumerate() {
             let (vector, i) = layout::place(k);
             let vector = &mut signal.vectors[vector];
-            let (b, norm) = (a * rate, rate.modulus());
+            let (b, norm) = (a * rate, sizes[k]);
             let c = b * rate;
             vector.decay[i] = rate.re;
             vector.frequency[i] = rate.im;

@@ -144,6 +144,22 @@ fn si_of(column: &ModulatedColumn, units: &Units) -> Option<(Kind, f64)> {
 /// Rows of the table that a terminal shows of each way.
 const SHOWN: usize = 16;
 
+/// Of how many distances one is shown.
+fn step_of(report: &ApproachReport) -> usize {
+    (report.table.len() / (2 * SHOWN)).max(1)
+}
+
+/// The table of one distance in `step`, with a word on those that are left out.
+fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
+    let all = report.table.len();
+    let left_out = if step > 1 {
+        format!("  every {step}th of {all} (--out writes all)\n")
+    } else {
+        String::new()
+    };
+    table.render() + &left_out + "\n"
+}
+
 fn text(case: &GivenCase, report: &ApproachReport) -> String {
     let units = case.units();
     let shown = |kind: Kind, value: f64| {
@@ -181,7 +197,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         ("F_max", Align::Right),
         ("contact (%)", Align::Point),
     ]);
-    let step = (report.table.len() / (2 * SHOWN)).max(1);
+    let step = step_of(report);
     let row = |p: &ApproachPoint| {
         let what = p.period.map_or_else(
             || p.classification.name().to_owned(),
@@ -205,15 +221,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     for p in report.table.iter().step_by(step) {
         table.row(row(p));
     }
-    text.push_str(&table.render());
-    if step > 1 {
-        let _ = writeln!(
-            text,
-            "  every {step}th of {} (--out writes all)",
-            report.table.len()
-        );
-    }
-    text.push('\n');
+    text.push_str(&thinned(&table, step, report));
     if report.hysteresis.is_empty() {
         text.push_str("  both ways show the same motions\n");
     }
@@ -301,7 +309,7 @@ fn modulated(
         ("contact (%)", Align::Point),
         ("open loop", Align::Left),
     ]);
-    let step = (report.table.len() / (2 * SHOWN)).max(1);
+    let step = step_of(report);
     for p in report.table.iter().step_by(step) {
         let (Some(found), Some(seen)) = (&p.modulation, &p.observables) else {
             continue;
@@ -323,15 +331,7 @@ fn modulated(
                 .map_or_else(String::new, |orbit| orbit.stability.name().to_owned()),
         ]);
     }
-    text.push_str(&table.render());
-    if step > 1 {
-        let _ = writeln!(
-            text,
-            "  every {step}th of {} (--out writes all)",
-            report.table.len()
-        );
-    }
-    text.push('\n');
+    text.push_str(&thinned(&table, step, report));
     text.push_str(&motion::paragraph(modulation.multipliers));
     for setpoint in modulation.setpoints.iter().flatten() {
         text.push_str(&motion::paragraph(&format!(

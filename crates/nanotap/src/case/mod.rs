@@ -506,6 +506,14 @@ impl Case {
         }
     }
 
+    /// The same with another frequency and strength of the drive, as numbers of the equations.
+    #[must_use]
+    pub fn with_drive(&self, frequency: f64, strength: f64) -> Self {
+        let [frequency_key, strength_key] = self.drive_keys();
+        self.with(frequency_key, frequency)
+            .with(strength_key, strength)
+    }
+
     /// The keys of the drive's frequency and strength among the numbers of the equations.
     pub const fn drive_keys(&self) -> [Key; 2] {
         match self.what {

@@ -298,7 +298,7 @@ pub fn approach(
         free_phase: free.phase,
         free_reach: free.reach,
         beam_clearance: beam_clearance(case, &table),
-        hysteresis: hysteresis(&table, free.amplitude),
+        hysteresis: hysteresis(&table, |a, b| difference(a, b, free.amplitude)),
         returned: returned(&table, free.amplitude),
         table,
         coexisting,
@@ -520,15 +520,18 @@ const STRONGEST: f64 = 1e4;
 /// Relative difference of amplitudes that is no longer rounding.
 const DIFFERENT: f64 = 1e-6;
 
-/// The intervals in which the two ways differ.
-fn hysteresis(table: &[ApproachPoint], free_amplitude: f64) -> Vec<Hysteresis> {
+/// The intervals in which the two ways differ; `difference` says by how much two points do.
+pub(super) fn hysteresis(
+    table: &[ApproachPoint],
+    difference: impl Fn(&ApproachPoint, &ApproachPoint) -> Option<f64>,
+) -> Vec<Hysteresis> {
     let back: Vec<&ApproachPoint> = table.iter().filter(|p| p.way == Way::Retract).collect();
     let mut intervals: Vec<Hysteresis> = Vec::new();
     let mut open = false;
     for there in table.iter().filter(|p| p.way == Way::Approach) {
         // The same numbers, since both ways take the same list.
         let found = back.iter().find(|p| p.gap.to_bits() == there.gap.to_bits());
-        let difference = found.and_then(|back| difference(there, back, free_amplitude));
+        let difference = found.and_then(|back| difference(there, back));
         if let Some(difference) = difference {
             match intervals.last_mut().filter(|_| open) {
                 Some(interval) => {
@@ -553,10 +556,7 @@ pub(super) fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> Option<f64
     let orbit = nearest.orbit.as_ref()?;
     let mut there = case.with(case.gap_key(), nearest.gap);
     if let Some(modulation) = &nearest.modulation {
-        let [frequency, strength] = case.drive_keys();
-        there = there
-            .with(frequency, modulation.drive_frequency)
-            .with(strength, modulation.drive_strength);
+        there = there.with_drive(modulation.drive_frequency, modulation.drive_strength);
     }
     let model = there.model().ok()?;
     let start = orbit.states.first()?;

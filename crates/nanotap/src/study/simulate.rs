@@ -583,7 +583,7 @@ impl From<SimulateError> for crate::Error {
             }
             SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
             SimulateError::Flow(error) => error.into(),
-            SimulateError::Stopped => Self::numerics(error.to_string()),
+            SimulateError::Stopped => Self::new(crate::ErrorKind::Stopped, error.to_string()),
         }
     }
 }

@@ -18,6 +18,7 @@ use nanotap_dynamics::{Control, StroboscopicMap};
 use proptest::prelude::*;
 
 use crate::derivatives::{advance, worst};
+use crate::taylor;
 
 /// A lever on a moving surface, driven as in the paper.
 fn lever(modes: usize, omega: f64, surface: MovingSurface) -> Cantilever {
@@ -123,11 +124,6 @@ impl Taylor {
         terms
     }
 
-    fn at(series: &[DVector<f64>], t: f64) -> DVector<f64> {
-        let zero = DVector::zeros(series[0].len());
-        series.iter().rev().fold(zero, |sum, term| sum * t + term)
-    }
-
     /// One period from `state` at drive phase 0, and how many switches it had.
     fn period(&self, state: &[f64]) -> (Vec<f64>, usize) {
         let size = self.gap.len();
@@ -155,7 +151,7 @@ impl Taylor {
                 .map(|k| length * f64::from(k) / f64::from(PARTS))
                 .find(|s| guard(*s) < 0.0);
             let Some(beyond) = found else {
-                y = Self::at(&series, length);
+                y = taylor::at(&series, length);
                 t += length;
                 continue;
             };
@@ -168,7 +164,7 @@ impl Taylor {
                     low = middle;
                 }
             }
-            y = Self::at(&series, high);
+            y = taylor::at(&series, high);
             t += high;
             touching = !touching;
             switches += 1;

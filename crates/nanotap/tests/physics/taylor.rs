@@ -124,7 +124,8 @@ fn guard(
     all
 }
 
-fn at(series: &[DVector<f64>], s: f64) -> DVector<f64> {
+/// The sum of a series at `s`.
+pub(crate) fn at(series: &[DVector<f64>], s: f64) -> DVector<f64> {
     let zero = DVector::zeros(series[0].len());
     series.iter().rev().fold(zero, |sum, c| sum * s + c)
 }

@@ -13,8 +13,8 @@ use crate::model::contact::ContactLaw;
 use crate::observe::{PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
-    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Hysteresis, Way, beam_clearance,
-    distances,
+    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Way, beam_clearance, distances,
+    hysteresis,
 };
 use crate::study::simulate::Classification;
 
@@ -32,8 +32,9 @@ pub fn modulated_approach(
     phase: f64,
     control: &Control<'_>,
 ) -> Result<ApproachReport, ApproachError> {
+    let model = case.model()?;
     let held = Held {
-        amplitude: FreeMotion::of(&case.model()?).amplitude,
+        amplitude: FreeMotion::of(&model).amplitude,
         phase,
     }
     .check()?;
@@ -48,7 +49,7 @@ pub fn modulated_approach(
     let curve = Curve {
         case,
         free: &free,
-        model: case.model()?,
+        model,
     };
     let averages = curve.averages();
     let beyond = from + BEYOND * from.abs().max(held.amplitude);
@@ -130,7 +131,7 @@ pub fn modulated_approach(
         free_phase: free.phase,
         free_reach: free.reach,
         beam_clearance: beam_clearance(case, &table),
-        hysteresis: hysteresis(&table),
+        hysteresis: hysteresis(&table, difference),
         returned: returned(&table),
         table,
         coexisting: Vec::new(),
@@ -177,10 +178,9 @@ impl Curve<'_> {
         averages: &Averages<'_>,
         control: &Control<'_>,
     ) -> Vec<ShiftSetpoint> {
-        let excess =
-            |p: &ApproachPoint| p.modulation.map_or(f64::NAN, |m| m.frequency_shift) - shift;
         let pairs = table.windows(2).filter(|pair| pair[0].way == pair[1].way);
-        let crossed = pairs.filter(|pair| (excess(&pair[0]) > 0.0) != (excess(&pair[1]) > 0.0));
+        let crossed =
+            pairs.filter(|pair| (excess(&pair[0], shift) > 0.0) != (excess(&pair[1], shift) > 0.0));
         let found = crossed.filter_map(|pair| {
             let way = pair[0].way;
             let (gap, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
@@ -215,9 +215,8 @@ impl Curve<'_> {
                 state: p.orbit.as_ref()?.states.first()?.clone(),
             })
         };
-        let value =
-            |p: &ApproachPoint| p.modulation.map_or(f64::NAN, |m| m.frequency_shift - shift);
-        let (mut low, mut high) = ((a.gap, value(a)), (b.gap, value(b)));
+        let mut low = (a.gap, excess(a, shift));
+        let mut high = (b.gap, excess(b, shift));
         let mut walk = HeldWalk::new(self.case, held, driven(a)?, a.gap);
         let mut closed = None;
         for step in 0..STEPS {
@@ -293,6 +292,11 @@ impl Curve<'_> {
     }
 }
 
+/// By how much the frequency has shifted more than asked.
+fn excess(point: &ApproachPoint, shift: f64) -> f64 {
+    point.modulation.map_or(f64::NAN, |m| m.frequency_shift) - shift
+}
+
 /// Adds the force that each way's shifts tell.
 fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
     for way in [Way::Approach, Way::Retract] {
@@ -317,36 +321,11 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
 /// Difference of relative shifts that is no longer rounding.
 const DIFFERENT: f64 = 1e-9;
 
-fn shift(point: &ApproachPoint) -> f64 {
-    point.modulation.map_or(f64::NAN, |m| m.relative_shift)
-}
-
-/// Where the shifts of both ways differ.
-fn hysteresis(table: &[ApproachPoint]) -> Vec<Hysteresis> {
-    let mut intervals: Vec<Hysteresis> = Vec::new();
-    let mut open = false;
-    for there in table.iter().filter(|p| p.way == Way::Approach) {
-        let back = table
-            .iter()
-            .find(|p| p.way == Way::Retract && p.gap.to_bits() == there.gap.to_bits());
-        let difference = back.map_or(0.0, |back| (shift(there) - shift(back)).abs());
-        let differs = difference > DIFFERENT;
-        if differs {
-            match intervals.last_mut().filter(|_| open) {
-                Some(interval) => {
-                    interval.near = there.gap;
-                    interval.difference = interval.difference.max(difference);
-                }
-                None => intervals.push(Hysteresis {
-                    near: there.gap,
-                    far: there.gap,
-                    difference,
-                }),
-            }
-        }
-        open = differs;
-    }
-    intervals
+/// By how much two shifts at one distance differ, if they do.
+fn difference(a: &ApproachPoint, b: &ApproachPoint) -> Option<f64> {
+    let shift = |p: &ApproachPoint| Some(p.modulation?.relative_shift);
+    let difference = (shift(a)? - shift(b)?).abs();
+    (difference > DIFFERENT).then_some(difference)
 }
 
 fn returned(table: &[ApproachPoint]) -> bool {
@@ -354,7 +333,6 @@ fn returned(table: &[ApproachPoint]) -> bool {
         .first()
         .zip(table.last())
         .is_some_and(|(first, last)| {
-            first.gap.to_bits() == last.gap.to_bits()
-                && (shift(first) - shift(last)).abs() <= DIFFERENT
+            first.gap.to_bits() == last.gap.to_bits() && difference(first, last).is_none()
         })
 }

@@ -47,7 +47,6 @@ impl FreeOscillation {
     /// When the case makes no sense, or the lever has no such phase there.
     pub fn of(case: &Case, held: Held) -> Result<Self, HeldError> {
         let alone = alone(&equations_of(case), held);
-        let [frequency_key, strength_key] = alone.drive_keys();
         let own = alone.omega();
         let start = nearest_resonance(&alone.model()?, own);
         // 1/G is nearly a parabola in the frequency, so that the secant method finds where its
@@ -59,7 +58,7 @@ impl FreeOscillation {
         };
         let none = || HeldError::NoPhase {
             phase: held.phase,
-            near: alone.shown(frequency_key, start),
+            near: alone.shown(alone.drive_keys()[0], start),
         };
         let (mut a, mut b) = (start, start * (1.0 + 1e-6));
         let (mut fa, mut fb) = (turned(a)?.im, turned(b)?.im);
@@ -84,8 +83,7 @@ impl FreeOscillation {
             return Err(none());
         }
         let strength = held.amplitude * there.re;
-        let driven = alone.with(frequency_key, b).with(strength_key, strength);
-        let model = driven.model()?;
+        let model = alone.with_drive(b, strength).model()?;
         let state = steady_state(&model)?;
         let closed = held.close(
             &alone,
@@ -159,9 +157,7 @@ fn nearest_resonance(model: &Model, frequency: f64) -> f64 {
 
 /// Strength of the drive over the amplitude of the free tip, with its phase.
 fn inverse_response(case: &Case, frequency: f64) -> Result<Complex, HeldError> {
-    let [frequency_key, strength_key] = case.drive_keys();
-    let there = case.with(frequency_key, frequency).with(strength_key, 1.0);
-    let free = FreeMotion::of(&there.model()?);
+    let free = FreeMotion::of(&case.with_drive(frequency, 1.0).model()?);
     let (sin, cos) = nanotap_arithmetic::sin_cos(free.phase.to_radians());
     Ok(Complex::new(cos, sin) / free.amplitude)
 }

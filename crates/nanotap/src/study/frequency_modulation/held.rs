@@ -223,12 +223,10 @@ impl Held {
 
     /// The equations and what the map gives of their derivatives.
     fn at(self, case: &Case, driven: Driven) -> Result<At, HeldError> {
-        let [frequency_key, strength_key] = case.drive_keys();
-        let case = case
-            .with(frequency_key, driven.frequency)
-            .with(strength_key, driven.strength);
+        let case = case.with_drive(driven.frequency, driven.strength);
         let model = case.model()?;
-        let tangents = [frequency_key, strength_key]
+        let tangents = case
+            .drive_keys()
             .into_iter()
             .map(|key| case.tangent(&model, key))
             .collect::<Result<Vec<_>, _>>()?;

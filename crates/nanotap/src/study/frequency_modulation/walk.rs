@@ -57,7 +57,7 @@ impl<'a> HeldWalk<'a> {
         target: f64,
         control: &Control<'_>,
     ) -> Result<Stepped, HeldError> {
-        let (start, from) = self.last.clone().unwrap_or((target, Driven::nothing()));
+        let start = self.last.as_ref().map_or(target, |(gap, _)| *gap);
         let whole = target - start;
         let shortest = whole.abs() * 0.5_f64.powi(HALVINGS);
         let (mut at, mut step) = (start, whole);
@@ -86,7 +86,7 @@ impl<'a> HeldWalk<'a> {
                 }
                 _ if step.abs() > shortest && !control.is_cancelled() => step *= 0.5,
                 Ok((_, false)) => return self.jump(target, at, None),
-                Err(error) => return self.jump(target, at, Some((error, from))),
+                Err(error) => return self.jump(target, at, Some(error)),
             }
         }
     }
@@ -96,7 +96,7 @@ impl<'a> HeldWalk<'a> {
         &mut self,
         target: f64,
         at: f64,
-        failed: Option<(HeldError, Driven)>,
+        failed: Option<HeldError>,
     ) -> Result<Stepped, HeldError> {
         let guess = self
             .last
@@ -109,7 +109,7 @@ impl<'a> HeldWalk<'a> {
                 self.last = Some((target, orbit.driven()));
                 Ok(Stepped::Jumped(orbit, at))
             }
-            Err(error) => Err(failed.map_or(error, |(first, _)| first)),
+            Err(error) => Err(failed.unwrap_or(error)),
         }
     }
 

@@ -305,6 +305,40 @@ fn clearing_begins_anew() {
     assert_eq!(whole.periods(), 5);
 }
 
+/// A stop that a motion of period one taps has the same Fourier coefficients in each period, in
+/// the hundred-thousandth as in the first: phases of multiples of the drive's frequency do not
+/// lose digits with time.
+#[test]
+fn harmonics_stay_exact_over_many_periods() {
+    let example = Example {
+        oscillators: vec![(1.0, 0.3, 0.2, 0.0, 1.0)],
+        offset: 0.1,
+        stop: Stop::Springy { k: 5.0, c: 0.5 },
+    };
+    let system = example.system().unwrap();
+    let mut request = Request::new();
+    let force = request.output_by_regime(&example.force());
+    let keys = [1, 2, 5].map(|n| request.fourier(force, f64::from(n) * OMEGA));
+    let mut accumulator = Accumulator::new(&request.plan(&system).unwrap());
+    let mut flow = Flow::new(Arc::clone(&system));
+    flow.start(&example.start(), 0.0).unwrap();
+    for _ in 0..100 {
+        flow.run_period(&mut ()).unwrap();
+    }
+    flow.run_period(&mut accumulator).unwrap();
+    let first = keys.map(|key| accumulator.fourier(key));
+    let many = 100_000;
+    for _ in 1..many {
+        flow.run_period(&mut accumulator).unwrap();
+    }
+    for (key, first) in keys.into_iter().zip(first) {
+        assert!(first.modulus() > 1e-6, "the motion taps");
+        let mean = accumulator.fourier(key) / f64::from(many);
+        let error = (mean - first).modulus() / first.modulus();
+        assert!(error < 1e-11, "{error:e}");
+    }
+}
+
 /// What does not fit is refused.
 #[test]
 fn outputs_that_do_not_fit_are_refused() {

@@ -168,22 +168,21 @@ impl Accumulator {
                 *sum += stretch.integral(&regime.weights[channel]);
             }
         }
-        for (number, (&omega, rates)) in plan.frequencies.iter().zip(&regime.turned).enumerate() {
+        for (number, (frequency, rates)) in plan.frequencies.iter().zip(&regime.turned).enumerate()
+        {
             let wanted = |&(c, n): &(usize, usize)| n == number && used(c);
             if !plan.fouriers.iter().any(wanted) {
                 continue;
             }
-            let tone = drive.frequencies().iter().position(|&w| w == omega);
-            let (start, over) = if let Some(tone) = tone {
-                let [start, over] = stretch.terms[modes + tone];
-                (start, over)
+            // A power of the tone's phase is as exact after any number of periods.
+            let [start, over] = if let Some((tone, n)) = frequency.multiple {
+                stretch.terms[modes + tone].map(|phasor| phasor.powu(n))
             } else {
                 let time = self.periods as f64 * drive.period() + segment.phase;
-                let turned = |angle: f64| {
-                    let (sin, cos) = nanotap_arithmetic::sin_cos(angle);
+                [time, length].map(|t| {
+                    let (sin, cos) = nanotap_arithmetic::sin_cos(frequency.omega * t);
                     Complex::new(cos, sin)
-                };
-                (turned(omega * time), turned(omega * length))
+                })
             };
             stretch.turn(rates, start.conj(), over.conj());
             for (sum, fourier) in self.fouriers.iter_mut().zip(&plan.fouriers) {

@@ -183,11 +183,14 @@ impl Request {
                 RegimePlan { signs, ..plan }
             })
             .collect();
+        let frequencies = frequencies.into_iter();
         Ok(Arc::new(Plan {
             request: self.clone(),
             ranges,
             fouriers,
-            frequencies,
+            frequencies: frequencies
+                .map(|omega| Frequency::new(omega, system.drive()))
+                .collect(),
             regimes,
         }))
     }
@@ -210,8 +213,34 @@ pub struct Plan {
     pub(super) ranges: Vec<RangePlan>,
     /// Channel and number of the frequency of each Fourier coefficient.
     pub(super) fouriers: Vec<(usize, usize)>,
-    pub(super) frequencies: Vec<f64>,
+    pub(super) frequencies: Vec<Frequency>,
     pub(super) regimes: Vec<RegimePlan>,
+}
+
+/// The frequency of a Fourier coefficient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frequency {
+    pub(super) omega: f64,
+    /// The tone that it is a multiple of, and which.
+    pub(super) multiple: Option<(usize, u32)>,
+}
+
+/// Highest multiple of a tone whose phase is taken as a power of the tone's.
+const HIGHEST_MULTIPLE: f64 = 1024.0;
+
+impl Frequency {
+    fn new(omega: f64, drive: &Drive) -> Self {
+        let multiple = drive
+            .frequencies()
+            .iter()
+            .enumerate()
+            .find_map(|(k, tone)| {
+                let n = (omega / tone).round();
+                let is_multiple = (n * tone - omega).abs() <= 2.0 * f64::EPSILON * omega.abs();
+                ((1.0..=HIGHEST_MULTIPLE).contains(&n) && is_multiple).then_some((k, n as u32))
+            });
+        Self { omega, multiple }
+    }
 }
 
 /// The extrema of one channel: their keys, where they are asked for.

@@ -6,13 +6,15 @@
 //!    ([`crate::neighbourhood`]). A neighbourhood that a start with another
 //!    destination enters is discarded.
 //! 3. The other starts follow in batches. Each is run until it enters a neighbourhood,
-//!    or is classified like a pilot; what a batch finds is known to the next.
+//!    or is classified like a pilot; what a batch finds is known to the next. A start on
+//!    chaos that is known is recognised, without exponents of its own, by parting from a
+//!    neighbour and by the means of its strobe states and their squares.
 //! 4. Starts that can be drawn without end ([`StartSet`]) go on until the share of
 //!    them that may lead to motions not yet found is bounded ([`Unseen`]) as the
 //!    options ask, or the budget is spent. Stable orbits that Newton closed on the way
 //!    are attractors too, with a fraction of zero if no start goes there.
-//! 5. Motions that do not close are merged when their exponents and mean states
-//!    agree within six standard errors.
+//! 5. Motions that do not close are merged when their exponents and the means of their
+//!    strobe states and their squares agree within six standard errors.
 //! 6. Chaos is claimed as an attractor only if no run escaped from it, with the mean
 //!    lifetime that this bounds from below. If runs that outlived every linear
 //!    transient escaped while others are still on it, it is transient chaos, with its
@@ -23,7 +25,7 @@
 //!
 //! Fails: attractors whose basins are a smaller part of the set of starts than
 //! [`Census::unseen`] says are missed; two different chaotic attractors with equal
-//! exponents and means would be merged; an attractor and a chaotic transient beside it
+//! means and mean squares would be merged; an attractor and a chaotic transient beside it
 //! are told apart only by the hazard of escape falling with time, as documented at
 //! [`Census::transient_chaos`].
 
@@ -169,7 +171,7 @@ pub enum AttractorKind {
 
 impl AttractorKind {
     /// Whether both are the same motion: orbits up to a cyclic shift within their error
-    /// estimates; chaos and tori by exponents and means that agree.
+    /// estimates; chaos and tori by exponents, means and mean squares that agree.
     pub fn is_same_as(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Periodic(a), Self::Periodic(b)) => a.is_same_as(b),

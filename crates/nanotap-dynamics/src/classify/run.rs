@@ -5,7 +5,7 @@ use crate::classify::birkhoff::birkhoff_digits;
 use crate::classify::candidates::candidate_periods;
 use crate::classify::{Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason};
 use crate::failure::{MapFailure, advance};
-use crate::lyapunov::{LyapunovRun, LyapunovSpectrum};
+use crate::lyapunov::{LyapunovRun, LyapunovSpectrum, StrobeMeans};
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit_from_points};
@@ -29,13 +29,21 @@ const WORTH_TRYING: f64 = 0.2;
 const LONG_WORTH_TRYING: f64 = 1e-2;
 /// The same in the last search before a motion is called anything but periodic.
 const LAST_WORTH_TRYING: f64 = 0.1;
+/// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
+const TELLING: f64 = 0.2;
+/// Distance of a neighbour, in standard deviations of the motion.
+const NEIGHBOUR: f64 = 1e-9;
+/// How many times its distance grows on chaos.
+const PARTING: f64 = 1e5;
+/// Periods in which it does.
+const LONGEST_PARTING: usize = 512;
 
 /// What is known already when a start sets out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Known<'a> {
     /// Neighbourhoods of attracting orbits.
     pub(crate) balls: &'a [Neighbourhood],
-    /// Exponents and means of chaotic attractors.
+    /// Exponents and means of chaotic motions and tori.
     pub(crate) chaos: &'a [LyapunovSpectrum],
     /// Periods after which most runs are in one of the neighbourhoods: before that,
     /// looking where a run goes costs more than waiting.
@@ -195,7 +203,10 @@ impl<'a> Run<'a> {
             }
             target *= 2;
         }
-        self.measure(map)
+        match self.known_chaos(map)? {
+            Some(kind) => Ok(kind),
+            None => self.measure(map),
+        }
     }
 
     fn step<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
@@ -316,6 +327,67 @@ impl<'a> Run<'a> {
             .fold(0.0, |m: f64, row| m.max(distance(row, &self.state)))
     }
 
+    /// The chaotic motion that is known already, if the run is on it: neighbours part, and the
+    /// strobe states after the first quarter have the means of the known one.
+    fn known_chaos<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Option<MotionKind>, Stop> {
+        let mut known = self.known.chaos.iter().filter(|k| is_chaotic(k)).peekable();
+        if known.peek().is_none() {
+            return Ok(None);
+        }
+        let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
+        let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
+        let deviations = means.deviations();
+        let telling = deviations
+            .iter()
+            .zip(&means.errors)
+            .all(|(deviation, error)| *error <= TELLING * deviation);
+        let found = known.find(|k| telling && k.strobe.agree_with(&means));
+        let Some(spectrum) = found else {
+            return Ok(None);
+        };
+        if !self.parts_from_neighbour(map, &deviations)? {
+            return Ok(None);
+        }
+        Ok(Some(self.chaotic(spectrum.clone())))
+    }
+
+    /// Whether a neighbour of the state comes to be [`PARTING`] times as far away, more than any
+    /// linear transient explains. The run goes on meanwhile.
+    fn parts_from_neighbour<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        deviations: &[f64],
+    ) -> Result<bool, Stop> {
+        let mut neighbour = self.state.clone();
+        for (x, deviation) in neighbour.iter_mut().zip(deviations) {
+            *x += NEIGHBOUR * deviation;
+        }
+        for _ in 0..LONGEST_PARTING {
+            self.step(map)?;
+            if advance(map, &mut neighbour).is_err() {
+                return Ok(false);
+            }
+            let apart = neighbour
+                .iter()
+                .zip(&self.state)
+                .zip(deviations)
+                .fold(0.0f64, |far, ((a, b), s)| far.max((a - b).abs() / s));
+            if apart > PARTING * NEIGHBOUR {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn chaotic(&self, spectrum: LyapunovSpectrum) -> MotionKind {
+        MotionKind::Chaotic(Chaos {
+            spectrum,
+            observed: self.periods,
+            lifetime_above: self.periods as f64 / 3.0,
+            longest_period: longest(self.options),
+        })
+    }
+
     /// Exponents of what does not close, looking for an escape after every doubling.
     fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
@@ -352,12 +424,7 @@ impl<'a> Run<'a> {
             target = (2 * target).min(budget.max_periods);
         };
         if is_chaotic(&spectrum) {
-            return Ok(MotionKind::Chaotic(Chaos {
-                spectrum,
-                observed: self.periods,
-                lifetime_above: self.periods as f64 / 3.0,
-                longest_period: longest(self.options),
-            }));
+            return Ok(self.chaotic(spectrum));
         }
         self.neither_periodic_nor_chaotic(map, spectrum)
     }

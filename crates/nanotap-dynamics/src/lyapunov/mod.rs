@@ -13,6 +13,7 @@
 //! number.
 
 mod block_average;
+mod strobe_means;
 
 use nalgebra::DMatrix;
 
@@ -20,6 +21,9 @@ use block_average::BlockAverage;
 
 use crate::failure::{MapFailure, advance_with_jacobian_and_determinant};
 use crate::map::StroboscopicMap;
+
+pub use strobe_means::StrobeMeans;
+use strobe_means::{agree, sampled};
 
 /// Part of a Jacobian's largest entry below which a stretch is rounding.
 const ROUNDING: f64 = 1e-10;
@@ -73,10 +77,8 @@ pub struct LyapunovSpectrum {
     pub errors: Vec<f64>,
     /// Periods averaged over.
     pub periods: usize,
-    /// Mean of the strobe states.
-    pub mean: Vec<f64>,
-    /// One standard error of that mean.
-    pub mean_errors: Vec<f64>,
+    /// Means of the strobe states.
+    pub strobe: StrobeMeans,
     /// Mean of log|det DP| over the same periods, which the sum of the exponents must
     /// be: by other means than the Jacobian where the map has any
     /// ([`StroboscopicMap::advance_with_jacobian_and_determinant`]), else by its LU factors.
@@ -92,27 +94,16 @@ impl LyapunovSpectrum {
         )
     }
 
-    /// True if two motions have the same exponents and mean states within six standard
-    /// errors of the difference (and what 1/T convergence leaves).
+    /// True if two motions have the same exponents and the same means of the strobe states and
+    /// their squares, within six standard errors of the difference (and what 1/T convergence
+    /// leaves).
     pub(crate) fn agrees_with(&self, other: &Self) -> bool {
         let length = self.periods.min(other.periods).max(1) as f64;
-        let close = |x: f64, ex: f64, y: f64, ey: f64, floor: f64| {
-            (x - y).abs() <= 6.0 * nanotap_arithmetic::hypot(ex, ey) + floor
-        };
-        let exponents = self
-            .exponents
-            .iter()
-            .zip(&self.errors)
-            .zip(other.exponents.iter().zip(&other.errors))
-            .all(|((x, ex), (y, ey))| close(*x, *ex, *y, *ey, 20.0 / length));
-        let scale = self.mean.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let means = self
-            .mean
-            .iter()
-            .zip(&self.mean_errors)
-            .zip(other.mean.iter().zip(&other.mean_errors))
-            .all(|((x, ex), (y, ey))| close(*x, *ex, *y, *ey, 20.0 * scale / length));
-        exponents && means
+        let ours = self.exponents.iter().zip(&self.errors);
+        let theirs = other.exponents.iter().zip(&other.errors);
+        ours.zip(theirs).all(|((x, ex), (y, ey))| {
+            agree(x - y, nanotap_arithmetic::hypot(*ex, *ey), 1.0, length)
+        }) && self.strobe.agree_with(&other.strobe)
     }
 
     /// Kaplan–Yorke dimension of the strobe points: j + Σ_{i≤j}λ_i/|λ_{j+1}| for the
@@ -161,7 +152,7 @@ pub(crate) struct LyapunovRun {
     frame: Vec<f64>,
     image: Vec<f64>,
     jacobian: DMatrix<f64>,
-    /// Logarithms of the stretches, the state, log|det DP|.
+    /// Logarithms of the stretches, the state and its squares, log|det DP|.
     sample: Vec<f64>,
     average: BlockAverage,
 }
@@ -177,8 +168,8 @@ impl LyapunovRun {
             image: frame.clone(),
             frame,
             jacobian: DMatrix::zeros(d, d),
-            sample: vec![0.0; 2 * d + 1],
-            average: BlockAverage::new(2 * d + 1),
+            sample: vec![0.0; 3 * d + 1],
+            average: BlockAverage::new(3 * d + 1),
         }
     }
 
@@ -214,7 +205,7 @@ impl LyapunovRun {
     /// Counts the period just stepped, which ended at `state`.
     #[inline]
     pub(crate) fn record(&mut self, state: &[f64]) {
-        self.sample[self.d..2 * self.d].copy_from_slice(state);
+        sampled(state, &mut self.sample[self.d..3 * self.d]);
         self.average.push(&self.sample);
     }
 
@@ -241,7 +232,7 @@ impl LyapunovRun {
         }
         self.orthonormalise();
         std::mem::swap(&mut self.frame, &mut self.image);
-        self.sample[2 * d] = exact.unwrap_or_else(|| log_determinant(&self.jacobian));
+        self.sample[3 * d] = exact.unwrap_or_else(|| log_determinant(&self.jacobian));
         if let Some(exact) = exact
             && d > 1
         {
@@ -291,9 +282,12 @@ impl LyapunovRun {
             exponents: order.iter().map(|&i| mean[i]).collect(),
             errors: order.iter().map(|&i| errors[i]).collect(),
             periods: self.periods(),
-            mean: mean[d..2 * d].to_vec(),
-            mean_errors: errors[d..2 * d].to_vec(),
-            log_determinant: mean[2 * d],
+            strobe: StrobeMeans {
+                means: mean[d..3 * d].to_vec(),
+                errors: errors[d..3 * d].to_vec(),
+                periods: self.periods(),
+            },
+            log_determinant: mean[3 * d],
         }
     }
 }

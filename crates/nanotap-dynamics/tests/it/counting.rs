@@ -9,7 +9,7 @@ use nanotap_dynamics::{
 };
 use rayon::ThreadPoolBuilder;
 
-use crate::systems::{Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System};
+use crate::systems::{Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System, TwoShells};
 
 fn starts(low: &[f64], high: &[f64], count: usize) -> Vec<Vec<f64>> {
     StartBox::new(low.to_vec(), high.to_vec())
@@ -93,6 +93,66 @@ fn chaos_is_claimed_with_a_pooled_bound() {
     assert_eq!(lifetime.escapes, 0);
     assert!(lifetime.low > 0.2 * watched as f64 && lifetime.low < watched as f64 / 2.99);
     assert!(result.transient_chaos.is_none());
+}
+
+/// A quarter of |y| ≤ 2 lies beyond 3/2. Starts after the first eight are recognised by the means
+/// of what is known, those of the second attractor too, whose mean state and exponents are the
+/// first one's.
+#[test]
+fn coexisting_chaos_with_equal_means_is_told_apart() {
+    let options = CensusOptions {
+        pilots: 8,
+        ..CensusOptions::default()
+    };
+    let starts = starts(&[-0.9, -2.0], &[0.9, 2.0], 200);
+    let result = taken(TwoShells, &starts, &options);
+    assert_eq!(result.attractors.len(), 2);
+    for (start, outcome) in starts.iter().zip(&result.outcomes_by_start) {
+        let StartOutcome::Attractor { index, .. } = *outcome else {
+            panic!("{start:?}: {outcome:?}")
+        };
+        let beyond = result.attractors[index].state[1].abs() > 1.5;
+        assert_eq!(beyond, start[1].abs() >= 1.5);
+    }
+    for attractor in &result.attractors {
+        let AttractorKind::Chaotic { spectrum, lifetime } = &attractor.kind else {
+            panic!()
+        };
+        let (largest, error) = spectrum.largest();
+        assert!((largest - 2f64.ln()).abs() < 5.0 * error);
+        assert_eq!(lifetime.escapes, 0);
+    }
+}
+
+/// A start that is recognised to be on known chaos has been watched for the whole transient, and
+/// no longer than it takes to part from a neighbour.
+#[test]
+fn recognised_chaos_is_watched_for_the_whole_transient() {
+    let options = CensusOptions {
+        pilots: 4,
+        ..CensusOptions::default()
+    };
+    let henon = Henon { a: 1.4, b: 0.3 };
+    let result = taken(henon, &starts(&[-0.5, -0.2], &[0.5, 0.2], 40), &options);
+    let watched = |range: std::ops::Range<usize>| -> Vec<usize> {
+        let outcomes = result.outcomes_by_start[range].iter();
+        let periods = outcomes.filter_map(|outcome| match outcome {
+            StartOutcome::Attractor { periods, .. } => Some(*periods),
+            _ => None,
+        });
+        periods.collect()
+    };
+    let transient = options.classify.max_transient;
+    let measured = transient + options.classify.lyapunov.min_periods;
+    assert!(watched(0..4).iter().all(|&periods| periods >= measured));
+    let recognised = watched(4..40);
+    assert!(!recognised.is_empty());
+    assert!(
+        recognised
+            .iter()
+            .all(|periods| (transient..measured).contains(periods)),
+        "{recognised:?}"
+    );
 }
 
 /// Geometric lifetimes of mean 1/ln(s/2) = 1/ln 1.001 ≈ 1000.5: some escape, some

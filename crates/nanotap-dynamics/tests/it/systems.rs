@@ -376,6 +376,30 @@ impl Formula for Nested {
     }
 }
 
+/// Ulam's map x → 1 − 2x² beside a number that changes sign every period and whose size goes to
+/// 1 from below 3/2 and to 2 from above: two chaotic attractors with the same exponents, ln 2 and
+/// −ln 2, and the same mean state, zero; only their mean squares differ.
+#[derive(Clone, Debug)]
+pub(crate) struct TwoShells;
+
+impl Formula for TwoShells {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let shell = if x[1].abs() < 1.5 { 1.0 } else { 2.0 };
+        out[0] = 1.0 - 2.0 * x[0] * x[0];
+        out[1] = -(shell + 0.5 * (x[1].abs() - shell)).copysign(x[1]);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = -4.0 * x[0];
+        out[(0, 1)] = 0.0;
+        out[(1, 0)] = 0.0;
+        out[(1, 1)] = -0.5;
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+    }
+}
+
 /// [`Focus`] with the angle as parameter: the fixed point has the size
 /// 1/|1 − ρ e^{iθ}|, a resonance at θ = 0.
 #[derive(Clone, Debug)]

@@ -264,7 +264,7 @@ pub fn lyapunov(
         kaplan_yorke_dimension: spectrum.kaplan_yorke_dimension(),
         exponents: spectrum.exponents,
         errors: spectrum.errors,
-        mean: spectrum.mean,
+        mean: spectrum.strobe.mean_state().to_vec(),
         section,
         section_at: options.section,
     })

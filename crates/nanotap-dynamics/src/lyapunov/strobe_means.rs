@@ -1,0 +1,77 @@
+//! Means of a motion's strobe states, by which motions that do not close are told apart.
+
+use super::block_average::BlockAverage;
+
+/// Means of the strobe states' d entries, then of their squares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StrobeMeans {
+    /// The means, 2 d of them.
+    pub means: Vec<f64>,
+    /// One standard error of each.
+    pub errors: Vec<f64>,
+    /// Periods averaged over.
+    pub periods: usize,
+}
+
+impl StrobeMeans {
+    /// Those of `states`, `d` entries each in the order in which they came.
+    pub(crate) fn of(states: &[f64], d: usize) -> Self {
+        let mut average = BlockAverage::new(2 * d);
+        let mut sample = vec![0.0; 2 * d];
+        for state in states.chunks_exact(d) {
+            sampled(state, &mut sample);
+            average.push(&sample);
+        }
+        Self {
+            means: average.mean(),
+            errors: average.standard_error(),
+            periods: average.count(),
+        }
+    }
+
+    /// The mean state.
+    pub fn mean_state(&self) -> &[f64] {
+        &self.means[..self.means.len() / 2]
+    }
+
+    /// Standard deviation of each entry of the states, a millionth of the largest at least, so
+    /// that an entry which hardly moves can be divided by it.
+    pub(crate) fn deviations(&self) -> Vec<f64> {
+        let (means, squares) = self.means.split_at(self.means.len() / 2);
+        let variances = means.iter().zip(squares).map(|(m, s)| s - m * m);
+        let deviations: Vec<f64> = variances.map(|v| v.max(0.0).sqrt()).collect();
+        let least = 1e-6 * deviations.iter().fold(0.0f64, |m, v| m.max(*v));
+        deviations.into_iter().map(|v| v.max(least)).collect()
+    }
+
+    /// True if all agree within six standard errors of the difference (and what 1/T
+    /// convergence leaves).
+    pub(crate) fn agree_with(&self, other: &Self) -> bool {
+        let d = self.means.len() / 2;
+        let length = self.periods.min(other.periods).max(1) as f64;
+        [0..d, d..2 * d].into_iter().all(|range| {
+            let largest = self.means[range.clone()]
+                .iter()
+                .fold(0.0f64, |m, v| m.max(v.abs()));
+            range.into_iter().all(|i| {
+                let error = nanotap_arithmetic::hypot(self.errors[i], other.errors[i]);
+                agree(self.means[i] - other.means[i], error, largest, length)
+            })
+        })
+    }
+}
+
+/// Writes what is averaged of a state.
+pub(crate) fn sampled(state: &[f64], sample: &mut [f64]) {
+    let (entries, squares) = sample.split_at_mut(state.len());
+    entries.copy_from_slice(state);
+    for (square, x) in squares.iter_mut().zip(state) {
+        *square = x * x;
+    }
+}
+
+/// Whether a difference of two means over so many periods is within six standard errors, and
+/// within what an average that converges like 1/T without scatter leaves of `scale`.
+pub(crate) fn agree(difference: f64, error: f64, scale: f64, periods: f64) -> bool {
+    difference.abs() <= 6.0 * error + 20.0 * scale / periods
+}

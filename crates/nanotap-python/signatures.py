@@ -326,7 +326,7 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
         return "Box"
     elif option == "over":
         return "str | Sequence[str] | Mapping[str, Any]"
-    elif option == "derivatives":
+    elif "object" not in known and declared.get("items") == {"type": "string"}:
         return "Sequence[str] | None"
     elif option in {"x", "y"}:
         return "str | Mapping[str, Any]"

@@ -9,7 +9,7 @@ use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{
-    Derivative, Observables, OutOfRange, PhysicalMotion, Spectrum, time_series,
+    Derivative, Observables, OutOfRange, PhysicalMotion, Set, Spectrum, Value, time_series,
 };
 use nanotap::study::proof::ProofReport;
 use nanotap::study::simulate::Classification;
@@ -28,7 +28,6 @@ pub(crate) fn verdict(classification: Classification, period: Option<usize>) -> 
     }
 }
 
-/// A phase in degrees.
 /// A lag in degrees behind a tone, or how far ahead of it.
 pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
     let phase = shown_phase(phase);
@@ -36,8 +35,53 @@ pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
     format!("{}° {way} {tone}", number::significant(phase.abs(), digits))
 }
 
+/// What was observed: tip, gap, contact, force and energy; of a choice of observables a row each.
+pub(crate) fn observed(o: &Observables, chosen: Option<Set>, units: &Units, beam: bool) -> String {
+    match chosen {
+        Some(chosen) => choice(o, chosen, units),
+        None => format!("{}\n{}", observables(o, units, beam), energy(o, units)),
+    }
+}
+
+fn choice(o: &Observables, chosen: Set, units: &Units) -> String {
+    let mut table = Table::new([
+        ("", Align::Left),
+        ("", Align::Left),
+        ("", Align::Left),
+        ("", Align::Left),
+    ]);
+    let mut balance = String::new();
+    for observable in chosen.iter() {
+        let numbers = match (observable.of)(o) {
+            Value::Absent => Vec::new(),
+            Value::Number(number) => vec![number],
+            Value::Count(count) => vec![count as f64],
+            Value::Range(ends) => ends.to_vec(),
+            Value::Energies(_) => {
+                balance = energy(o, units);
+                continue;
+            }
+        };
+        let shown = |show: &dyn Fn(f64) -> String| {
+            let all: Vec<String> = numbers.iter().map(|v| show(*v)).collect();
+            all.join(" … ")
+        };
+        let kind = observable.dimension.kind();
+        let si = kind.and_then(|kind| Some((kind, units.si(kind)?)));
+        table.row([
+            observable.name.to_owned(),
+            shown(&|v| number::significant(v, 6)),
+            si.map_or_else(String::new, |(kind, unit)| {
+                shown(&|v| kind.format(unit * v))
+            }),
+            observable.words.to_owned(),
+        ]);
+    }
+    table.render() + &balance
+}
+
 /// Tip, gap, contact and force.
-pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String {
+fn observables(o: &Observables, units: &Units, beam: bool) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("", Align::Left),
@@ -192,7 +236,7 @@ pub(crate) fn observables(o: &Observables, units: &Units, beam: bool) -> String 
 }
 
 /// What the drive feeds in and what takes it.
-pub(crate) fn energy(o: &Observables, units: &Units) -> String {
+fn energy(o: &Observables, units: &Units) -> String {
     let balance = &o.energy_balance;
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
     let mut row = |name: &str, value: f64, note: String| {

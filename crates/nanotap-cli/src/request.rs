@@ -66,7 +66,7 @@ fn flags(schema: &Schema) -> impl Iterator<Item = Property<'_>> {
     request::properties(schema).filter(|property| property.schema["x-own"].is_null())
 }
 
-/// Whether the option is given several times, a text each.
+/// Whether the option may be given several times, a text or a list of texts each.
 fn is_repeated(property: Property<'_>) -> bool {
     property.allows("array") && property.schema["items"]["type"] == "string"
 }
@@ -168,7 +168,18 @@ fn typed(property: Property<'_>, matches: &ArgMatches) -> Option<Value> {
     }
     let mut texts = matches.get_many::<String>(property.name)?;
     if is_repeated(property) {
-        return Some(texts.map(|text| Value::from(text.as_str())).collect());
+        let listed = property.schema["x-value"].as_str();
+        let listed = listed.is_some_and(|name| name.ends_with(",…"));
+        let each = texts.flat_map(|text| {
+            let parts: Vec<&str> = if listed {
+                let parts = text.split(',').map(str::trim);
+                parts.filter(|part| !part.is_empty()).collect()
+            } else {
+                vec![text]
+            };
+            parts
+        });
+        return Some(each.map(Value::from).collect());
     }
     texts.next_back().map(|text| property.parsed(text))
 }

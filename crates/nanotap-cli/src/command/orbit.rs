@@ -6,7 +6,7 @@ use clap::Args;
 use nanotap::control::Control;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::{PhysicalMotion, time_series};
+use nanotap::observe::{PhysicalMotion, Set, time_series};
 use nanotap::study::orbit::{OrbitReport, OrbitRequest, OrbitStudy};
 use nanotap::study::registry::Study as _;
 
@@ -81,7 +81,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         "",
         output,
     );
-    output.study(&case, found, |found| text(&case, &model, &found.motion))
+    output.study(&case, found, |found| {
+        text(&case, &model, &found.motion, request.observables)
+    })
 }
 
 /// A row a harmonic; of a physical case the SI columns follow.
@@ -107,7 +109,7 @@ fn harmonics_csv(orbit: &OrbitReport, physical: Option<&PhysicalMotion>) -> Stri
     csv
 }
 
-fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
+fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set>) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
@@ -124,13 +126,12 @@ fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport) -> String {
     }
     text.push_str(&table.render());
     text.push('\n');
-    text.push_str(&motion::observables(
+    text.push_str(&motion::observed(
         &orbit.observables,
+        chosen,
         &units,
         model.beam.is_some(),
     ));
-    text.push('\n');
-    text.push_str(&motion::energy(&orbit.observables, &units));
     text.push('\n');
     text.push_str(&motion::spectrum(&orbit.spectrum, orbit.period, &units));
     text.push('\n');

@@ -7,6 +7,7 @@ use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
+use nanotap::observe::Set;
 use nanotap::study::fixed_step::FixedStepRun;
 use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{
@@ -69,12 +70,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
     }
     output.study(&case, &report, |report| match report {
-        SimulateReport::Exact(run) => text(&case, &model, &run.motion),
+        SimulateReport::Exact(run) => text(&case, &model, &run.motion, request.observables),
         SimulateReport::FixedStep(run) => rk4_text(&case, run),
     })
 }
 
-fn text(case: &GivenCase, model: &Model, run: &Simulation) -> String {
+fn text(case: &GivenCase, model: &Model, run: &Simulation, chosen: Option<Set>) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
@@ -117,13 +118,12 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation) -> String {
             number::counted(run.transient, "period", "periods")
         },
     );
-    text.push_str(&motion::observables(
+    text.push_str(&motion::observed(
         &run.observables,
+        chosen,
         &units,
         model.beam.is_some(),
     ));
-    text.push('\n');
-    text.push_str(&motion::energy(&run.observables, &units));
     if let Some(orbit) = &run.orbit {
         let pairs: Vec<[f64; 2]> = orbit.multipliers.iter().map(|m| [m.re, m.im]).collect();
         text.push('\n');

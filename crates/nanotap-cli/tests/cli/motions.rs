@@ -86,6 +86,50 @@ fn simulate_tells_the_contract_and_ends_on_the_orbit() {
     }
 }
 
+/// Only what is named is measured, and it is what all together give; a name may be the one that
+/// experimenters use, and the terminal shows a row each.
+#[test]
+fn observables_are_those_that_are_named() {
+    let folder = Folder::with_paper_case();
+    for study in ["simulate", "orbit"] {
+        let run = |more: &[&str]| {
+            let arguments = [&[study, "case.toml", "--set", "omega=3"], more].concat();
+            folder.run(&arguments)
+        };
+        let all = run(&["--json"]).json();
+        let some = run(&["--observables", "A,gap_range", "--json"]).json();
+        assert!((number(&some, "first_harmonic") - number(&all, "first_harmonic")).abs() < 1e-14);
+        assert_eq!(vector(&some["gap_range"]), vector(&all["gap_range"]));
+        for absent in ["tip_max", "beam_clearance", "energy_balance", "dissipation"] {
+            assert!(some.get(absent).is_none(), "{study}: {absent}");
+            assert!(all.get(absent).is_some(), "{study}: {absent}");
+        }
+        assert!(
+            run(&["--observables=", "--json"])
+                .json()
+                .get("gap_range")
+                .is_none()
+        );
+        let text = run(&["--observables", "A,energy_balance"]).stdout;
+        assert!(text.contains("first_harmonic") && text.contains("drive work"));
+        assert!(!text.contains("gap_range"), "{text}");
+    }
+}
+
+/// Keys in a list, as in several options.
+#[test]
+fn derivatives_are_listed() {
+    let folder = Folder::with_paper_case();
+    let derivatives = |more: &[&str]| {
+        let arguments = [&["orbit", "case.toml", "--set", "omega=3", "--json"], more].concat();
+        folder.run(&arguments).json()["derivatives"].clone()
+    };
+    let listed = derivatives(&["--derivatives", "alpha1, alpha3"]);
+    assert_eq!(listed.as_object().map(serde_json::Map::len), Some(2));
+    let each = derivatives(&["--derivatives", "alpha1", "--derivatives", "alpha3"]);
+    assert_eq!(listed, each);
+}
+
 #[test]
 fn simulate_from_the_start_takes_states_and_periods_as_given() {
     let folder = Folder::with_paper_case();

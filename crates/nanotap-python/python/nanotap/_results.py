@@ -249,8 +249,18 @@ class Modes(Result):
 
 
 class _Observed:
-    """What is observed of an orbit besides: found in its document, in the model's units."""
+    """What is observed of an orbit, in the model's units: found in its document, where only what
+    was asked for is.
+    """
 
+    tip_max: float
+    tip_min: float
+    amplitude: float
+    first_harmonic: float
+    phase: float
+    contact_fraction: float
+    peak_force: float
+    energy_balance: Record
     mean_deflection: float
     indentation: float
     mean_force: float
@@ -323,16 +333,8 @@ class Orbit(_Observed, Result):
     stable: bool
     stability: str
     events: list[Record]
-    tip_max: float
-    tip_min: float
-    amplitude: float
-    contact_fraction: float
-    peak_force: float
-    energy_balance: Record
     harmonics: list[Record]
     thd: float
-    phase: float
-    first_harmonic: float
     physical: Record | None = None
     derivatives: Record | None = None
     proof: Record | None = None

@@ -78,6 +78,7 @@ def simulate(
     strobe: int = 1,
     events: int = 50_000,
     max_period: int = 64,
+    observables: Sequence[str] | None = None,
     resolution: int = 200,
     method: Literal["exact", "rk4"] = "exact",
     steps: int | Sequence[int] = 200,
@@ -108,6 +109,9 @@ def simulate(
         1000000000).
     max_period : int
         Longest period looked for (1 to 10000).
+    observables : Sequence[str] | None
+        Observables to measure; without it, every one that there is, the beam's
+        clearance included.
     resolution : int
         Samples a drive period in the time series (1 to 1000000).
     method : Literal["exact", "rk4"]
@@ -153,6 +157,7 @@ def simulate(
         "strobe": strobe,
         "events": events,
         "max_period": max_period,
+        "observables": observables,
         "resolution": resolution,
         "method": method,
         "steps": steps,
@@ -167,6 +172,7 @@ def orbit(  # type: ignore[overload-overlap]
     period: int | None = None,
     state: Any = None,
     harmonics: int = 20,
+    observables: Sequence[str] | None = None,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
     prove: bool = False,
@@ -181,6 +187,7 @@ def orbit(
     period: int | None = None,
     state: Any = None,
     harmonics: int = 20,
+    observables: Sequence[str] | None = None,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
     prove: bool = False,
@@ -194,6 +201,7 @@ def orbit(
     period: int | None = None,
     state: Any = None,
     harmonics: int = 20,
+    observables: Sequence[str] | None = None,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
     prove: bool = False,
@@ -214,6 +222,9 @@ def orbit(
         State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
     harmonics : int
         Harmonics of the drive frequency to report (0 to 100000).
+    observables : Sequence[str] | None
+        Observables to measure; without it, every one that there is, the beam's
+        clearance included.
     resolution : int
         Samples a drive period in the time series (1 to 1000000).
     derivatives : Sequence[str] | None
@@ -245,6 +256,7 @@ def orbit(
         "period": period,
         "state": state,
         "harmonics": harmonics,
+        "observables": observables,
         "resolution": resolution,
         "derivatives": derivatives,
         "prove": prove,
@@ -489,11 +501,11 @@ def fit(
     case: Case,
     *,
     data: Any = None,
-    free: Any = None,
-    per_curve: Any = None,
+    free: Sequence[str] | None = None,
+    per_curve: Sequence[str] | None = None,
     bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
-    columns: Any = None,
-    laws: Any = None,
+    columns: Sequence[str] | None = None,
+    laws: Sequence[str] | None = None,
     starts: int = 8,
     seed: int = 0,
     max_period: int = 4,
@@ -511,16 +523,16 @@ def fit(
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
-    free : Any
+    free : Sequence[str] | None
         Parameters to find: keys of the case, gap.offset, and NAME.offset or
         NAME.scale of a column.
-    per_curve : Any
+    per_curve : Sequence[str] | None
         Parameters to find, one value a curve.
     bounds : Mapping[str, tuple[float | str, float | str]] | str | None
         Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m".
-    columns : Any
+    columns : Sequence[str] | None
         Columns of the data that count; without it, all.
-    laws : Any
+    laws : Sequence[str] | None
         Contact laws to compare, as in hertz,dmt; without it, the case's own.
     starts : int
         Starts to try as long as nothing describes the data (1 to 1000).

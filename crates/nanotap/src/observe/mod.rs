@@ -2,6 +2,7 @@
 //! beam clearance. Everything is exact on the piecewise closed form: extrema from
 //! roots of rates, integrals in closed form, never from samples.
 
+mod choice;
 mod clearance;
 pub mod columns;
 mod contact_event;

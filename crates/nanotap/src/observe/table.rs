@@ -201,6 +201,9 @@ macro_rules! observables {
             pub const FIRST_HARMONIC: Self =
                 Self(1 << Row::first_harmonic as usize | 1 << Row::phase as usize);
 
+            /// The least and the greatest gap.
+            pub(super) const GAP: Self = Self(1 << Row::gap_range as usize);
+
             /// Where and when the beam is lowest.
             pub(super) const CLEARANCE: Self = Self(
                 1 << Row::beam_clearance as usize

@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::table::Observables;
+use super::table::{Observables, Set};
 use crate::model::Model;
 
 /// A ratio that a force law takes to be small, and that a motion makes large.
@@ -20,6 +20,14 @@ pub struct OutOfRange {
 }
 
 impl OutOfRange {
+    /// `set` with what [`OutOfRange::of`] looks at.
+    pub fn observed_with(model: &Model, set: Set) -> Set {
+        match model.nonlinear {
+            Some(_) => set.union(Set::GAP),
+            None => set,
+        }
+    }
+
     /// What the motion with these observables violates; their gap must have been measured.
     pub fn of(model: &Model, seen: &Observables) -> Vec<Self> {
         let Some(nonlinear) = &model.nonlinear else {

@@ -37,6 +37,8 @@ pub struct OrbitOptions {
     pub state: Option<Vec<f64>>,
     /// Harmonics of the drive frequency reported.
     pub harmonics: usize,
+    /// What is measured.
+    pub observables: Set,
     /// Budgets of the run from rest.
     pub classify: ClassifyOptions,
     /// Newton's budgets.
@@ -49,6 +51,7 @@ impl Default for OrbitOptions {
             period: None,
             state: None,
             harmonics: 20,
+            observables: Set::ALL,
             classify: ClassifyOptions::default(),
             shooting: ShootingOptions::default(),
         }
@@ -160,7 +163,7 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Orbit
         (Some(period), Some(_)) => close_orbit(&mut map, &start, period, &options.shooting)?,
         (period, _) => settled(model, &mut map, &start, period, options)?,
     };
-    report(model, &found, options.harmonics)
+    report_on(model, &found, options.harmonics, options.observables)
 }
 
 /// The orbit where a run from `start` settles, or one of the asked period: near its end, or
@@ -270,13 +273,23 @@ pub fn report(
     orbit: &PeriodicOrbit,
     harmonics: usize,
 ) -> Result<OrbitReport, OrbitError> {
+    report_on(model, orbit, harmonics, Set::ALL)
+}
+
+fn report_on(
+    model: &Model,
+    orbit: &PeriodicOrbit,
+    harmonics: usize,
+    observables: Set,
+) -> Result<OrbitReport, OrbitError> {
     let start = orbit.states.first().cloned().unwrap_or_default();
     let kept = Kept {
         recorded: orbit.period,
         events: true,
         ..Kept::default()
     };
-    let seen = watch(model, &start, orbit.period, Set::ALL, kept)?;
+    let observed = OutOfRange::observed_with(model, observables);
+    let seen = watch(model, &start, orbit.period, observed, kept)?;
     Ok(OrbitReport {
         period: orbit.period,
         state: start,
@@ -438,6 +451,9 @@ pub struct OrbitRequest {
     /// Harmonics of the drive frequency to report
     #[schemars(range(min = 0, max = MOST_HARMONICS), extend("x-value" = "H"))]
     pub harmonics: usize,
+    /// Observables to measure; without it, every one that there is, the beam's clearance included
+    #[schemars(extend("x-value" = "NAME,…"))]
+    pub observables: Option<Set>,
     /// Samples a drive period in the time series
     #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
     pub resolution: usize,
@@ -455,6 +471,7 @@ impl Default for OrbitRequest {
             period: options.period,
             state: options.state,
             harmonics: options.harmonics,
+            observables: None,
             resolution: 200,
             derivatives: Vec::new(),
             prove: false,
@@ -469,6 +486,7 @@ impl OrbitRequest {
             period: self.period,
             state: self.state.clone(),
             harmonics: self.harmonics,
+            observables: self.observables.unwrap_or(Set::ALL),
             ..OrbitOptions::default()
         }
     }
@@ -494,10 +512,18 @@ impl Study for OrbitStudy {
             .map(|name| case.key(name))
             .collect::<Result<Vec<_>, _>>()?;
         let model = case.model()?;
-        let mut found = orbit(&model, &request.options())?;
+        let options = request.options();
+        let mut found = orbit(&model, &options)?;
         for key in keys {
             let at = (found.state.as_slice(), found.period);
-            let derivative = Derivative::of(case, &model, key, at, &found.observables, Set::ALL)?;
+            let derivative = Derivative::of(
+                case,
+                &model,
+                key,
+                at,
+                &found.observables,
+                options.observables,
+            )?;
             found.derivatives.insert(key.path(), derivative);
         }
         if request.prove {

@@ -199,7 +199,8 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         events: true,
         each_period: false,
     };
-    let mut record = watch(model, &state, options.periods, options.observables, kept)?;
+    let observed = OutOfRange::observed_with(model, options.observables);
+    let mut record = watch(model, &state, options.periods, observed, kept)?;
     let events_left_out = record.events.len().saturating_sub(options.events);
     record.events.truncate(options.events);
     let named = Named::of(&classify(&mut map, &state, &options.classify).kind);
@@ -462,6 +463,9 @@ pub struct SimulateRequest {
     /// Longest period looked for
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
     pub max_period: usize,
+    /// Observables to measure; without it, every one that there is, the beam's clearance included
+    #[schemars(extend("x-value" = "NAME,…"))]
+    pub observables: Option<Set>,
     /// Samples a drive period in the time series
     #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
     pub resolution: usize,
@@ -489,6 +493,7 @@ impl Default for SimulateRequest {
             strobe: options.strobe,
             events: options.events,
             max_period: options.classify.max_period,
+            observables: None,
             resolution: 200,
             method: Method::default(),
             steps: Steps::default(),
@@ -506,8 +511,8 @@ impl SimulateRequest {
             state: self.state.clone(),
             strobe: self.strobe,
             events: self.events,
+            observables: self.observables.unwrap_or(Set::ALL),
             classify: self.classify(),
-            ..SimulateOptions::default()
         }
     }
 

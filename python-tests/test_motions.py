@@ -57,6 +57,25 @@ def test_a_run_has_the_terminals_numbers(regular, tmp_path):
             assert variable.attrs["long_name"] and variable.attrs["units"], name
 
 
+def test_observables_are_those_that_are_named(regular):
+    """One orbit, many and a run: what is asked for is what all together give, and nothing else."""
+    asked = {"observables": ["A", "phase", "gap_range"]}
+    every = nanotap.orbit(regular)
+    some = nanotap.orbit(regular, **asked)
+    assert some.first_harmonic == pytest.approx(every.first_harmonic, rel=1e-13)
+    assert some.gap_range == every.gap_range
+    with pytest.raises(AttributeError, match="there is no `tip_max`"):
+        _ = some.tip_max
+    many = nanotap.orbit(regular, omega=[3.0, 3.01], **asked)
+    assert {"first_harmonic", "phase", "gap_range"} <= set(many)
+    assert not {"tip_max", "beam_clearance", "dissipation"} & set(many)
+    run = nanotap.simulate(regular, periods=3, observables=["E_dis"])
+    assert "dissipation" in run.attrs or "dissipation" in run
+    assert "first_harmonic" not in run and "first_harmonic" not in run.attrs
+    with pytest.raises(ValueError, match="did you mean `phase`"):
+        nanotap.orbit(regular, observables=["phas"])
+
+
 def test_orbits_are_proved(regular, tmp_path):
     said = terminal(tmp_path, regular, "orbit", "--prove")
     proof = nanotap.orbit(regular, prove=True).proof

@@ -127,6 +127,7 @@ fn no_document_is_left_out() {
             "capillary.md",
             "dforce.md",
             "dynamicist.md",
+            "fit-frequency-modulation.md",
             "fit.md",
             "fm-lever-on-polystyrene.md",
             "frequency-modulation.md",
@@ -156,6 +157,7 @@ macro_rules! follows {
 
 follows! {
     fit: "fit.md", 6 commands, 32 numbers;
+    fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
     frequency_modulation: "frequency-modulation.md", 2 commands, 13 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_bistable_lever: "bistable.md", 2 commands, 9 numbers;

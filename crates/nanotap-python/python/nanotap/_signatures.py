@@ -510,6 +510,7 @@ def fit(
     seed: int = 0,
     max_period: int = 4,
     jumps: bool = True,
+    phase: float = 90.0,
     profile: bool = True,
     threads: int | None = None,
     progress: Progress = None,
@@ -543,6 +544,9 @@ def fit(
     jumps : bool
         The place at which the data jump from a branch that ends in a fold counts
         too.
+    phase : float
+        Phase behind the drive that the loop held, in degrees, of curves of a
+        frequency shift.
     profile : bool
         Intervals by the profile of the likelihood.
     threads : int | None
@@ -575,6 +579,7 @@ def fit(
         "seed": seed,
         "max_period": max_period,
         "jumps": jumps,
+        "phase": phase,
         "profile": profile,
     }
     return _studies.fit(case, options, threads, progress)

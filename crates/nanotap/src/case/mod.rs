@@ -406,6 +406,16 @@ impl Case {
         }
     }
 
+    /// The keys of the numbers of a cantilever's equations that change with a key, each with its
+    /// derivative.
+    pub(crate) fn numbers_by(&self, key: Key) -> Result<Vec<(Key, f64)>, CaseError> {
+        let (slopes, _) = self.parameters_by(key)?;
+        Ok(slopes
+            .into_iter()
+            .map(|(parameter, by)| (Key::of(parameter), by))
+            .collect())
+    }
+
     /// The units of the model beside a value of a key, below and above it, and how far apart
     /// these values are; `None` where the units do not follow from the key.
     pub(crate) fn scales_beside(

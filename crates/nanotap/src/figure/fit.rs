@@ -11,6 +11,7 @@ use crate::figure::shown::Shown;
 use crate::observe::table::shown_phase;
 use crate::study::approach::Way;
 use crate::study::fit::{FitReport, FittedColumn, FittedRow, Reading};
+use crate::study::frequency_modulation::COLUMNS;
 
 /// Panels side by side.
 const ACROSS: usize = 3;
@@ -104,10 +105,16 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
         .filter_map(|reading| reading.measured)
         .fold(0.0, |size: f64, value| size.max(value.abs()));
     let si = |_| (column.unit != "1" && Key::find(&report.swept).is_some()).then_some(1.0);
-    let (label, factor) = shown.map_or_else(
-        || (column.name.clone(), 1.0),
-        |shown| shown.axis(true, si, size),
-    );
+    let modulated = COLUMNS.iter().find(|c| c.name == column.observable);
+    let (label, factor) = match (shown, modulated.map(|c| (c.label, c.kind))) {
+        (Some(shown), _) => shown.axis(true, si, size),
+        (None, Some((label, Some(kind)))) if column.unit != "1" => {
+            let (factor, unit) = prefixed(kind, 1.0, size);
+            (format!("{label} ({unit})"), factor)
+        }
+        (None, Some((label, _))) => (label.to_owned(), 1.0),
+        (None, None) => (column.name.clone(), 1.0),
+    };
     let y = |value: f64| factor * if phase { shown_phase(value) } else { value };
     let points = |rows: &[&FittedRow], of: fn(&Reading) -> Option<f64>| -> Vec<(f64, f64)> {
         let point = |row: &&FittedRow| {

@@ -282,7 +282,18 @@ pub(crate) fn first_harmonic_changes(
         // The same change of the motion, if the key may change so far.
         let change = (0..n).fold(0.0, |m: f64, i| m.max(by[(i, k)].abs() / sizes[i]));
         let value = case.get(*key);
-        let step = (BESIDE / change).min(0.1 * value.abs());
+        // What the motion is linear in, as the drive's strength, may change far.
+        let part = if case.drive_keys().contains(key) {
+            0.1
+        } else {
+            3e-3
+        };
+        let farthest = if value == 0.0 {
+            1.0
+        } else {
+            part * value.abs()
+        };
+        let step = (BESIDE / change).min(farthest);
         let beside = |side: f64| -> Result<Observables, DerivativeError> {
             let there = case.with(*key, value + side * step).model()?;
             Ok(measure(&there, state, 1, set)?)

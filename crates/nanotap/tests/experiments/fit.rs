@@ -558,8 +558,8 @@ fn bad_tables_are_refused_with_their_place() {
         ),
         ("distance (nm),phase\n,9\n", &["line 2", "column 1"]),
         (
-            "distance (nm),frequency shift (Hz)\n1,9\n",
-            &["frequency modulation"],
+            "distance (nm),frequency shift (Hz),phase\n1,9,3\n",
+            &["phase", "frequency modulation"],
         ),
         (
             "distance (nm),phase,direction\n1,9,sideways\n",
@@ -735,4 +735,155 @@ fn a_curve_that_approach_wrote_is_fitted_as_it_is() {
         .iter()
         .any(|r| r.starts_with("3 rows of neither way"));
     assert!(counted, "{:?}", report.remarks);
+}
+
+/// A lever whose frequency a loop follows, over a sample that pulls and presses.
+const FOLLOWED: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"100 kHz\"\n\
+     Q = 2000\n[tip]\nradius = \"10 nm\"\n[sample]\nlaw = \"dmt+exponential-damping\"\n\
+     modulus = \"3 GPa\"\npoisson = 0.3\nhamaker = \"2e-19 J\"\ndamping = \"1e-7 N s/m\"\n\
+     decay_length = \"0.2 nm\"\n[drive]\n\
+     actuation = \"tip\"\nfrequency = \"100 kHz\"\nfree_amplitude = \"10 nm\"\n[gap]\n\
+     tip = \"11 nm\"\n";
+
+/// What `approach` under frequency modulation writes of the way there, with noise of the shift (Hz) and of the
+/// drive's ratio.
+fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) -> Table {
+    let length = case.physical().unwrap().scales.length;
+    let options = ApproachOptions {
+        from: Some(range[0] * 1e-9 / length),
+        to: Some(range[1] * 1e-9 / length),
+        points,
+        branches: false,
+        phase: Some(90.0),
+        ..ApproachOptions::default()
+    };
+    let report = approach(case, &options, &Control::default()).unwrap();
+    let names = [
+        "way",
+        "alpha5",
+        "classification",
+        "period",
+        "spectral_radius",
+    ];
+    let names = names
+        .into_iter()
+        .chain(["phase", "A (m)", "zc (m)", "frequency_shift (Hz)"]);
+    let names = names.chain(["relative_shift", "drive_ratio", "drive_dissipation (J)"]);
+    let mut columns: Vec<(String, Vec<Entry>)> =
+        names.map(|name| (name.to_owned(), Vec::new())).collect();
+    let mut noise = noise.map(Noise);
+    let mut normal = || noise.as_mut().map_or(0.0, Noise::normal);
+    for point in report.table.iter().filter(|p| p.way == Way::Approach) {
+        let (of, si) = (point.modulation.unwrap(), point.modulation_si.unwrap());
+        let row = [
+            Entry::Text(point.way.name().to_owned()),
+            Entry::Number(point.gap),
+            Entry::Text("periodic".to_owned()),
+            Entry::Number(1.0),
+            Entry::Number(0.99),
+            Entry::Number(90.0),
+            Entry::Number(10e-9),
+            Entry::Number(point.zc.unwrap()),
+            Entry::Number(si.frequency_shift + 0.5 * normal()),
+            Entry::Number(of.relative_shift),
+            Entry::Number(of.drive_ratio + 2e-3 * normal()),
+            Entry::Number(si.drive_dissipation),
+        ];
+        for ((_, column), entry) in columns.iter_mut().zip(row) {
+            column.push(entry);
+        }
+    }
+    Table {
+        name: "fm.csv".to_owned(),
+        columns,
+        lines: Vec::new(),
+    }
+}
+
+#[test]
+fn a_curve_under_frequency_modulation_is_fitted_as_it_is() {
+    let truth = case(FOLLOWED, &[]);
+    let table = modulated(&truth, [12.0, 9.9], 12, Some(51));
+    let start = case(
+        FOLLOWED,
+        &["sample.modulus=2.4 GPa", "sample.hamaker=1.5e-19 J"],
+    );
+    let free = [
+        "sample.modulus",
+        "sample.hamaker",
+        "sample.damping",
+        "gap.offset",
+    ];
+    let asked = FitRequest {
+        profile: false,
+        ..request(vec![table], &free)
+    };
+    let report = fitted(&start, &asked);
+    assert!(report.fits && report.remarks.is_empty(), "{report:?}");
+    let names: Vec<&str> = report.columns.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["frequency_shift", "drive_ratio"]);
+    assert!(report.rows.iter().all(|row| row.branch == Some(0)));
+    // The noise that was put in, known from 12 values to 1/√24 of itself.
+    for (column, noise) in report.columns.iter().zip([0.5, 2e-3]) {
+        let error = column.standard_error;
+        assert!(
+            (error / noise - 1.0).abs() < 3.0 / 24f64.sqrt(),
+            "{error} {noise}"
+        );
+    }
+    for (parameter, truth) in report.parameters.iter().zip([3e9, 2e-19, 1e-7, 0.0]) {
+        let error = parameter.standard_error.unwrap();
+        let [low, high] = parameter.interval.map(Option::unwrap);
+        assert!(
+            low < high && (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
+    }
+}
+
+#[test]
+fn derivatives_of_a_curve_under_frequency_modulation_are_exact() {
+    let columns = [
+        "frequency_shift",
+        "relative_shift",
+        "drive_ratio",
+        "drive_dissipation",
+    ];
+    let with_columns = |request: FitRequest| FitRequest {
+        columns: columns.map(str::to_owned).to_vec(),
+        ..request
+    };
+    // A linear contact, whose derivatives are closed forms throughout.
+    let linear = case(
+        &LEVER.replace("free_amplitude = \"20 nm\"", "free_amplitude = \"10 nm\""),
+        &[],
+    );
+    let table = modulated(&linear, [12.0, 8.0], 3, None);
+    let free = [
+        "sample.stiffness",
+        "sample.loss_tangent",
+        "cantilever.k",
+        "cantilever.f0",
+        "cantilever.Q",
+        "drive.free_amplitude",
+        "gap.offset",
+        "frequency_shift.offset",
+        "drive_ratio.scale",
+    ];
+    let asked = with_columns(request(vec![table], &free));
+    let at = [29.0, 0.11, 41.0, 331e3, 390.0, 10.3e-9, 1e-10, 2.0, 1.1];
+    let steps = [0.03, 1e-4, 0.04, 30.0, 0.4, 1e-12, 1e-12, 0.1, 1e-3];
+    derivatives_are_right(&linear, &asked, &at, &steps, 1e-5);
+    // Under a nonlinear law what is observed beside the orbit is differenced.
+    let pulling = case(FOLLOWED, &[]);
+    let table = modulated(&pulling, [12.0, 9.9], 3, None);
+    let free = [
+        "sample.modulus",
+        "sample.hamaker",
+        "sample.damping",
+        "cantilever.Q",
+    ];
+    let asked = with_columns(request(vec![table], &free));
+    let at = [2.9e9, 2.1e-19, 1.1e-7, 2100.0];
+    derivatives_are_right(&pulling, &asked, &at, &[3e6, 2e-22, 1e-10, 2.0], 1e-4);
 }

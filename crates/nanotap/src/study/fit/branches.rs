@@ -234,26 +234,36 @@ impl Along<'_> {
     /// Where the motion at a row goes from a state, or from rest.
     fn settled(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
-        let rest = vec![0.0; model.dimension()];
-        // Only whether it comes to repeat matters: exponents of a motion that does not would take
-        // longer than all the rest of a fit.
-        let options = ClassifyOptions {
-            max_period: self.max_period,
-            long_period: self.max_period,
-            lyapunov: LyapunovOptions {
-                alignment: 0,
-                min_periods: LAST_LOOK,
-                max_periods: LAST_LOOK,
-                ..LyapunovOptions::default()
-            },
-            birkhoff_periods: 0,
-            ..ClassifyOptions::default()
-        };
-        let end = classify(&mut Strobe::new(&model), state.unwrap_or(&rest), &options);
-        match end.kind {
-            MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => Some(orbit),
-            _ => None,
-        }
+        settled(&model, state, self.max_period)
+    }
+}
+
+/// The orbit of up to `max_period` drive periods at which the motion from a state, or from rest,
+/// comes to repeat.
+pub(super) fn settled(
+    model: &Model,
+    state: Option<&[f64]>,
+    max_period: usize,
+) -> Option<PeriodicOrbit> {
+    let rest = vec![0.0; model.dimension()];
+    // Only whether it comes to repeat matters: exponents of a motion that does not would take
+    // longer than all the rest of a fit.
+    let options = ClassifyOptions {
+        max_period,
+        long_period: max_period,
+        lyapunov: LyapunovOptions {
+            alignment: 0,
+            min_periods: LAST_LOOK,
+            max_periods: LAST_LOOK,
+            ..LyapunovOptions::default()
+        },
+        birkhoff_periods: 0,
+        ..ClassifyOptions::default()
+    };
+    let end = classify(&mut Strobe::new(model), state.unwrap_or(&rest), &options);
+    match end.kind {
+        MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => Some(orbit),
+        _ => None,
     }
 }
 

@@ -10,15 +10,16 @@
 //!
 //! A table that `approach` wrote is read as it is. It has most observables twice, in the model's
 //! units and in SI: of a physical case those in SI count, and amplitude and phase alone unless
-//! others are named. What its rows of neither way show is no part of either curve; they are left
+//! others are named, and of a curve under frequency modulation its shift and the drive's ratio. What its rows of neither way show is no part of either curve; they are left
 //! out and counted.
 
 use crate::Error;
 use crate::case::near_name::near_name;
 use crate::case::{Case, Key};
-use crate::observe::{Dimension, OBSERVABLES, Observable};
+use crate::observe::OBSERVABLES;
 use crate::study::approach::Way;
 
+use super::quantity::Quantity;
 use crate::case::table::{Entry, Header, Table};
 
 /// All curves, and what their columns are.
@@ -38,7 +39,7 @@ pub struct Data {
 #[derive(Clone, Debug)]
 pub struct Column {
     /// What it is.
-    pub observable: &'static Observable,
+    pub quantity: Quantity,
     /// What the data call it.
     pub name: String,
     /// The unit that the data give it; empty for none.
@@ -92,6 +93,13 @@ impl Data {
         self.rows().flat_map(|row| &row.values).flatten().count()
     }
 
+    /// Whether it was measured under frequency modulation.
+    pub fn is_modulated(&self) -> bool {
+        self.columns
+            .iter()
+            .any(|column| column.quantity.modulated().is_some())
+    }
+
     /// The rows of all curves, one curve after the other.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.curves.iter().flat_map(|curve| &curve.rows)
@@ -123,6 +131,21 @@ impl Data {
                 "data",
                 "no column says where the values were measured",
                 "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
+            ));
+        }
+        let besides = data
+            .columns
+            .iter()
+            .find(|c| c.quantity.observable().is_some());
+        if let (true, Some(besides)) = (data.is_modulated(), besides) {
+            return Err(Error::option(
+                "data",
+                format!(
+                    "`{}` stands beside a curve under frequency modulation, which holds amplitude \
+                     and phase",
+                    besides.name
+                ),
+                "name the {columns} that count: frequency_shift, drive_ratio",
             ));
         }
         data.finish();
@@ -187,12 +210,12 @@ impl Data {
             .map(|(role, header)| self.place_of(role, header))
             .collect();
         for (role, index) in roles.iter().zip(0..) {
-            if let Role::Error(observable, _) = role
-                && !self.columns.iter().any(|c| c.observable == *observable)
+            if let Role::Error(quantity, _) = role
+                && !self.columns.iter().any(|c| c.quantity == *quantity)
             {
                 return Err(Error::input(
                     format!("{}: its values are missing", table.place(None, index)),
-                    format!("give the column `{}` too", observable.name),
+                    format!("give the column `{}` too", quantity.name()),
                 ));
             }
         }
@@ -231,14 +254,11 @@ impl Data {
                     self.swept.len() - 1
                 })
             }
-            Role::Measured(observable, factor) => {
-                let known = self
-                    .columns
-                    .iter()
-                    .position(|c| c.observable == *observable);
+            Role::Measured(quantity, factor) => {
+                let known = self.columns.iter().position(|c| c.quantity == *quantity);
                 known.unwrap_or_else(|| {
                     self.columns.push(Column {
-                        observable,
+                        quantity: *quantity,
                         name: header.name.clone(),
                         unit: header.unit.clone(),
                         factor: *factor,
@@ -308,17 +328,14 @@ impl Data {
             match role {
                 Role::Set(_, factor) => row.at[places[column]] = number * factor,
                 Role::Measured(_, factor) => row.values[places[column]] = Some(number * factor),
-                Role::Error(observable, factor) => {
+                Role::Error(quantity, factor) => {
                     if number <= 0.0 {
                         return refuse(
                             format!("{number} is no standard error"),
                             "it must be above zero; leave it empty where it is not known",
                         );
                     }
-                    let at = self
-                        .columns
-                        .iter()
-                        .position(|c| c.observable == *observable);
+                    let at = self.columns.iter().position(|c| c.quantity == *quantity);
                     row.errors[at.unwrap_or(0)] = Some(number * factor);
                 }
                 Role::Nothing | Role::Way | Role::Curve => {}
@@ -424,19 +441,22 @@ fn counts_of_approach(headers: &[Header], index: usize, case: &Case, only: &[Str
         _ if index == 1 => return !(physical && has_zc),
         _ => {}
     }
-    let Some(observable) = measured(&header.name, true) else {
+    let Some(quantity) = Quantity::named(&header.name, true) else {
         return false;
     };
-    let wanted = if only.is_empty() {
-        matches!(observable.name, "first_harmonic" | "phase")
+    let modulated = headers.iter().any(|h| h.name == "frequency_shift");
+    let wanted = if only.is_empty() && modulated {
+        matches!(quantity.name(), "frequency_shift" | "drive_ratio")
+    } else if only.is_empty() {
+        matches!(quantity.name(), "first_harmonic" | "phase")
     } else {
         let named = |name: &String| {
             let name = Header::of(name).name;
-            name == header.name || name == observable.name || name == observable.si_name
+            name == header.name || name == quantity.name() || name == quantity.si_name()
         };
         only.iter().any(named)
     };
-    let same = |other: &&Header| measured(&other.name, true) == Some(observable);
+    let same = |other: &&Header| Quantity::named(&other.name, true) == Some(quantity);
     let mut all = headers.iter().filter(same);
     let in_si = all.clone().find(|other| physical && !other.unit.is_empty());
     let first = in_si.or_else(|| all.next());
@@ -447,8 +467,8 @@ fn counts_of_approach(headers: &[Header], index: usize, case: &Case, only: &[Str
 #[derive(Clone, Copy, Debug)]
 enum Role {
     Set(Key, f64),
-    Measured(&'static Observable, f64),
-    Error(&'static Observable, f64),
+    Measured(Quantity, f64),
+    Error(Quantity, f64),
     Way,
     Curve,
     Nothing,
@@ -483,26 +503,25 @@ impl Header {
                 unit: self.unit.clone(),
             };
             return match column.role(case, own_amplitude)? {
-                Role::Measured(observable, factor) => Ok(Role::Error(observable, factor)),
+                Role::Measured(quantity, factor) => Ok(Role::Error(quantity, factor)),
                 _ => Err(Error::input(
                     format!("errors are taken of what was measured, and `{of}` is set"),
                     "leave the column away",
                 )),
             };
         }
-        if let Some(observable) = measured(&self.name, own_amplitude) {
-            return Ok(Role::Measured(observable, self.unit_of(observable, case)?));
+        if let Some(quantity) = Quantity::named(&self.name, own_amplitude) {
+            return Ok(Role::Measured(quantity, self.unit_of(quantity, case)?));
         }
         let key = set(&self.name, case)?;
         Ok(Role::Set(key, self.unit_of_key(key, case)?))
     }
 
-    fn unit_of(&self, observable: &Observable, case: &Case) -> Result<f64, Error> {
-        let kind = observable.dimension.kind().filter(|_| case.is_physical());
-        match (observable.dimension, kind, self.unit.as_str()) {
-            (Dimension::Angle, _, "" | "deg" | "°" | "degree" | "degrees")
-            | (_, None, "" | "1") => Ok(1.0),
-            (Dimension::Angle, _, "rad") => Ok(1f64.to_degrees()),
+    fn unit_of(&self, quantity: Quantity, case: &Case) -> Result<f64, Error> {
+        let kind = quantity.kind().filter(|_| case.is_physical());
+        match (quantity.is_angle(), kind, self.unit.as_str()) {
+            (true, _, "" | "deg" | "°" | "degree" | "degrees") | (_, None, "" | "1") => Ok(1.0),
+            (true, _, "rad") => Ok(1f64.to_degrees()),
             (_, Some(kind), "") => Err(Error::input(
                 format!("it has no unit, and {} needs one", kind.noun()),
                 format!("name it as in `{} ({})`", self.name, kind.si_unit()),
@@ -529,18 +548,6 @@ impl Header {
     }
 }
 
-/// The observable that a word means.
-pub(super) fn measured(name: &str, own_amplitude: bool) -> Option<&'static Observable> {
-    let plain = name.replace([' ', '-'], "_");
-    let name = match plain.as_str() {
-        "amplitude" if !own_amplitude => "first_harmonic",
-        other => other,
-    };
-    let numbers = || OBSERVABLES.iter().filter(|o| o.is_number);
-    let exact = numbers().find(|o| o.name == name || o.si_name == name);
-    exact.or_else(|| numbers().find(|o| o.name == name.to_lowercase()))
-}
-
 /// The key of the case that a word means.
 pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
     let plain = name.to_lowercase().replace([' ', '-'], "_");
@@ -551,12 +558,6 @@ pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
         "frequency" if physical => return Ok(Key::DriveFrequency),
         "frequency" if case.oscillator().is_some() => return Ok(Key::OscillatorOmega),
         "frequency" => return Ok(Key::Omega),
-        "frequency_shift" => {
-            return Err(Error::input(
-                "a frequency shift belongs to frequency modulation, whose loop is not modelled",
-                "fit amplitude and phase at a fixed drive",
-            ));
-        }
         _ => {}
     }
     case.key(name).map_err(|error| {

@@ -13,16 +13,21 @@
 //! errors, until the branches stay. Standard errors that are not given are those of the
 //! residuals.
 //!
+//! A curve under frequency modulation is one of orbits at held amplitude and phase, with frequency
+//! and strength of the drive as unknowns (`held.rs`).
+//!
 //! Fails by stopping in a local minimum (of which `fits` warns), and where the data lie on a
 //! motion that is not periodic.
 
 mod branches;
 mod data;
+mod held;
 mod jumps;
 mod laws;
 mod parameters;
 mod problem;
 mod profile;
+mod quantity;
 mod report;
 mod reporting;
 mod search;
@@ -35,11 +40,13 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::case::table::{Entry, MOST_ROWS, Table};
 pub use data::{Column, Curve, Data, Row, Swept};
+pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
     OtherOrbit, Reading, Undetermined,
 };
 
+use held::Loop;
 use parameters::parameters;
 use problem::Problem;
 use search::Search;
@@ -91,6 +98,9 @@ pub struct FitRequest {
     /// The place at which the data jump from a branch that ends in a fold counts too
     #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
     pub jumps: bool,
+    /// Phase behind the drive that the loop held, in degrees, of curves of a frequency shift
+    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+    pub phase: f64,
     /// Intervals by the profile of the likelihood
     #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
     pub profile: bool,
@@ -109,6 +119,7 @@ impl Default for FitRequest {
             seed: 0,
             max_period: 4,
             jumps: true,
+            phase: 90.0,
             profile: true,
         }
     }
@@ -173,6 +184,10 @@ fn with_search<R>(
     let free = names(&request.free);
     let per_curve = names(&request.per_curve);
     let parameters = parameters(&case, &data, &free, &per_curve, &request.bounds)?;
+    let held = data
+        .is_modulated()
+        .then(|| Loop::of(&case, request.phase))
+        .transpose()?;
     work(&Search {
         problem: Problem {
             case: &case,
@@ -182,6 +197,7 @@ fn with_search<R>(
             noise: Vec::new(),
             robust: None,
             jumps: Vec::new(),
+            held,
         },
         request,
         control,

@@ -6,11 +6,11 @@
 
 use crate::Error;
 use crate::case::{Case, Key};
-use crate::observe::Observable;
 use crate::study::value::{Amount, Interval, Intervals};
 
 use super::data::{self, Data, is_distance};
 use super::laws::between;
+use super::quantity::Quantity;
 
 /// What a parameter changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,10 +50,10 @@ impl Parameter {
             Target::Place(at) => unit_of(data.swept[at].key),
             Target::Scale(_) => "1",
             Target::Offset(column) => {
-                let dimension = data.columns[column].observable.dimension;
-                match dimension.kind() {
+                let quantity = data.columns[column].quantity;
+                match quantity.kind() {
                     Some(_) if !case.is_physical() => "1",
-                    _ => dimension.si_unit(),
+                    _ => quantity.unit(true),
                 }
             }
         }
@@ -210,9 +210,8 @@ fn nuisance(
         .columns
         .iter()
         .any(|c| c.name == "A" || c.name == "first_harmonic");
-    let column = data::measured(of, own).and_then(|observable: &Observable| {
-        data.columns.iter().position(|c| c.observable == observable)
-    });
+    let column = Quantity::named(of, own)
+        .and_then(|quantity| data.columns.iter().position(|c| c.quantity == quantity));
     let swept = || {
         let key = data::set(of, case).ok()?;
         let same =
@@ -269,7 +268,7 @@ fn bound(
         Target::Key(key) => Ok(case.value(key, amount.text())?),
         Target::Place(at) => Ok(case.value(data.swept[at].key, amount.text())?),
         Target::Offset(column) => {
-            let kind = data.columns[column].observable.dimension.kind();
+            let kind = data.columns[column].quantity.kind();
             let kind = kind.filter(|_| case.is_physical());
             let number = amount.text().parse::<f64>().ok();
             match (kind, number) {

@@ -10,10 +10,11 @@ use rayon::prelude::*;
 use crate::case::{Case, Key};
 use crate::model::Model;
 use crate::model::strobe::Strobe;
-use crate::observe::{Derivative, Dimension, Observables, Set, measure};
+use crate::observe::{Derivative, Observables, Set, measure};
 
 use super::branches::{Along, Candidate, Rows, continued, path};
 use super::data::{Column, Data, Row};
+use super::held::{HeldRow, Loop};
 use super::jumps::{Fold, Jump};
 use super::parameters::{Parameter, Target};
 use super::solve::LeastSquares;
@@ -32,10 +33,12 @@ pub(super) struct Problem<'a> {
     pub(super) robust: Option<f64>,
     /// Jumps whose folds count beside the rows.
     pub(super) jumps: Vec<Jump>,
+    /// What a loop of frequency modulation held.
+    pub(super) held: Option<Loop>,
 }
 
 /// Keys of the case, each with its derivative by a parameter.
-type Effects = Vec<(Key, f64)>;
+pub(super) type Effects = Vec<(Key, f64)>;
 
 /// The model at one row.
 #[derive(Clone, Debug)]
@@ -49,17 +52,47 @@ pub(super) struct RowPoint {
     /// What the model says was measured, a place a column, without scales and offsets.
     pub(super) values: Vec<f64>,
     /// All that is observed of it.
-    observables: Option<Box<Observables>>,
-    /// Derivative of the state by every parameter; empty until it was asked for.
-    states: Vec<Vec<f64>>,
+    pub(super) observables: Option<Box<Observables>>,
+    /// Derivative of the state by every parameter, under frequency modulation of drive and state;
+    /// empty until it was asked for.
+    pub(super) states: Vec<Vec<f64>>,
     /// The case and its model; none where the orbit is lost.
-    at: Option<Arc<(Case, Model)>>,
+    pub(super) at: Option<Arc<(Case, Model)>>,
+    /// The orbit under frequency modulation; where it is lost, the last one that was known.
+    pub(super) held: Option<Box<HeldRow>>,
+}
+
+impl RowPoint {
+    /// Where no orbit was found.
+    pub(super) fn nothing(columns: usize) -> Self {
+        Self {
+            orbit: None,
+            lost: true,
+            branch: usize::MAX,
+            values: vec![f64::NAN; columns],
+            observables: None,
+            states: Vec::new(),
+            at: None,
+            held: None,
+        }
+    }
+
+    /// The same without an orbit that continues it.
+    pub(super) fn without_orbit(&self) -> Self {
+        Self {
+            lost: true,
+            observables: None,
+            at: None,
+            states: Vec::new(),
+            ..self.clone()
+        }
+    }
 }
 
 /// The model at all rows, curve after curve, and at the folds of the jumps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Point {
-    rows: Vec<RowPoint>,
+    pub(super) rows: Vec<RowPoint>,
     /// One a jump; `None` where there is no fold.
     pub(super) folds: Vec<Option<Fold>>,
 }
@@ -76,7 +109,8 @@ impl Problem<'_> {
     /// What is observed.
     fn set(&self) -> Set {
         let columns = self.data.columns.iter();
-        columns.fold(Set::NONE, |set, column| set.with(column.observable))
+        let observed = columns.filter_map(|column| column.quantity.observable());
+        observed.fold(Set::NONE, Set::with)
     }
 
     /// The curves' cases at some parameters.
@@ -116,7 +150,7 @@ impl Problem<'_> {
 
     /// What of the case changes with each parameter in each curve: keys, each with its
     /// derivative by the parameter.
-    fn effects(&self, x: &[f64]) -> Vec<Vec<Effects>> {
+    pub(super) fn effects(&self, x: &[f64]) -> Vec<Vec<Effects>> {
         let plain = |parameter: &Parameter| match parameter.target {
             Target::Key(key) => vec![(key, 1.0)],
             Target::Place(at) => vec![(self.data.swept[at].key, 1.0)],
@@ -169,7 +203,7 @@ impl Problem<'_> {
     }
 
     /// The case at a place.
-    fn case_at(&self, base: &Case, at: &[f64]) -> Case {
+    pub(super) fn case_at(&self, base: &Case, at: &[f64]) -> Case {
         let swept = self.data.swept.iter().zip(at);
         swept.fold(base.clone(), |case, (swept, value)| {
             case.with(swept.key, *value)
@@ -199,7 +233,7 @@ impl Problem<'_> {
             None => observables,
         };
         let values = self.data.columns.iter();
-        let values = values.map(|column| (column.observable.of)(&si).number());
+        let values = values.map(|column| (column.quantity.observable()?.of)(&si).number());
         Some(RowPoint {
             values: values.collect::<Option<_>>()?,
             orbit: Some(orbit),
@@ -208,6 +242,7 @@ impl Problem<'_> {
             observables: Some(Box::new(observables)),
             states: Vec::new(),
             at: Some(at),
+            held: None,
         })
     }
 
@@ -257,8 +292,7 @@ impl Problem<'_> {
         value: f64,
     ) -> Option<f64> {
         let difference = self.read(x, curve, column, value) - row.values[column]?;
-        let angle = self.data.columns[column].observable.dimension == Dimension::Angle;
-        Some(if angle {
+        Some(if self.data.columns[column].quantity.is_angle() {
             difference - 360.0 * (difference / 360.0).round()
         } else {
             difference
@@ -281,6 +315,9 @@ impl Problem<'_> {
     /// The orbits at all rows, and of these the ones that the data are on; `None` where the
     /// parameters make no sense.
     pub(super) fn discover(&self, x: &[f64]) -> (Point, Vec<Rows>) {
+        if let Some(held) = self.held {
+            return held.discover(self, x);
+        }
         let bases = self.cases(x);
         let curves: Vec<(Point, Rows)> = self
             .data
@@ -316,7 +353,7 @@ impl Problem<'_> {
     fn measured(&self, x: &[f64], curve: usize, row: &Row, model: &Model) -> Option<Vec<f64>> {
         let known = |names: [&str; 2]| {
             let columns = &self.data.columns;
-            let named = |c: &Column| names.contains(&c.observable.name);
+            let named = |c: &Column| names.contains(&c.quantity.name());
             let column = columns.iter().position(named)?;
             let zero = self.read(x, curve, column, 0.0);
             let scale = self.read(x, curve, column, 1.0) - zero;
@@ -341,6 +378,10 @@ impl Problem<'_> {
     pub(super) fn find_jumps(&mut self, x: &[f64], point: &mut Point) {
         self.jumps.clear();
         point.folds.clear();
+        // Where a loop holds amplitude and phase, other folds end a branch.
+        if self.held.is_some() {
+            return;
+        }
         let rows = self.rows();
         let near = |k: usize| {
             let (curve, row) = rows[k];
@@ -498,15 +539,7 @@ impl Problem<'_> {
         let chosen = path(rows, &costs, PRICE);
         let pick = |(row, chosen): (usize, Option<usize>)| {
             let found = chosen.and_then(|k| seen[row][k].clone());
-            found.unwrap_or_else(|| RowPoint {
-                orbit: None,
-                lost: true,
-                branch: usize::MAX,
-                values: vec![f64::NAN; self.data.columns.len()],
-                observables: None,
-                states: Vec::new(),
-                at: None,
-            })
+            found.unwrap_or_else(|| RowPoint::nothing(self.data.columns.len()))
         };
         Point {
             rows: chosen.into_iter().enumerate().map(pick).collect(),
@@ -547,10 +580,11 @@ impl Problem<'_> {
                 .zip(&derivative.state)
                 .for_each(|(sum, part)| *sum += weight * part);
             for (column, of) in columns.iter().enumerate() {
+                let observable = of.quantity.observable()?;
                 let number = if case.is_physical() {
-                    derivative.number_in_si(of.observable)
+                    derivative.number_in_si(observable)
                 } else {
-                    derivative.number(of.observable)
+                    derivative.number(observable)
                 };
                 let scale = self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0);
                 by[column] += weight * scale * number?;
@@ -576,14 +610,11 @@ impl LeastSquares for Problem<'_> {
         {
             return None;
         }
+        if let Some(held) = self.held {
+            return Some(held.follow(self, (x, &bases), (before, from)));
+        }
         let one = |((curve, row), before_point): (&(usize, &Row), &RowPoint)| {
-            let lost = || RowPoint {
-                lost: true,
-                observables: None,
-                at: None,
-                states: Vec::new(),
-                ..before_point.clone()
-            };
+            let lost = || before_point.without_orbit();
             let case = self.case_at(&bases[*curve], &self.place(x, *curve, row));
             let follow = move || {
                 let mut guess = before_point.orbit.clone()?;
@@ -653,9 +684,12 @@ impl LeastSquares for Problem<'_> {
                 if point.lost {
                     return block;
                 }
-                let by: Option<Vec<_>> = (0..count)
-                    .map(|k| self.derivative(x, (*curve, point), k, &effects[*curve][k]))
-                    .collect();
+                let by: Option<Vec<_>> = match self.held {
+                    Some(_) => Loop::derivatives(self, x, (*curve, point), &effects[*curve]),
+                    None => (0..count)
+                        .map(|k| self.derivative(x, (*curve, point), k, &effects[*curve][k]))
+                        .collect(),
+                };
                 let Some(by) = by else {
                     return block;
                 };

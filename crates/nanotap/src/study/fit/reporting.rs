@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::case::Case;
 
+use super::MOST_PERIOD;
+use super::branches::settled;
 use super::data::Data;
 use super::jumps::Jump;
 use super::parameters::{self, Parameter};
@@ -15,6 +17,9 @@ use super::report::{
 };
 use super::search::{Found, Search, UNLIKELY, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
+
+/// Rows of which a remark speaks singly.
+const SAID: usize = 8;
 
 impl Search<'_> {
     /// The problem in the standard errors, and with the jumps, of what was found.
@@ -82,17 +87,12 @@ impl Search<'_> {
             .map(|(index, column)| {
                 let differences = self.differences(x, point, index);
                 let squares: f64 = differences.iter().map(|d| d * d).sum();
-                let dimension = column.observable.dimension;
                 let rows = data.curves.iter().flat_map(|curve| &curve.rows);
                 let mut of = rows.filter(|row| row.values[index].is_some());
                 FittedColumn {
                     name: column.name.clone(),
-                    observable: column.observable.name.to_owned(),
-                    unit: match dimension.kind() {
-                        Some(_) if !case.is_physical() => dimension.model_unit(),
-                        _ => dimension.si_unit(),
-                    }
-                    .to_owned(),
+                    observable: column.quantity.name().to_owned(),
+                    unit: column.quantity.unit(case.is_physical()).to_owned(),
                     residual: (squares / differences.len().max(1) as f64).sqrt(),
                     standard_error: found.noise[index],
                     estimated: of.any(|row| row.errors[index].is_none()),
@@ -182,6 +182,53 @@ impl Search<'_> {
             .collect()
     }
 
+    /// Which rows have no orbit, and how the lever moves there instead.
+    fn without_orbit(&self, found: &Found) -> String {
+        let (problem, x) = (&self.problem, &found.solution.x);
+        let rows = problem.rows();
+        let points = found.solution.point.iter();
+        let lost: Vec<_> = rows.iter().zip(points).filter(|(_, p)| p.lost).collect();
+        let lines: Vec<String> = lost
+            .iter()
+            .take(SAID)
+            .map(|(r, _)| r.1.line.to_string())
+            .collect();
+        let lines = lines.join(", ") + if lost.len() > SAID { ", …" } else { "" };
+        if problem.held.is_some() {
+            return format!(
+                "{} of {} rows have no orbit with the amplitude and phase that are held and do not \
+                 count: lines {lines}",
+                lost.len(),
+                rows.len()
+            );
+        }
+        let cases = problem.cases(x);
+        let longer = lost.iter().take(SAID).filter_map(|((curve, row), _)| {
+            let case = problem.case_at(&cases[*curve], &problem.place(x, *curve, row));
+            let orbit = settled(&case.model().ok()?, None, MOST_PERIOD)?;
+            (orbit.period > problem.max_period).then_some(orbit.period)
+        });
+        let longer: Vec<usize> = longer.collect();
+        let said = match longer.iter().max() {
+            None => String::new(),
+            Some(most) => {
+                let periods: Vec<String> = longer.iter().map(usize::to_string).collect();
+                format!(
+                    "; from rest the motion comes to repeat there after {} periods, which a \
+                     max_period of {most} takes",
+                    periods.join(", ")
+                )
+            }
+        };
+        format!(
+            "{} of {} rows have no periodic orbit of up to {} drive periods on their branch and do \
+             not count: lines {lines}{said}",
+            lost.len(),
+            rows.len(),
+            problem.max_period
+        )
+    }
+
     /// Why the model does not describe the data, and what else puts the result in doubt.
     fn judge(
         &self,
@@ -202,10 +249,7 @@ impl Search<'_> {
         }
         let lost = point.iter().filter(|row| row.lost).count();
         if lost > 0 {
-            remarks.push(format!(
-                "{lost} of {} rows have no periodic orbit on their branch and do not count",
-                point.len()
-            ));
+            remarks.push(self.without_orbit(found));
         }
         for parameter in parameters.iter().filter(|p| p.at_bound) {
             remarks.push(format!(

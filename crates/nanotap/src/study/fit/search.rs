@@ -8,7 +8,7 @@ use super::jumps::Jump;
 use super::problem::{Point, Problem};
 use super::report::FitReport;
 use super::solve::{Solution, minimise};
-use super::statistics::exceeding;
+use super::statistics::{exceeding, persistence};
 use crate::Error;
 use crate::control::Control;
 
@@ -34,6 +34,12 @@ const ROUGH: f64 = 0.03;
 const FAR: f64 = 3.0;
 /// Mean squared rough residual above which nothing describes the data.
 const POOR: f64 = 1.0;
+/// Residuals of a column from which on their signs tell noise from a misfit.
+const TELLING: usize = 12;
+/// Mean squared residual, in parts of the column's spread, that is not the column itself.
+const SMALL: f64 = 0.1;
+/// Correlation of neighbouring residuals, in standard errors, of what is noise.
+const INDEPENDENT: f64 = 2.0;
 /// Probability of chi2 below which the model does not describe the data.
 pub(super) const UNLIKELY: f64 = 1e-6;
 /// Relative difference of two misfits that are one.
@@ -58,14 +64,12 @@ impl<'a> Search<'a> {
             let Some(found) = found else { continue };
             let good = self.describes(&found);
             let misfit = self.misfit(&found);
-            let least = best
-                .as_ref()
-                .map_or(f64::INFINITY, |best| self.misfit(best));
-            if misfit < least {
+            let least = best.as_ref().map(|best| self.misfit(best));
+            if least.is_none_or(|least| misfit < least) {
                 best = Some(found);
             }
             // Two starts that end in one minimum are enough to take it for the least.
-            if good || (misfit - least).abs() <= SAME * least {
+            if good || least.is_some_and(|least| (misfit - least).abs() <= SAME * least) {
                 break;
             }
         }
@@ -274,10 +278,33 @@ impl<'a> Search<'a> {
         self.problem.data.count() + found.jumps.len() - self.problem.parameters.len()
     }
 
-    /// Whether the model describes the data.
+    /// Whether the model describes the data: what is left is small, or noise.
     fn describes(&self, found: &Found) -> bool {
-        self.misfit(found) < POOR * ROUGH * ROUGH
+        (self.misfit(found) < POOR * ROUGH * ROUGH || self.leaves_noise(found))
             && (!self.all_given() || self.probability(found) > UNLIKELY)
+    }
+
+    /// Whether the residuals are smaller than the data vary, keep no sign from row to row and have
+    /// none among them that stands out, as far as there are enough of them to tell.
+    fn leaves_noise(&self, found: &Found) -> bool {
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let lost = point.iter().any(|row| row.lost);
+        let columns = self.problem.data.columns.iter().enumerate();
+        !lost
+            && columns.into_iter().all(|(index, column)| {
+                let left = self.differences(x, point, index);
+                let squares: f64 = left.iter().map(|d| (d / column.spread).powi(2)).sum();
+                let largest = left
+                    .iter()
+                    .fold(0.0, |m: f64, d| m.max((d / column.spread).abs()));
+                let count = left.len() as f64;
+                // The largest of n normal deviates is about √(2 ln n).
+                let usual = (2.0 * nanotap_arithmetic::ln(count)).sqrt() + 0.5;
+                left.len() >= TELLING
+                    && largest < usual * (squares / count).sqrt()
+                    && squares < SMALL * count
+                    && persistence(&left) < INDEPENDENT
+            })
     }
 
     pub(super) fn probability(&self, found: &Found) -> f64 {

@@ -121,6 +121,53 @@ impl FreeOscillation {
     }
 }
 
+impl FreeOscillation {
+    /// How frequency and strength change with keys of the case, each of which stands with what
+    /// the amplitude that is held changes by.
+    ///
+    /// # Errors
+    /// As [`Held::changes`].
+    pub(crate) fn changes(
+        &self,
+        case: &Case,
+        held: Held,
+        keys: &[(Key, f64)],
+    ) -> Result<Vec<[f64; 2]>, HeldError> {
+        let alone = alone(&equations_of(case), held);
+        let mut driven = self.driven();
+        driven.state.truncate(alone.model()?.dimension());
+        // A lever that answers linearly: the strength is as the amplitude.
+        let by_amplitude = self.strength / self.amplitude;
+        let drive = case.drive_keys();
+        let there = case.with_drive(self.frequency, self.strength);
+        let change = |&(key, amplitude): &(Key, f64)| {
+            let slopes = match case.cantilever() {
+                Some(_) => there.numbers_by(key)?,
+                None => vec![(key, 1.0)],
+            };
+            let slopes = slopes.into_iter().filter(|(key, _)| !drive.contains(key));
+            let (numbers, slopes): (Vec<_>, Vec<_>) = slopes.map(|(k, by)| ((k, 0.0), by)).unzip();
+            let by_number = if numbers.is_empty() {
+                Vec::new()
+            } else {
+                held.changes(&alone, driven.clone(), &numbers)?
+            };
+            let sum = |of: fn(&Driven) -> f64| -> f64 {
+                by_number
+                    .iter()
+                    .zip(&slopes)
+                    .map(|(d, by)| of(d) * by)
+                    .sum()
+            };
+            Ok([
+                sum(|d| d.frequency),
+                sum(|d| d.strength) + amplitude * by_amplitude,
+            ])
+        };
+        keys.iter().map(change).collect()
+    }
+}
+
 /// The lever of `case` without a sample, in the exact engine.
 fn alone(case: &Case, held: Held) -> Case {
     let far = 1e3 * held.amplitude;

@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, DVector};
 use nanotap_dynamics::{MultiplierError, Multipliers, PeriodicOrbit};
 
-use crate::case::{Case, CaseError};
+use crate::case::{Case, CaseError, Key};
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::{DerivativeError, Set, first_harmonic_changes, measure};
@@ -160,7 +160,7 @@ impl Held {
     pub fn close(self, case: &Case, guess: &Driven) -> Result<HeldOrbit, HeldError> {
         self.check()?;
         let case = equations_of(case);
-        let mut at = self.at(&case, guess.clone())?;
+        let mut at = self.at(&case, guess.clone(), &[])?;
         let mut rows = None;
         for iteration in 0..STEPS {
             let residual = at.residual.amax();
@@ -192,7 +192,7 @@ impl Held {
                 damping = damping.min(most / step[n + k].abs());
             }
             loop {
-                let trial = self.at(&case, at.moved(&step, damping));
+                let trial = self.at(&case, at.moved(&step, damping), &[]);
                 if let Ok(trial) = trial
                     && trial.residual.amax() < (1.0 - 0.5 * damping) * residual
                 {
@@ -221,19 +221,61 @@ impl Held {
         })
     }
 
-    /// The equations and what the map gives of their derivatives.
-    fn at(self, case: &Case, driven: Driven) -> Result<At, HeldError> {
+    /// How drive and state of an orbit change with keys of the case while amplitude and phase are
+    /// held: du/dθ = −(∂G/∂u)⁻¹ ∂G/∂θ of the equations G and the unknowns u. Each key stands with
+    /// what the amplitude that is held changes by. Numbers of the equations that follow from
+    /// the case's own drive keep their dependence on it, as in [`close`](Self::close).
+    ///
+    /// # Errors
+    /// When the case makes no sense beside the value of a key, or where the orbit turns back.
+    pub(crate) fn changes(
+        self,
+        case: &Case,
+        orbit: Driven,
+        keys: &[(Key, f64)],
+    ) -> Result<Vec<Driven>, HeldError> {
+        let of: Vec<Key> = keys.iter().map(|(key, _)| *key).collect();
+        let at = self.at(case, orbit, &of)?;
+        let rows = at.first_harmonic_rows(self)?;
+        let n = at.sizes.len();
+        let columns = at.column_sizes();
+        let factors = at.newton_matrix(&rows).lu();
+        let change = |(k, (_, amplitude)): (usize, &(Key, f64))| {
+            let right = DVector::from_fn(n + 2, |i, _| match i {
+                i if i < n => -at.by[(i, 2 + k)] / at.sizes[i],
+                i if i == n => {
+                    let reached = 1.0 + at.residual[n];
+                    amplitude / self.amplitude * reached - rows[(0, n + 2 + k)]
+                }
+                _ => -rows[(1, n + 2 + k)],
+            });
+            let solved = factors
+                .solve(&right)
+                .filter(|step| step.iter().all(|v| v.is_finite()))
+                .ok_or(HeldError::Singular)?;
+            Ok(Driven {
+                frequency: solved[n] * columns[n],
+                strength: solved[n + 1] * columns[n + 1],
+                state: (0..n).map(|i| solved[i] * columns[i]).collect(),
+            })
+        };
+        keys.iter().enumerate().map(change).collect()
+    }
+
+    /// The equations and what the map gives of their derivatives by state, frequency, strength
+    /// and the values of `more` keys.
+    fn at(self, case: &Case, driven: Driven, more: &[Key]) -> Result<At, HeldError> {
         let case = case.with_drive(driven.frequency, driven.strength);
         let model = case.model()?;
-        let tangents = case
-            .drive_keys()
-            .into_iter()
-            .map(|key| case.tangent(&model, key))
+        let keys: Vec<Key> = case.drive_keys().iter().chain(more).copied().collect();
+        let tangents = keys
+            .iter()
+            .map(|key| case.tangent(&model, *key))
             .collect::<Result<Vec<_>, _>>()?;
         let n = model.dimension();
         let mut map = Strobe::with_tangents(&model, tangents);
         let mut end = driven.state.clone();
-        let (mut jacobian, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 2));
+        let (mut jacobian, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
         map.advance_with_derivatives(&mut end, &mut jacobian, &mut by)?;
         let seen = measure(&model, &driven.state, 1, Set::FIRST_HARMONIC)?;
         let sizes = self.sizes(&model, driven.frequency);
@@ -246,6 +288,7 @@ impl Held {
         Ok(At {
             driven,
             case,
+            keys,
             model,
             jacobian,
             by,
@@ -279,6 +322,8 @@ fn turn(degrees: f64) -> f64 {
 struct At {
     driven: Driven,
     case: Case,
+    /// Those of frequency and strength, and more that derivatives are taken by.
+    keys: Vec<Key>,
     model: Model,
     jacobian: DMatrix<f64>,
     by: DMatrix<f64>,
@@ -288,18 +333,19 @@ struct At {
 }
 
 impl At {
-    /// ∂(|c|/A, −arg c) by state, frequency and strength, relative to their sizes.
+    /// ∂(|c|/A, −arg c) by state, frequency and strength, relative to their sizes, and by the
+    /// values of further keys.
     fn first_harmonic_rows(&self, held: Held) -> Result<DMatrix<f64>, HeldError> {
-        let keys = self.case.drive_keys();
         let mut rows = first_harmonic_changes(
             &self.case,
             &self.model,
-            &keys,
+            &self.keys,
             &self.driven.state,
             &self.sizes,
             &self.by,
         )?;
-        for (k, size) in self.column_sizes().into_iter().enumerate() {
+        let more = std::iter::repeat_n(1.0, self.keys.len() - 2);
+        for (k, size) in self.column_sizes().into_iter().chain(more).enumerate() {
             rows[(0, k)] *= size / held.amplitude;
             rows[(1, k)] *= size.to_radians();
         }
@@ -326,7 +372,8 @@ impl At {
                 matrix[(i, j)] = change * columns[j] / self.sizes[i];
             }
         }
-        matrix.view_mut((n, 0), (2, n + 2)).copy_from(rows);
+        let of_unknowns = rows.columns(0, n + 2);
+        matrix.view_mut((n, 0), (2, n + 2)).copy_from(&of_unknowns);
         matrix
     }
 
@@ -426,7 +473,7 @@ mod tests {
                 phase: 90.0,
             };
             let free = FreeOscillation::of(&case, held).unwrap().driven();
-            let at = held.at(&case, free).unwrap();
+            let at = held.at(&case, free, &[]).unwrap();
             let rows = at.first_harmonic_rows(held).unwrap();
             let matrix = at.newton_matrix(&rows);
             let n = matrix.nrows();
@@ -435,7 +482,7 @@ mod tests {
                 let beside = |side: f64| {
                     let mut change = DVector::zeros(n);
                     change[column] = side * step;
-                    let there = held.at(&case, at.moved(&change, 1.0)).unwrap();
+                    let there = held.at(&case, at.moved(&change, 1.0), &[]).unwrap();
                     let mut residual = there.residual;
                     for (k, size) in there.sizes.iter().enumerate() {
                         residual[k] *= size / at.sizes[k];

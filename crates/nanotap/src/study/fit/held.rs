@@ -1,0 +1,491 @@
+//! Curves under frequency modulation: at every row the orbit that has the amplitude and phase
+//! that the loop held, with the drive's frequency and strength as unknowns beside its state.
+//!
+//! What such an instrument records is the frequency less that of the free lever, and the drive
+//! over the free lever's. Both change with a parameter as the equations of orbit, amplitude and
+//! phase say by the implicit function theorem ([`Held::changes`]), those of the free lever too.
+//! Units that follow from a parameter change with it.
+//!
+//! Fails by omission: where the curve has several orbits at a distance, the one is taken that
+//! continues the row before.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::branches::Rows;
+use super::data::is_distance;
+use super::parameters::Target;
+use super::problem::{Effects, Point, Problem, RowPoint};
+use crate::Error;
+use crate::case::physical::Scales;
+use crate::case::{Case, Key};
+use crate::control::Control;
+use crate::model::parameter::Parameter;
+use crate::study::FreeMotion;
+use crate::study::frequency_modulation::walk::{HeldWalk, Stepped};
+use crate::study::frequency_modulation::{Driven, FreeOscillation, Held, HeldOrbit, Modulated};
+
+/// What a loop held.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Loop {
+    /// Amplitude at the drive's frequency, in m, or in a dimensionless case's own unit.
+    amplitude: f64,
+    /// Phase behind the drive, degrees.
+    phase: f64,
+}
+
+/// An orbit with what was held.
+#[derive(Clone, Debug)]
+pub(super) struct HeldRow {
+    driven: Driven,
+    case: Case,
+    free: Arc<Free>,
+}
+
+/// The free lever at the same amplitude and phase.
+#[derive(Clone, Debug)]
+struct Free {
+    case: Case,
+    held: Held,
+    oscillation: FreeOscillation,
+    /// Its frequency, strength and loss in SI.
+    frequency: f64,
+    strength: f64,
+    loss: f64,
+}
+
+/// Sizes of the model's units in SI; 1 of a dimensionless case.
+#[derive(Clone, Copy, Debug)]
+struct Sizes {
+    length: f64,
+    frequency: f64,
+    strength: f64,
+    energy: f64,
+}
+
+impl Sizes {
+    const OWN: Self = Self {
+        length: 1.0,
+        frequency: 1.0,
+        strength: 1.0,
+        energy: 1.0,
+    };
+
+    fn of_scales(case: &Case, scales: &Scales) -> Option<Self> {
+        Some(Self {
+            length: scales.length,
+            frequency: scales.frequency,
+            strength: scales.of(Parameter::Alpha2, case.cantilever()?.actuation),
+            energy: scales.energy,
+        })
+    }
+
+    fn of(case: &Case) -> Option<Self> {
+        match case.physical() {
+            Some(view) => Self::of_scales(case, &view.scales),
+            None => Some(Self::OWN),
+        }
+    }
+
+    /// How they change with a key.
+    fn by(case: &Case, key: Key) -> Option<Self> {
+        let Some((low, high, width)) = case.scales_beside(key).ok()? else {
+            return Some(Self {
+                length: 0.0,
+                frequency: 0.0,
+                strength: 0.0,
+                energy: 0.0,
+            });
+        };
+        let (low, high) = (Self::of_scales(case, &low)?, Self::of_scales(case, &high)?);
+        let slope = |of: fn(&Self) -> f64| (of(&high) - of(&low)) / width;
+        Some(Self {
+            length: slope(|s| s.length),
+            frequency: slope(|s| s.frequency),
+            strength: slope(|s| s.strength),
+            energy: slope(|s| s.energy),
+        })
+    }
+}
+
+/// How far beyond the first row the free oscillation is put, if Newton needs a way there.
+const BEYOND: f64 = 8.0;
+
+impl Loop {
+    /// The free amplitude of a case, and a phase.
+    pub(super) fn of(case: &Case, phase: f64) -> Result<Self, Error> {
+        let model = case.model()?;
+        let held = Held {
+            amplitude: FreeMotion::of(&model).amplitude,
+            phase,
+        }
+        .check()?;
+        let sizes = Sizes::of(case).unwrap_or(Sizes::OWN);
+        // Whether the free lever can be held so is a matter of the case, not of a row.
+        FreeOscillation::of(case, held)?;
+        Ok(Self {
+            amplitude: held.amplitude * sizes.length,
+            phase,
+        })
+    }
+
+    /// What is held at a row: its own amplitude, the free one, or that of the case.
+    fn at(self, problem: &Problem<'_>, x: &[f64], at: &[f64], case: &Case) -> Option<Held> {
+        let key = Key::DriveFreeAmplitude;
+        let swept = problem.data.swept.iter().position(|s| s.key == key);
+        let free = problem
+            .parameters
+            .iter()
+            .position(|p| p.target == Target::Key(key));
+        let amplitude = match (swept, free) {
+            (Some(k), _) => at[k],
+            (None, Some(k)) => x[k],
+            (None, None) => self.amplitude,
+        };
+        Some(Held {
+            amplitude: amplitude / Sizes::of(case)?.length,
+            phase: self.phase,
+        })
+    }
+
+    /// What the free lever does beside a row.
+    fn free(case: &Case, held: Held) -> Option<Free> {
+        let oscillation = FreeOscillation::of(case, held).ok()?;
+        let sizes = Sizes::of(case)?;
+        Some(Free {
+            case: case.clone(),
+            held,
+            frequency: oscillation.frequency * sizes.frequency,
+            strength: oscillation.strength * sizes.strength,
+            loss: oscillation.loss * sizes.energy,
+            oscillation,
+        })
+    }
+
+    /// A row's place without the distance: where rows have it in common, the free lever is one.
+    fn besides_distance(problem: &Problem<'_>, at: &[f64]) -> Vec<f64> {
+        let swept = problem.data.swept.iter().zip(at);
+        swept
+            .filter(|(swept, _)| !is_distance(swept.key))
+            .map(|(_, at)| *at)
+            .collect()
+    }
+
+    /// The orbits at all rows, each continued from the row before, the first of a curve from
+    /// far away.
+    pub(super) fn discover(self, problem: &Problem<'_>, x: &[f64]) -> (Point, Vec<Rows>) {
+        let bases = problem.cases(x);
+        let curves = problem.data.curves.par_iter().enumerate();
+        let found: Vec<Vec<RowPoint>> = curves
+            .map(|(curve, _)| self.along(problem, x, curve, &bases[curve]))
+            .collect();
+        let rows = found.iter().map(|rows| vec![Vec::new(); rows.len()]);
+        let candidates = rows.collect();
+        let point = Point {
+            rows: found.into_iter().flatten().collect(),
+            folds: Vec::new(),
+        };
+        (point, candidates)
+    }
+
+    fn along(self, problem: &Problem<'_>, x: &[f64], curve: usize, base: &Case) -> Vec<RowPoint> {
+        let mut free: Option<(Vec<f64>, Arc<Free>)> = None;
+        let mut last: Option<(Vec<f64>, f64, Driven)> = None;
+        let mut branch = 0;
+        let columns = problem.data.columns.len();
+        let mut row = |row| -> Option<RowPoint> {
+            let at = problem.place(x, curve, row);
+            let case = problem.case_at(base, &at);
+            let held = self.at(problem, x, &at, &case)?;
+            let besides = Self::besides_distance(problem, &at);
+            let known = free.take().filter(|(of, _)| *of == besides);
+            let of_row = match known {
+                Some((_, known)) => known,
+                None => Arc::new(Self::free(&case, held)?),
+            };
+            free = Some((besides.clone(), Arc::clone(&of_row)));
+            let gap = case.get(case.gap_key());
+            let from = last.as_ref().filter(|(of, ..)| *of == besides);
+            let (far, start) = match from {
+                Some((_, before, driven)) => (*before, driven.clone()),
+                None => (
+                    gap + BEYOND * gap.abs().max(held.amplitude),
+                    of_row.oscillation.driven(),
+                ),
+            };
+            let mut walk = HeldWalk::new(&case, held, start, far);
+            let orbit = match walk.step(gap, &Control::default()).ok()? {
+                Stepped::On(orbit) => orbit,
+                Stepped::Jumped(orbit, _) => {
+                    branch += 1;
+                    orbit
+                }
+            };
+            last = Some((besides, gap, orbit.driven()));
+            Self::seen(problem, &case, &of_row, orbit, branch)
+        };
+        let rows = problem.data.curves[curve].rows.iter();
+        rows.map(|of| row(of).unwrap_or_else(|| RowPoint::nothing(columns)))
+            .collect()
+    }
+
+    /// What was found at a row.
+    fn seen(
+        problem: &Problem<'_>,
+        case: &Case,
+        free: &Arc<Free>,
+        orbit: HeldOrbit,
+        branch: usize,
+    ) -> Option<RowPoint> {
+        let driven = orbit.driven();
+        let told = told(case, free, &driven)?;
+        let columns = problem.data.columns.iter();
+        let values = columns.map(|column| (column.quantity.modulated()?.of)(&told));
+        Some(RowPoint {
+            orbit: Some(orbit.orbit),
+            lost: false,
+            branch,
+            values: values.collect::<Option<_>>()?,
+            held: Some(Box::new(HeldRow {
+                driven,
+                case: case.clone(),
+                free: Arc::clone(free),
+            })),
+            ..RowPoint::nothing(0)
+        })
+    }
+
+    /// The orbits at other parameters, from a point already evaluated, to first order where they
+    /// go.
+    pub(super) fn follow(
+        self,
+        problem: &Problem<'_>,
+        (x, bases): (&[f64], &[Case]),
+        (before, from): (&[f64], &Point),
+    ) -> Point {
+        let rows = problem.rows();
+        let frees = self.frees(problem, x, bases);
+        let one = |(index, point): (usize, &RowPoint)| {
+            let (curve, row) = rows[index];
+            let follow = || {
+                let mut guess = point.held.as_ref()?.driven.clone();
+                if !point.lost {
+                    for (k, by) in point.states.iter().enumerate() {
+                        guess.add(x[k] - before[k], by);
+                    }
+                }
+                let at = problem.place(x, curve, row);
+                let case = problem.case_at(&bases[curve], &at);
+                let held = self.at(problem, x, &at, &case)?;
+                let orbit = held.close(&case, &guess).ok()?;
+                Self::seen(problem, &case, frees[index].as_ref()?, orbit, point.branch)
+            };
+            follow().unwrap_or_else(|| point.without_orbit())
+        };
+        let found = from.rows.par_iter().enumerate().map(one);
+        Point {
+            rows: found.collect(),
+            folds: Vec::new(),
+        }
+    }
+
+    /// The free lever beside every row.
+    fn frees(self, problem: &Problem<'_>, x: &[f64], bases: &[Case]) -> Vec<Option<Arc<Free>>> {
+        let mut known: Option<(usize, Vec<f64>, Option<Arc<Free>>)> = None;
+        let mut all = Vec::new();
+        for (curve, row) in problem.rows() {
+            let at = problem.place(x, curve, row);
+            let besides = Self::besides_distance(problem, &at);
+            let same = known
+                .take()
+                .filter(|(of, place, _)| *of == curve && *place == besides);
+            let (_, _, free) = known.insert(same.unwrap_or_else(|| {
+                let case = problem.case_at(&bases[curve], &at);
+                let held = self.at(problem, x, &at, &case);
+                let free = held.and_then(|held| Self::free(&case, held));
+                (curve, besides, free.map(Arc::new))
+            }));
+            all.push(free.clone());
+        }
+        all
+    }
+
+    /// The derivatives of drive and state, and of what was measured, by every parameter.
+    pub(super) fn derivatives(
+        problem: &Problem<'_>,
+        x: &[f64],
+        (curve, point): (usize, &RowPoint),
+        effects: &[Effects],
+    ) -> Option<Vec<(Vec<f64>, Vec<f64>)>> {
+        let row = point.held.as_ref()?;
+        let keys = keys_of(effects);
+        let by_key = row.by(&keys)?;
+        let columns = &problem.data.columns;
+        let parameter = |(k, effects): (usize, &Effects)| -> Option<(Vec<f64>, Vec<f64>)> {
+            let mut state = vec![0.0; row.driven.state.len() + 2];
+            let mut by = vec![0.0; columns.len()];
+            let of = &problem.parameters[k];
+            if !of.is_of(curve) {
+                return Some((state, by));
+            }
+            match of.target {
+                Target::Offset(column) => by[column] = 1.0,
+                Target::Scale(column) => by[column] = point.values[column],
+                Target::Key(_) | Target::Place(_) => {}
+            }
+            for (key, weight) in effects {
+                let (driven, told) = &by_key[keys.iter().position(|other| other == key)?];
+                let drive = [driven.frequency, driven.strength];
+                let changes = drive.iter().chain(&driven.state);
+                state
+                    .iter_mut()
+                    .zip(changes)
+                    .for_each(|(sum, part)| *sum += weight * part);
+                for (column, of) in columns.iter().enumerate() {
+                    let number = (of.quantity.modulated()?.of)(told)?;
+                    let zero = problem.read(x, curve, column, 0.0);
+                    let scale = problem.read(x, curve, column, 1.0) - zero;
+                    by[column] += weight * scale * number;
+                }
+            }
+            Some((state, by))
+        };
+        effects.iter().enumerate().map(parameter).collect()
+    }
+}
+
+/// The keys that change with any parameter.
+fn keys_of(effects: &[Effects]) -> Vec<Key> {
+    let mut keys: Vec<Key> = effects.iter().flatten().map(|(key, _)| *key).collect();
+    keys.sort_unstable();
+    keys.dedup();
+    keys
+}
+
+/// What a loop tells of a drive, in SI.
+fn told(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
+    let sizes = Sizes::of(case)?;
+    let frequency = driven.frequency * sizes.frequency;
+    let strength = driven.strength * sizes.strength;
+    let relative = (frequency - free.frequency) / free.frequency;
+    let ratio = strength / free.strength;
+    Some(Modulated {
+        drive_frequency: frequency,
+        drive_strength: strength,
+        frequency_shift: frequency - free.frequency,
+        relative_shift: relative,
+        drive_ratio: ratio,
+        drive_dissipation: free.loss * (ratio - 1.0 - relative),
+        closest: f64::NAN,
+        first_order_shift: None,
+        giessibl_shift: None,
+        static_force: None,
+        sader_jarvis_force: None,
+    })
+}
+
+impl HeldRow {
+    /// How drive and state, and what the loop tells, change with keys of the case.
+    fn by(&self, keys: &[Key]) -> Option<Vec<(Driven, Modulated)>> {
+        let (case, free) = (&self.case, &*self.free);
+        let held = Held {
+            amplitude: free.held.amplitude * Sizes::of(&free.case)?.length
+                / Sizes::of(case)?.length,
+            phase: free.held.phase,
+        };
+        let at_row = amplitudes(case, held, keys)?;
+        let at_free = amplitudes(&free.case, free.held, keys)?;
+        let changes = held.changes(case, self.driven.clone(), &at_row).ok()?;
+        let of_free = free.oscillation.changes(&free.case, free.held, &at_free);
+        let told_here = told(case, free, &self.driven)?;
+        let (sizes, free_sizes) = (Sizes::of(case)?, Sizes::of(&free.case)?);
+        let one = |((key, change), by): ((&Key, Driven), [f64; 2])| {
+            let (here, there) = (Sizes::by(case, *key)?, Sizes::by(&free.case, *key)?);
+            let oscillation = &free.oscillation;
+            let frequency =
+                change.frequency * sizes.frequency + self.driven.frequency * here.frequency;
+            let strength = change.strength * sizes.strength + self.driven.strength * here.strength;
+            let free_frequency =
+                by[0] * free_sizes.frequency + oscillation.frequency * there.frequency;
+            let free_strength = by[1] * free_sizes.strength + oscillation.strength * there.strength;
+            let shift = frequency - free_frequency;
+            let relative = (shift - told_here.relative_shift * free_frequency) / free.frequency;
+            let ratio = (strength - told_here.drive_ratio * free_strength) / free.strength;
+            let rest = told_here.drive_ratio - 1.0 - told_here.relative_shift;
+            let loss = if rest == 0.0 {
+                0.0
+            } else {
+                free.loss_by(*key)?
+            };
+            let told = Modulated {
+                drive_frequency: frequency,
+                drive_strength: strength,
+                frequency_shift: shift,
+                relative_shift: relative,
+                drive_ratio: ratio,
+                drive_dissipation: loss * rest + free.loss * (ratio - relative),
+                ..told_here
+            };
+            Some((change, told))
+        };
+        keys.iter()
+            .zip(changes)
+            .zip(of_free.ok()?)
+            .map(one)
+            .collect()
+    }
+}
+
+/// Each key with what the amplitude that is held, in the model's unit, changes by.
+fn amplitudes(case: &Case, held: Held, keys: &[Key]) -> Option<Vec<(Key, f64)>> {
+    let length = Sizes::of(case)?.length;
+    let one = |key: &Key| {
+        let own = if *key == Key::DriveFreeAmplitude {
+            length.recip()
+        } else {
+            0.0
+        };
+        let of_unit = held.amplitude * Sizes::by(case, *key)?.length / length;
+        Some((*key, own - of_unit))
+    };
+    keys.iter().map(one).collect()
+}
+
+impl Free {
+    /// How its loss, in SI, changes with a key: a chain of closed forms, whose central difference
+    /// is good to ten digits.
+    fn loss_by(&self, key: Key) -> Option<f64> {
+        let value = self.case.get(key);
+        let step = 1e-5 * if value == 0.0 { 1.0 } else { value.abs() };
+        let amplitude = self.held.amplitude * Sizes::of(&self.case)?.length;
+        let beside = |side: f64| {
+            let case = self.case.with(key, value + side * step);
+            let amplitude = if key == Key::DriveFreeAmplitude {
+                amplitude + side * step
+            } else {
+                amplitude
+            };
+            let held = Held {
+                amplitude: amplitude / Sizes::of(&case)?.length,
+                ..self.held
+            };
+            Some(Loop::free(&case, held)?.loss)
+        };
+        Some((beside(1.0)? - beside(-1.0)?) / (2.0 * step))
+    }
+}
+
+impl Driven {
+    /// Moves on by so much of the change of frequency, strength and state.
+    fn add(&mut self, by: f64, change: &[f64]) {
+        let [frequency, strength, state @ ..] = change else {
+            return;
+        };
+        self.frequency += by * frequency;
+        self.strength += by * strength;
+        for (x, change) in self.state.iter_mut().zip(state) {
+            *x += by * change;
+        }
+    }
+}

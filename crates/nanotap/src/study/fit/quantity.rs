@@ -1,0 +1,107 @@
+//! What a column of measured values is: an observable of the motion, or what a loop of frequency
+//! modulation tells.
+
+use crate::case::physical::Kind;
+use crate::observe::{Dimension, OBSERVABLES, Observable};
+use crate::study::frequency_modulation::{COLUMNS, ModulatedColumn};
+
+/// What was measured.
+#[derive(Clone, Copy, Debug)]
+pub enum Quantity {
+    /// An observable.
+    Observed(&'static Observable),
+    /// A number of frequency modulation.
+    Modulated(&'static ModulatedColumn),
+}
+
+/// What an instrument under frequency modulation records; the other columns of the study are
+/// formulas that stand beside it.
+const RECORDED: [&str; 4] = [
+    "frequency_shift",
+    "relative_shift",
+    "drive_ratio",
+    "drive_dissipation",
+];
+
+impl Quantity {
+    /// What a word means; `own_amplitude` where another column is what a lock-in amplifier reads.
+    pub(super) fn named(name: &str, own_amplitude: bool) -> Option<Self> {
+        let plain = name.replace([' ', '-'], "_");
+        let name = match plain.as_str() {
+            "amplitude" if !own_amplitude => "first_harmonic",
+            other => other,
+        };
+        let numbers = || OBSERVABLES.iter().filter(|o| o.is_number);
+        let lower = name.to_lowercase();
+        let modulated = COLUMNS
+            .iter()
+            .find(|c| c.name == lower && RECORDED.contains(&c.name));
+        let exact = numbers().find(|o| o.name == name || o.si_name == name);
+        let observed = exact.or_else(|| numbers().find(|o| o.name == lower));
+        modulated
+            .map(Self::Modulated)
+            .or_else(|| observed.map(Self::Observed))
+    }
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Observed(observable) => observable.name,
+            Self::Modulated(column) => column.name,
+        }
+    }
+
+    /// Its name in SI.
+    pub(super) const fn si_name(self) -> &'static str {
+        match self {
+            Self::Observed(observable) => observable.si_name,
+            Self::Modulated(column) => column.name,
+        }
+    }
+
+    /// The observable, if it is one.
+    pub const fn observable(self) -> Option<&'static Observable> {
+        match self {
+            Self::Observed(observable) => Some(observable),
+            Self::Modulated(_) => None,
+        }
+    }
+
+    /// The number of frequency modulation, if it is one.
+    pub const fn modulated(self) -> Option<&'static ModulatedColumn> {
+        match self {
+            Self::Observed(_) => None,
+            Self::Modulated(column) => Some(column),
+        }
+    }
+
+    /// Whether it is an angle.
+    pub fn is_angle(self) -> bool {
+        let observable = self.observable();
+        observable.is_some_and(|o| o.dimension == Dimension::Angle)
+    }
+
+    /// What it measures, with a unit; `None` where it is the same in the model and in SI.
+    pub const fn kind(self) -> Option<Kind> {
+        match self {
+            Self::Observed(observable) => observable.dimension.kind(),
+            Self::Modulated(column) => column.kind,
+        }
+    }
+
+    /// Its unit in SI, or in a dimensionless case's own units.
+    pub const fn unit(self, physical: bool) -> &'static str {
+        match (self, self.kind()) {
+            (Self::Observed(o), Some(_)) if !physical => o.dimension.model_unit(),
+            (Self::Observed(o), _) => o.dimension.si_unit(),
+            (Self::Modulated(_), Some(kind)) if physical => kind.si_unit(),
+            (Self::Modulated(_), _) => "1",
+        }
+    }
+}
+
+impl PartialEq for Quantity {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}

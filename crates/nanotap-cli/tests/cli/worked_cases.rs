@@ -127,6 +127,7 @@ fn no_document_is_left_out() {
             "capillary.md",
             "dforce.md",
             "dynamicist.md",
+            "fit-adhesion.md",
             "fit-frequency-modulation.md",
             "fit.md",
             "fm-lever-on-polystyrene.md",
@@ -156,7 +157,8 @@ macro_rules! follows {
 }
 
 follows! {
-    fit: "fit.md", 6 commands, 32 numbers;
+    fit: "fit.md", 7 commands, 41 numbers;
+    fit_of_sticky_and_wet_samples: "fit-adhesion.md", 2 commands, 10 numbers;
     fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
     frequency_modulation: "frequency-modulation.md", 2 commands, 13 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;

@@ -74,6 +74,25 @@ impl Along<'_> {
         rows
     }
 
+    /// The orbits at every row that continue those found beside other parameters; `None` where one
+    /// of them has no continuation.
+    pub(super) fn continued_from(&self, before: &Rows) -> Option<Rows> {
+        let row = |(place, candidates): (&Vec<f64>, &Vec<Candidate>)| {
+            let model = (self.at)(place)?.model().ok()?;
+            let mut map = Strobe::new(&model);
+            let one = |candidate: &Candidate| {
+                let orbit = continued(&mut map, &candidate.orbit)?;
+                let near = orbit.distance_to(&candidate.orbit).1 <= FAR * candidate.orbit.scale();
+                (orbit.is_stable() && near).then_some(Candidate {
+                    branch: candidate.branch,
+                    orbit,
+                })
+            };
+            candidates.iter().map(one).collect::<Option<Vec<_>>>()
+        };
+        self.places.iter().zip(before).map(row).collect()
+    }
+
     /// Adds the branches of motions that swing as was measured where no orbit does so far.
     fn as_measured(&self, rows: &mut Rows, branches: &mut usize) {
         let count = rows.len();

@@ -234,7 +234,7 @@ pub fn residuals(
             ));
         }
         let problem = search.weighted(search.rough_noise(), None);
-        let (mut point, _) = problem.discover(values);
+        let (mut point, _) = problem.discover(values, None);
         let residuals = problem.residuals(values, &point);
         let jacobian = problem.jacobian(values, &mut point);
         Ok(Residuals {

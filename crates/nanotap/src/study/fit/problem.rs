@@ -314,7 +314,10 @@ impl Problem<'_> {
 
     /// The orbits at all rows, and of these the ones that the data are on; `None` where the
     /// parameters make no sense.
-    pub(super) fn discover(&self, x: &[f64]) -> (Point, Vec<Rows>) {
+    ///
+    /// `before` are orbits at parameters not far off, whose branches were all there was: where
+    /// each of them continues here, no others are looked for.
+    pub(super) fn discover(&self, x: &[f64], before: Option<&[Rows]>) -> (Point, Vec<Rows>) {
         if let Some(held) = self.held {
             return held.discover(self, x);
         }
@@ -336,7 +339,8 @@ impl Problem<'_> {
                     places: &places,
                     max_period: self.max_period,
                 };
-                let rows = along.discover();
+                let known = before.and_then(|rows| along.continued_from(rows.get(curve)?));
+                let rows = known.unwrap_or_else(|| along.discover());
                 (self.choose(x, curve, &bases[curve], &places, &rows), rows)
             })
             .collect();

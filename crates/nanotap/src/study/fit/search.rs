@@ -155,11 +155,13 @@ impl<'a> Search<'a> {
         let plain = plain_errors(problem.data);
         problem.data = &plain;
         let mut before: Option<Vec<usize>> = None;
+        let mut known: Option<Vec<Rows>> = None;
         for _ in 0..ROUNDS {
             if self.control.is_cancelled() {
                 break;
             }
-            let (point, _) = problem.discover(&x);
+            let (point, candidates) = problem.discover(&x, known.as_deref());
+            known = Some(candidates);
             let branches = branches_of(&point);
             if before.as_ref() == Some(&branches) {
                 break;
@@ -184,7 +186,9 @@ impl<'a> Search<'a> {
                 break;
             }
             let problem = self.weighted(noise.clone(), None);
-            let (mut point, candidates) = problem.discover(&x);
+            // The parameters move little from here on.
+            let known = found.as_ref().map(|found| found.candidates.as_slice());
+            let (mut point, candidates) = problem.discover(&x, known);
             if point.iter().all(|row| row.lost) {
                 return None;
             }

@@ -230,6 +230,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         let (found, expected) = (accumulator.integral(integrals[i]), signal.integral());
         let known = 1e-12 * sizes[i] * duration;
         prop_assert!((found - expected).abs() <= known, "{i}: {found} {expected}");
+        prop_assert!((signal.mean() - found / duration).abs() <= 1e-12 * sizes[i]);
         for (key, omega) in fouriers[i].iter().zip(frequencies) {
             let found = accumulator.fourier(*key);
             let expected = signal.fourier(omega) * (0.5 * duration);

@@ -55,6 +55,7 @@ fn between_stops(damping: f64, stops: [f64; 2]) -> System {
 fn two_tones_and_three_regimes_agree_with_fine_runge_kutta() {
     for (damping, tolerance) in [(0.1, 2e-4), (2.0, 5e-5), (9.0, 5e-5)] {
         let system = Arc::new(between_stops(damping, [20.0, 11.0]));
+        assert_eq!(system.drive().harmonics(), [1, 3]);
         let start = [0.3, -0.4];
         let mut flow = Flow::new(Arc::clone(&system));
         flow.start(&start, 0.0).unwrap();
@@ -74,6 +75,24 @@ fn two_tones_and_three_regimes_agree_with_fine_runge_kutta() {
         }
         assert!(damping > 5.0 || flow.switches() > 4, "{}", flow.switches());
     }
+}
+
+/// A step that passes a stop: looked at once a step, the stop is not felt within it, and the
+/// step is as between stops that are not there; looked at in every stage, it is felt.
+#[test]
+fn a_stop_is_felt_within_a_step_only_where_every_stage_looks() {
+    let first_step = |stops: [f64; 2], switching: Switching| {
+        let system = between_stops(0.1, stops);
+        let mut steps = FixedStep::new(&system, &[0.49, 1.0], &[50; 3], switching).unwrap();
+        let mut first = None;
+        steps.run_period(|_, state| first = first.take().or_else(|| Some(state.to_vec())));
+        first.unwrap()
+    };
+    let unfelt = first_step([0.0, 0.0], Switching::EveryStage);
+    assert!(unfelt[0] > 0.5, "the step passes the stop");
+    assert_eq!(first_step([20.0, 11.0], Switching::EveryStep), unfelt);
+    let felt = first_step([20.0, 11.0], Switching::EveryStage);
+    assert!(felt[1] < unfelt[1] - 1e-3, "{felt:?} {unfelt:?}");
 }
 
 /// The same map whether the period is run in one piece or cut in many: a cut is nothing

@@ -136,6 +136,14 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
             &lag(phase, "that tone", 4),
         ]);
     }
+    if let Some((amplitude, phase)) = o.tip_motion.zip(o.tip_motion_phase) {
+        table.row([
+            "the tip itself moves",
+            &number::significant(amplitude, 6),
+            &si(Kind::Length, amplitude),
+            &format!("{}, deflection and base", lag(phase, "the base", 4)),
+        ]);
+    }
     table.row([
         "gap",
         &range(o.gap_range[0], o.gap_range[1]),

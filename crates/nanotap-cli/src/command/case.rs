@@ -182,7 +182,9 @@ fn physical(title: &str, view: &Physical) -> String {
     if let Some(quality) = ModeTable::new(case).ok().and_then(|table| table.quality) {
         let measured = case.higher_modes.quality;
         for (k, quality) in quality.iter().enumerate().skip(1).take(2) {
-            let source = if measured[k - 1] > 0.0 {
+            let source = if measured[k - 1] > 0.0 && view.is_in_fluid() {
+                "in the fluid, at its own frequency"
+            } else if measured[k - 1] > 0.0 {
                 "as given"
             } else {
                 "by damping in proportion to mass, several times that of real levers in air"

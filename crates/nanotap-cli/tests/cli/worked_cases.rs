@@ -167,7 +167,7 @@ follows! {
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
-    the_liquid: "liquid.md", 3 commands, 7 numbers;
+    the_liquid: "liquid.md", 5 commands, 21 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;

@@ -278,6 +278,8 @@ class _Observed:
     slope_range: list[float]
     optical_amplitude: float
     optical_phase: float
+    tip_motion: float
+    tip_motion_phase: float
     beam_clearance: float
     beam_clearance_xi: float
     beam_clearance_period: float

@@ -246,6 +246,9 @@ keys! {
     Mode2Stiffness = number(
         Parameter::Mode2Stiffness, "k₂", "measured stiffness of the second free mode at the tip, k2·L³/(EI) (0: the beam's own)",
     ).or(0.0);
+    Mode3Stiffness = number(
+        Parameter::Mode3Stiffness, "k₃", "measured stiffness of the third free mode at the tip, k3·L³/(EI) (0: the beam's own)",
+    ).or(0.0);
 
     Mass = oscillator(Of::Mass, "m", OSCILLATORS, "mass").or(1.0);
     Stiffness = oscillator(Of::Stiffness, "k", OSCILLATORS, "spring");
@@ -296,6 +299,8 @@ keys! {
         .feeds(Parameter::Mode3Quality);
     LeverK2 = quantity(Cantilever, "k2", Stiffness, R::POSITIVE, "stiffness of the second mode at the tip")
         .feeds(Parameter::Mode2Stiffness);
+    LeverK3 = quantity(Cantilever, "k3", Stiffness, R::POSITIVE, "stiffness of the third mode at the tip")
+        .feeds(Parameter::Mode3Stiffness);
     FluidDensity = quantity(Cantilever, "fluid_density", Density, R::POSITIVE, "density of the fluid around a rectangular lever, with fluid_viscosity in place of Q; a given f0 is then that in vacuum")
         .feeds(Parameter::Alpha3);
     FluidViscosity = quantity(Cantilever, "fluid_viscosity", Viscosity, R::POSITIVE, "viscosity of the fluid around the lever")

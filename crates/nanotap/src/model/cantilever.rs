@@ -167,7 +167,8 @@ impl Cantilever {
             Parameter::Mode3Frequency => self.higher_modes.frequency[1],
             Parameter::Mode2Quality => self.higher_modes.quality[0],
             Parameter::Mode3Quality => self.higher_modes.quality[1],
-            Parameter::Mode2Stiffness => self.higher_modes.stiffness,
+            Parameter::Mode2Stiffness => self.higher_modes.stiffness[0],
+            Parameter::Mode3Stiffness => self.higher_modes.stiffness[1],
         }
     }
 
@@ -193,7 +194,8 @@ impl Cantilever {
             Parameter::Mode3Frequency => &mut self.higher_modes.frequency[1],
             Parameter::Mode2Quality => &mut self.higher_modes.quality[0],
             Parameter::Mode3Quality => &mut self.higher_modes.quality[1],
-            Parameter::Mode2Stiffness => &mut self.higher_modes.stiffness,
+            Parameter::Mode2Stiffness => &mut self.higher_modes.stiffness[0],
+            Parameter::Mode3Stiffness => &mut self.higher_modes.stiffness[1],
         } = value;
         self
     }
@@ -224,7 +226,8 @@ impl Cantilever {
                 | Parameter::Mode3Frequency
                 | Parameter::Mode2Quality
                 | Parameter::Mode3Quality
-                | Parameter::Mode2Stiffness => self.get(*parameter) != 0.0,
+                | Parameter::Mode2Stiffness
+                | Parameter::Mode3Stiffness => self.get(*parameter) != 0.0,
                 _ => true,
             })
             .collect()

@@ -9,8 +9,8 @@
 //! M + (s − 1) uuᵀ,   C + (sω′/Q − vᵀCv) uuᵀ,   K + (sω′² − ω²) uuᵀ,
 //! ```
 //!
-//! ω′ its measured frequency, Q its quality factor, s = k₂ (p·v)²/ω′² the modal mass that the
-//! stiffness k₂ felt at the tip tells (otherwise 1; without Q damping stays in proportion to the
+//! ω′ its measured frequency, Q its quality factor, s = k (p·v)²/ω′² the modal mass that the
+//! stiffness k₂ or k₃ felt at the tip tells (otherwise 1; without Q damping stays in proportion to the
 //! modal mass). Its shape stays, and so do all other modes, but for what C, which has no part in
 //! the tip's mass, couples between them. A base that moves by y carries the mode along by
 //! (α₁p + I)·v y: mass and damping act on the sum.
@@ -32,8 +32,8 @@ pub struct HigherModes {
     pub frequency: [f64; 2],
     /// Quality factors.
     pub quality: [f64; 2],
-    /// Stiffness of the second mode at the tip, over EI/L³ (or in N/m).
-    pub stiffness: f64,
+    /// Stiffnesses at the tip, over EI/L³ (or in N/m).
+    pub stiffness: [f64; 2],
 }
 
 impl HigherModes {
@@ -41,8 +41,21 @@ impl HigherModes {
     pub const NONE: Self = Self {
         frequency: [0.0; 2],
         quality: [0.0; 2],
-        stiffness: 0.0,
+        stiffness: [0.0; 2],
     };
+
+    /// What `other` has where nothing was measured.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        let first = |own: [f64; 2], other: [f64; 2]| {
+            [0, 1].map(|k| if own[k] == 0.0 { other[k] } else { own[k] })
+        };
+        Self {
+            frequency: first(self.frequency, other.frequency),
+            quality: first(self.quality, other.quality),
+            stiffness: first(self.stiffness, other.stiffness),
+        }
+    }
 
     /// Whether nothing was measured.
     pub fn is_empty(&self) -> bool {
@@ -58,7 +71,8 @@ impl Serialize for HigherModes {
             (Parameter::Mode3Frequency, self.frequency[1]),
             (Parameter::Mode2Quality, self.quality[0]),
             (Parameter::Mode3Quality, self.quality[1]),
-            (Parameter::Mode2Stiffness, self.stiffness),
+            (Parameter::Mode2Stiffness, self.stiffness[0]),
+            (Parameter::Mode3Stiffness, self.stiffness[1]),
         ];
         let measured = numbers.iter().filter(|(_, number)| *number != 0.0);
         serializer.collect_map(measured.map(|(parameter, number)| (parameter.name(), number)))
@@ -107,7 +121,7 @@ impl Correction {
             of_mode(
                 2,
                 [Parameter::Mode3Frequency, Parameter::Mode3Quality],
-                None,
+                measured(Parameter::Mode3Stiffness),
             ),
         ]
         .into_iter()
@@ -225,7 +239,7 @@ mod tests {
             higher_modes: HigherModes {
                 frequency: [21.0, 58.0],
                 quality: [90.0, 120.0],
-                stiffness: 110.0,
+                stiffness: [110.0, 800.0],
             },
             ..Cantilever::paper()
         }
@@ -285,7 +299,7 @@ mod tests {
             frequency: [frequencies[1], frequencies[2]],
             quality: [1, 2].map(|k| frequencies[k] / plain.alpha3),
             // β⁴/φ(1)² with φ(1)² = 4.
-            stiffness: frequencies[1].powi(2) / 4.0,
+            stiffness: [1, 2].map(|k| frequencies[k].powi(2) / 4.0),
         };
         let same = Galerkin::new(&own).unwrap();
         let far = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() / a.amax();

@@ -48,6 +48,8 @@ pub enum Parameter {
     Mode3Quality,
     /// Measured stiffness k₂L³/(EI) of the second free mode at the tip.
     Mode2Stiffness,
+    /// Measured stiffness k₃L³/(EI) of the third free mode at the tip.
+    Mode3Stiffness,
 }
 
 impl Parameter {
@@ -63,7 +65,7 @@ impl Parameter {
     ];
 
     /// Parameters that only some samples, drives and levers have; 0 where they are not said.
-    pub const FURTHER: [Self; 12] = [
+    pub const FURTHER: [Self; 13] = [
         Self::RelaxationStiffness,
         Self::RelaxationTime,
         Self::SurfaceStiffness,
@@ -76,6 +78,7 @@ impl Parameter {
         Self::Mode2Quality,
         Self::Mode3Quality,
         Self::Mode2Stiffness,
+        Self::Mode3Stiffness,
     ];
 
     /// Every parameter there is.
@@ -105,6 +108,7 @@ impl Parameter {
             Self::Mode2Quality => "mode2_quality",
             Self::Mode3Quality => "mode3_quality",
             Self::Mode2Stiffness => "mode2_stiffness",
+            Self::Mode3Stiffness => "mode3_stiffness",
         }
     }
 }

@@ -726,6 +726,14 @@ impl<'a, D: Number> Measured<'a, D> {
         self.is_beam().then(|| reads(self))
     }
 
+    /// The component of the tip's height at the drive's frequency, of a beam whose base moves:
+    /// deflection and base together. With the base at rest the tip moves as it is deflected.
+    pub(super) fn tip_motion(&mut self) -> Option<Phasor<D>> {
+        let base = &self.model.beam.as_ref()?.base;
+        let moves = base.tones.iter().any(|tone| tone.norm_sqr() > 0.0);
+        moves.then(|| self.component(Signal::Height, Tone::First))
+    }
+
     /// What the drive feeds in, and what takes it.
     pub(super) fn energy_balance(&mut self) -> EnergyBalance<D> {
         self.asked_ends = true;

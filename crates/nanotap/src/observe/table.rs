@@ -350,6 +350,14 @@ observables! {
     optical_phase: Option<f64>, Angle, rare,
         "phase read by an optical lever (°)", "lag that an optical lever reads behind the drive",
         |m| m.optical_lever().map(Phasor::lag);
+    tip_motion: Option<f64>, Length, rare,
+        "amplitude of the tip's own motion",
+        "amplitude of the tip's height at the drive frequency, of a lever whose base moves: \
+         deflection and motion of the base together",
+        |m| m.tip_motion().map(Phasor::norm);
+    tip_motion_phase: Option<f64>, Angle, rare,
+        "phase of the tip's own motion (°)", "lag of the tip's height behind the base that moves it",
+        |m| m.tip_motion().map(Phasor::lag);
     energy_balance: EnergyBalance, Energy, rare,
         "energy", "energies over the recording; the residual as a part of what was moved",
         |m| m.energy_balance();

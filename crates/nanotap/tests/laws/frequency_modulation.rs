@@ -212,6 +212,63 @@ fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
     }
 }
 
+/// Laws that remember on which branch they are: what the sample takes in a period is the area of
+/// the loop of its static force, by a sum over the distance, whatever the amplitude; the drive
+/// tells it; and the shift is that of the force averaged along both ways.
+#[test]
+fn a_law_that_jumps_takes_the_area_of_its_loop() {
+    let [_, modulus, poisson, ..] = DMT;
+    let jkr = [
+        "sample.law=jkr",
+        modulus,
+        poisson,
+        "sample.work_of_adhesion=30 mJ/m^2",
+    ];
+    let bridge = [
+        "sample.law=hertz + capillary",
+        modulus,
+        poisson,
+        "sample.film_thickness=0.3 nm",
+        "sample.surface_energy=70 mJ/m^2",
+    ];
+    let stiff = |sample: &[&str]| lever((40.0, 5e3, "100 kHz"), (10.0, 11.0), sample);
+    for (case, range) in [(stiff(&jkr), (10.4, 9.4)), (stiff(&bridge), (11.5, 9.8))] {
+        let model = case.model().unwrap();
+        let law = model.nonlinear.as_ref().unwrap();
+        let unit = 1e-9 / case.physical().unwrap().scales.length;
+        let (near, far, count) = (-0.5 * unit, 9.5 * unit, 400_000);
+        let step = (far - near) / f64::from(count);
+        let place = |k: i32| near + step * (f64::from(k) + 0.5);
+        let curve = law.force_curve((0..count).rev().chain(0..count).map(place));
+        let (inwards, outwards) = curve.split_at(curve.len() / 2);
+        let sum = |way: &[[f64; 2]]| way.iter().map(|[_, force]| force * step).sum::<f64>();
+        let area = sum(inwards) - sum(outwards);
+        let report = modulated(&case, range, 4);
+        let free = report.modulation.as_ref().unwrap();
+        assert!(free.ended.is_empty() && free.jumps.is_empty(), "{free:?}");
+        let mut met = 0;
+        for point in report.table.iter().filter(|p| p.way == Way::Approach) {
+            let (found, seen) = (point.modulation.unwrap(), point.observables.unwrap());
+            if seen.dissipation == 0.0 {
+                continue;
+            }
+            met += 1;
+            assert!(
+                (seen.dissipation / area - 1.0).abs() < 1e-4,
+                "{seen:?} {area}"
+            );
+            assert!(
+                (found.drive_dissipation / area - 1.0).abs() < 0.02,
+                "{found:?}"
+            );
+            let first = found.first_order_shift.unwrap();
+            let off = (found.relative_shift - first).abs();
+            assert!(off < 0.03 * first.abs() + 3e-6, "{found:?}");
+        }
+        assert!(met >= 2, "{met}");
+    }
+}
+
 /// A shift that the attraction gives is met twice on approach, outside and inside of the deepest
 /// one, and twice on the way back at the same distances; a deeper one nowhere.
 #[test]

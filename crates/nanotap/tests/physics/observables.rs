@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use nanotap::case::physical::free_response::free_response;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::observe::Spectrum;
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_dynamics::Complex;
 
@@ -116,6 +117,90 @@ fn virial_and_dissipation_of_a_permanent_contact() {
         o.energy_balance.drive_work,
         1e-12,
     );
+}
+
+/// A beam on a moving base, at the Q of a lever in water, moves as its differential equation
+/// says: v'''' = β⁴ v with β⁴ = Ω² − iα3Ω, v = 1 and v' = 0 at the clamp, v'' = v''' = 0 at the
+/// tip, which moves by (cos β + cosh β)/(1 + cos β cosh β) times the base. The deflection is that
+/// less the base.
+#[test]
+fn the_tip_on_a_moving_base_moves_as_the_beam_does() {
+    let resonance = 3.516_015_268_5;
+    for (quality, omega) in [(3.35, resonance), (3.35, 1.0), (2.0, 9.0), (50.0, 2.6)] {
+        let case = Cantilever {
+            modes: 20,
+            alpha1: 0.0,
+            alpha3: resonance / quality,
+            alpha5: 100.0,
+            omega,
+            ..Cantilever::paper()
+        };
+        let (_, found) = period_1(&case);
+        let o = &found.observables;
+        let squared = Complex::new(omega * omega, -case.alpha3 * omega).square_root();
+        let beta = squared.square_root();
+        let i = Complex::new(0.0, 1.0);
+        let cosh = |z: Complex<f64>| (z.exponential() + (-z).exponential()) * 0.5;
+        let (cos, cosh) = (cosh(i * beta), cosh(beta));
+        let tip = (cos + cosh) / (1.0 + cos * cosh);
+        near(o.tip_motion.unwrap(), tip.modulus() * case.alpha2, 1e-6);
+        let lag = -tip.argument().to_degrees();
+        assert!((o.tip_motion_phase.unwrap() - lag).abs() < 1e-4);
+        let deflection = tip - 1.0;
+        near(o.first_harmonic, deflection.modulus() * case.alpha2, 1e-6);
+        assert!((o.phase + deflection.argument().to_degrees()).abs() < 1e-4);
+    }
+}
+
+/// With the base at rest the tip moves as it is deflected.
+#[test]
+fn only_a_moving_base_moves_the_tip_beside_its_deflection() {
+    let case = Cantilever {
+        actuation: nanotap::model::drive_form::Actuation::Tip,
+        alpha5: 100.0,
+        ..Cantilever::paper()
+    };
+    assert_eq!(period_1(&case).1.observables.tip_motion, None);
+}
+
+/// What one mode on a moving base gives a contact with a damper, from the deflection alone. At ω₀
+/// the equation m z̈ + (mω₀/Q) ż + kz = F − γ(m ÿ + (mω₀/Q) ẏ), γ = φ(1)∫φ, times ż + ẏ gives
+/// E = (πk/Q)(A₀A₁ sin φ' − Σn²Aₙ² − Y Re(z₁ − z₀)), with z₀ the free deflection, φ' the lag
+/// behind z₀ and 90° more, and Y the base's amplitude.
+#[test]
+fn dissipation_on_a_moving_base_from_the_deflection() {
+    let resonance = 1.875_104_068_711_961_f64.powi(2);
+    for quality in [2.0, 10.0] {
+        let case = Cantilever {
+            modes: 1,
+            alpha1: 0.0,
+            alpha2: 0.3,
+            alpha3: resonance / quality,
+            alpha4: 60.0,
+            alpha5: 0.4,
+            alpha6: 0.3,
+            omega: resonance,
+            ..Cantilever::paper()
+        };
+        let (model, found) = period_1(&case);
+        let o = &found.observables;
+        assert!(o.contact_fraction > 0.1, "{}", o.contact_fraction);
+        let free = free_response(&case).unwrap();
+        // The deflection is Im(z e^{iΩτ}), the base sin Ωτ.
+        let lag = Complex::new(0.0, -o.phase.to_radians());
+        let tip = lag.exponential() * o.first_harmonic;
+        let free = Complex::new(free.re, free.im) * case.alpha2;
+        let spectrum = Spectrum::of(&model, &found.trajectory, 1, 400);
+        let squares = spectrum.harmonics.iter().map(|h| (h.order * h.tip).powi(2));
+        let swing = (tip * free.conj()).re;
+        let work = swing - squares.sum::<f64>() - case.alpha2 * (tip - free).re;
+        let stiffness = 0.25 * resonance * resonance;
+        let unit = std::f64::consts::PI * stiffness / quality;
+        near(o.dissipation, unit * work, 1e-6);
+        let energies = &o.energy_balance;
+        let taken = energies.beam_damping + o.dissipation;
+        near(energies.drive_work, taken, 1e-10);
+    }
 }
 
 /// An optical lever is calibrated by a static force at the tip: a beam so bent reads its own

@@ -3,7 +3,8 @@
 //! On a beam of width b that swings at ω the fluid acts with (π/4) ρ b² ω² Γ(ω) times the
 //! deflection a length (J. E. Sader, J. Appl. Phys. 84, 64 (1998)): Γ_r adds (π/4) ρ b² Γ_r to its
 //! mass a length, Γ_i damps it. Γ is that of a circular cylinder, 1 + 4i K₁(z)/(√(i Re) K₀(z)) with
-//! z = −i √(i Re) and Re = ρωb²/(4η), times Sader's fit for a thin blade.
+//! z = −i √(i Re) and Re = ρωb²/(4η), times Sader's fit for a thin blade. Every mode has the Γ of
+//! its own frequency.
 
 use nalgebra::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -15,6 +16,7 @@ use super::reader::Reader;
 use super::remark::Remark;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
+use crate::model::higher_modes::HigherModes;
 
 /// Reynolds numbers for which the fit holds.
 const REYNOLDS: [f64; 2] = [1e-6, 1e4];
@@ -76,6 +78,45 @@ impl Fluid {
         Ok(found)
     }
 
+    /// Frequency, quality factor and stiffness at the tip of the second and third mode of `lever`,
+    /// which is that in the fluid: each swings with the mass and the damping that Γ has at its own
+    /// frequency. In SI; 0 beyond the `count` modes, and where Γ is not known.
+    pub(crate) fn higher_modes(
+        self,
+        lever: &Lever,
+        width: f64,
+        length: f64,
+        count: usize,
+    ) -> Result<HigherModes, PhysicalError> {
+        let unit = PI / 4.0 * self.density * width * width * length;
+        let dry = lever.beam_mass - unit * self.on_lever(width, lever.f0)?.re;
+        let mut found = HigherModes::NONE;
+        for k in 1..count.min(3) {
+            let (mut frequency, _) = lever.mode(k, lever.beam_mass)?;
+            for _ in 0..MOST_ITERATIONS {
+                let Ok(gamma) = self.on_lever(width, frequency) else {
+                    return Ok(found);
+                };
+                let last = frequency;
+                (frequency, _) = lever.mode(k, dry + unit * gamma.re)?;
+                if (frequency - last).abs() <= 1e-14 * last {
+                    break;
+                }
+            }
+            let Ok(gamma) = self.on_lever(width, frequency) else {
+                return Ok(found);
+            };
+            let mass = dry + unit * gamma.re;
+            let (_, share) = lever.mode(k, mass)?;
+            // The beam's ∫φ² and the tip's φ(1)², of a mode that is 1 at the tip.
+            let modal = mass / share + lever.tip_mass();
+            found.frequency[k - 1] = frequency;
+            found.quality[k - 1] = modal * share / (unit * gamma.im);
+            found.stiffness[k - 1] = modal * (TAU * frequency).powi(2);
+        }
+        Ok(found)
+    }
+
     fn on_lever(self, width: f64, frequency: f64) -> Result<Complex<f64>, PhysicalError> {
         let reynolds = self.reynolds(width, frequency);
         if (REYNOLDS[0]..=REYNOLDS[1]).contains(&reynolds) {
@@ -95,7 +136,8 @@ impl Fluid {
     pub(crate) fn remark(self, lever: &Lever, width: f64) -> Remark {
         Remark::note(format!(
             "in a fluid of {} and {} the lever resonates at {} with Q = {} (Re = {}; Sader 1998), a \
-             given f0 is that in vacuum; the higher modes move with the mass and damping of the first",
+             given f0 is that in vacuum; the second and third mode have mass and damping of their \
+             own (up to Re = 1e4), any beyond those of the first",
             Kind::Density.format(self.density),
             Kind::Viscosity.format(self.viscosity),
             Kind::Frequency.format(lever.f0),

@@ -189,6 +189,15 @@ impl Lever {
         omega * modal_mass_factor(omega.sqrt(), self.tip_mass_ratio) / self.quality_factor
     }
 
+    /// Frequency in Hz and φ(1)²/∫φ² of the free mode `k`, 0 the first, where the beam and what
+    /// goes with it have `beam_mass` in kg beside the tip's mass.
+    pub(super) fn mode(&self, k: usize, beam_mass: f64) -> Result<(f64, f64), PhysicalError> {
+        let ratio = bounded(self.tip_mass() / beam_mass)?;
+        let omega = exact_beam::frequencies(ratio, 0.0, k + 1)?[k];
+        let time = (3.0 * beam_mass / self.k).sqrt();
+        Ok((omega / (TAU * time), tip_share(omega.sqrt(), ratio)))
+    }
+
     /// What had to be assumed of the lever, and what puts it in doubt.
     pub(crate) fn remarks(&self, data: &LeverData) -> Vec<Remark> {
         let mut remarks = Vec::new();
@@ -415,6 +424,11 @@ fn frequency_ratio(ratio: f64) -> Result<f64, PhysicalError> {
 /// 1 + cos β cosh β = α1 β D, D = sin β cosh β − cos β sinh β, whence with
 /// q = β sin β sinh β/D the factor is (1 + α1 + 2α1q)/(1 − 3α1 + 2α1q).
 fn modal_mass_factor(beta: f64, ratio: f64) -> f64 {
+    1.0 + ratio * tip_share(beta, ratio)
+}
+
+/// φ(1)²/∫φ² of that mode: 4/(1 − 3α1 + 2α1q).
+fn tip_share(beta: f64, ratio: f64) -> f64 {
     let q = if beta < 1.0 {
         // Both cancel to third order: q = (3/2)(1 − x/360 …)/(1 − x/840 …), x = 4β⁴.
         let x = 4.0 * beta.powi(4);
@@ -426,7 +440,7 @@ fn modal_mass_factor(beta: f64, ratio: f64) -> f64 {
         beta * sin * nanotap_arithmetic::sinh(beta)
             / (sin * nanotap_arithmetic::cosh(beta) - cos * nanotap_arithmetic::sinh(beta))
     };
-    (1.0 + ratio + 2.0 * ratio * q) / (1.0 - 3.0 * ratio + 2.0 * ratio * q)
+    4.0 / (1.0 - 3.0 * ratio + 2.0 * ratio * q)
 }
 
 impl LeverData {

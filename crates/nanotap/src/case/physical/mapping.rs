@@ -79,7 +79,8 @@ impl Scales {
             Parameter::Alpha4
             | Parameter::RelaxationStiffness
             | Parameter::SurfaceStiffness
-            | Parameter::Mode2Stiffness => self.stiffness,
+            | Parameter::Mode2Stiffness
+            | Parameter::Mode3Stiffness => self.stiffness,
             Parameter::AdhesionForce => self.force,
             Parameter::Omega | Parameter::Mode2Frequency | Parameter::Mode3Frequency => {
                 self.frequency
@@ -146,7 +147,7 @@ impl PhysicalParameters {
             higher_modes: HigherModes {
                 frequency: [Parameter::Mode2Frequency, Parameter::Mode3Frequency].map(value),
                 quality: [Parameter::Mode2Quality, Parameter::Mode3Quality].map(value),
-                stiffness: value(Parameter::Mode2Stiffness),
+                stiffness: [Parameter::Mode2Stiffness, Parameter::Mode3Stiffness].map(value),
             },
         }
     }
@@ -181,7 +182,8 @@ impl PhysicalParameters {
             Parameter::Mode3Frequency => self.higher_modes.frequency[1],
             Parameter::Mode2Quality => self.higher_modes.quality[0],
             Parameter::Mode3Quality => self.higher_modes.quality[1],
-            Parameter::Mode2Stiffness => self.higher_modes.stiffness,
+            Parameter::Mode2Stiffness => self.higher_modes.stiffness[0],
+            Parameter::Mode3Stiffness => self.higher_modes.stiffness[1],
         }
     }
 }
@@ -291,6 +293,11 @@ const fn description(
         Parameter::Mode2Stiffness => (
             "k2 L^3/(EI) = 3 k2/k",
             "stiffness of the second mode",
+            Kind::Stiffness,
+        ),
+        Parameter::Mode3Stiffness => (
+            "k3 L^3/(EI) = 3 k3/k",
+            "stiffness of the third mode",
             Kind::Stiffness,
         ),
     }

@@ -16,6 +16,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::exact_beam;
+use crate::model::galerkin::Galerkin;
 use crate::model::higher_modes::HigherModes;
 
 /// A case that was read, with what was remarked.
@@ -1183,6 +1184,35 @@ fn a_fluid_slows_and_damps_a_lever() {
     assert!((lever.quality_factor / 3.349_750_762_880_2 - 1.0).abs() < 1e-9);
     // The stiffness is that of the beam.
     assert!((lever.k / 1.2675 - 1.0).abs() < 1e-12);
+    // The higher modes by the same equations, each at its own frequency; a mode bends with the
+    // beam's own stiffness, β⁴EI/(4L³) at the tip.
+    let modes = case.physical().unwrap().parameters.higher_modes;
+    let expected = HigherModes {
+        frequency: [160_762.630_080_171_63, 464_217.702_512_056_8],
+        quality: [7.127_590_690_153_069_5, 10.974_220_674_266_789],
+        stiffness: [51.282_925_205_474_81, 402.066_449_387_596_9],
+    };
+    let found = [modes.frequency, modes.quality, modes.stiffness];
+    let expected = [expected.frequency, expected.quality, expected.stiffness];
+    for (found, expected) in found
+        .into_iter()
+        .flatten()
+        .zip(expected.into_iter().flatten())
+    {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
+    // What was measured in the fluid stands.
+    let measured = [
+        water[0],
+        water[1],
+        "cantilever.Q2=5",
+        "cantilever.k3=300 N/m",
+    ];
+    let case = Case::parse(None, &words(&measured)).unwrap();
+    let found = case.physical().unwrap().parameters.higher_modes;
+    assert!((found.quality[0] - 5.0).abs() < 1e-12);
+    assert!((found.stiffness[1] - 300.0).abs() < 1e-9);
+    assert_eq!(found.quality[1].to_bits(), modes.quality[1].to_bits());
     let said: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
     assert!(
         said.iter()
@@ -1198,6 +1228,28 @@ fn a_fluid_slows_and_damps_a_lever() {
         .unwrap()
         .lever;
     assert!(heavy.f0 < lever.f0 && (heavy.tip_mass() / 5e-12 - 1.0).abs() < 1e-9);
+    // A gas that weighs nothing leaves the modes of a lever with a tip as they are, but for what
+    // forty modes of a bare beam do not know of them.
+    let vacuum = [
+        "modes=40",
+        "tip.mass_ratio=0.05",
+        "cantilever.fluid_density=1e-3 kg/m^3",
+        "cantilever.fluid_viscosity=1e-9 Pa s",
+    ];
+    let case = Case::parse(None, &words(&vacuum)).unwrap();
+    let with = case.cantilever().unwrap();
+    let without = Cantilever {
+        higher_modes: HigherModes::NONE,
+        ..with.clone()
+    };
+    let [with, without] = [with, &without].map(|case| Galerkin::new(case).unwrap());
+    let change = (&with.mass - &without.mass).amax();
+    assert!(change < 0.01, "{change}");
+    let change = (&with.stiffness[0] - &without.stiffness[0]).amax();
+    assert!(
+        change > 0.0 && change < 0.01 * without.stiffness[0][(2, 2)],
+        "{change}"
+    );
 
     let refused = |more: &[&str]| Case::parse(None, &words(more)).unwrap_err().to_string();
     assert!(refused(&[]).contains("cantilever.Q"));

@@ -104,6 +104,11 @@ impl Physical {
         }
     }
 
+    /// Whether a fluid tells mass and damping.
+    pub const fn is_in_fluid(&self) -> bool {
+        self.data.fluid.is_some()
+    }
+
     /// The key of the drive's own strength: of the base's motion, or of the force.
     pub(crate) fn strength_key(&self, keys: [Key; 3]) -> Key {
         match self.cantilever.actuation {
@@ -244,10 +249,17 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
     // in which a force is measured in k/3.
     let measured = measured_modes(reader, &tip, &lever)?;
+    let measured = match (data.fluid, data.geometry) {
+        (Some(fluid), Some(beam)) => {
+            let loaded = fluid.higher_modes(&lever, beam.width, beam.length, like.modes)?;
+            measured.or(loaded)
+        }
+        _ => measured,
+    };
     let time = lever.time_unit();
     let higher_modes = HigherModes {
         frequency: measured.frequency.map(|frequency| TAU * frequency * time),
-        stiffness: 3.0 * measured.stiffness / lever.k,
+        stiffness: measured.stiffness.map(|k| 3.0 * k / lever.k),
         ..measured
     };
     let free = Cantilever {
@@ -359,7 +371,7 @@ fn measured_modes(
             frequency(Key::LeverF3, 2)?,
         ],
         quality: [number(Key::LeverQ2)?, number(Key::LeverQ3)?],
-        stiffness: number(Key::LeverK2)?,
+        stiffness: [number(Key::LeverK2)?, number(Key::LeverK3)?],
     })
 }
 

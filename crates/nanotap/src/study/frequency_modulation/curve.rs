@@ -64,7 +64,9 @@ pub fn modulated_approach(
         if way == Way::Retract {
             gaps.reverse();
             gaps.retain(|gap| *gap >= reached);
-            walk.turn();
+            if let Some((gap, driven)) = table.last().and_then(driven) {
+                walk.turn(gap, driven);
+            }
         }
         let mut failed: Option<Ended> = None;
         let mut missed = 0;
@@ -207,17 +209,10 @@ impl Curve<'_> {
         control: &Control<'_>,
     ) -> Option<(f64, HeldOrbit)> {
         let [a, b] = points;
-        let driven = |p: &ApproachPoint| {
-            let modulation = p.modulation?;
-            Some(Driven {
-                frequency: modulation.drive_frequency,
-                strength: modulation.drive_strength,
-                state: p.orbit.as_ref()?.states.first()?.clone(),
-            })
-        };
         let mut low = (a.gap, excess(a, shift));
         let mut high = (b.gap, excess(b, shift));
-        let mut walk = HeldWalk::new(self.case, held, driven(a)?, a.gap);
+        let (gap, start) = driven(a)?;
+        let mut walk = HeldWalk::new(self.case, held, start, gap);
         let mut closed = None;
         for step in 0..STEPS {
             let straight = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
@@ -290,6 +285,17 @@ impl Curve<'_> {
             orbit: Some(orbit.orbit),
         })
     }
+}
+
+/// A point's distance, and the drive and state there.
+fn driven(point: &ApproachPoint) -> Option<(f64, Driven)> {
+    let modulation = point.modulation?;
+    let driven = Driven {
+        frequency: modulation.drive_frequency,
+        strength: modulation.drive_strength,
+        state: point.orbit.as_ref()?.states.first()?.clone(),
+    };
+    Some((point.gap, driven))
 }
 
 /// By how much the frequency has shifted more than asked.

@@ -43,7 +43,8 @@ pub struct Modulated {
     /// Energy that the sample takes in a period as the excitation tells it,
     /// E₀ (drive ratio − f/f₀) with what the free lever loses in a period, in the model's unit.
     pub drive_dissipation: f64,
-    /// Least distance of a sinusoidal oscillation, in the model's unit of length.
+    /// Least distance of a sinusoidal oscillation, a driven base's motion included, in the model's
+    /// unit of length.
     pub closest: f64,
     /// Δf/f₀ to first order in the law's static force.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -77,7 +78,7 @@ impl Modulated {
             relative_shift: relative,
             drive_ratio: ratio,
             drive_dissipation: free.loss * (ratio - 1.0 - relative),
-            closest: gap - free.amplitude,
+            closest: gap - free.reach,
             first_order_shift: known.map(|k| k.first_order),
             giessibl_shift: known.map(|k| k.giessibl),
             static_force: known.map(|k| k.force),

@@ -43,8 +43,10 @@ impl<'a> HeldWalk<'a> {
         self.last.as_ref().map_or(f64::NAN, |(gap, _)| *gap)
     }
 
-    /// Turns round: what lies behind foresees nothing.
-    pub(crate) fn turn(&mut self) {
+    /// Turns round at the orbit `driven` of the distance `gap`: what lies behind foresees nothing,
+    /// and past a distance that was given up the curve may have turned back on another orbit.
+    pub(crate) fn turn(&mut self, gap: f64, driven: Driven) {
+        self.last = Some((gap, driven));
         self.before = None;
     }
 

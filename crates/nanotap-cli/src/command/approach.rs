@@ -290,16 +290,30 @@ fn modulated(
     shown: &dyn Fn(Kind, f64) -> String,
     units: &Units,
 ) -> String {
+    let kept = match modulation.closest {
+        Some(closest) => format!(
+            "least distance {} (amplitude {} at first)",
+            shown(Kind::Length, closest),
+            shown(Kind::Length, modulation.amplitude)
+        ),
+        None => format!("amplitude {}", shown(Kind::Length, modulation.amplitude)),
+    };
     let mut text = motion::paragraph(&format!(
-        "frequency modulation: amplitude {}, {} are held; free: {}, {} lost in a period",
-        shown(Kind::Length, modulation.amplitude),
+        "frequency modulation: {kept}, {} are held; free: {}, {} lost in a period",
         motion::lag(modulation.phase, "the drive", 4),
         shown(Kind::Frequency, modulation.free_frequency),
         energy(modulation.free_loss, units),
     ));
     let mut table = Table::new([
         ("way", Align::Left),
-        ("distance", Align::Right),
+        (
+            if modulation.closest.is_some() {
+                "A"
+            } else {
+                "distance"
+            },
+            Align::Right,
+        ),
         ("Δf", Align::Right),
         ("Δf/f0", Align::Right),
         ("first order", Align::Right),
@@ -316,7 +330,10 @@ fn modulated(
         };
         table.row([
             p.way.name().to_owned(),
-            shown(Kind::Length, p.gap),
+            shown(
+                Kind::Length,
+                modulation.closest.map_or(p.gap, |_| seen.first_harmonic),
+            ),
             shown(Kind::Frequency, found.frequency_shift),
             number::significant(found.relative_shift, 5),
             found

@@ -160,7 +160,7 @@ follows! {
     fit: "fit.md", 7 commands, 41 numbers;
     fit_of_sticky_and_wet_samples: "fit-adhesion.md", 2 commands, 10 numbers;
     fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
-    frequency_modulation: "frequency-modulation.md", 2 commands, 13 numbers;
+    frequency_modulation: "frequency-modulation.md", 3 commands, 21 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_bistable_lever: "bistable.md", 2 commands, 9 numbers;
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;

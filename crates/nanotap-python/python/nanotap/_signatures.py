@@ -431,6 +431,7 @@ def approach(
     fm: bool = False,
     phase: float = 90.0,
     shift: float | str | None = None,
+    closest: float | str | None = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
@@ -462,6 +463,10 @@ def approach(
     shift : float | str | None
         Frequency shift of frequency modulation whose distances are to be found, in
         units of the case ("-50 Hz") or as omega.
+    closest : float | str | None
+        Least distance of the oscillation that frequency modulation keeps, in units
+        of the case ("1 nm") or as alpha5: the amplitude then changes with the
+        distance.
     threads : int | None
         Threads; without it, one a core.
     progress : Progress
@@ -494,6 +499,7 @@ def approach(
         "fm": fm,
         "phase": phase,
         "shift": shift,
+        "closest": closest,
     }
     return _studies.approach(case, options, threads, progress)
 

@@ -460,6 +460,13 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
             rows[2],
             (force, f"physical_{force}", "force after Sader, Jarvis", "N", 1.0),
         )
+    # Where the least distance is kept, the amplitude grows with the distance.
+    kept = "closest" in json.loads(ds.attrs.get("modulation", "{}"))
+    if kept:
+        rows = rows[:3]
+        amplitude = ds.physical_A if physical else ds.first_harmonic
+        distance = amplitude.max("way").values
+        factor, unit = _prefixed(distance, "m") if physical else (1.0, "")
     # How many of the unit a model's number is: its ratio where it is largest.
     x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
     panels = []
@@ -519,9 +526,12 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     symbol = (
         "distance $z_c$" if physical else "distance $α₅$" if name == "alpha5" else name
     )
+    if kept:
+        symbol = "amplitude $A$"
     facts = {
         "x_label": f"{symbol}{unit}",
         "x_range": [float(factor * distance.min()), float(factor * distance.max())],
+        "logarithmic": kept,
         "panels": panels,
     }
     return _drawn("approach", facts, where)

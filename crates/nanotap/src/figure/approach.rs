@@ -20,7 +20,14 @@ use crate::study::frequency_modulation::{COLUMNS, Modulated, ModulatedColumn};
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
     let (x_factor, x_unit) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
-    let symbol = if matches!(units, Units::Si(_)) {
+    // Where the least distance is kept, the amplitude grows with the distance.
+    let kept = report.modulation.as_ref().and_then(|m| {
+        let closest = m.closest?;
+        Some((closest, m.amplitude / (report.from - closest)))
+    });
+    let symbol = if kept.is_some() {
+        "amplitude $A$"
+    } else if matches!(units, Units::Si(_)) {
         "distance $z_c$"
     } else if report.parameter == "gap" {
         "gap"
@@ -46,12 +53,16 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
                 .map(|shown| ApproachPanel::of(report, shown, units, x_factor)),
         )
         .chain(of_drive(&["sader_jarvis_force"]));
-    ApproachCurves {
+    let mut curves = ApproachCurves {
         x_label: format!("{symbol}{x_unit}"),
         x_range: [report.to, report.from].map(|gap| x_factor * gap),
+        logarithmic: false,
         panels: panels.collect(),
+    };
+    if let Some((closest, share)) = kept {
+        curves.against(|x| share * (x - x_factor * closest));
     }
-    .figure()
+    curves.figure()
 }
 
 /// Curves of approach and retract as they are drawn, in the units shown.
@@ -61,6 +72,9 @@ pub struct ApproachCurves {
     pub x_label: String,
     /// Its range.
     pub x_range: [f64; 2],
+    /// Whether it stands in equal ratios, as amplitudes do.
+    #[serde(default)]
+    pub logarithmic: bool,
     /// What is drawn against it.
     pub panels: Vec<ApproachPanel>,
 }
@@ -92,6 +106,19 @@ pub struct ApproachPanel {
 }
 
 impl ApproachCurves {
+    /// Draws what was met against an amplitude instead; panels without points go.
+    fn against(&mut self, other: impl Fn(f64) -> f64) {
+        self.x_range = self.x_range.map(&other);
+        self.logarithmic = true;
+        self.panels.retain(|panel| !panel.approach.is_empty());
+        for panel in &mut self.panels {
+            let curves = [&mut panel.approach, &mut panel.retract, &mut panel.compared];
+            for (x, _) in curves.into_iter().flatten() {
+                *x = other(*x);
+            }
+        }
+    }
+
     /// The figure.
     pub fn figure(&self) -> Figure {
         let rows = self.panels.len().div_ceil(2).max(1);
@@ -101,7 +128,12 @@ impl ApproachCurves {
             .share_x();
         for (k, one) in self.panels.iter().enumerate() {
             let [from, to] = self.x_range;
-            let x = Axis::linear(&self.x_label).range(from, to);
+            let x = if self.logarithmic {
+                Axis::log(&self.x_label)
+            } else {
+                Axis::linear(&self.x_label)
+            };
+            let x = x.range(from, to);
             let panel = one.panel(x);
             // One legend is enough.
             figure = figure.with(if k == 0 || !one.comparison.is_empty() {

@@ -67,6 +67,9 @@ pub struct ApproachOptions {
     /// The frequency shift, in the model's unit, whose distances are to be found where amplitude
     /// and phase are held.
     pub shift: Option<f64>,
+    /// The least distance of the oscillation that is kept where amplitude and phase are held: the
+    /// amplitude then changes with the distance.
+    pub closest: Option<f64>,
 }
 
 impl Default for ApproachOptions {
@@ -81,6 +84,7 @@ impl Default for ApproachOptions {
             periods: 256,
             phase: None,
             shift: None,
+            closest: None,
         }
     }
 }
@@ -88,6 +92,9 @@ impl Default for ApproachOptions {
 /// Where the default curve begins, in units of the tip's free reach: far enough to see the
 /// free motion, and branches that reach beyond it.
 const BEYOND: f64 = 1.25;
+
+/// Where a curve at a kept least distance ends, as a part of the amplitude with which it begins.
+const LEAST_AMPLITUDE: f64 = 0.02;
 
 /// Why there is no curve.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -107,6 +114,17 @@ pub enum ApproachError {
         /// Where it was to begin.
         from: f64,
         /// Where it was to end.
+        to: f64,
+    },
+    /// No amplitude is left.
+    #[error(
+        "an oscillation that comes as near as {closest} has no amplitude at the distance {to}: the \
+         last distance must be the greater"
+    )]
+    Closest {
+        /// The least distance that was to be kept.
+        closest: f64,
+        /// Where the curve was to end.
         to: f64,
     },
     /// Nothing moves.
@@ -329,17 +347,31 @@ pub(super) fn distances(
         return Err(ApproachError::NoDrive);
     }
     let from = options.from.unwrap_or(BEYOND * free.reach);
-    let to = options.to.unwrap_or_else(|| from.min(0.0));
+    let to = match (options.to, options.closest) {
+        (Some(to), _) => to,
+        (None, Some(closest)) => closest + LEAST_AMPLITUDE * (from - closest),
+        (None, None) => from.min(0.0),
+    };
     if !(from.is_finite() && to.is_finite() && from > to) {
         return Err(ApproachError::Range { from, to });
     }
+    if let Some(closest) = options.closest
+        && (to <= closest || !closest.is_finite())
+    {
+        return Err(ApproachError::Closest { closest, to });
+    }
     let last = (options.points - 1) as f64;
+    // Amplitudes at a kept least distance stand in equal ratios.
+    let between = |share: f64| match options.closest {
+        Some(closest) if share > 0.0 && share < 1.0 => {
+            let ratio = (to - closest) / (from - closest);
+            closest + (from - closest) * nanotap_arithmetic::powf(ratio, share)
+        }
+        // Both ends exactly.
+        _ => from * (1.0 - share) + to * share,
+    };
     Ok((0..options.points)
-        .map(|k| {
-            let share = k as f64 / last;
-            // Both ends exactly.
-            from * (1.0 - share) + to * share
-        })
+        .map(|k| between(k as f64 / last))
         .collect())
 }
 
@@ -621,6 +653,10 @@ pub struct ApproachRequest {
     /// case ("-50 Hz") or as omega
     #[schemars(extend("x-value" = "SHIFT"))]
     pub shift: Option<Amount>,
+    /// Least distance of the oscillation that frequency modulation keeps, in units of the case
+    /// ("1 nm") or as alpha5: the amplitude then changes with the distance
+    #[schemars(extend("x-value" = "DISTANCE"))]
+    pub closest: Option<Amount>,
 }
 
 impl Default for ApproachRequest {
@@ -636,6 +672,7 @@ impl Default for ApproachRequest {
             fm: false,
             phase: 90.0,
             shift: None,
+            closest: None,
         }
     }
 }
@@ -662,7 +699,15 @@ impl ApproachRequest {
                 "add {fm}, which holds amplitude and phase instead",
             ));
         }
+        if self.closest.is_some() && !self.fm {
+            return Err(Error::option(
+                "closest",
+                "the least distance cannot be kept where nothing holds the amplitude",
+                "add {fm}, which holds amplitude and phase",
+            ));
+        }
         Ok(ApproachOptions {
+            closest: distance("closest", &self.closest)?,
             shift: shift.map_err(|error| Error::from(error).at("shift"))?,
             from: distance("from", &self.from)?,
             to: distance("to", &self.to)?,
@@ -704,6 +749,7 @@ impl From<ApproachError> for crate::Error {
         match &error {
             ApproachError::Points { .. } => input("give {points} 80"),
             ApproachError::Range { .. } => input("change {from} or {to}"),
+            ApproachError::Closest { .. } => input("change {to} or {closest}"),
             ApproachError::NoDrive => input("give {from}"),
             ApproachError::NoPeriod => input("give a {max_period} of 1 or more"),
             ApproachError::NoPeriods => input("give 1 or more {periods}"),

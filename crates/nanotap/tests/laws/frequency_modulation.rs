@@ -269,6 +269,75 @@ fn a_law_that_jumps_takes_the_area_of_its_loop() {
     }
 }
 
+/// At one least distance D, under van der Waals' force F = −HR/(6d²): the average over a sinusoid
+/// about z = D + A is in closed form Δf/f₀ = −HR/(6k (z² − A²)^{3/2}). At small amplitudes that is
+/// −k_ts/2k with the force's slope at z, at large ones the power law A^{−3/2} of Giessibl.
+#[test]
+fn the_shift_against_the_amplitude_at_one_least_distance() {
+    let case = reference(1e6, 10.0, 11.0);
+    let scales = case.physical().unwrap().scales;
+    let unit = 1e-9 / scales.length;
+    let (stiffness, strength, closest) = (40.0, 2e-19 * 10e-9 / 6.0, 1e-9);
+    let options = ApproachOptions {
+        from: Some(401.0 * unit),
+        to: Some(1.02 * unit),
+        closest: Some(unit),
+        points: 30,
+        phase: Some(90.0),
+        ..ApproachOptions::default()
+    };
+    let report = approach(&case, &options, &Control::default()).unwrap();
+    let kept = report.modulation.as_ref().unwrap();
+    assert!(kept.ended.is_empty() && kept.jumps.is_empty(), "{kept:?}");
+    assert!(report.returned && report.hysteresis.is_empty());
+    for point in &report.table {
+        let found = point.modulation.unwrap();
+        let amplitude = point.physical.as_ref().unwrap().observables.first_harmonic;
+        let least = found.closest * scales.length;
+        assert!((least / closest - 1.0).abs() < 1e-9, "{least}");
+        assert!((point.gap * scales.length - amplitude - closest).abs() < 1e-17);
+        let free = std::f64::consts::PI * stiffness * amplitude * amplitude / 1e6;
+        let loss = kept.free_loss * scales.energy * (amplitude / 400e-9).powi(2);
+        assert!((loss / free - 1.0).abs() < 1e-6, "{loss} {free}");
+        let root = closest * (closest + 2.0 * amplitude);
+        let average = -strength / stiffness / (root * root.sqrt());
+        let first = found.first_order_shift.unwrap();
+        assert!((first / average - 1.0).abs() < 1e-6, "{first} {average}");
+        // The mean force bends the lever towards the sample, by 0.8 % of D at the least amplitude.
+        let bent = point.physical.as_ref().unwrap().observables.mean_deflection;
+        let root = (closest + bent) * (closest + bent + 2.0 * amplitude);
+        // f² and not f is linear in the stiffness; harmonics are left out.
+        let shift = found.relative_shift * (1.0 + 0.5 * found.relative_shift);
+        let share = -shift * stiffness / strength * root * root.sqrt();
+        assert!((share - 1.0).abs() < 1e-3, "{amplitude}: {share}");
+    }
+    let at = |k: usize| {
+        let point = &report.table[k];
+        let amplitude = point.physical.as_ref().unwrap().observables.first_harmonic;
+        (amplitude, point.modulation.unwrap().relative_shift)
+    };
+    let (amplitude, shift) = at(0);
+    let large = -strength / (stiffness * (2.0 * closest * amplitude).powf(1.5));
+    assert!((shift / large - 1.0).abs() < 0.003, "{shift} {large}");
+    // The slope of the force where the bent lever rests, 2HR/(6z³), over twice the stiffness.
+    let (amplitude, shift) = at(29);
+    let place = closest + amplitude;
+    let bent = strength / (stiffness * place * place);
+    let slope = -2.0 * strength / (place - bent).powi(3);
+    let small = (1.0 + slope / stiffness).sqrt() - 1.0;
+    assert!((shift / small - 1.0).abs() < 0.002, "{shift} {small}");
+    let refused = serde_json::json!({"closest": "1 nm"});
+    let refused: ApproachRequest = read(refused).unwrap();
+    let refused = refused.options(&case).unwrap_err().to_string();
+    assert!(refused.contains("add fm"), "{refused}");
+    let none = ApproachOptions {
+        to: Some(0.5 * unit),
+        ..options
+    };
+    let refused = approach(&case, &none, &Control::default()).unwrap_err();
+    assert!(refused.to_string().contains("no amplitude"), "{refused}");
+}
+
 /// A shift that the attraction gives is met twice on approach, outside and inside of the deepest
 /// one, and twice on the way back at the same distances; a deeper one nowhere.
 #[test]

@@ -46,12 +46,22 @@ pub fn modulated_approach(
     };
     let distances = distances(&far, options)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
+    let reach = free.reach / free.amplitude;
+    let closest = options.closest;
+    // Where the least distance is kept, the amplitude of the first distance is held up to there.
+    let free = closest.map_or(free.clone(), |closest| {
+        free.with_amplitude((from - closest) / reach)
+    });
+    let held = Held {
+        amplitude: free.amplitude,
+        phase,
+    };
     let curve = Curve {
         case,
         free: &free,
         model,
+        closest,
     };
-    let averages = curve.averages();
     let beyond = from + BEYOND * from.abs().max(held.amplitude);
     let mut walk = HeldWalk::new(case, held, free.driven(), beyond);
     let mut table: Vec<ApproachPoint> = Vec::new();
@@ -105,7 +115,9 @@ pub fn modulated_approach(
                 });
                 missed = 0;
             }
-            table.push(curve.point(way, gap, orbit, &averages)?);
+            let amplitude = walk.held(gap).amplitude;
+            table.push(curve.point(way, gap, orbit, amplitude)?);
+            walk.keep(closest, reach);
             done += 1;
             if let Some(report) = control.progress {
                 report(done, total);
@@ -116,7 +128,10 @@ pub fn modulated_approach(
     if let Some(report) = control.progress {
         report(total, total);
     }
-    invert(&mut table, &free);
+    // Of one least distance there is nothing to invert.
+    if closest.is_none() {
+        invert(&mut table, &free);
+    }
     if let Some(view) = case.physical() {
         for point in &mut table {
             point.modulation_si = point.modulation.map(|m| m.in_si(&view.scales));
@@ -124,7 +139,7 @@ pub fn modulated_approach(
     }
     let setpoints = options
         .shift
-        .map(|shift| curve.setpoints(held, shift, &table, &averages, control));
+        .map(|shift| curve.setpoints(held, shift, &table, control));
     Ok(ApproachReport {
         parameter: case.gap_key().path(),
         from,
@@ -150,6 +165,7 @@ pub fn modulated_approach(
             free_strength: free.strength,
             stiffness: free.stiffness,
             free_loss: free.loss,
+            closest,
             multipliers: OPEN_LOOP,
             setpoints,
             jumps,
@@ -163,8 +179,11 @@ const MISSED: usize = 3;
 
 struct Curve<'a> {
     case: &'a Case,
+    /// At the first distance.
     free: &'a FreeOscillation,
     model: crate::model::Model,
+    /// The least distance that is kept.
+    closest: Option<f64>,
 }
 
 /// Steps of regula falsi at most.
@@ -177,7 +196,6 @@ impl Curve<'_> {
         held: Held,
         shift: f64,
         table: &[ApproachPoint],
-        averages: &Averages<'_>,
         control: &Control<'_>,
     ) -> Vec<ShiftSetpoint> {
         let pairs = table.windows(2).filter(|pair| pair[0].way == pair[1].way);
@@ -185,9 +203,8 @@ impl Curve<'_> {
             pairs.filter(|pair| (excess(&pair[0], shift) > 0.0) != (excess(&pair[1], shift) > 0.0));
         let found = crossed.filter_map(|pair| {
             let way = pair[0].way;
-            let (gap, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
-            let averages = pair[0].modulation?.first_order_shift.map(|_| averages);
-            let modulation = Modulated::of(&orbit, self.free, averages, gap);
+            let (gap, held, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
+            let modulation = self.modulated(&orbit, held.amplitude, gap);
             let view = self.case.physical();
             Some(ShiftSetpoint {
                 way,
@@ -207,12 +224,13 @@ impl Curve<'_> {
         shift: f64,
         points: [&ApproachPoint; 2],
         control: &Control<'_>,
-    ) -> Option<(f64, HeldOrbit)> {
+    ) -> Option<(f64, Held, HeldOrbit)> {
         let [a, b] = points;
         let mut low = (a.gap, excess(a, shift));
         let mut high = (b.gap, excess(b, shift));
         let (gap, start) = driven(a)?;
         let mut walk = HeldWalk::new(self.case, held, start, gap);
+        walk.keep(self.closest, self.free.reach / self.free.amplitude);
         let mut closed = None;
         for step in 0..STEPS {
             let straight = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
@@ -238,20 +256,28 @@ impl Curve<'_> {
         }
         let (gap, off, orbit) = closed?;
         // Where the curve jumps past the value, none has it.
-        (off.abs() <= 1e-6 * shift.abs()).then_some((gap, orbit))
+        (off.abs() <= 1e-6 * shift.abs()).then(|| (gap, walk.held(gap), orbit))
     }
 
-    fn averages(&self) -> Averages<'_> {
+    /// What frequency modulation tells of an orbit of this amplitude.
+    fn modulated(&self, orbit: &HeldOrbit, amplitude: f64, gap: f64) -> Modulated {
+        // A rigid stop has no static force, and a moving surface one of its own height.
+        let moves = self
+            .case
+            .cantilever()
+            .is_some_and(|c| c.contact == ContactLaw::MovingSurface && c.law.is_none());
+        let known = !self.case.has_rigid_stop() && !moves;
+        let averages = known.then(|| self.averages(amplitude));
+        let free = self.free.with_amplitude(amplitude);
+        Modulated::of(orbit, &free, averages.as_ref(), gap)
+    }
+
+    fn averages(&self, amplitude: f64) -> Averages<'_> {
         let spring = match self.case.oscillator() {
             Some(_) => self.case.get(Key::StopStiffness),
             None => self.case.get(Key::Alpha4),
         };
-        Averages::new(
-            &self.model,
-            spring,
-            self.free.amplitude,
-            self.free.stiffness,
-        )
+        Averages::new(&self.model, spring, amplitude, self.free.stiffness)
     }
 
     fn point(
@@ -259,17 +285,12 @@ impl Curve<'_> {
         way: Way,
         gap: f64,
         orbit: HeldOrbit,
-        averages: &Averages<'_>,
+        amplitude: f64,
     ) -> Result<ApproachPoint, ApproachError> {
         let view = self.case.physical();
         let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)
             .map_err(super::HeldError::from)?;
-        // A rigid stop has no static force, and a moving surface one of its own height.
-        let moves = self
-            .case
-            .cantilever()
-            .is_some_and(|c| c.contact == ContactLaw::MovingSurface && c.law.is_none());
-        let averages = (!self.case.has_rigid_stop() && !moves).then_some(averages);
+        let modulation = self.modulated(&orbit, amplitude, gap);
         Ok(ApproachPoint {
             way,
             gap,
@@ -280,7 +301,7 @@ impl Curve<'_> {
             physical: view.map(|view| PhysicalMotion::of(&observables, view)),
             observables: Some(observables),
             reason: None,
-            modulation: Some(Modulated::of(&orbit, self.free, averages, gap)),
+            modulation: Some(modulation),
             modulation_si: None,
             orbit: Some(orbit.orbit),
         })

@@ -111,6 +111,20 @@ impl FreeOscillation {
 }
 
 impl FreeOscillation {
+    /// The same with another amplitude: the free lever is linear.
+    #[must_use]
+    pub fn with_amplitude(&self, amplitude: f64) -> Self {
+        let share = amplitude / self.amplitude;
+        Self {
+            amplitude,
+            strength: share * self.strength,
+            reach: share * self.reach,
+            loss: share * share * self.loss,
+            state: self.state.iter().map(|x| share * x).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Its drive and state.
     pub fn driven(&self) -> Driven {
         Driven {

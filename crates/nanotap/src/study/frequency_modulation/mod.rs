@@ -208,6 +208,10 @@ pub struct ModulationReport {
     pub stiffness: f64,
     /// What the free lever loses in a period at this amplitude, in the model's unit.
     pub free_loss: f64,
+    /// The least distance that is kept, in the model's unit of length: amplitude and what belongs
+    /// to it are then those of the first distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closest: Option<f64>,
     /// What the multipliers are of.
     pub multipliers: &'static str,
     /// The distances at which the frequency shift has the asked value, on each way in the order

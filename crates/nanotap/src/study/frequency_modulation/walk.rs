@@ -9,6 +9,10 @@ use crate::case::Case;
 pub(crate) struct HeldWalk<'a> {
     case: &'a Case,
     held: Held,
+    /// The least distance that is kept, and how far the tip swings at the amplitude 1.
+    closest: Option<(f64, f64)>,
+    /// How many numbers at the end of the state are the sample's.
+    memory: usize,
     /// The last two orbits, each with its distance.
     last: Option<(f64, Driven)>,
     before: Option<(f64, Driven)>,
@@ -33,8 +37,34 @@ impl<'a> HeldWalk<'a> {
         Self {
             case,
             held,
+            closest: None,
+            memory: 0,
             last: Some((far, start)),
             before: None,
+        }
+    }
+
+    /// Keeps the least distance `closest` from here on, where the tip swings by `reach` at the
+    /// amplitude 1.
+    pub(crate) fn keep(&mut self, closest: Option<f64>, reach: f64) {
+        let kept = closest.map(|closest| (closest, reach));
+        if kept != self.closest {
+            self.closest = kept;
+            // What had another amplitude foresees nothing.
+            self.before = None;
+        }
+    }
+
+    /// What is held at a distance.
+    pub(crate) fn held(&self, gap: f64) -> Held {
+        let amplitude = self
+            .closest
+            .map_or(self.held.amplitude, |(closest, reach)| {
+                (gap - closest) / reach
+            });
+        Held {
+            amplitude,
+            ..self.held
         }
     }
 
@@ -71,14 +101,15 @@ impl<'a> HeldWalk<'a> {
             };
             let guess = self.foreseen(next);
             let found = self
-                .held
+                .held(next)
                 .close(&self.case.with(self.case.gap_key(), next), &guess)
                 .map(|orbit| {
-                    let near = self.unforeseen(&guess, &orbit) < UNFORESEEN;
+                    let near = self.unforeseen(next, &guess, &orbit) < UNFORESEEN;
                     (orbit, near)
                 });
             match found {
                 Ok((orbit, true)) => {
+                    self.memory = orbit.model.memory;
                     self.before = self.last.replace((next, orbit.driven()));
                     if next.to_bits() == target.to_bits() {
                         return Ok(Stepped::On(orbit));
@@ -102,10 +133,10 @@ impl<'a> HeldWalk<'a> {
     ) -> Result<Stepped, HeldError> {
         let guess = self
             .last
-            .clone()
-            .map_or_else(Driven::nothing, |(_, driven)| driven);
+            .as_ref()
+            .map_or_else(Driven::nothing, |known| self.resized(known, target));
         let case = self.case.with(self.case.gap_key(), target);
-        match self.held.close(&case, &guess) {
+        match self.held(target).close(&case, &guess) {
             Ok(orbit) => {
                 self.before = None;
                 self.last = Some((target, orbit.driven()));
@@ -117,15 +148,17 @@ impl<'a> HeldWalk<'a> {
 
     /// Where the last two orbits point to.
     fn foreseen(&self, gap: f64) -> Driven {
-        let Some((at, last)) = &self.last else {
+        let Some(known) = &self.last else {
             return Driven::nothing();
         };
-        let Some((behind, before)) = &self.before else {
-            return last.clone();
+        let (at, last) = (known.0, self.resized(known, gap));
+        let Some(known) = &self.before else {
+            return last;
         };
+        let (behind, before) = (known.0, self.resized(known, gap));
         let share = (gap - at) / (at - behind);
         if !share.is_finite() || share.abs() > 4.0 {
-            return last.clone();
+            return last;
         }
         let on = |a: f64, b: f64| b + share * (b - a);
         Driven {
@@ -140,11 +173,23 @@ impl<'a> HeldWalk<'a> {
         }
     }
 
-    fn unforeseen(&self, guess: &Driven, orbit: &HeldOrbit) -> f64 {
+    /// What was found at another distance, with the amplitude of this one.
+    fn resized(&self, (there, found): &(f64, Driven), gap: f64) -> Driven {
+        let share = self.held(gap).amplitude / self.held(*there).amplitude;
+        let mut driven = found.clone();
+        let moving = driven.state.len().saturating_sub(self.memory);
+        driven.strength *= share;
+        for x in driven.state.iter_mut().take(moving) {
+            *x *= share;
+        }
+        driven
+    }
+
+    fn unforeseen(&self, gap: f64, guess: &Driven, orbit: &HeldOrbit) -> f64 {
         let found = orbit.driven();
         let kept = found.state.len() - orbit.model.memory;
         let half = kept / 2;
-        let amplitude = self.held.amplitude;
+        let amplitude = self.held(gap).amplitude;
         let of_state = guess.state.iter().zip(&found.state).take(kept).enumerate();
         let state = of_state.map(|(k, (a, b))| {
             let size = if k < half {

@@ -446,7 +446,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     distance = ds.zc.values if physical else ds[name].values
     factor, unit = _prefixed(distance, "m") if physical else (1.0, "")
     electronvolts = 1.602176634e-19
-    rows = (
+    rows: tuple[tuple[str, str, str, str, float], ...] = (
         ("first_harmonic", "physical_A", "amplitude $A$", "m", 1.0),
         ("phase", "physical_phase", "phase behind the drive (°)", "", 1.0),
         ("dissipation", "physical_E_dis", "dissipation $E_{dis}$", "eV", electronvolts),

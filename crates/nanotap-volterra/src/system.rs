@@ -44,11 +44,12 @@ pub struct Options {
 }
 
 impl Options {
-    /// A tolerance in the unit of the gap, and at most ten million steps a run.
+    /// A tolerance in the unit of the gap, and at most a hundred thousand steps a run: a motion
+    /// takes some hundred a period, and a recorded one that takes more fills gigabytes.
     pub const fn new(tolerance: f64) -> Self {
         Self {
             tolerance,
-            max_steps: 10_000_000,
+            max_steps: 100_000,
         }
     }
 }

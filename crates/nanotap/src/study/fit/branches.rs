@@ -348,3 +348,28 @@ pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<us
     }
     chosen
 }
+
+/// Takes the last row before and the first row after each change of branch away from the other
+/// branch, if it is there only because its own has no orbit there: with parameters that are not
+/// yet those behind the data a branch ends too early, and a row that is left to the other one
+/// would bend everything towards it. `costs` as for [`path`]; `dear` is more than noise costs.
+pub(super) fn leave_ends(rows: &Rows, costs: &[Vec<f64>], dear: f64, chosen: &mut [Option<usize>]) {
+    let branch = |chosen: &[Option<usize>], row: usize| {
+        chosen[row].map(|candidate| rows[row][candidate].branch)
+    };
+    let before = chosen.to_vec();
+    for row in 1..before.len() {
+        let (a, b) = (branch(&before, row - 1), branch(&before, row));
+        let (Some(a), Some(b)) = (a, b) else { continue };
+        if a == b {
+            continue;
+        }
+        for (here, other) in [(row - 1, b), (row, a)] {
+            let is_dear = before[here].is_some_and(|candidate| costs[here][candidate] > dear);
+            let has_other = rows[here].iter().any(|candidate| candidate.branch == other);
+            if is_dear && !has_other {
+                chosen[here] = None;
+            }
+        }
+    }
+}

@@ -12,7 +12,7 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Derivative, Observables, Set, measure};
 
-use super::branches::{Along, Candidate, Rows, continued, path};
+use super::branches::{Along, Candidate, Rows, continued, leave_ends, path};
 use super::data::{Column, Data, Row};
 use super::held::{HeldRow, Loop};
 use super::jumps::{Fold, Jump};
@@ -389,28 +389,29 @@ impl Problem<'_> {
         let rows = self.rows();
         let near = |k: usize| {
             let (curve, row) = rows[k];
-            !point[k].lost
-                && (0..self.data.columns.len()).all(|column| {
-                    let value = point[k].values[column];
-                    let difference = self.difference(x, curve, row, column, value);
-                    difference.is_none_or(|d| d.abs() < NEAR * self.error(row, column))
-                })
+            (0..self.data.columns.len()).all(|column| {
+                let value = point[k].values[column];
+                let difference = self.difference(x, curve, row, column, value);
+                difference.is_none_or(|d| d.abs() < NEAR * self.error(row, column))
+            })
         };
         let bases = self.cases(x);
         let mut jumps = Vec::new();
         let mut first = 0;
-        for k in 1..rows.len() {
+        let with_orbit: Vec<usize> = (0..rows.len()).filter(|k| !point[*k].lost).collect();
+        for pair in with_orbit.windows(2) {
+            let [before, k] = [pair[0], pair[1]];
             let (same_curve, same_branch) = (
-                rows[k - 1].0 == rows[k].0,
-                point[k - 1].branch == point[k].branch,
+                rows[before].0 == rows[k].0,
+                point[before].branch == point[k].branch,
             );
             if same_curve && same_branch {
                 continue;
             }
             let run = first;
             first = k;
-            let between = [rows[k - 1].1.at[0], rows[k].1.at[0]];
-            if !same_curve || between[0] == between[1] || !near(k - 1) || !near(k) {
+            let between = [rows[before].1.at[0], rows[k].1.at[0]];
+            if !same_curve || between[0] == between[1] || !near(before) || !near(k) {
                 continue;
             }
             let all = rows.iter().filter(|row| row.0 == rows[k].0);
@@ -419,7 +420,7 @@ impl Problem<'_> {
             });
             jumps.push(Jump {
                 curve: rows[k].0,
-                rows: [k - 1, k],
+                rows: [before, k],
                 first: run,
                 between,
                 reach: REACH * (high - low),
@@ -512,6 +513,8 @@ impl Problem<'_> {
         rows: &Rows,
     ) -> Point {
         const PRICE: f64 = 20.0;
+        // One residual of eight standard errors.
+        const DEAR: f64 = 18.0;
         let measured = &self.data.curves[curve].rows;
         let seen: Vec<Vec<Option<RowPoint>>> = (0..rows.len())
             .into_par_iter()
@@ -540,7 +543,8 @@ impl Problem<'_> {
             .enumerate()
             .map(|(row, points)| points.iter().map(|point| cost(row, point)).collect())
             .collect();
-        let chosen = path(rows, &costs, PRICE);
+        let mut chosen = path(rows, &costs, PRICE);
+        leave_ends(rows, &costs, DEAR, &mut chosen);
         let pick = |(row, chosen): (usize, Option<usize>)| {
             let found = chosen.and_then(|k| seen[row][k].clone());
             found.unwrap_or_else(|| RowPoint::nothing(self.data.columns.len()))

@@ -277,9 +277,14 @@ impl<'a> Search<'a> {
         values.all(|(value, error)| value.is_none() || error.is_some())
     }
 
-    /// Measured values and jumps less parameters.
+    /// Values measured where there is an orbit, and jumps, less parameters.
     pub(super) fn freedom(&self, found: &Found) -> usize {
-        self.problem.data.count() + found.jumps.len() - self.problem.parameters.len()
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let columns = 0..self.problem.data.columns.len();
+        let values: usize = columns.map(|c| self.differences(x, point, c).len()).sum();
+        (values + found.jumps.len())
+            .saturating_sub(self.problem.parameters.len())
+            .max(1)
     }
 
     /// Whether the model describes the data: what is left is small, or noise.

@@ -1,7 +1,9 @@
 //! What would be published: every crate and the Python package, each built from its own archive
 //! alone and tried in an empty environment.
 
+use std::env;
 use std::fs;
+use std::path::{Path, PathBuf};
 
 use crate::process::{output, succeeds};
 use crate::tally::Tally;
@@ -20,7 +22,10 @@ print('nanotap', nanotap.__version__, 'from its source archive:', found)";
 /// # Errors
 /// When cargo cannot be started.
 pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
+    let target = workspace.target().join("packed");
+    forget(&target);
     let mut command = workspace.cargo(&["package", "--workspace", "--locked"]);
+    command.arg("--target-dir").arg(&target);
     for own in ["xtask", "nanotap-book", "nanotap-python"] {
         command.args(["--exclude", own]);
     }
@@ -28,6 +33,29 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     command.args(["--allow-dirty", "--config", "profile.dev.opt-level=0"]);
     command.args(["--config", "profile.dev.debug=0"]);
     Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+}
+
+/// Cargo takes a version for what never changes: what it unpacked and compiled of an earlier state
+/// of the same version would stand in for what is packed now.
+fn forget(target: &Path) {
+    let _ = fs::remove_dir_all(target);
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let Some(home) = home.or_else(|| Some(env::home_dir()?.join(".cargo"))) else {
+        return;
+    };
+    let Ok(registries) = fs::read_dir(home.join("registry/src")) else {
+        return;
+    };
+    let registries = registries.flatten().filter(|registry| {
+        // One that has no host is a folder, such as cargo makes of what it packs.
+        registry.file_name().to_string_lossy().starts_with('-')
+    });
+    let unpacked = registries.filter_map(|registry| fs::read_dir(registry.path()).ok());
+    for crate_ in unpacked.flatten().flatten() {
+        if crate_.file_name().to_string_lossy().starts_with("nanotap") {
+            let _ = fs::remove_dir_all(crate_.path());
+        }
+    }
 }
 
 /// Packs the Python package's sources, installs that archive into an empty environment, and

@@ -163,9 +163,11 @@ def _drawn_at(
         for spare in flat[len(panels) :]:
             spare.remove()
         for index, (one, panel) in enumerate(zip(flat, panels, strict=False)):
-            _panel(
-                one, panel, last=index + cols >= len(panels) or not figure["share_x"]
-            )
+            lowest = index + cols >= len(panels)
+            _panel(one, panel, last=lowest or not figure["share_x"])
+            if lowest:
+                # matplotlib leaves them to the panel beneath, where there is none.
+                one.tick_params(labelbottom=True)
             one.annotate(
                 panel["letter"] or "",
                 (0, 1),

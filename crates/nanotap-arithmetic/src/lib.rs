@@ -1,4 +1,4 @@
-//! Elementary functions with the same bits on every machine.
+//! Elementary functions and eigenvalues with the same bits on every machine.
 //!
 //! The standard library takes sines and exponentials from the platform's mathematics library,
 //! which rounds differently from one platform, version and processor to another. These are
@@ -7,6 +7,10 @@
 //!
 //! [`VERSION`] is part of every dataset: what was computed with another arithmetic is not mixed
 //! with it.
+
+mod eigenvalues;
+
+pub use eigenvalues::eigenvalues;
 
 use nalgebra::{Complex, DMatrix};
 

@@ -58,6 +58,11 @@ impl Output {
         }
     }
 
+    /// Whether the result is a JSON document.
+    pub(crate) fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// A remark worth knowing.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {

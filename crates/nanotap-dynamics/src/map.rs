@@ -31,6 +31,13 @@ pub trait StroboscopicMap: Clone + Send + Sync {
     /// Length of one drive period.
     fn period(&self) -> f64;
 
+    /// How many of the last entries of the state are whole numbers that the map sets, such as
+    /// whether a neck of adhesion is there. They change by leaps from orbit to orbit along a
+    /// branch; Newton's method takes them from the map.
+    fn discrete_entries(&self) -> usize {
+        0
+    }
+
     /// Replaces `state` (length `dimension`) by `P(state)`.
     ///
     /// # Errors

@@ -70,7 +70,7 @@ impl Raster {
 pub(crate) fn encode(pixels: &[Colour], columns: usize, rows: usize, dpi: Option<f64>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, columns as u32, rows as u32);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(png::Compression::Balanced);
     if let Some(dpi) = dpi {
         // Latin letters and a known keyword: it cannot be refused.
         let _ = encoder.add_text_chunk("Software".into(), MADE_BY.into());

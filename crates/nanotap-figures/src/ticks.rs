@@ -162,7 +162,14 @@ pub fn linear(low: f64, high: f64, most: usize) -> Ticks {
     }
     Ticks {
         positions: marks.iter().map(|m| m.value().clamp(low, high)).collect(),
-        labels: marks.iter().map(|m| rest(m).text(shift)).collect(),
+        labels: marks
+            .iter()
+            // A mark at the offset, alone, needs no decimals: they line up with none.
+            .map(|m| match rest(m) {
+                _ if largest == 0.0 => "0".into(),
+                rest => rest.text(shift),
+            })
+            .collect(),
         minor: Vec::new(),
         note: (!note.is_empty()).then_some(note),
     }
@@ -332,6 +339,9 @@ mod tests {
         let near = linear(2.6, 2.6000003, 4);
         assert_eq!(near.labels, ["0", "1", "2", "3"]);
         assert_eq!(near.note.as_deref(), Some("×10^{−7} + 2.6"));
+        let one = linear(595.524318658102, 595.524318658102 * (1.0 + 1e-9), 2);
+        assert_eq!(one.labels, ["0"]);
+        assert_eq!(one.note.as_deref(), Some("+ 595.524319"));
     }
 
     #[test]

@@ -6,8 +6,8 @@
 //! force: subharmonics appear that the system does not have.
 
 use crate::system::System;
-use crate::{FlowError, Output};
-use nalgebra::DVector;
+use crate::{Complex, Drive, FlowError, HarmonicVector, Regime};
+use nalgebra::{DMatrix, DVector};
 
 /// Where within a step the regime is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +27,76 @@ pub struct FixedStep<'a> {
     switching: Switching,
     regime: usize,
     state: DVector<f64>,
+    /// The whole step of each regime; none where the stages look at the guards.
+    whole: Vec<WholeStep>,
+    /// `e^{iω_k t}` at the state's phase.
+    phasors: Vec<Complex>,
+    next: DVector<f64>,
+}
+
+/// All four stages of a step of one length in one regime. The field `A x + c + Re(z e^{iωt})`
+/// is linear, so they come to `R x + c' + Re(z' e^{iωt})` with, for `Z = h A`,
+/// `R = I + Z + Z²/2 + Z³/6 + Z⁴/24`.
+#[derive(Clone, Debug)]
+struct WholeStep {
+    length: f64,
+    matrix: DMatrix<f64>,
+    added: HarmonicVector,
+    /// `e^{iω_k h}`.
+    turns: Vec<Complex>,
+}
+
+impl WholeStep {
+    fn new(regime: &Regime, drive: &Drive, length: f64) -> Self {
+        let n = regime.matrix().nrows();
+        let one = DMatrix::identity(n, n);
+        let z = regime.matrix() * length;
+        // What the field's own part at the start, the middle and the end of a step adds.
+        let start = (&one + &z * (&one + &z * (&one + &z * 0.5) * 0.5)) * (length / 6.0);
+        let middle = (&one * 4.0 + &z * (&one * 2.0 + &z * 0.5)) * (length / 6.0);
+        let end = &one * (length / 6.0);
+        let turns = |t: f64| -> Vec<Complex> {
+            let tones = 0..drive.frequencies().len();
+            tones.map(|k| drive.phasor(k, t)).collect()
+        };
+        let later = |t: f64| HarmonicVector {
+            constant: regime.forcing().constant.clone(),
+            tones: regime
+                .forcing()
+                .tones
+                .iter()
+                .zip(turns(t))
+                .map(|(tone, turn)| tone * turn)
+                .collect(),
+        };
+        Self {
+            length,
+            matrix: &one + &z * (&one + &z * (&one + &z * (&one + &z * 0.25) / 3.0) * 0.5),
+            added: later(0.0)
+                .mapped(&start)
+                .plus(1.0, &later(0.5 * length).mapped(&middle))
+                .plus(1.0, &later(length).mapped(&end)),
+            turns: turns(length),
+        }
+    }
+
+    /// The state after the step from `x`, where the tones are at `phasors`, written to `next`.
+    fn take(&self, phasors: &mut [Complex], x: &DVector<f64>, next: &mut DVector<f64>) {
+        next.copy_from(&self.added.constant);
+        for (tone, phasor) in self.added.tones.iter().zip(&*phasors) {
+            for (next, z) in next.iter_mut().zip(tone.iter()) {
+                *next += z.re * phasor.re - z.im * phasor.im;
+            }
+        }
+        for (column, x) in self.matrix.column_iter().zip(x.iter()) {
+            for (next, m) in next.iter_mut().zip(column.iter()) {
+                *next += m * x;
+            }
+        }
+        for (phasor, turn) in phasors.iter_mut().zip(&self.turns) {
+            *phasor *= turn;
+        }
+    }
 }
 
 impl<'a> FixedStep<'a> {
@@ -67,12 +137,27 @@ impl<'a> FixedStep<'a> {
             return Err(FlowError::NotFinite { what: "the state" });
         }
         let (regime, _) = system.regime_at(x, 0.0)?;
+        let drive = system.drive();
+        let whole = match switching {
+            Switching::EveryStep => system
+                .regimes()
+                .iter()
+                .zip(steps)
+                .map(|(regime, &steps)| {
+                    WholeStep::new(regime, drive, drive.period() / f64::from(steps))
+                })
+                .collect(),
+            Switching::EveryStage => Vec::new(),
+        };
         Ok(Self {
             system,
             steps: steps.to_vec(),
             switching,
             regime,
             state: DVector::from_column_slice(x),
+            whole,
+            phasors: vec![Complex::new(1.0, 0.0); drive.frequencies().len()],
+            next: DVector::zeros(x.len()),
         })
     }
 
@@ -87,12 +172,20 @@ impl<'a> FixedStep<'a> {
         let period = self.system.drive().period();
         let mut phase = 0.0;
         let mut switches = 0;
+        self.phasors.fill(Complex::new(1.0, 0.0));
         while phase < period * (1.0 - 1e-12) {
             let step = (period / f64::from(self.steps[self.regime])).min(period - phase);
-            self.step(phase, step);
+            match self.whole.get(self.regime) {
+                Some(whole) if whole.length == step => {
+                    whole.take(&mut self.phasors, &self.state, &mut self.next);
+                    std::mem::swap(&mut self.state, &mut self.next);
+                }
+                // Stages that look at the guards; a step cut short by the period's end.
+                _ => self.step(phase, step),
+            }
             phase += step;
             watch(phase, self.state.as_slice());
-            if let Some(next) = self.passed(phase) {
+            if let Some(next) = self.passed() {
                 self.regime = next;
                 switches += 1;
             }
@@ -100,29 +193,30 @@ impl<'a> FixedStep<'a> {
         switches
     }
 
-    fn passed(&self, t: f64) -> Option<usize> {
+    fn passed(&self) -> Option<usize> {
         self.system.transitions()[self.regime]
             .iter()
-            .find(|e| self.value(&e.guard, &self.state, t) <= 0.0)
+            .find(|e| {
+                e.guard
+                    .where_tones_are(&self.phasors, self.state.as_slice())
+                    <= 0.0
+            })
             .map(|e| e.target)
     }
 
-    fn value(&self, output: &Output, x: &DVector<f64>, t: f64) -> f64 {
-        output.at(self.system.drive(), x.as_slice(), t)
-    }
-
     fn field(&self, x: &DVector<f64>, t: f64) -> DVector<f64> {
+        let drive = self.system.drive();
         let mut regime = self.regime;
         if self.switching == Switching::EveryStage {
             let transitions = &self.system.transitions()[regime];
             if let Some(e) = transitions
                 .iter()
-                .find(|e| self.value(&e.guard, x, t) <= 0.0)
+                .find(|e| e.guard.at(drive, x.as_slice(), t) <= 0.0)
             {
                 regime = e.target;
             }
         }
-        self.system.regimes()[regime].field(self.system.drive(), x, t)
+        self.system.regimes()[regime].field(drive, x, t)
     }
 
     fn step(&mut self, t: f64, h: f64) {
@@ -132,5 +226,8 @@ impl<'a> FixedStep<'a> {
         let k3 = self.field(&(x + &k2 * (0.5 * h)), t + 0.5 * h);
         let k4 = self.field(&(x + &k3 * h), t + h);
         self.state += (k1 + 2.0 * (k2 + k3) + k4) * (h / 6.0);
+        for (k, phasor) in self.phasors.iter_mut().enumerate() {
+            *phasor = self.system.drive().phasor(k, t + h);
+        }
     }
 }

@@ -193,14 +193,25 @@ impl Output {
 
     /// The value at state `x` and time `t`.
     pub fn at(&self, drive: &Drive, x: &[f64], t: f64) -> f64 {
-        let linear: f64 = self.row.iter().zip(x).map(|(r, x)| r * x).sum();
         let harmonic: f64 = self
             .tones
             .iter()
             .enumerate()
+            .filter(|(_, z)| **z != Complex::new(0.0, 0.0))
             .map(|(k, z)| (z * drive.phasor(k, t)).re)
             .sum();
-        linear + self.constant + harmonic
+        self.linear_at(x) + self.constant + harmonic
+    }
+
+    /// The value at state `x`, where `e^{iω_k t}` of the tones are `phasors`.
+    pub(crate) fn where_tones_are(&self, phasors: &[Complex], x: &[f64]) -> f64 {
+        let tones = self.tones.iter().zip(phasors);
+        let harmonic: f64 = tones.map(|(z, p)| z.re * p.re - z.im * p.im).sum();
+        self.linear_at(x) + self.constant + harmonic
+    }
+
+    fn linear_at(&self, x: &[f64]) -> f64 {
+        self.row.iter().zip(x).map(|(r, x)| r * x).sum()
     }
 
     /// Its time derivative along `ẋ = matrix · x + forcing`, again such a scalar.

@@ -11,7 +11,7 @@
 
 use crate::{Complex, FlowError};
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{DMatrix, DVector, Schur};
+use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 
 /// A group of close eigenvalues: coordinates `start..start + size` obey
@@ -71,15 +71,12 @@ impl SpectralBasis {
         let n = matrix.nrows();
         let mut balanced = matrix.clone();
         let scale = balance_parlett_reinsch(&mut balanced);
-        let eigenvalues = Schur::try_new(balanced.clone(), f64::EPSILON, 10_000 * n.max(1))
-            .ok_or(FlowError::IllConditioned { regime, digits: 16 })?
-            .complex_eigenvalues();
+        let eigenvalues = nanotap_arithmetic::eigenvalues(&balanced)
+            .ok_or(FlowError::IllConditioned { regime, digits: 16 })?;
         let mut grouping = FIRST_GROUPING;
         let mut best: Option<(f64, Self)> = None;
         while grouping <= LAST_GROUPING {
-            if let Some(mut basis) =
-                grouped_basis(&balanced, eigenvalues.as_slice(), grouping / horizon)
-            {
+            if let Some(mut basis) = grouped_basis(&balanced, &eigenvalues, grouping / horizon) {
                 let residual = basis.residual(&balanced);
                 if best.as_ref().is_none_or(|(r, _)| residual < *r) {
                     basis.finish(horizon);

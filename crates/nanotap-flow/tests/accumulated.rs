@@ -360,3 +360,41 @@ fn outputs_that_do_not_fit_are_refused() {
     request.fourier(gap, f64::NAN);
     assert!(request.plan(&system).is_err());
 }
+
+/// A whole period's flight whose least gap comes just before its end: random cases found that it
+/// lay beyond the last tabulated point, as for a quarter of all ratios of period and step.
+#[test]
+fn extrema_at_the_end_of_a_flight_are_seen() {
+    let example = Example {
+        oscillators: vec![
+            (12.5225, 1.52466, 0.0, 0.0, -0.2),
+            (9.5646, 1.1, 0.140136, 0.0, -0.49592),
+            (6.1372, 0.2821, 0.0, 0.0, -0.64619),
+            (0.3937, 0.9, 0.09016, 0.216585, 0.66778),
+            (8.1479, 0.140919, -0.1303, 0.2534, 0.83426),
+            (2.1126, 0.175934, -0.05197, 0.024156, -0.46028),
+        ],
+        offset: 0.26942,
+        stop: Stop::Rigid { e: 0.385 },
+    };
+    compare(&example).unwrap();
+}
+
+/// Terms so fast beside the drive that a table ends before the flight does, and a beat that
+/// grows up to the last period's end.
+#[test]
+fn extrema_beyond_the_table_are_seen() {
+    let mut oscillators = vec![
+        (400.0, 1e-5, 0.1, 0.0, 1.0),
+        (400.28, 1e-5, -0.1, 0.0, 1.0),
+        (4000.0, 0.001, 0.01, 0.0, 0.3),
+    ];
+    // More terms than a guard's table follows: extrema have one of their own, with finer steps.
+    oscillators.extend((0..8).map(|j| (500.0 + 20.0 * f64::from(j), 0.05, 1e-3, 0.0, 0.2)));
+    let example = Example {
+        oscillators,
+        offset: 1.0,
+        stop: Stop::Rigid { e: 0.4 },
+    };
+    compare(&example).unwrap();
+}

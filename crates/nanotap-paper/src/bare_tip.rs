@@ -25,7 +25,7 @@ struct Bare {
 /// One reading of the three figures.
 struct Reading {
     counted: Rc<Counted>,
-    orbits: Vec<PeriodicOrbit>,
+    orbits: Rc<[PeriodicOrbit]>,
 }
 
 impl Reading {

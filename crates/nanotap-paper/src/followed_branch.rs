@@ -2,8 +2,8 @@
 //! sections ask of it: its extrema, its bifurcations, where it attracts.
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationOptions, Direction,
-    MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
+    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationError, ContinuationOptions,
+    Direction, MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
 };
 
 use super::PaperError;
@@ -69,20 +69,23 @@ impl FollowedBranch {
         range: (f64, f64),
     ) -> Result<Self, PaperError> {
         let family = case.family(OMEGA);
-        let options = ContinuationOptions::over(range.0, range.1);
-        let follow = |direction| -> Result<Branch, PaperError> {
-            runs.controlled(|control| {
-                continue_orbit(&family, entry, orbit, direction, &options, control)
-            })
-            .map_err(|error| PaperError::Failed {
-                what: format!("the period-{} branch from Ω = {entry}", orbit.period),
-                why: error.to_string(),
-            })
+        let options = ContinuationOptions {
+            max_step: 0.1,
+            ..ContinuationOptions::over(range.0, range.1)
         };
-        let (down, up) = (
-            follow(Direction::Decreasing)?,
-            follow(Direction::Increasing)?,
-        );
+        let (down, up) = runs.controlled(|control| {
+            let follow =
+                |direction| continue_orbit(&family, entry, orbit, direction, &options, control);
+            rayon::join(
+                || follow(Direction::Decreasing),
+                || follow(Direction::Increasing),
+            )
+        });
+        let failed = |error: ContinuationError| PaperError::Failed {
+            what: format!("the period-{} branch from Ω = {entry}", orbit.period),
+            why: error.to_string(),
+        };
+        let (down, up) = (down.map_err(failed)?, up.map_err(failed)?);
         let mut points = points_of(&down, case)?;
         points.reverse();
         // Reversed, a bifurcation lies before the point that it lay after.

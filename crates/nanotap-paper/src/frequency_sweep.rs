@@ -1,7 +1,10 @@
 //! What attracts at each drive frequency, from several starts: the columns of a
 //! bifurcation diagram, of the cantilever or of an oscillator.
 
-use nanotap_dynamics::{ClassifyOptions, LyapunovOptions, MotionKind, PeriodicOrbit, classify};
+use nanotap_dynamics::{
+    AttractorKind, CensusOptions, ClassifyOptions, Control, LyapunovOptions, StroboscopicMap as _,
+    census,
+};
 use nanotap_figures::{Colour, Panel, Points};
 use nanotap_flow::Trajectory;
 use nanotap_flow::trajectory::PiecewiseSignal;
@@ -18,6 +21,8 @@ use nanotap::study::start_box::default_box;
 const SHOWN: usize = 48;
 /// Longest period looked for.
 const LONGEST: usize = 32;
+/// Starts of a column that are followed before its attractors are known.
+const PILOTS: usize = 2;
 
 /// What a motion is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,7 +52,6 @@ impl Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Seen {
     pub(super) kind: Kind,
-    orbit: Option<PeriodicOrbit>,
     /// Greatest value of what is drawn in each of its drive periods: the deflection W of
     /// the cantilever's tip, the distance of an oscillator from its stop.
     maxima: Vec<f64>,
@@ -132,48 +136,51 @@ fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> 
         what: "the box of starts".into(),
         why: error.to_string(),
     })?;
-    let mut map = Strobe::new(&model);
-    let budgets = budgets();
+    let options = CensusOptions {
+        pilots: PILOTS,
+        classify: budgets(),
+        ..CensusOptions::default()
+    };
+    let starts = area.starts(SEED, starts);
+    let found = census(&Strobe::new(&model), &starts, &options, &Control::default());
+    let seen = |kind, state: &[f64], periods| -> Result<Seen, PaperError> {
+        let maxima = maxima(&model, state, periods)?;
+        Ok(Seen { kind, maxima })
+    };
     let mut motions: Vec<Seen> = Vec::new();
-    for start in area.starts(SEED, starts) {
-        let classified = classify(&mut map, &start, &budgets);
-        let (kind, orbit) = match classified.kind {
-            MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
-                (Kind::Periodic(orbit.period), Some(orbit))
+    for attractor in found.attractors {
+        let state = &attractor.state;
+        motions.push(match attractor.kind {
+            AttractorKind::Periodic(orbit) => {
+                seen(Kind::Periodic(orbit.period), &orbit.states[0], orbit.period)
             }
-            MotionKind::QuasiPeriodic(_) => (Kind::Torus, None),
-            MotionKind::Chaotic(_) => (Kind::Chaos, None),
-            MotionKind::Unbounded | MotionKind::Undecided { .. } => (Kind::Undecided, None),
-        };
-        let known = motions.iter().any(|m| match (&m.orbit, &orbit) {
-            (Some(a), Some(b)) => a.is_same_as(b),
-            (None, None) => m.kind == kind,
-            _ => false,
-        });
-        if !known {
-            let (state, periods) = match &orbit {
-                Some(orbit) => (&orbit.states[0], orbit.period),
-                None => (&classified.state, SHOWN),
-            };
-            let maxima = maxima(&model, state, periods)?;
-            motions.push(Seen {
-                kind,
-                orbit,
-                maxima,
-            });
+            AttractorKind::QuasiPeriodic(_) => seen(Kind::Torus, state, SHOWN),
+            AttractorKind::Chaotic { .. } => seen(Kind::Chaos, state, SHOWN),
+        }?);
+    }
+    if let Some((start, _)) = found.undecided.first() {
+        let mut state = starts[*start].clone();
+        let mut map = Strobe::new(&model);
+        for _ in 0..options.classify.max_transient {
+            map.advance(&mut state).map_err(|error| not_drawn(&error))?;
         }
+        motions.push(seen(Kind::Undecided, &state, SHOWN)?);
     }
     Ok(Column { at, motions })
+}
+
+fn not_drawn(error: &impl ToString) -> PaperError {
+    PaperError::Failed {
+        what: "a motion's maxima".into(),
+        why: error.to_string(),
+    }
 }
 
 /// Greatest deflection of the tip away from the sample (of an oscillator: distance from its
 /// stop) in each of `periods` drive periods from `state`.
 pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec<f64>, PaperError> {
     let trajectory =
-        Trajectory::record(&model.system, state, periods).map_err(|error| PaperError::Failed {
-            what: "a motion's maxima".into(),
-            why: error.to_string(),
-        })?;
+        Trajectory::record(&model.system, state, periods).map_err(|error| not_drawn(&error))?;
     let signal = trajectory.signal(if model.beam.is_some() {
         &model.tip
     } else {
@@ -274,13 +281,13 @@ pub(super) fn where_seen(columns: &[Column], kind: impl Fn(&Column) -> bool) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nanotap_dynamics::{MotionKind, classify};
 
     fn column(at: f64, kinds: &[Kind]) -> Column {
         let motions = kinds
             .iter()
             .map(|kind| Seen {
                 kind: *kind,
-                orbit: None,
                 maxima: vec![1.0],
             })
             .collect();

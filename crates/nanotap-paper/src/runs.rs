@@ -36,7 +36,15 @@ pub(super) struct Runs<'a> {
     /// Percent reported so far: progress never goes back.
     reported: AtomicUsize,
     counts: RefCell<Vec<Rc<Counted>>>,
+    found: RefCell<Vec<Found>>,
     spurious: RefCell<Option<Rc<super::time_step::Scan>>>,
+}
+
+/// The orbits of a case that one search found.
+struct Found {
+    case: Cantilever,
+    search: OrbitSearch,
+    orbits: Rc<[PeriodicOrbit]>,
 }
 
 impl<'a> Runs<'a> {
@@ -47,6 +55,7 @@ impl<'a> Runs<'a> {
             share: Cell::new((0.0, 1.0)),
             reported: AtomicUsize::new(0),
             counts: RefCell::default(),
+            found: RefCell::default(),
             spurious: RefCell::default(),
         }
     }
@@ -119,23 +128,35 @@ impl<'a> Runs<'a> {
     }
 
     /// Every periodic orbit up to `longest`, stable or not, that Newton reaches from
-    /// starts in the box and from near returns of runs of `run` periods.
+    /// starts in the box and from near returns of runs of `run` periods, looked for when it
+    /// is first asked for.
     pub(super) fn orbits(
         &self,
         counted: &Counted,
         longest: usize,
         run: usize,
-    ) -> Result<Vec<PeriodicOrbit>, PaperError> {
+    ) -> Result<Rc<[PeriodicOrbit]>, PaperError> {
         let starts = start_box(&counted.model)?;
         let search = OrbitSearch {
             max_period: longest,
             run,
             ..OrbitSearch::default()
         };
+        let same = |f: &&Found| f.case == counted.case && f.search == search;
+        if let Some(known) = self.found.borrow().iter().find(same) {
+            return Ok(Rc::clone(&known.orbits));
+        }
         let map = Strobe::new(&counted.model);
         let count = self.either(64, 12);
-        Ok(self
-            .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control)))
+        let orbits: Rc<[PeriodicOrbit]> = self
+            .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control))
+            .into();
+        self.found.borrow_mut().push(Found {
+            case: counted.case.clone(),
+            search,
+            orbits: Rc::clone(&orbits),
+        });
+        Ok(orbits)
     }
 
     /// `count` starts in the box of a case.

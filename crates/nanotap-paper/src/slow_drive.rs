@@ -34,7 +34,7 @@ const SHOWN: (usize, usize) = (16, 200);
 /// The case of both figures with its census and its orbits, stable or not.
 struct Slow {
     counted: Rc<Counted>,
-    orbits: Vec<PeriodicOrbit>,
+    orbits: Rc<[PeriodicOrbit]>,
 }
 
 impl Slow {

@@ -7,7 +7,7 @@
 //! them, once each.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::complex::Rectangle;
 use crate::interval::Interval;
@@ -102,11 +102,11 @@ pub(crate) fn approximate_pairs(matrix: &DMatrix<f64>) -> Option<Vec<Pair>> {
     if matrix.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let values = Schur::try_new(matrix.clone(), f64::EPSILON, 10_000 * n)?.complex_eigenvalues();
+    let values = nanotap_arithmetic::eigenvalues(matrix)?;
     let complex = matrix.map(|x| Complex::new(x, 0.0));
     let size = matrix.amax().max(f64::MIN_POSITIVE);
     let mut pairs = Vec::with_capacity(n);
-    for &value in values.iter() {
+    for value in values {
         let factor = (0..6).find_map(|k| {
             let off = f64::EPSILON * size * 8.0_f64.powi(k);
             let mut shifted = complex.clone();
@@ -206,4 +206,101 @@ fn enclosed_pair(
         unknown = next;
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An eigenvalue and its vector, the largest entry 1, of a matrix that has them by a closed form.
+    struct Known {
+        matrix: [[f64; 3]; 3],
+        value: Complex<f64>,
+        vector: [Complex<f64>; 3],
+    }
+
+    fn known() -> Vec<Known> {
+        let real = |x: f64| Complex::new(x, 0.0);
+        // Triangular: eigenvalues on the diagonal, vectors by back substitution.
+        let triangular = [[2.0, 1.0, 3.0], [0.0, 5.0, -1.0], [0.0, 0.0, -4.0]];
+        // The companion of (x − 3)(x² + 2x + 5): vectors (1, λ, λ²)/λ².
+        let companion = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [15.0, 1.0, 1.0]];
+        let of = |matrix, value, vector| Known {
+            matrix,
+            value,
+            vector,
+        };
+        vec![
+            of(triangular, real(2.0), [1.0, 0.0, 0.0].map(real)),
+            of(triangular, real(5.0), [1.0 / 3.0, 1.0, 0.0].map(real)),
+            of(
+                triangular,
+                real(-4.0),
+                [-14.0 / 27.0, 1.0 / 9.0, 1.0].map(real),
+            ),
+            of(companion, real(3.0), [1.0 / 9.0, 1.0 / 3.0, 1.0].map(real)),
+            of(
+                companion,
+                Complex::new(-1.0, 2.0),
+                [
+                    Complex::new(-3.0, 4.0) / 25.0,
+                    Complex::new(-1.0, -2.0) / 5.0,
+                    real(1.0),
+                ],
+            ),
+        ]
+    }
+
+    /// From a pair that is off by so much that the square of it counts, what is enclosed is the
+    /// true one, or nothing is.
+    #[test]
+    fn a_coarse_pair_is_enclosed_or_refused() {
+        let (mut enclosed, mut refused) = (0, 0);
+        for Known {
+            matrix,
+            value,
+            vector,
+        } in known()
+        {
+            let intervals = Matrix::from_fn(3, 3, |i, j| Interval::point(matrix[i][j]));
+            let fixed = (0..3)
+                .find(|&i| vector[i] == Complex::new(1.0, 0.0))
+                .unwrap();
+            for k in 0..240_usize {
+                let size = nanotap_arithmetic::powf(10.0, -0.025 * k as f64);
+                // Irregular directions; of a real pair they are real.
+                let mut turn = 0.37 * k as f64;
+                let mut off = || {
+                    turn += 2.4;
+                    let im = if value.im == 0.0 {
+                        0.0
+                    } else {
+                        nanotap_arithmetic::cos(turn)
+                    };
+                    Complex::new(nanotap_arithmetic::sin(turn), im) * size
+                };
+                let coarse = value + off();
+                let mut beside = DVector::from_fn(3, |i, _| vector[i] + off());
+                beside[fixed] = Complex::new(1.0, 0.0);
+                if (0..3).any(|i| i != fixed && beside[i].norm_sqr() >= 1.0) {
+                    continue;
+                }
+                let Some((found, around)) = enclosed_pair(&intervals, coarse, &beside) else {
+                    refused += 1;
+                    continue;
+                };
+                enclosed += 1;
+                let holds = |z: Rectangle, x: Complex<f64>| {
+                    let reach = 1e-15 * (1.0 + x.norm_sqr());
+                    let near = |z: Interval, x: f64| !z.is_disjoint(Interval::around(x, reach));
+                    near(z.re, x.re) && near(z.im, x.im)
+                };
+                assert!(holds(found, value), "{value}, off by {size}: {found:?}");
+                for (z, x) in around.iter().zip(vector) {
+                    assert!(holds(*z, x), "{value}, off by {size}: {around:?}");
+                }
+            }
+        }
+        assert!(enclosed > 400 && refused > 20, "{enclosed} {refused}");
+    }
 }

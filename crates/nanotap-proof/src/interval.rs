@@ -416,3 +416,56 @@ impl std::iter::Sum for Interval {
         all.fold(Self::ZERO, |sum, x| sum + x)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 32 bits each of the hexadecimal digits of π after the point, and of ln 2 (π as in the
+    /// tables of the cipher Blowfish; both are Machin-like sums to 400 bits).
+    const PI: [u32; 6] = [
+        0x243f_6a88,
+        0x85a3_08d3,
+        0x1319_8a2e,
+        0x0370_7344,
+        0xa409_3822,
+        0x299f_31d0,
+    ];
+    const LOGARITHM: [u32; 6] = [
+        0xb172_17f7,
+        0xd1cf_79ab,
+        0xc9e3_b398,
+        0x03f2_f6af,
+        0x40f3_4326,
+        0x7298_b62d,
+    ];
+
+    /// The number with the binary digits from `from` up to `to` of these, of which the first
+    /// counts 2^`top`, rounded to nearest once.
+    fn part(digits: &[bool], from: usize, to: usize, top: i32) -> f64 {
+        let bits = digits[from..to]
+            .iter()
+            .fold(0_u128, |n, &bit| 2 * n + u128::from(bit));
+        bits as f64 * 2.0_f64.powi(top + 1 - to as i32)
+    }
+
+    fn digits(words: &[u32]) -> impl Iterator<Item = bool> {
+        words
+            .iter()
+            .flat_map(|word| (0..32).rev().map(move |k| word >> k & 1 == 1))
+    }
+
+    /// Two parts of π/2 are 33 of its binary digits each, the third is the rest rounded; the first
+    /// part of ln 2 is its first 32, the second the rest rounded.
+    #[test]
+    fn the_parts_of_a_quarter_turn_and_of_the_logarithm_of_two_are_their_digits() {
+        // 3 = 11 in binary, and π/2 begins with 1.
+        let quarter: Vec<bool> = [true, true].into_iter().chain(digits(&PI)).collect();
+        assert_eq!(QUARTER[0], part(&quarter, 0, 33, 0));
+        assert_eq!(QUARTER[1], part(&quarter, 33, 66, 0));
+        assert_eq!(QUARTER[2], part(&quarter, 66, 190, 0));
+        let two: Vec<bool> = digits(&LOGARITHM).collect();
+        assert_eq!(LN_2[0], part(&two, 0, 32, -1));
+        assert_eq!(LN_2[1], part(&two, 32, 160, -1));
+    }
+}

@@ -89,7 +89,7 @@ impl Recipe {
                 control: *control,
             };
             match recipe.compute(&store, &work) {
-                Ok(()) | Err(WorkError::Cancelled { .. }) => Ok(()),
+                Ok(()) | Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
                 Err(WorkError::Store(error)) => Err(error.into()),
             }
         })?;
@@ -164,7 +164,7 @@ impl Receiver {
             control: Control::default(),
         };
         match self.recipe.compute(&self.store, &work) {
-            Ok(()) | Err(WorkError::Cancelled { .. }) => Ok(()),
+            Ok(()) | Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
             Err(WorkError::Store(error)) => Err(Failure::from(error).into()),
         }
     }

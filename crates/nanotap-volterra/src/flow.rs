@@ -80,6 +80,8 @@ pub struct Flow {
     /// The last accepted step, not yet handed on: a step that ends a contact may cut it.
     pending: Step,
     has_pending: bool,
+    /// Whether `work.modal` are the modal coordinates at its end.
+    reached: bool,
     /// Length numbers that were accepted last on each branch.
     hints: Vec<usize>,
     work: Work,
@@ -129,6 +131,7 @@ impl Flow {
             step: Step::new(&system),
             pending: Step::new(&system),
             has_pending: false,
+            reached: false,
             hints: vec![FIRST_INDEX; system.law().branches()],
             work: Work {
                 values: zeros.clone(),
@@ -268,6 +271,7 @@ impl Flow {
                 self.step.end = u;
                 std::mem::swap(&mut self.step, &mut self.pending);
                 self.has_pending = true;
+                self.reached = false;
                 self.pinned = None;
                 self.onset = None;
                 self.time = end;
@@ -337,7 +341,7 @@ impl Flow {
                             self.commit_pending(system, end, observer);
                             return Ok(None);
                         }
-                        self.commit_pending(system, start, observer);
+                        self.commit_to_step(system, observer);
                         return Ok(Some((exit, 1.0)));
                     }
                     self.solver.statistics.refused += 1;
@@ -440,7 +444,7 @@ impl Flow {
                 } else {
                     (2.0 * nanotap_arithmetic::log2(0.5 / quality.truncation) / degree)
                         .floor()
-                        .clamp(0.0, 2.0) as usize
+                        .clamp(0.0, 3.0) as usize
                 };
                 Attempt::Whole(growth)
             }
@@ -457,7 +461,9 @@ impl Flow {
         self.commit_pending(system, f64::INFINITY, observer);
         std::mem::swap(&mut self.step, &mut self.pending);
         self.has_pending = true;
-        self.pending.modal_at(system, 1.0, &mut self.modal);
+        self.pending.modal_at(system, 1.0, &mut self.work.modal);
+        self.reached = true;
+        self.modal.copy_from_slice(&self.work.modal);
         self.time = self.pending.time(1.0);
         self.pinned = None;
         self.onset = None;
@@ -482,13 +488,22 @@ impl Flow {
             step.modal_at(system, step.end, &mut self.work.modal);
             self.modal.copy_from_slice(&self.work.modal);
             self.time = until;
-        } else if step.end < 1.0 {
+        } else if !self.reached {
             step.modal_at(system, step.end, &mut self.work.modal);
-        } else {
-            step.modal_at(system, 1.0, &mut self.work.modal);
         }
         self.solver.statistics.steps += 1;
         observer.step(system, &mut self.solver, step, &self.work.modal);
+    }
+
+    /// Hands on the pending step, cut where the step in `self.step` begins on it.
+    fn commit_to_step<O: Observer>(&mut self, system: &System, observer: &mut O) {
+        self.has_pending = false;
+        let step = &mut self.pending;
+        self.time = self.step.start;
+        step.end = step.map.variable(step.length, self.time - step.start);
+        self.modal.copy_from_slice(&self.step.modal);
+        self.solver.statistics.steps += 1;
+        observer.step(system, &mut self.solver, step, &self.step.modal);
     }
 
     /// Cuts the step in `self.step` at `u`, hands it on and switches.
@@ -520,8 +535,23 @@ impl Flow {
                 if near || !(next > 0.0 && next <= 1.0) || next == self.step.end {
                     break;
                 }
+                let time_shift = self.step.time(next) - time;
+                let kernel = system.kernel();
+                if kernel.along_tangent(time_shift) {
+                    let force = self.step.force_at(self.step.end);
+                    kernel.modes().apply(&self.modal, &mut self.work.modal);
+                    for ((y, slope), b) in self
+                        .modal
+                        .iter_mut()
+                        .zip(&self.work.modal)
+                        .zip(&kernel.source)
+                    {
+                        *y += time_shift * (slope + b * force);
+                    }
+                } else {
+                    self.step.modal_at(system, next, &mut self.modal);
+                }
                 self.step.end = next;
-                self.step.modal_at(system, next, &mut self.modal);
             }
         }
         self.time = self.step.end_time();
@@ -693,8 +723,9 @@ impl Flow {
             .modes()
             .blocks()
             .iter()
-            .filter(|block| block.rate() * self.step.length > n)
-            .map(|block| {
+            .zip(&kernel.rates)
+            .filter(|(_, rate)| **rate * self.step.length > n)
+            .map(|(block, _)| {
                 let norm = |v: &[f64]| {
                     v[block.start..block.start + block.size]
                         .iter()

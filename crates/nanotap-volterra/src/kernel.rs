@@ -6,7 +6,11 @@
 //! between them, and on the modal coordinates at the end depends on the step's length and on
 //! how `u` runs with time, and on nothing else. Lengths are `h₀ 2^{−k/2}`.
 
+// Only what is inlined into a function for wide registers gets their instructions.
+#![allow(clippy::inline_always)]
+
 use crate::VolterraError;
+use crate::linear::{dot_body, wide_registers};
 use crate::modes::{Block, Modes};
 use crate::quadrature::{
     chebyshev_basis, chebyshev_coefficients, chebyshev_nodes, gauss_legendre, series_at,
@@ -27,6 +31,8 @@ const PANEL_POINTS: usize = 24;
 /// its error is rounding: modes turn by less than half a radian between them, and the force's
 /// polynomials by less than half a turn.
 const SHORT_POINTS: usize = 10;
+/// How far a mode turns at most where its tangent will do: half the square is far below rounding.
+const TANGENT: f64 = 3e-9;
 /// How far a mode may turn or decay within one panel.
 const PANEL_REACH: f64 = 8.0;
 
@@ -92,6 +98,10 @@ pub struct Kernel {
     pub(crate) points: Vec<f64>,
     /// From values at the nodes to coefficients, column-major.
     pub(crate) coefficients: Vec<f64>,
+    /// Its last two rows.
+    pub(crate) last_coefficients: [Vec<f64>; 2],
+    /// A bound of each block's rates.
+    pub(crate) rates: Vec<f64>,
     longest: f64,
     /// Bound of the amplitude in the gap that a unit impulse of force excites.
     pub(crate) reach: f64,
@@ -120,8 +130,14 @@ pub(crate) struct Table {
     pub(crate) carry: Vec<f64>,
     /// `e^{Bh}` of each block.
     pub(crate) exponentials: Vec<[[f64; 2]; 2]>,
-    /// Sums of the sizes in the rows of `gap_force` and `rate_force`, at the nodes.
-    pub(crate) row_sums: Vec<[f64; 2]>,
+    /// Gap at the points from a constant unit force.
+    pub(crate) gap_unit: Vec<f64>,
+    /// Its rate.
+    pub(crate) rate_unit: Vec<f64>,
+    /// Sums of the sizes in the rows of `gap_force`, at the nodes.
+    pub(crate) gap_sums: Vec<f64>,
+    /// The same of `rate_force`.
+    pub(crate) rate_sums: Vec<f64>,
 }
 
 /// Nodes and weights of a Gauss–Legendre rule on [0, 1].
@@ -133,6 +149,114 @@ fn rule<const POINTS: usize>() -> Rule<POINTS> {
         std::array::from_fn(|i| nodes[i]),
         std::array::from_fn(|i| weights[i]),
     )
+}
+
+/// A part of a step with the points of a Gauss–Legendre rule.
+#[derive(Debug)]
+struct Panel<const POINTS: usize> {
+    /// Time of its end since the start of the step.
+    end: f64,
+    /// The points.
+    places: [f64; POINTS],
+    /// Times from the points to its end.
+    rests: [f64; POINTS],
+    /// Weights in time.
+    weights: [f64; POINTS],
+}
+
+impl<const POINTS: usize> Panel<POINTS> {
+    fn new(rule: &Rule<POINTS>, map: TimeMap, h: f64, [from, to]: [f64; 2]) -> Self {
+        let end = map.time(h, to);
+        let places = rule.0.map(|x| from + (to - from) * x);
+        Self {
+            end,
+            places,
+            rests: places.map(|u| end - map.time(h, u)),
+            weights: std::array::from_fn(|i| rule.1[i] * (to - from) * map.rate(h, places[i])),
+        }
+    }
+
+    /// The weights times a series in the step's variable.
+    fn weighted(&self, coefficients: &[f64]) -> [f64; POINTS] {
+        wide_registers!([const POINTS: usize] weighted(
+            panel: &Panel<POINTS> = self,
+            coefficients: &[f64] = coefficients,
+        ) -> [f64; POINTS])
+    }
+
+    /// `∫ (C, S) F` over the panel for a force times its weights, `C` and `S` as in
+    /// [`Block::short_exps`].
+    fn response(&self, block: &Block, force: &[f64; POINTS]) -> [f64; 2] {
+        wide_registers!([const POINTS: usize] response(
+            panel: &Panel<POINTS> = self,
+            block: &Block = block,
+            force: &[f64; POINTS] = force,
+        ) -> [f64; 2])
+    }
+
+    /// `(C, S)` of [`Block::short_exps`] from the points to the end.
+    fn exponentials(&self, block: &Block) -> ([f64; POINTS], [f64; POINTS]) {
+        wide_registers!([const POINTS: usize] exponentials(
+            panel: &Panel<POINTS> = self,
+            block: &Block = block,
+        ) -> ([f64; POINTS], [f64; POINTS]))
+    }
+
+    /// The same for each polynomial `T_j` of the step's variable instead of the force.
+    fn moments(&self, block: &Block, out: &mut [[f64; 2]]) {
+        wide_registers!([const POINTS: usize] moments(
+            panel: &Panel<POINTS> = self,
+            block: &Block = block,
+            out: &mut [[f64; 2]] = out,
+        ));
+    }
+}
+
+#[inline(always)]
+fn weighted<const POINTS: usize>(panel: &Panel<POINTS>, coefficients: &[f64]) -> [f64; POINTS] {
+    let mut values = series_at(coefficients, &panel.places);
+    for (value, weight) in values.iter_mut().zip(&panel.weights) {
+        *value *= weight;
+    }
+    values
+}
+
+#[inline(always)]
+fn exponentials<const POINTS: usize>(
+    panel: &Panel<POINTS>,
+    block: &Block,
+) -> ([f64; POINTS], [f64; POINTS]) {
+    block.short_exps(&panel.rests)
+}
+
+#[inline(always)]
+fn response<const POINTS: usize>(
+    panel: &Panel<POINTS>,
+    block: &Block,
+    force: &[f64; POINTS],
+) -> [f64; 2] {
+    let (even, odd) = block.short_exps(&panel.rests);
+    [dot_body(&even, force), dot_body(&odd, force)]
+}
+
+#[inline(always)]
+fn moments<const POINTS: usize>(panel: &Panel<POINTS>, block: &Block, out: &mut [[f64; 2]]) {
+    let (mut even, mut odd) = block.short_exps(&panel.rests);
+    for i in 0..POINTS {
+        even[i] *= panel.weights[i];
+        odd[i] *= panel.weights[i];
+    }
+    let x = panel.places.map(|u| 2.0 * u - 1.0);
+    // T₋₁ = T₁.
+    let (mut before, mut basis) = (x, [1.0; POINTS]);
+    for out in out {
+        *out = [dot_body(&even, &basis), dot_body(&odd, &basis)];
+        for i in 0..POINTS {
+            let next = 2.0 * x[i] * basis[i] - before[i];
+            before[i] = basis[i];
+            basis[i] = next;
+        }
+    }
 }
 
 impl Kernel {
@@ -188,6 +312,7 @@ impl Kernel {
         let source: Vec<f64> = (modes.left() * &column).iter().copied().collect();
         let mut reach = 0.0;
         let mut rate_readout = vec![0.0; n];
+        let rates = modes.blocks().iter().map(Block::rate).collect();
         for block in modes.blocks() {
             let s = block.start;
             let norm = |v: &[f64]| {
@@ -208,6 +333,7 @@ impl Kernel {
         if direct.abs() > 1e-9 * reach {
             return Err(VolterraError::Inertialess);
         }
+        let coefficients = chebyshev_coefficients(nodes);
         let mut points = chebyshev_nodes(nodes);
         // Between the nodes, where the polynomial's error is largest, spread over the step.
         for k in 0..CHECKS {
@@ -223,7 +349,14 @@ impl Kernel {
             column,
             nodes,
             points,
-            coefficients: chebyshev_coefficients(nodes),
+            last_coefficients: [2, 1].map(|from_end| {
+                coefficients
+                    .chunks_exact(nodes)
+                    .map(|column| column[nodes - from_end])
+                    .collect()
+            }),
+            coefficients,
+            rates,
             longest,
             reach,
             panel: rule(),
@@ -245,6 +378,12 @@ impl Kernel {
     /// The column of the force.
     pub fn column(&self) -> &DVector<f64> {
         &self.column
+    }
+
+    /// Whether the modal coordinates follow their tangent to rounding for this time.
+    pub(crate) fn along_tangent(&self, time: f64) -> bool {
+        let fastest = self.rates.iter().copied().fold(0.0, f64::max);
+        time.abs() * fastest < TANGENT
     }
 
     /// Length of the steps number `index`.
@@ -281,7 +420,10 @@ impl Kernel {
             between: vec![0.0; CHECKS * n],
             carry: vec![0.0; dimension * n],
             exponentials: self.modes.blocks().iter().map(|b| b.exp(h)).collect(),
-            row_sums: vec![[0.0; 2]; n],
+            gap_unit: vec![0.0; rows],
+            rate_unit: vec![0.0; rows],
+            gap_sums: vec![0.0; n],
+            rate_sums: vec![0.0; n],
         };
         let mut moments = vec![[0.0; 2]; n];
         let (mut of_gap, mut of_rate) = (vec![0.0; n], vec![0.0; n]);
@@ -321,9 +463,12 @@ impl Kernel {
                 table.gap_force[node * rows + i] = dot(&of_gap);
                 table.rate_force[node * rows + i] = dot(&of_rate);
             }
+            table.gap_unit[i] = of_gap[0];
+            table.rate_unit[i] = of_rate[0];
             if i < n {
                 let sum = |m: &[f64]| (0..n).map(|node| m[node * rows + i].abs()).sum::<f64>();
-                table.row_sums[i] = [sum(&table.gap_force), sum(&table.rate_force)];
+                table.gap_sums[i] = sum(&table.gap_force);
+                table.rate_sums[i] = sum(&table.rate_force);
             }
         }
         let mut basis = vec![0.0; n];
@@ -359,24 +504,18 @@ impl Kernel {
         }
         let panels = Self::panels(block, map, h, u);
         let width = u / panels as f64;
-        let end = map.time(h, u);
         let source = self.source_of(block);
-        let mut basis = [0.0; MAX_NODES];
-        let basis = &mut basis[..out.len()];
+        let mut sums = [[0.0; 2]; MAX_NODES];
+        let sums = &mut sums[..out.len()];
         for panel in 0..panels {
-            for (x, w) in self.panel.0.iter().zip(&self.panel.1) {
-                let at = width * (panel as f64 + x);
-                let weight = w * width * map.rate(h, at);
-                let e = block.exp(end - map.time(h, at));
-                let value = [
-                    weight * (e[0][0] * source[0] + e[0][1] * source[1]),
-                    weight * (e[1][0] * source[0] + e[1][1] * source[1]),
-                ];
-                chebyshev_basis(at, basis);
-                for (out, t) in out.iter_mut().zip(basis.iter()) {
-                    out[0] += value[0] * t;
-                    out[1] += value[1] * t;
-                }
+            let ends = [width * panel as f64, width * (panel + 1) as f64];
+            let panel = Panel::new(&self.panel, map, h, ends);
+            panel.moments(block, sums);
+            let e = block.exp(map.time(h, u) - panel.end);
+            for (out, [even, odd]) in out.iter_mut().zip(sums.iter()) {
+                let [x, y] = block.turn(*even, *odd, source);
+                out[0] += e[0][0] * x + e[0][1] * y;
+                out[1] += e[1][0] * x + e[1][1] * y;
             }
         }
     }
@@ -403,9 +542,8 @@ impl Kernel {
         out: &mut [f64],
     ) {
         let end = map.time(h, u);
-        let mut panels = 0;
-        // (time to the end, weighted force) at the quadrature points.
-        let mut forces: Vec<(f64, f64)> = Vec::new();
+        // The panels of the block before, with the force on them times the weights.
+        let mut panels: Vec<(Panel<PANEL_POINTS>, [f64; PANEL_POINTS])> = Vec::new();
         for block in self.modes.blocks() {
             let s = block.start;
             let e = block.exp(end);
@@ -415,40 +553,25 @@ impl Kernel {
                 e[1][0] * y[s] + e[1][1] * second,
             ];
             let needed = Self::panels(block, map, h, u);
-            if needed != panels {
-                panels = needed;
-                self.forces(map, h, u, panels, coefficients, &mut forces);
+            if needed != panels.len() {
+                let width = u / needed as f64;
+                panels.clear();
+                panels.extend((0..needed).map(|panel| {
+                    let ends = [width * panel as f64, width * (panel + 1) as f64];
+                    let panel = Panel::new(&self.panel, map, h, ends);
+                    let weighted = panel.weighted(coefficients);
+                    (panel, weighted)
+                }));
             }
             let source = self.source_of(block);
-            for &(rest, force) in &forces {
-                if force != 0.0 {
-                    let e = block.exp(rest);
-                    value[0] += force * (e[0][0] * source[0] + e[0][1] * source[1]);
-                    value[1] += force * (e[1][0] * source[0] + e[1][1] * source[1]);
-                }
+            for (panel, force) in &panels {
+                let [even, odd] = panel.response(block, force);
+                let [x, y] = block.turn(even, odd, source);
+                let e = block.exp(end - panel.end);
+                value[0] += e[0][0] * x + e[0][1] * y;
+                value[1] += e[1][0] * x + e[1][1] * y;
             }
             out[s..s + block.size].copy_from_slice(&value[..block.size]);
-        }
-    }
-
-    fn forces(
-        &self,
-        map: TimeMap,
-        h: f64,
-        u: f64,
-        panels: usize,
-        coefficients: &[f64],
-        out: &mut Vec<(f64, f64)>,
-    ) {
-        out.clear();
-        let end = map.time(h, u);
-        let width = u / panels as f64;
-        for panel in 0..panels {
-            let places = self.panel.0.each_ref().map(|x| width * (panel as f64 + x));
-            let values = series_at(coefficients, &places);
-            for ((at, force), w) in places.into_iter().zip(values).zip(&self.panel.1) {
-                out.push((end - map.time(h, at), w * width * map.rate(h, at) * force));
-            }
         }
     }
 
@@ -465,29 +588,69 @@ impl Kernel {
         if from == to {
             return;
         }
-        let end = map.time(h, to);
-        let places = self.short.0.map(|x| from + (to - from) * x);
-        let forces = series_at(coefficients, &places);
-        let silent = forces.iter().all(|force| *force == 0.0);
-        let parts: [(f64, f64); SHORT_POINTS] = std::array::from_fn(|i| {
-            let weight = self.short.1[i] * (to - from) * map.rate(h, places[i]);
-            (end - map.time(h, places[i]), weight * forces[i])
-        });
+        let panel = Panel::new(&self.short, map, h, [from, to]);
+        let time = panel.end - map.time(h, from);
+        let force = panel.weighted(coefficients);
+        let silent = force.iter().all(|force| *force == 0.0);
         for block in self.modes.blocks() {
             let y = &mut y[block.start..block.start + block.size];
-            let source = self.source_of(block);
-            let e = block.exp(end - map.time(h, from));
+            let e = block.exp(time);
             let second = y.get(1).copied().unwrap_or(0.0);
             let mut value = [
                 e[0][0] * y[0] + e[0][1] * second,
                 e[1][0] * y[0] + e[1][1] * second,
             ];
-            for &(rest, force) in parts.iter().filter(|_| !silent) {
-                let e = block.exp(rest);
-                value[0] += force * (e[0][0] * source[0] + e[0][1] * source[1]);
-                value[1] += force * (e[1][0] * source[0] + e[1][1] * source[1]);
+            if !silent {
+                let [even, odd] = panel.response(block, &force);
+                let [x, y] = block.turn(even, odd, self.source_of(block));
+                value[0] += x;
+                value[1] += y;
             }
             y.copy_from_slice(&value[..block.size]);
+        }
+    }
+
+    /// The same of many motions with their coefficients, a column each.
+    pub(crate) fn between_all(
+        &self,
+        map: TimeMap,
+        h: f64,
+        [from, to]: [f64; 2],
+        y: &mut [f64],
+        coefficients: &[f64],
+    ) {
+        if from == to {
+            return;
+        }
+        let panel = Panel::new(&self.short, map, h, [from, to]);
+        let time = panel.end - map.time(h, from);
+        let forces: Vec<[f64; SHORT_POINTS]> = coefficients
+            .chunks_exact(self.nodes)
+            .map(|column| panel.weighted(column))
+            .collect();
+        for block in self.modes.blocks() {
+            let e = block.exp(time);
+            let (even, odd) = if forces.is_empty() {
+                ([0.0; SHORT_POINTS], [0.0; SHORT_POINTS])
+            } else {
+                panel.exponentials(block)
+            };
+            let source = self.source_of(block);
+            for (k, y) in y.chunks_exact_mut(self.modes.dimension()).enumerate() {
+                let y = &mut y[block.start..block.start + block.size];
+                let second = y.get(1).copied().unwrap_or(0.0);
+                let mut value = [
+                    e[0][0] * y[0] + e[0][1] * second,
+                    e[1][0] * y[0] + e[1][1] * second,
+                ];
+                if let Some(force) = forces.get(k) {
+                    let (even, odd) = (dot_body(&even, force), dot_body(&odd, force));
+                    let [x, y] = block.turn(even, odd, source);
+                    value[0] += x;
+                    value[1] += y;
+                }
+                y.copy_from_slice(&value[..block.size]);
+            }
         }
     }
 

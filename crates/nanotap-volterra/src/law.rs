@@ -103,10 +103,20 @@ pub trait ForceLaw: Debug + Send + Sync {
         true
     }
 
-    /// The force at the nodes of a step, as [`ForceLaw::force`] at each.
-    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
-        for ((out, gap), rate) in out.iter_mut().zip(gaps).zip(rates) {
-            *out = self.force(branch, *gap, *rate);
+    /// The force at the nodes of a step and its derivatives by gap and rate, as
+    /// [`ForceLaw::force`] at each. All slices are of one length.
+    fn forces(
+        &self,
+        branch: usize,
+        gaps: &[f64],
+        rates: &[f64],
+        [values, by_gap, by_rate]: [&mut [f64]; 3],
+    ) {
+        for (i, (gap, rate)) in gaps.iter().zip(rates).enumerate() {
+            let force = self.force(branch, *gap, *rate);
+            values[i] = force.value;
+            by_gap[i] = force.by_gap;
+            by_rate[i] = force.by_rate;
         }
     }
 

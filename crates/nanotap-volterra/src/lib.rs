@@ -8,7 +8,7 @@
 //! Chebyshev nodes, so that Newton solves for the forces at the nodes whatever the number of
 //! modes. Where a contact begins or ends like a power of the root of time, the polynomial is
 //! one in the root of time, and a step that ends a contact moves its start until it ends
-//! exactly there. Jacobian and parameter derivatives come from the same factorisation.
+//! exactly there. Jacobian and parameter derivatives come from one factorisation a step.
 //!
 //! - [`modes`]: the linear modes in real blocks; [`kernel`]: their Green's function
 //!   integrated against a step's polynomials, tabulated by step length;
@@ -112,6 +112,7 @@ pub mod modes;
 pub mod system;
 pub mod tangent;
 pub mod trajectory;
+pub mod variation;
 
 mod bracket;
 mod linear;
@@ -130,3 +131,4 @@ pub use step::Statistics;
 pub use system::{Drive, Options, System, Tone};
 pub use tangent::{Parameter, ToneChange};
 pub use trajectory::{Node, Output, Sample, Trajectory};
+pub use variation::{Moment, Reading, Variation, VariedOutput};

@@ -5,9 +5,12 @@
 //! 2 × 2 block whose exponential is written with `cos`, `cosh` and their quotients, smooth
 //! through the defective case. Three or more coinciding eigenvalues are refused.
 
+// Only what is inlined into a function for wide registers gets their instructions.
+#![allow(clippy::inline_always)]
+
 use crate::{Complex, VolterraError};
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{DMatrix, DVector, Schur};
+use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 
 /// The largest dimension of the state.
@@ -16,6 +19,8 @@ pub const MAX_DIMENSION: usize = 200;
 const CLOSE: f64 = 0.05;
 /// A basis must rebuild its matrix to this relative accuracy.
 const ACCEPTED_RESIDUAL: f64 = 1e-9;
+/// Times in [`Block::short_exps`] are halved so often at most.
+const MAX_DOUBLINGS: usize = 40;
 
 /// One or two coordinates that the linear flow couples to no others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +48,76 @@ impl Block {
         let decay = nanotap_arithmetic::exp(mean * t);
         let (even, odd) = even_and_odd(discriminant, t, mean, decay);
         [[even + odd * half, odd * b], [odd * c, even - odd * half]]
+    }
+
+    /// `e^{Bt} = C + S N` with `N` as in [`Self::turn`], as `(C, S)` at many times over which the
+    /// block turns or decays little: the series of a part of each time, doubled up again. No
+    /// function is called, so that all times are worked on together.
+    #[inline(always)]
+    pub(crate) fn short_exps<const P: usize>(&self, times: &[f64; P]) -> ([f64; P], [f64; P]) {
+        let [[a, b], [c, d]] = self.matrix;
+        let (mean, discriminant) = if self.size == 1 {
+            (a, 0.0)
+        } else {
+            let half = 0.5 * (a - d);
+            (0.5 * (a + d), half * half + b * c)
+        };
+        let longest = times.iter().fold(0.0, |m, t| f64::max(m, t.abs()));
+        let mut reach = longest * self.rate();
+        let (mut doublings, mut part) = (0, 1.0);
+        while reach > 1.0 && doublings < MAX_DOUBLINGS {
+            reach *= 0.5;
+            part *= 0.5;
+            doublings += 1;
+        }
+        let gentle = mean.abs() * longest * part < 1.0 / 16.0;
+        let (mut even, mut odd) = ([0.0; P], [0.0; P]);
+        for i in 0..P {
+            let t = part * times[i];
+            let z = discriminant * t * t;
+            let w = mean * t;
+            // The terms left out are below 1/18!.
+            let (mut cosine, mut sine, mut decay) = (1.0, 1.0, 1.0);
+            for k in (1..9).rev() {
+                let k = 2.0 * k as f64;
+                cosine = 1.0 + cosine * z * (1.0 / ((k - 1.0) * k));
+                sine = 1.0 + sine * z * (1.0 / (k * (k + 1.0)));
+            }
+            if gentle {
+                // Below (1/16)⁹/9!.
+                for k in (1..9).rev() {
+                    decay = 1.0 + decay * w * (1.0 / k as f64);
+                }
+            } else {
+                for k in (1..18).rev() {
+                    decay = 1.0 + decay * w * (1.0 / k as f64);
+                }
+            }
+            even[i] = decay * cosine;
+            odd[i] = decay * (t * sine);
+        }
+        for _ in 0..doublings {
+            for i in 0..P {
+                let (c, s) = (even[i], odd[i]);
+                even[i] = c * c + discriminant * (s * s);
+                odd[i] = 2.0 * (c * s);
+            }
+        }
+        (even, odd)
+    }
+
+    /// `(C + S N) b`, where `B = μ + N` with the mean `μ` of its diagonal.
+    #[inline]
+    pub(crate) fn turn(&self, even: f64, odd: f64, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [[a, b], [c, d]] = self.matrix;
+        if self.size == 1 {
+            return [even * x, 0.0];
+        }
+        let half = 0.5 * (a - d);
+        [
+            even * x + odd * (half * x + b * y),
+            even * y + odd * (c * x - half * y),
+        ]
     }
 
     /// A bound of the eigenvalues' sizes.
@@ -103,15 +178,14 @@ impl Modes {
         let n = check_square(matrix)?;
         let mut balanced = matrix.clone();
         let scale = balance_parlett_reinsch(&mut balanced);
-        let eigenvalues = Schur::try_new(balanced.clone(), f64::EPSILON, 10_000 * n)
-            .ok_or(VolterraError::IllConditioned {
+        let eigenvalues =
+            nanotap_arithmetic::eigenvalues(&balanced).ok_or(VolterraError::IllConditioned {
                 residual: f64::INFINITY,
-            })?
-            .complex_eigenvalues();
+            })?;
         let mut right = DMatrix::zeros(n, n);
         let mut sizes = Vec::new();
         let mut column = 0;
-        for group in groups(eigenvalues.as_slice()) {
+        for group in groups(&eigenvalues) {
             let basis = group.basis(&balanced)?;
             if column + basis.ncols() > n {
                 return Err(VolterraError::IllConditioned {
@@ -515,6 +589,29 @@ mod tests {
                 let reference = nanotap_arithmetic::matrix_exp(&(&a * t));
                 let error = (exponential(&modes, t) - &reference).amax();
                 assert!(error < 1e-11 * (1.0 + reference.amax()), "{error}");
+            }
+        }
+    }
+
+    #[test]
+    fn short_exponentials_are_the_exponentials() {
+        for (stiffness, damping) in [(1.0, 0.1), (400.0, 0.0), (1.0, 9.0), (1.0, 2.0)] {
+            let block = Modes::from_oscillators(&[(stiffness, damping)])
+                .unwrap()
+                .blocks()[0];
+            for reach in [1e-3, 0.7, 8.0] {
+                let end = reach / block.rate();
+                let times = [0.0, 0.1, 0.5, 1.0].map(|x| x * end);
+                let (even, odd) = block.short_exps(&times);
+                for (k, t) in times.into_iter().enumerate() {
+                    let e = block.exp(t);
+                    for (j, unit) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+                        let found = block.turn(even[k], odd[k], unit);
+                        let size = 1.0 + e[0][j].abs() + e[1][j].abs();
+                        assert!((found[0] - e[0][j]).abs() < 2e-14 * size);
+                        assert!((found[1] - e[1][j]).abs() < 2e-14 * size);
+                    }
+                }
             }
         }
     }

@@ -1,5 +1,8 @@
 //! Gauss–Legendre quadrature and Chebyshev interpolation on `[0, 1]`.
 
+// Only what is inlined into a function for wide registers gets their instructions.
+#![allow(clippy::inline_always)]
+
 use std::f64::consts::PI;
 
 /// Nodes on `[0, 1]` and weights of the Gauss–Legendre rule with `count` points, by Newton
@@ -97,6 +100,7 @@ pub(crate) fn series(coefficients: &[f64], u: f64) -> f64 {
 }
 
 /// [`series`] at many points at once.
+#[inline(always)]
 pub(crate) fn series_at<const N: usize>(coefficients: &[f64], u: &[f64; N]) -> [f64; N] {
     let x = u.map(|u| 2.0 * u - 1.0);
     let (mut b1, mut b2) = ([0.0; N], [0.0; N]);

@@ -2,22 +2,28 @@
 
 use crate::error::Refusal;
 use crate::kernel::{CHECKS, MAX_NODES, Table, TimeMap};
-use crate::law::Force;
-use crate::linear::{add_product, add_rows, factor, solve};
+pub(crate) use crate::linear::largest;
+use crate::linear::{
+    add_product, add_rows, dot, factor, largest_sum, largest_terms, next_term, solve,
+};
 use crate::quadrature::series;
 use crate::system::System;
-use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Newton steps before a shorter step is tried.
 const MAX_ITERATIONS: usize = 20;
 /// Part of the allowed error that the iteration may leave.
 const LEFT: f64 = 0.05;
-/// Below this contraction number plain iteration is cheaper than a factorisation.
-const CONTRACTION: f64 = 0.1;
+/// Part of a residual that its correction may leave for the next.
+const ENOUGH: f64 = 0.0003;
+/// The same on a step with a fixed end, whose place is found to rounding.
+const ENOUGH_AT_END: f64 = 1e-6;
+/// Terms of a correction's series before a factorisation is tried.
+const MAX_TERMS: usize = 16;
 /// How much the force may amplify an error on one step, as `∫|G| |∂F|`: by `cosh √(2κ)`, 27.
 const STEEPEST: f64 = 8.0;
-/// A tail of the law, along a guess of the motion, that no iteration will mend.
-const HOPELESS: f64 = 1e4;
+/// A tail of the law, along the first guess of the motion and the second, that no iteration
+/// will mend.
+const HOPELESS: [f64; 2] = [1e7, 1e4];
 
 /// A step with its forces. Points are the nodes, then the check points.
 #[derive(Clone, Debug)]
@@ -151,13 +157,18 @@ pub(crate) struct Solver {
     shift_gap: Vec<f64>,
     shift_rate: Vec<f64>,
     residual: Vec<f64>,
+    /// A term of [`Solver::correct`], what it does to gap and rate, and the sums of these.
+    term: Vec<f64>,
+    image: [Vec<f64>; 2],
+    change: [Vec<f64>; 2],
     matrix: Vec<f64>,
     pivots: Vec<usize>,
     column: Vec<f64>,
     slope: Vec<f64>,
-    evaluated: Vec<Force>,
+    /// The law's values.
+    evaluated: Vec<f64>,
     /// Whether the law needs the rate.
-    rates: bool,
+    pub(crate) rates: bool,
     /// Bounds of the gap and its rate on the present step.
     scale: (f64, f64),
     /// The law's derivative by the gap at a pinned end.
@@ -176,7 +187,7 @@ pub struct Statistics {
     pub iterations: u64,
     /// Evaluations of the law.
     pub evaluations: u64,
-    /// Factorisations.
+    /// Factorisations, where no series would do and for derivatives.
     pub factorisations: u64,
     /// Switches of the law.
     pub switches: u64,
@@ -192,11 +203,14 @@ impl Solver {
             shift_gap: vec![0.0; rows],
             shift_rate: vec![0.0; rows],
             residual: vec![0.0; n],
+            term: vec![0.0; n],
+            image: [vec![0.0; n], vec![0.0; n]],
+            change: [vec![0.0; n], vec![0.0; n]],
             matrix: vec![0.0; n * n],
             pivots: vec![0; n],
             column: vec![0.0; n],
             slope: vec![0.0; system.dimension()],
-            evaluated: vec![Force::default(); n],
+            evaluated: vec![0.0; n],
             rates: system.law().depends_on_rate(),
             scale: (0.0, 0.0),
             end_slope: 0.0,
@@ -220,27 +234,55 @@ impl Solver {
             let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * step.start);
             let re = amplitude.re * cos - amplitude.im * sin;
             let im = amplitude.re * sin + amplitude.im * cos;
-            for (i, [c, s]) in phasors[k * rows..(k + 1) * rows].iter().enumerate() {
-                self.base_gap[i] += re * c - im * s;
-                self.base_rate[i] -= tone.frequency * (re * s + im * c);
+            let phasors = &phasors[2 * k * rows..2 * (k + 1) * rows];
+            add_product(phasors, &[re, -im], &mut self.base_gap);
+            if system.needs_rate {
+                let rate = [-tone.frequency * im, -tone.frequency * re];
+                add_product(phasors, &rate, &mut self.base_rate);
             }
         }
         add_product(&table.gap, &step.modal, &mut self.base_gap);
-        add_product(&table.rate, &step.modal, &mut self.base_rate);
+        if system.needs_rate {
+            add_product(&table.rate, &step.modal, &mut self.base_rate);
+        }
     }
 
-    /// The gap, its rate and the law at the nodes for the step's present forces; the law's
-    /// values less the forces go to `residual`. Returns the gap's excess over the pinned end.
-    fn evaluate(&mut self, system: &System, table: &Table, step: &mut Step) -> f64 {
+    /// The gap and its rate at the nodes for the step's present forces.
+    fn follow(&self, table: &Table, step: &mut Step) {
         let n = step.forces.len();
         let rows = n + CHECKS;
-        let law = system.law();
-        step.gap[..n].copy_from_slice(&self.base_gap[..n]);
-        add_rows(&table.gap_force, rows, &step.forces, &mut step.gap[..n]);
+        let constant = step.forces.iter().all(|force| *force == step.forces[0]);
+        let add = |matrix: &[f64], unit: &[f64], base: &[f64], out: &mut [f64]| {
+            if constant {
+                for ((out, base), unit) in out.iter_mut().zip(base).zip(unit) {
+                    *out = base + step.forces[0] * unit;
+                }
+            } else {
+                out.copy_from_slice(&base[..n]);
+                add_rows(matrix, rows, &step.forces, out);
+            }
+        };
+        add(
+            &table.gap_force,
+            &table.gap_unit,
+            &self.base_gap,
+            &mut step.gap[..n],
+        );
         if self.rates {
-            step.rate[..n].copy_from_slice(&self.base_rate[..n]);
-            add_rows(&table.rate_force, rows, &step.forces, &mut step.rate[..n]);
+            add(
+                &table.rate_force,
+                &table.rate_unit,
+                &self.base_rate,
+                &mut step.rate[..n],
+            );
         }
+    }
+
+    /// The law at the nodes for the step's present gap and rate; the law's values less the
+    /// forces go to `residual`. Returns the gap's excess over the pinned end.
+    fn evaluate(&mut self, system: &System, step: &mut Step) -> f64 {
+        let n = step.forces.len();
+        let law = system.law();
         let mut excess = 0.0;
         if let Some(level) = step.pinned_end {
             excess = step.gap[n - 1] - level;
@@ -253,12 +295,15 @@ impl Solver {
             step.branch,
             &step.gap[..n],
             &step.rate[..n],
-            &mut self.evaluated,
+            [&mut self.evaluated, &mut step.by_gap, &mut step.by_rate],
         );
-        for (i, force) in self.evaluated.iter().enumerate() {
-            self.residual[i] = force.value - step.forces[i];
-            step.by_gap[i] = force.by_gap;
-            step.by_rate[i] = force.by_rate;
+        for ((r, law), force) in self
+            .residual
+            .iter_mut()
+            .zip(&self.evaluated)
+            .zip(&step.forces)
+        {
+            *r = law - force;
         }
         // Where the gap is held its slope is of no use to Newton, and may be infinite.
         if step.pinned_end.is_some() {
@@ -272,12 +317,14 @@ impl Solver {
     }
 
     /// Gap and rate at all points for forces that have been found.
-    fn complete(&mut self, table: &Table, step: &mut Step) {
+    fn complete(&mut self, system: &System, table: &Table, step: &mut Step) {
         let n = step.forces.len();
         step.gap.copy_from_slice(&self.base_gap);
         add_product(&table.gap_force, &step.forces, &mut step.gap);
         step.rate.copy_from_slice(&self.base_rate);
-        add_product(&table.rate_force, &step.forces, &mut step.rate);
+        if system.needs_rate {
+            add_product(&table.rate_force, &step.forces, &mut step.rate);
+        }
         if let Some(level) = step.pinned_end {
             step.gap[n - 1] = level;
         }
@@ -306,6 +353,63 @@ impl Solver {
     /// Solves with the last factors, in place.
     pub(crate) fn back_substitute(&self, x: &mut [f64]) {
         solve(&self.matrix, x.len(), &self.pivots, x);
+    }
+
+    /// Turns `residual` into the correction of the forces, `(1 − ∂F_d W − ∂F_v W')⁻¹` of it, by
+    /// the series of that inverse: it converges as every Volterra equation's does, like that of
+    /// `cosh √(2κ)`, and a term costs a product. Terms are summed until the next is `enough`;
+    /// what the sum does to gap and rate is left in `change`. Returns the size of that next term, if
+    /// it comes to that.
+    fn correct(&mut self, table: &Table, step: &Step, enough: f64) -> Option<f64> {
+        let n = step.forces.len();
+        let rows = n + CHECKS;
+        self.term.copy_from_slice(&self.residual);
+        self.change[0].fill(0.0);
+        self.change[1].fill(0.0);
+        for _ in 0..MAX_TERMS {
+            self.image[0].fill(0.0);
+            add_rows(&table.gap_force, rows, &self.term, &mut self.image[0]);
+            if self.rates {
+                self.image[1].fill(0.0);
+                add_rows(&table.rate_force, rows, &self.term, &mut self.image[1]);
+            }
+            let slopes: [&[f64]; 2] = [&step.by_gap, &step.by_rate];
+            let images = [&self.image[0][..], &self.image[1][..]];
+            next_term(slopes, images, &mut self.change, &mut self.term);
+            let size = largest(&self.term);
+            if size <= enough {
+                return Some(size);
+            }
+            for (x, t) in self.residual.iter_mut().zip(&self.term) {
+                *x += t;
+            }
+        }
+        None
+    }
+
+    /// As [`Self::correct`] for a step with a fixed end, of `residual` or of `column`, as far as
+    /// the end needs it. Returns what the correction does to the gap at the end.
+    fn correct_end(&mut self, table: &Table, step: &Step, of_column: bool) -> Option<f64> {
+        let (n, rows) = (step.forces.len(), step.gap.len());
+        if of_column {
+            std::mem::swap(&mut self.residual, &mut self.column);
+        }
+        let mut asked = [0.0; MAX_NODES];
+        asked[..n].copy_from_slice(&self.residual);
+        let size = largest(&self.residual);
+        let mut effect = None;
+        if self.correct(table, step, ENOUGH_AT_END * size).is_some() {
+            effect = Some(self.change[0][n - 1]);
+        } else if self.factor(table, step) {
+            self.residual.copy_from_slice(&asked[..n]);
+            solve(&self.matrix, n, &self.pivots, &mut self.residual);
+            let last_row = table.gap_force[n - 1..].iter().step_by(rows);
+            effect = Some(last_row.zip(&self.residual).map(|(w, x)| w * x).sum());
+        }
+        if of_column {
+            std::mem::swap(&mut self.residual, &mut self.column);
+        }
+        effect
     }
 
     /// Solves the step for its forces.
@@ -337,11 +441,12 @@ impl Solver {
             .value;
         step.forces.fill(start);
         self.scale = gap_scale(system, &step.modal);
-        let mut factored = false;
-        let mut last = f64::INFINITY;
+        // No rate is known before the second.
+        let mut last = 0.0;
+        self.follow(table, step);
         for round in 0..MAX_ITERATIONS {
             self.statistics.iterations += 1;
-            self.evaluate(system, table, step);
+            self.evaluate(system, step);
             let size = largest(&self.residual);
             if !size.is_finite() {
                 return Err(Refusal::Newton);
@@ -352,9 +457,9 @@ impl Solver {
                 return self.assess(system, table, step, allowed, rounding);
             }
             // Where the law along the first guesses is far from resolved, so is its solution.
-            if round == 1 {
+            if round < HOPELESS.len() {
                 let error = self.tail_of_law(system) / allowed;
-                if error > HOPELESS {
+                if error > HOPELESS[round] {
                     return Ok(Quality {
                         error,
                         truncation: error,
@@ -362,16 +467,21 @@ impl Solver {
                     });
                 }
             }
-            let contraction = steepness(table, step);
-            // What will be left after this correction: by the bound of a plain iteration, by
-            // the rate of the last two under one factorisation.
-            let left = if contraction > CONTRACTION {
-                let rate = size / last;
-                if !factored || rate > 0.02 {
-                    if !self.factor(table, step) {
-                        return Err(Refusal::Newton);
-                    }
-                    factored = true;
+            // What will be left after this correction: what its series leaves, and no more than
+            // by the bound of a plain iteration, or by the rate of the last two corrections.
+            let enough = (ENOUGH * size).max(0.5 * LEFT * allowed);
+            let rate = steepness(table, step).min(size / last);
+            last = size;
+            let summed = self.correct(table, step, enough);
+            let left = (rate * size).max(summed.unwrap_or(0.0));
+            if summed.is_none() {
+                self.residual
+                    .iter_mut()
+                    .zip(&self.evaluated)
+                    .zip(&step.forces)
+                    .for_each(|((r, law), force)| *r = law - force);
+                if !self.factor(table, step) {
+                    return Err(Refusal::Newton);
                 }
                 solve(
                     &self.matrix,
@@ -379,14 +489,23 @@ impl Solver {
                     &self.pivots,
                     &mut self.residual,
                 );
-                if last.is_finite() { rate * size } else { size }
-            } else {
-                contraction * size
-            };
-            last = size;
+            }
             self.add_residual(step);
             if left <= LEFT * allowed {
                 return self.assess(system, table, step, allowed, rounding);
+            }
+            if summed.is_some() {
+                let [gap, rate] = &self.change;
+                for (v, change) in step.gap.iter_mut().zip(gap) {
+                    *v += change;
+                }
+                if self.rates {
+                    for (v, change) in step.rate.iter_mut().zip(rate) {
+                        *v += change;
+                    }
+                }
+            } else {
+                self.follow(table, step);
             }
         }
         Err(Refusal::Newton)
@@ -400,18 +519,8 @@ impl Solver {
 
     /// The size of the last two coefficients of the law's values at the nodes.
     fn tail_of_law(&self, system: &System) -> f64 {
-        let n = self.evaluated.len();
-        let mut last = [0.0; 2];
-        for (column, force) in system
-            .kernel()
-            .coefficients
-            .chunks_exact(n)
-            .zip(&self.evaluated)
-        {
-            last[0] += column[n - 2] * force.value;
-            last[1] += column[n - 1] * force.value;
-        }
-        last[0].abs() + last[1].abs()
+        let [one, other] = &system.kernel().last_coefficients;
+        dot(one, &self.evaluated).abs() + dot(other, &self.evaluated).abs()
     }
 
     /// Solves a step that ends where the gap reaches `step.pinned_end`, by moving its start
@@ -427,23 +536,29 @@ impl Solver {
         step.length = table.length;
         step.end = 1.0;
         let n = step.forces.len();
-        let rows = n + CHECKS;
         let (earliest, latest) = (before.start, before.time(1.0));
         self.scale = gap_scale(system, &before.modal);
         let scale = self.scale.0;
-        let mut first = true;
+        let mut moved = f64::INFINITY;
         for _ in 0..MAX_ITERATIONS {
             self.statistics.iterations += 1;
             let u = before
                 .map
                 .variable(before.length, step.start - before.start);
-            before.modal_at(system, u, &mut step.modal);
+            let first = moved.is_infinite();
+            if kernel.along_tangent(moved) {
+                for (y, s) in step.modal.iter_mut().zip(&self.slope) {
+                    *y += moved * s;
+                }
+            } else {
+                before.modal_at(system, u, &mut step.modal);
+            }
             self.free(system, table, step);
             if first {
                 step.forces.fill(before.force_at(u));
-                first = false;
             }
-            let excess = self.evaluate(system, table, step);
+            self.follow(table, step);
+            let excess = self.evaluate(system, step);
             let size = largest(&self.residual);
             if !(size.is_finite() && excess.is_finite()) {
                 return Err(Refusal::Newton);
@@ -451,34 +566,30 @@ impl Solver {
             let floor = 8.0 * f64::EPSILON * scale;
             let (allowed, rounding) = self.allowed(system, table, step);
             if size <= 0.1 * allowed && excess.abs() <= floor {
-                self.add_residual(step);
-                if !step.moving_end {
-                    // A variation at fixed time changes the gap at the end.
-                    step.by_gap[n - 1] = self.end_slope;
-                }
-                return self.assess(system, table, step, allowed, rounding);
-            }
-            if !self.factor(table, step) {
-                return Err(Refusal::Newton);
+                return self.assess_end(system, table, step, allowed, rounding);
             }
             self.shift(system, table, step, before.force_at(u));
             for i in 0..n {
                 self.column[i] =
                     step.by_gap[i] * self.shift_gap[i] + step.by_rate[i] * self.shift_rate[i];
             }
-            solve(&self.matrix, n, &self.pivots, &mut self.residual);
-            solve(&self.matrix, n, &self.pivots, &mut self.column);
-            let effect = |x: &[f64]| -> f64 {
-                (0..n)
-                    .map(|j| table.gap_force[j * rows + n - 1] * x[j])
-                    .sum()
+            let (Some(by_residual), Some(by_start)) = (
+                self.correct_end(table, step, false),
+                self.correct_end(table, step, true),
+            ) else {
+                return Err(Refusal::Newton);
             };
-            let slope = self.shift_gap[n - 1] + effect(&self.column);
-            let delta = -(excess + effect(&self.residual)) / slope;
+            let delta = -(excess + by_residual) / (self.shift_gap[n - 1] + by_start);
             if !delta.is_finite() {
                 return Err(Refusal::Newton);
             }
-            step.start += delta;
+            // Late times are too coarse for the gap at the end to be less than its own rounding.
+            if delta.abs() <= 2.0 * f64::EPSILON * step.start.abs() && size <= allowed {
+                return self.assess_end(system, table, step, allowed, rounding);
+            }
+            let start = step.start + delta;
+            moved = start - step.start;
+            step.start = start;
             for ((force, r), c) in step.forces.iter_mut().zip(&self.residual).zip(&self.column) {
                 *force += r + c * delta;
             }
@@ -487,6 +598,24 @@ impl Solver {
             }
         }
         Err(Refusal::Newton)
+    }
+
+    /// The tests of a step with a fixed end, after the last correction of its forces.
+    fn assess_end(
+        &mut self,
+        system: &System,
+        table: &Table,
+        step: &mut Step,
+        allowed: f64,
+        rounding: f64,
+    ) -> Result<Quality, Refusal> {
+        self.add_residual(step);
+        if !step.moving_end {
+            // A variation at fixed time changes the gap at the end.
+            let last = step.forces.len() - 1;
+            step.by_gap[last] = self.end_slope;
+        }
+        self.assess(system, table, step, allowed, rounding)
     }
 
     /// How gap and rate at the points change as the start of the step moves along the motion,
@@ -520,15 +649,9 @@ impl Solver {
     /// and the latter alone.
     fn allowed(&self, system: &System, table: &Table, step: &Step) -> (f64, f64) {
         let wanted = system.options().tolerance / (table.length * system.kernel().reach);
-        let (gap, rate) = self.scale;
-        let n = step.forces.len();
-        let mut rounding: f64 = 0.0;
-        for i in 0..n {
-            rounding = rounding.max(
-                step.forces[i].abs() + step.by_gap[i].abs() * gap + step.by_rate[i].abs() * rate,
-            );
-        }
-        let rounding = 2.0 * f64::EPSILON * rounding;
+        let slopes: [&[f64]; 2] = [&step.by_gap, &step.by_rate];
+        let size = largest_terms(&step.forces, slopes, self.scale.into());
+        let rounding = 2.0 * f64::EPSILON * size;
         (wanted.max(rounding), rounding)
     }
 
@@ -542,7 +665,7 @@ impl Solver {
         rounding: f64,
     ) -> Result<Quality, Refusal> {
         let n = step.forces.len();
-        self.complete(table, step);
+        self.complete(system, table, step);
         step.coefficients.fill(0.0);
         add_product(
             &system.kernel().coefficients,
@@ -581,34 +704,22 @@ impl Solver {
 
 /// `max |∂F_d| ∫|G| + |∂F_v| ∫|G'|` over the nodes.
 fn steepness(table: &Table, step: &Step) -> f64 {
-    step.by_gap
-        .iter()
-        .zip(&step.by_rate)
-        .zip(&table.row_sums)
-        .map(|((d, v), sums)| d.abs() * sums[0] + v.abs() * sums[1])
-        .fold(0.0, f64::max)
+    largest_sum(
+        &step.by_gap,
+        &table.gap_sums,
+        &step.by_rate,
+        &table.rate_sums,
+    )
 }
 
 /// Bounds of the gap and its rate over the motion to come, for what rounding makes of them.
 pub(crate) fn gap_scale(system: &System, y: &[f64]) -> (f64, f64) {
     let kernel = system.kernel();
-    let mut gap = system.gap_constant.abs();
-    let mut rate = 0.0;
-    for (tone, amplitude) in system.drive().tones.iter().zip(&system.gap_tones) {
-        gap += amplitude.modulus();
-        rate += amplitude.modulus() * tone.frequency;
-    }
+    let [tones, mut rate] = system.gap_sizes;
+    let mut gap = system.gap_constant.abs() + tones;
     for (k, y) in y.iter().enumerate() {
         gap += (kernel.readout[k] * y).abs();
         rate += (kernel.rate_readout[k] * y).abs();
     }
     (gap, rate)
-}
-
-pub(crate) fn largest(values: &[f64]) -> f64 {
-    debug_assert!(values.len() <= MAX_NODES + CHECKS);
-    // A NaN must not be lost in the maximum.
-    values
-        .iter()
-        .fold(0.0, |m, v| if v.abs() <= m { m } else { v.abs() })
 }

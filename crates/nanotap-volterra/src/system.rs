@@ -1,7 +1,7 @@
 //! Modes, drive and law together.
 
 use crate::kernel::{Kernel, LENGTHS, TimeMap};
-use crate::law::{Exit, ForceLaw};
+use crate::law::{Exit, ForceLaw, Guard};
 use crate::{Complex, VolterraError};
 use nalgebra::DVector;
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -70,11 +70,15 @@ pub struct System {
     /// Complex amplitudes of the gap's forced part.
     pub(crate) gap_tones: Vec<Complex>,
     pub(crate) gap_constant: f64,
+    /// Sizes of the drive's part in the gap and in its rate.
+    pub(crate) gap_sizes: [f64; 2],
+    /// Whether a step needs the gap's rate: the law or a guard does.
+    pub(crate) needs_rate: bool,
     phasors: Arc<[Vec<OnceLock<Phasors>>; 3]>,
 }
 
-/// Cosine and sine of every tone at the points of a table.
-type Phasors = Vec<[f64; 2]>;
+/// Cosines and sines of every tone at the points of a table.
+type Phasors = Vec<f64>;
 
 /// A constant and complex amplitudes of the tones.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,12 +172,23 @@ impl System {
                 .map(|(r, z)| z * *r)
                 .sum()
         };
-        let gap_tones = drive
+        let gap_tones: Vec<Complex> = drive
             .tones
             .iter()
             .zip(&response.tones)
             .map(|(tone, y)| tone.gap + dot(y))
             .collect();
+        let mut gap_sizes = [0.0; 2];
+        for (tone, amplitude) in drive.tones.iter().zip(&gap_tones) {
+            let size = amplitude.modulus();
+            gap_sizes[0] += size;
+            gap_sizes[1] += size * tone.frequency;
+        }
+        let needs_rate = law.depends_on_rate()
+            || exits
+                .iter()
+                .flatten()
+                .any(|exit| matches!(exit.guard, Guard::Turns | Guard::Own(_)));
         let gap_constant = drive.offset
             + kernel
                 .readout
@@ -191,6 +206,8 @@ impl System {
             response,
             gap_tones,
             gap_constant,
+            gap_sizes,
+            needs_rate,
             phasors: Arc::new(std::array::from_fn(|_| {
                 (0..LENGTHS).map(|_| OnceLock::new()).collect()
             })),
@@ -250,18 +267,18 @@ impl System {
         &self.forced
     }
 
-    /// `e^{iω t}` of every tone, tone after tone, at the points of a table.
-    pub(crate) fn phasors(&self, map: TimeMap, index: usize) -> &[[f64; 2]] {
+    /// `cos ωt` at the points of a table, then `sin ωt`, tone after tone.
+    pub(crate) fn phasors(&self, map: TimeMap, index: usize) -> &[f64] {
         self.phasors[map as usize][index].get_or_init(|| {
             let table = self.kernel.table(map, index);
             self.drive
                 .tones
                 .iter()
                 .flat_map(|tone| {
-                    table.times.iter().map(|t| {
-                        let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * t);
-                        [cos, sin]
-                    })
+                    let angles = table.times.iter().map(|t| tone.frequency * t);
+                    let (sines, cosines): (Vec<f64>, Vec<f64>) =
+                        angles.map(nanotap_arithmetic::sin_cos).unzip();
+                    cosines.into_iter().chain(sines)
                 })
                 .collect()
         })

@@ -63,12 +63,14 @@ impl Parameter {
 
 /// The change of the linear forced motion.
 #[derive(Clone, Debug)]
-struct Forced {
+pub(crate) struct Forced {
     law: Vec<f64>,
     gap_constant: f64,
     /// Modal: the constant, and for each tone what grows like `1` and like `t`.
-    constant: DVector<f64>,
-    tones: Vec<[DVector<Complex>; 2]>,
+    pub(crate) constant: DVector<f64>,
+    pub(crate) tones: Vec<[DVector<Complex>; 2]>,
+    /// Of each tone's angular frequency.
+    pub(crate) frequencies: Vec<f64>,
     /// Of the gap.
     gap_tones: Vec<[Complex; 2]>,
 }
@@ -134,6 +136,9 @@ impl Forced {
             law: parameter.law.clone(),
             gap_constant,
             constant: response.constant,
+            frequencies: (0..drive.tones.len())
+                .map(|k| change(k).frequency)
+                .collect(),
             tones,
             gap_tones,
         })
@@ -205,11 +210,28 @@ fn check(system: &System, parameter: &Parameter) -> Result<(), VolterraError> {
     Ok(())
 }
 
+/// How the motion changes on a step, a column each: relative to the step, which may move.
+#[derive(Clone, Debug)]
+pub(crate) struct StepChange {
+    /// Modal coordinates at its start.
+    pub(crate) modal: Vec<f64>,
+    /// Coefficients of the force.
+    pub(crate) coefficients: Vec<f64>,
+    /// By how much the step moves in time.
+    pub(crate) shifts: Vec<f64>,
+    /// By how much its end does, where the law switches there; else empty.
+    pub(crate) ends: Vec<f64>,
+}
+
 /// Carries the derivatives along a run, in modal coordinates.
 #[derive(Clone, Debug)]
-struct Tangents {
-    parameters: Vec<Forced>,
-    /// Dimension × (dimension + parameters), column-major.
+pub(crate) struct Tangents {
+    /// Of the last columns; those before change with their start alone.
+    pub(crate) parameters: Vec<Forced>,
+    plain: usize,
+    /// Every step's, if they are kept.
+    pub(crate) kept: Option<Vec<StepChange>>,
+    /// Dimension × changes, column-major.
     columns: Vec<f64>,
     /// How the time of the last switch varies, while the variation is taken relative to it.
     shifts: Vec<f64>,
@@ -222,22 +244,54 @@ struct Tangents {
 }
 
 impl Tangents {
-    fn new(system: &System, parameters: &[Parameter], start: f64) -> Result<Self, VolterraError> {
+    /// Of a run that begins at time `start`, where the state changes by `starts`, a column a change;
+    /// the last of them come with the parameters.
+    pub(crate) fn new(
+        system: &System,
+        starts: &DMatrix<f64>,
+        parameters: &[Parameter],
+        start: f64,
+    ) -> Result<Self, VolterraError> {
         let dimension = system.dimension();
+        let count = starts.ncols();
+        for (what, found, expected) in [
+            ("the changes of the state", starts.nrows(), dimension),
+            (
+                "the changes that come with parameters",
+                parameters.len().max(count),
+                count,
+            ),
+        ] {
+            if found != expected {
+                return Err(VolterraError::Shape {
+                    what,
+                    found,
+                    expected,
+                });
+            }
+        }
         let parameters = parameters
             .iter()
             .map(|p| Forced::new(system, p))
             .collect::<Result<Vec<_>, _>>()?;
-        let count = dimension + parameters.len();
-        let mut columns = Vec::with_capacity(dimension * count);
+        let plain = count - parameters.len();
         // A variation x' of the state is L x' in modal coordinates, less the forced one.
-        columns.extend(system.kernel().modes().left().iter());
-        for p in &parameters {
-            columns.extend(p.modal(system, start).iter().map(|v| -v));
+        let mut columns = (system.kernel().modes().left() * starts)
+            .as_slice()
+            .to_vec();
+        for (column, p) in columns[plain * dimension..]
+            .chunks_exact_mut(dimension)
+            .zip(&parameters)
+        {
+            for (y, forced) in column.iter_mut().zip(p.modal(system, start).iter()) {
+                *y -= forced;
+            }
         }
         let n = system.kernel().nodes;
         Ok(Self {
             parameters,
+            plain,
+            kept: None,
             columns,
             shifts: vec![0.0; count],
             moving: false,
@@ -249,8 +303,26 @@ impl Tangents {
         })
     }
 
+    /// The same, keeping what happens on every step.
+    pub(crate) fn keeping(mut self) -> Self {
+        self.kept = Some(Vec::new());
+        self
+    }
+
+    /// How the state changes at the end of the run, at time `end`.
+    pub(crate) fn at_end(&self, system: &System, end: f64) -> DMatrix<f64> {
+        let dimension = system.dimension();
+        let count = self.shifts.len();
+        let mut modal = DMatrix::from_column_slice(dimension, count, &self.columns);
+        for (k, p) in self.parameters.iter().enumerate() {
+            let mut column = modal.column_mut(self.plain + k);
+            column += p.modal(system, end);
+        }
+        system.kernel().modes().right() * modal
+    }
+
     /// `ẏ` at modal coordinates `modal` under a force.
-    fn slope(system: &System, modal: &[f64], force: f64) -> Vec<f64> {
+    pub(crate) fn slope(system: &System, modal: &[f64], force: f64) -> Vec<f64> {
         let kernel = system.kernel();
         let mut slope = vec![0.0; modal.len()];
         kernel.modes().apply(modal, &mut slope);
@@ -312,8 +384,17 @@ impl Observer for Tangents {
                 .sum()
         };
         let end_slope = Self::slope(system, end, step.force_at(step.end));
-        for column in 0..self.shifts.len() {
-            let parameter = column.checked_sub(dimension).map(|p| &self.parameters[p]);
+        let count = self.shifts.len();
+        if let Some(kept) = &mut self.kept {
+            kept.push(StepChange {
+                modal: Vec::with_capacity(dimension * count),
+                coefficients: vec![0.0; if idle { 0 } else { n * count }],
+                shifts: vec![0.0; count],
+                ends: Vec::new(),
+            });
+        }
+        for column in 0..count {
+            let parameter = column.checked_sub(self.plain).map(|p| &self.parameters[p]);
             let y = &mut self.columns[column * dimension..(column + 1) * dimension];
             let mut time_shift = 0.0;
             if step.moving_start {
@@ -335,7 +416,9 @@ impl Observer for Tangents {
                 let (mut gap, mut rate) = ([0.0; 40], [0.0; 40]);
                 let (gap, rate) = (&mut gap[..rows], &mut rate[..rows]);
                 add_product(&table.gap, y, gap);
-                add_product(&table.rate, y, rate);
+                if solver.rates {
+                    add_product(&table.rate, y, rate);
+                }
                 for (i, (d, v)) in self.base.iter().enumerate() {
                     gap[i] += d;
                     rate[i] += v;
@@ -372,6 +455,14 @@ impl Observer for Tangents {
                 }
                 for (y, s) in y.iter_mut().zip(&start_slope) {
                     *y += s * time_shift;
+                }
+            }
+            if let Some(kept) = self.kept.as_mut().and_then(|kept| kept.last_mut()) {
+                kept.modal.extend_from_slice(y);
+                kept.shifts[column] = time_shift;
+                if !idle {
+                    let coefficients = &mut kept.coefficients[column * n..(column + 1) * n];
+                    add_product(&kernel.coefficients, &self.right, coefficients);
                 }
             }
             for (block, e) in kernel.modes().blocks().iter().zip(&exponentials) {
@@ -430,7 +521,7 @@ impl Observer for Tangents {
                 let dot = |row: &[f64]| row.iter().zip(y.iter()).map(|(r, y)| r * y).sum::<f64>();
                 let mut change =
                     by_gap * dot(&kernel.readout) + by_rate * dot(&kernel.rate_readout);
-                if let Some(p) = column.checked_sub(dimension).map(|p| &self.parameters[p]) {
+                if let Some(p) = column.checked_sub(self.plain).map(|p| &self.parameters[p]) {
                     let (d, v) = p.gap(system, switch.time);
                     change += by_gap * d + by_rate * v;
                     if !p.law.is_empty() {
@@ -454,6 +545,9 @@ impl Observer for Tangents {
             }
         }
         self.moving = false;
+        if let Some(last) = self.kept.as_mut().and_then(|kept| kept.last_mut()) {
+            last.ends.clone_from(&self.shifts);
+        }
     }
 }
 
@@ -500,18 +594,13 @@ impl Flow {
     ) -> Result<(), VolterraError> {
         let system = self.system.clone();
         let n = system.dimension();
-        let mut tangents = Tangents::new(&system, parameters, self.time())?;
+        let mut starts = DMatrix::identity(n, n + parameters.len());
+        starts.columns_mut(n, parameters.len()).fill(0.0);
+        let mut tangents = Tangents::new(&system, &starts, parameters, self.time())?;
         self.run(end, &mut tangents)?;
-        let right = system.kernel().modes().right();
-        let own = DMatrix::from_column_slice(n, n, &tangents.columns[..n * n]);
-        *jacobian = right * own;
-        *derivatives = DMatrix::zeros(n, parameters.len());
-        for (k, p) in tangents.parameters.iter().enumerate() {
-            let start = (n + k) * n;
-            let modal = DVector::from_column_slice(&tangents.columns[start..start + n])
-                + p.modal(&system, self.time());
-            derivatives.set_column(k, &(right * modal));
-        }
+        let all = tangents.at_end(&system, self.time());
+        *jacobian = all.columns(0, n).into_owned();
+        *derivatives = all.columns(n, parameters.len()).into_owned();
         Ok(())
     }
 }

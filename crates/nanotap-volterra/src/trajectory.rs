@@ -11,7 +11,7 @@ use nalgebra::{DVector, RowDVector};
 use std::sync::Arc;
 
 /// Points of the Gauss–Legendre rule of one panel of an integral.
-const POINTS: usize = 24;
+pub(crate) const POINTS: usize = 24;
 /// How far the fastest mode may turn within a panel.
 const REACH: f64 = 6.0;
 /// By how much the phase of a factor may turn in a panel: Gauss's rule of [`POINTS`] points is
@@ -93,21 +93,21 @@ pub struct Stretch {
 
 /// A stretch of motion between two steps' ends.
 #[derive(Clone, Debug)]
-struct Piece {
-    map: TimeMap,
-    start: f64,
-    length: f64,
-    end: f64,
-    branch: usize,
-    modal: Vec<f64>,
-    coefficients: Vec<f64>,
+pub(crate) struct Piece {
+    pub(crate) map: TimeMap,
+    pub(crate) start: f64,
+    pub(crate) length: f64,
+    pub(crate) end: f64,
+    pub(crate) branch: usize,
+    pub(crate) modal: Vec<f64>,
+    pub(crate) coefficients: Vec<f64>,
 }
 
 /// A recorded run.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
-    system: Arc<System>,
-    pieces: Vec<Piece>,
+    pub(crate) system: Arc<System>,
+    pub(crate) pieces: Vec<Piece>,
     switches: Vec<Switch>,
     overflow: bool,
 }
@@ -140,21 +140,9 @@ impl Flow {
     /// # Errors
     /// As [`Flow::run_until`]; [`VolterraError::TooLarge`] beyond [`MAX_RECORDED_STEPS`].
     pub fn record_until(&mut self, end: f64) -> Result<Trajectory, VolterraError> {
-        let mut trajectory = Trajectory {
-            system: self.system.clone(),
-            pieces: Vec::new(),
-            switches: Vec::new(),
-            overflow: false,
-        };
+        let mut trajectory = Trajectory::empty(self.system.clone());
         self.run(end, &mut trajectory)?;
-        if trajectory.overflow {
-            return Err(VolterraError::TooLarge {
-                what: "the number of recorded steps",
-                found: MAX_RECORDED_STEPS + 1,
-                limit: MAX_RECORDED_STEPS,
-            });
-        }
-        Ok(trajectory)
+        trajectory.whole()
     }
 }
 
@@ -170,7 +158,7 @@ impl Piece {
         slope
     }
 
-    fn sample(&self, system: &System, u: f64) -> Sample {
+    pub(crate) fn sample(&self, system: &System, u: f64) -> Sample {
         let mut modal = vec![0.0; system.dimension()];
         system.kernel().partial(
             self.map,
@@ -206,7 +194,38 @@ impl Piece {
     }
 }
 
+/// Where an output is extreme.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extreme {
+    pub(crate) piece: usize,
+    /// Where on the piece.
+    pub(crate) u: f64,
+    time: f64,
+    pub(crate) value: f64,
+}
+
 impl Trajectory {
+    pub(crate) fn empty(system: Arc<System>) -> Self {
+        Self {
+            system,
+            pieces: Vec::new(),
+            switches: Vec::new(),
+            overflow: false,
+        }
+    }
+
+    /// Itself, if nothing had to be left out.
+    pub(crate) fn whole(self) -> Result<Self, VolterraError> {
+        if self.overflow {
+            return Err(VolterraError::TooLarge {
+                what: "the number of recorded steps",
+                found: MAX_RECORDED_STEPS + 1,
+                limit: MAX_RECORDED_STEPS,
+            });
+        }
+        Ok(self)
+    }
+
     /// The switches of the law, in order.
     pub fn switches(&self) -> &[Switch] {
         &self.switches
@@ -399,12 +418,13 @@ impl Trajectory {
 
     /// The local extrema of an output inside the span, as times and values, in order.
     pub fn extrema(&self, output: &Output) -> Vec<(f64, f64)> {
-        self.extrema_among(&self.nodes(), output)
+        let found = self.extrema_among(&self.nodes(), output).into_iter();
+        found.map(|e| (e.time, e.value)).collect()
     }
 
-    fn extrema_among(&self, nodes: &[Node], output: &Output) -> Vec<(f64, f64)> {
+    fn extrema_among(&self, nodes: &[Node], output: &Output) -> Vec<Extreme> {
         let rate = |node: &Node| self.read_with(output, &node.sample, &node.field).1;
-        let mut found: Vec<(f64, f64)> = Vec::new();
+        let mut found = Vec::new();
         for nodes in nodes.chunk_by(|a, b| a.piece == b.piece) {
             let piece = &self.pieces[nodes[0].piece];
             let rate_at = |u: f64| self.read(output, &piece.sample(&self.system, u)).1;
@@ -414,7 +434,12 @@ impl Trajectory {
                 if last.1 * here.1 < 0.0 || (last.1 != 0.0 && here.1 == 0.0) {
                     let u = bisect(&rate_at, last, here);
                     let sample = piece.sample(&self.system, u);
-                    found.push((sample.time, self.read(output, &sample).0));
+                    found.push(Extreme {
+                        piece: nodes[0].piece,
+                        u,
+                        time: sample.time,
+                        value: self.read(output, &sample).0,
+                    });
                 }
                 last = here;
             }
@@ -431,21 +456,31 @@ impl Trajectory {
     /// When an output is least and when it is largest, each with its value; `nodes` are the
     /// trajectory's own ([`Trajectory::nodes`]).
     pub fn ends_of_range(&self, nodes: &[Node], output: &Output) -> [(f64, f64); 2] {
-        let mut ends = [(0.0, f64::INFINITY), (0.0, f64::NEG_INFINITY)];
-        let mut take = |time: f64, value: f64| {
-            if value < ends[0].1 {
-                ends[0] = (time, value);
+        self.extremes(nodes, output).map(|e| (e.time, e.value))
+    }
+
+    /// The same with their places.
+    pub(crate) fn extremes(&self, nodes: &[Node], output: &Output) -> [Extreme; 2] {
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY].map(|value| Extreme {
+            piece: 0,
+            u: 0.0,
+            time: 0.0,
+            value,
+        });
+        let edges = nodes.iter().filter(|node| node.weight == 0.0);
+        let edges = edges.map(|node| Extreme {
+            piece: node.piece,
+            u: node.u,
+            time: node.sample.time,
+            value: self.read_with(output, &node.sample, &node.field).0,
+        });
+        for one in edges.chain(self.extrema_among(nodes, output)) {
+            if one.value < ends[0].value {
+                ends[0] = one;
             }
-            if value > ends[1].1 {
-                ends[1] = (time, value);
+            if one.value > ends[1].value {
+                ends[1] = one;
             }
-        };
-        for node in nodes.iter().filter(|node| node.weight == 0.0) {
-            let value = self.read_with(output, &node.sample, &node.field).0;
-            take(node.sample.time, value);
-        }
-        for (time, value) in self.extrema_among(nodes, output) {
-            take(time, value);
         }
         ends
     }
@@ -461,7 +496,7 @@ impl Trajectory {
         }
     }
 
-    fn panels(&self, piece: &Piece, omega: f64) -> usize {
+    pub(crate) fn panels(&self, piece: &Piece, omega: f64) -> usize {
         let fastest = self
             .fastest()
             .max((self.fastest() + omega) * REACH / OSCILLATION);

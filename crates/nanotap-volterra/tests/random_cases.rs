@@ -208,8 +208,7 @@ impl Case {
     }
 }
 
-fn check(count: usize, seed: u64) {
-    let mut random = Random(seed);
+fn check(count: usize, mut random: Random) {
     let all: Vec<&'static TableLaw> = laws::all().collect();
     assert_eq!(all.last().unwrap().entry, polyline::TABLE.entry);
     let (mut worst, mut worst_jacobian, mut touched, mut jacobians) = (0.0_f64, 0.0_f64, 0, 0);
@@ -236,12 +235,12 @@ fn check(count: usize, seed: u64) {
 
 #[test]
 fn a_dozen_agree_with_an_independent_integrator() {
-    check(12, 20_260_201);
+    check(12, Random(20_260_201));
 }
 
 /// Over every law and every number of modes.
 #[test]
 #[ignore = "minutes; run it with --run-ignored only"]
 fn two_hundred_agree_with_an_independent_integrator() {
-    check(200, 20_260_202);
+    check(200, Random::of_a_long_run(20_260_202));
 }

@@ -20,6 +20,9 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
+/// Bytes of points beyond which a document does not list all.
+const LONGEST_DOCUMENT: usize = 8_000_000;
+
 /// Periodic orbits followed in a parameter, stable and unstable, with their bifurcations.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
@@ -32,6 +35,10 @@ pub(crate) struct Arguments {
     /// What --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
     show: Option<Shown>,
+
+    /// List every point in the JSON document, however long it becomes
+    #[arg(long)]
+    all_points: bool,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -58,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
-    let report = progress::watched(output, BranchStudy::COUNTED, |control| {
+    let mut report = progress::watched(output, BranchStudy::COUNTED, |control| {
         arguments
             .threads
             .install(|| followed(&case, &options, control))
@@ -74,6 +81,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| case_figure(&case, &report, arguments.show))?;
+    if output.is_json() && !arguments.all_points {
+        shorten(&mut report, output);
+    }
     output.study(&case, &report, |report| text(&case, report))?;
     let cut = report.branches.iter().filter(|b| !b.complete).count();
     if cut > 0 && !report.cancelled {
@@ -81,6 +91,23 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         return Err(Failure::numerics(format!("{what} cut before the end")));
     }
     Ok(())
+}
+
+/// Leaves points out of a document that would be longer than [`LONGEST_DOCUMENT`].
+fn shorten(report: &mut BranchReport, output: &Output) {
+    let point = report.points.first();
+    let bytes = point
+        .and_then(|p| serde_json::to_string_pretty(p).ok())
+        // Each line is indented by four spaces more.
+        .map_or(0, |p| p.len() + 4 * p.lines().count());
+    let step = (bytes * report.points.len()).div_ceil(LONGEST_DOCUMENT);
+    if step > 1 {
+        report.thin(step);
+        output.note(&format!(
+            "{} points between those in the document are left out: --all-points lists them, --out writes all of them",
+            report.points_left_out
+        ));
+    }
 }
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the

@@ -47,6 +47,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let model = case.model()?;
     let found = OrbitStudy::run(&case, &request, &Control::default())?;
     let found = &found;
+    for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
+        case.say_held(&[key], output);
+    }
     let orbit = &found.motion;
     if let Some(asked) = request.period.filter(|n| *n != orbit.period) {
         output.note(&format!(

@@ -23,6 +23,48 @@ fn of_kind(json: &Value, kind: &str) -> Vec<f64> {
 const IMPACT: &str = "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0\nforcing = 1\nomega = 2\n\
                       gap = 0\nrestitution = 0.8\n";
 
+/// Short steps are some 10⁴ points of 1.3 kB: every other one is listed, with both ends, and the
+/// CSV has all of them.
+#[test]
+fn a_long_document_lists_points_evenly_and_says_how_many_it_leaves_out() {
+    let folder = Folder::new();
+    folder.write("case.toml", IMPACT);
+    let arguments = [
+        "branch",
+        "case.toml",
+        "--parameter",
+        "omega",
+        "--from",
+        "2",
+        "--to",
+        "3",
+        "--period",
+        "1",
+        "--max-step",
+        "2e-4",
+        "--json",
+    ];
+    let short = folder.run(&[&arguments[..], &["--out", "all.csv"]].concat());
+    let json = short.json();
+    assert!(short.stdout.len() < 10_000_000);
+    let left_out = json["points_left_out"].as_u64().unwrap() as usize;
+    let listed = json["points"].as_array().unwrap();
+    assert!(left_out > 0 && listed.len() > 2000);
+    let rows = folder.read("all.csv").lines().count() - 1;
+    let bifurcations = json["bifurcations"].as_array().unwrap().len();
+    assert_eq!(listed.len() + left_out + bifurcations, rows);
+    let all = folder
+        .run(&[&arguments[..], &["--all-points"]].concat())
+        .json();
+    let every = all["points"].as_array().unwrap();
+    assert_eq!(all["points_left_out"], 0);
+    assert_eq!(every.len(), listed.len() + left_out);
+    assert_eq!(
+        (listed.first(), listed.last()),
+        (every.first(), every.last())
+    );
+}
+
 #[test]
 fn the_period_1_orbit_doubles_where_it_should() {
     let folder = Folder::with_paper_case();

@@ -42,8 +42,8 @@ use rayon::prelude::*;
 
 use crate::census::escapes::Escapes;
 use crate::classify::{
-    Chaos, Classified, ClassifyOptions, Known, MotionKind, RunEnd, Torus, UndecidedReason,
-    follow_start, watch,
+    Chaos, Classified, ClassifyOptions, Known, MotionKind, RECOGNISABLE, RunEnd, Torus,
+    UndecidedReason, follow_start, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -57,6 +57,8 @@ pub use start_box::{StartBox, StartBoxError};
 pub use start_set::{StartOrigin, StartSet};
 pub use unseen::Unseen;
 
+/// Pilots that are followed before anything is known at all.
+const FIRST_PILOTS: usize = 4;
 /// Starts of one batch after the pilots.
 const BATCH: usize = 128;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
@@ -68,7 +70,7 @@ const WATCHED_TRANSIENTS: f64 = 8.0;
 /// How a census is taken.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CensusOptions {
-    /// Starts that are classified without knowledge of any attractor.
+    /// Starts that are classified without knowledge of any orbit's neighbourhood.
     pub pilots: usize,
     /// Budgets of each start.
     pub classify: ClassifyOptions,
@@ -266,13 +268,13 @@ pub fn census_of<M: StroboscopicMap>(
         periods: 0,
         row: 0,
     };
-    let mut size = options.pilots.max(1);
-    while work.outcomes.len() < last {
-        work.batch(size);
-        size = BATCH;
-        if work.is_enough() {
-            break;
-        }
+    // Chaos that the first of the pilots are on need not be measured again by the others.
+    let mut pilots = work.follow(options.pilots.clamp(1, FIRST_PILOTS));
+    pilots.extend(work.follow(options.pilots.saturating_sub(FIRST_PILOTS)));
+    work.know_neighbourhoods(&pilots);
+    while work.outcomes.len() < last && !work.is_enough() {
+        let classified = work.follow(BATCH);
+        work.know_neighbourhoods(&classified);
     }
     let mut after = Escapes::after(work.relaxation());
     work.watch_chaos(&mut after);
@@ -307,7 +309,7 @@ struct Work<'a, M> {
     /// Spectra of the chaotic motions and tori found, one of each.
     chaos: Vec<LyapunovSpectrum>,
     transient_spectrum: Option<LyapunovSpectrum>,
-    /// Periods after which most starts are in a neighbourhood.
+    /// Periods after which most starts are in a neighbourhood, or on chaos that is recognised.
     patience: usize,
     /// Periods run so far.
     periods: usize,
@@ -327,8 +329,8 @@ impl<M: StroboscopicMap> Work<'_, M> {
                 && self.periods >= self.options.max_periods
     }
 
-    /// Runs the next `size` starts.
-    fn batch(&mut self, size: usize) {
+    /// Follows the next `size` starts; returns those that were classified.
+    fn follow(&mut self, size: usize) -> Vec<usize> {
         let first = self.outcomes.len();
         let range: Vec<usize> = (first..self.last.min(first + size)).collect();
         for start in range.iter().filter_map(|k| self.starts.start(*k)) {
@@ -352,8 +354,14 @@ impl<M: StroboscopicMap> Work<'_, M> {
             }
             self.outcomes.push(outcome);
         }
+        classified
+    }
+
+    /// Finds neighbourhoods of the orbits that are new, checks all by the starts that were
+    /// `classified` without them, and says how long a start is left to itself from now on.
+    fn know_neighbourhoods(&mut self, classified: &[usize]) {
         self.find_neighbourhoods();
-        self.check_neighbourhoods(&classified);
+        self.check_neighbourhoods(classified);
         let sides = self.sides();
         self.patience = self
             .neighbourhoods
@@ -364,6 +372,10 @@ impl<M: StroboscopicMap> Work<'_, M> {
                 LEAST_PATIENCE,
                 self.options.classify.max_transient.max(LEAST_PATIENCE),
             );
+        let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
+        if 2 * self.outcomes.iter().filter(chaotic).count() > self.outcomes.len() {
+            self.patience = self.patience.max(RECOGNISABLE);
+        }
     }
 
     /// Sides of the box around the starts so far.
@@ -517,10 +529,23 @@ impl<M: StroboscopicMap> Work<'_, M> {
 
     /// Follows chaotic starts for several times the periods `after` which escapes are
     /// counted: beside a weakly stable orbit, chaos that was watched for less than a
-    /// linear transient takes is no evidence of an attractor. Where one of them escapes,
+    /// linear transient takes is no evidence of an attractor. Where no stable orbit is known there
+    /// is none to be beside. Where starts escaped, the others are watched for as long as a start
+    /// may be in transit at all. Where one of them escapes,
     /// escapes count from when it was known to be chaotic.
     fn watch_chaos(&mut self, after: &mut f64) {
-        let enough = (WATCHED_TRANSIENTS * *after) as usize;
+        let escaped = |outcome: &Outcome| matches!(outcome, Outcome::Orbit { periods, .. } if *periods as f64 > *after);
+        let least = if self.outcomes.iter().any(escaped) {
+            self.options.classify.max_transient
+        } else {
+            0
+        };
+        let beside = if self.orbits.is_empty() {
+            0.0
+        } else {
+            WATCHED_TRANSIENTS * *after
+        };
+        let enough = least.max(beside as usize);
         let mut budget = self.options.max_periods;
         let watched: Vec<usize> = (0..self.outcomes.len())
             .filter(|&k| match &self.outcomes[k] {

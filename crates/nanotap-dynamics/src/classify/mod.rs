@@ -37,7 +37,7 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
-pub(crate) use run::{Known, RunEnd, follow_start, watch};
+pub(crate) use run::{Known, RECOGNISABLE, RunEnd, follow_start, watch};
 pub use undecided::UndecidedReason;
 
 /// Budgets of [`classify`].

@@ -29,6 +29,8 @@ const WORTH_TRYING: f64 = 0.2;
 const LONG_WORTH_TRYING: f64 = 1e-2;
 /// The same in the last search before a motion is called anything but periodic.
 const LAST_WORTH_TRYING: f64 = 0.1;
+/// Periods after which the means of a run may tell that it is on chaos that is known.
+pub(crate) const RECOGNISABLE: usize = 256;
 /// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
 const TELLING: f64 = 0.2;
 /// Distance of a neighbour, in standard deviations of the motion.
@@ -45,8 +47,8 @@ pub(crate) struct Known<'a> {
     pub(crate) balls: &'a [Neighbourhood],
     /// Exponents and means of chaotic motions and tori.
     pub(crate) chaos: &'a [LyapunovSpectrum],
-    /// Periods after which most runs are in one of the neighbourhoods: before that,
-    /// looking where a run goes costs more than waiting.
+    /// Periods after which most runs are in one of the neighbourhoods, or on known chaos:
+    /// before that, looking where a run goes costs more than waiting.
     pub(crate) patience: usize,
 }
 
@@ -107,6 +109,14 @@ pub(crate) fn watch<M: StroboscopicMap>(
     while run.periods < periods {
         if let Err(stop) = run.step(map) {
             return Err(run.stopped(stop));
+        }
+    }
+    // It may have gone to an orbit that no other start found.
+    if !run.guesses(longest(options), LONG_WORTH_TRYING).is_empty() {
+        match run.look(map) {
+            Ok(Some(kind)) => return Err(run.classified(kind)),
+            Ok(None) => {}
+            Err(stop) => return Err(run.stopped(stop)),
         }
     }
     Ok(run.state)
@@ -198,14 +208,15 @@ impl<'a> Run<'a> {
             if let Some(kind) = self.look(map)? {
                 return Ok(kind);
             }
+            if self.periods >= RECOGNISABLE.min(self.options.max_transient)
+                && let Some(kind) = self.known_chaos(map)?
+            {
+                return Ok(kind);
+            }
             if target >= self.options.max_transient {
-                break;
+                return self.measure(map);
             }
             target *= 2;
-        }
-        match self.known_chaos(map)? {
-            Some(kind) => Ok(kind),
-            None => self.measure(map),
         }
     }
 
@@ -545,4 +556,51 @@ fn longest(options: &ClassifyOptions) -> usize {
 fn is_chaotic(spectrum: &LyapunovSpectrum) -> bool {
     let (exponent, error) = spectrum.largest();
     exponent > CLEAR * error && exponent * spectrum.periods as f64 > 20.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    #[derive(Clone)]
+    struct Logistic(f64);
+
+    impl StroboscopicMap for Logistic {
+        type Error = std::convert::Infallible;
+
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {
+            state[0] *= self.0 * (1.0 - state[0]);
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Self::Error> {
+            jacobian[(0, 0)] = self.0 * (1.0 - 2.0 * state[0]);
+            self.advance(state)
+        }
+    }
+
+    /// 3.2 x (1 − x) has a stable orbit of period 2, at 3.9 it is chaotic; no neighbourhood is known.
+    #[test]
+    fn a_motion_that_is_watched_may_go_to_an_orbit_that_nobody_knows() {
+        let options = ClassifyOptions::default();
+        let watched = |r: f64| watch(&mut Logistic(r), &[0.3], &[], 200, &options);
+        let Err(RunEnd::Classified(end)) = watched(3.2) else {
+            panic!("the orbit was not noticed")
+        };
+        assert!(matches!(&end.kind, MotionKind::Periodic(orbit) if orbit.period == 2));
+        assert!(watched(3.9).is_ok());
+    }
 }

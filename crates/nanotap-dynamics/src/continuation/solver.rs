@@ -16,6 +16,8 @@ use crate::vector::{distance, dot, norm};
 
 /// Newton steps after which a corrector gives up: the caller shortens its step.
 const ITERATIONS: usize = 12;
+/// Residual, in units of the orbit's scale, that is rounding: Newton cannot mend it.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A tangency somewhere on an orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,7 +216,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         let mut residual = self.evaluate(parameter)?;
         let scale = self.state_scale.max(norm(points));
         let mut iterations = 0;
-        while residual > 0.0 {
+        let rounding = ROUNDING * scale;
+        while residual > rounding {
             if iterations == ITERATIONS {
                 return Err(CorrectorFailure::NoConvergence);
             }

@@ -37,6 +37,10 @@ pub struct PeriodicOrbit {
     pub log_determinant: f64,
     /// What the multipliers say.
     pub stability: Stability,
+    /// How many of the last entries of a state are whole numbers that the map sets
+    /// ([`StroboscopicMap::discrete_entries`](crate::StroboscopicMap::discrete_entries)): no part
+    /// of sizes and distances.
+    pub discrete: usize,
 }
 
 impl PeriodicOrbit {
@@ -58,7 +62,13 @@ impl PeriodicOrbit {
 
     /// Largest entry of any state.
     pub fn scale(&self) -> f64 {
-        self.states.iter().fold(0.0, |m, s| m.max(norm(s)))
+        let states = self.states.iter();
+        states.fold(0.0, |m, s| m.max(norm(self.continuous(s))))
+    }
+
+    /// A state without its discrete entries.
+    fn continuous<'a>(&self, state: &'a [f64]) -> &'a [f64] {
+        &state[..state.len().saturating_sub(self.discrete)]
     }
 
     /// Smallest distance (largest entry over all phases) to another orbit of the
@@ -74,7 +84,8 @@ impl PeriodicOrbit {
         for shift in 0..n {
             let mut worst: f64 = 0.0;
             for k in 0..n {
-                worst = worst.max(distance(&self.states[k], &other.states[(k + shift) % n]));
+                let [here, there] = [&self.states[k], &other.states[(k + shift) % n]];
+                worst = worst.max(distance(self.continuous(here), self.continuous(there)));
                 if worst >= best.1 {
                     break;
                 }

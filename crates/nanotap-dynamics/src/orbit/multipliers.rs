@@ -260,9 +260,7 @@ fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MultiplierErr
     }
     let mut balanced = matrix.clone();
     balance_parlett_reinsch(&mut balanced);
-    let schur = Schur::try_new(balanced, f64::EPSILON, 400 * matrix.nrows())
-        .ok_or(MultiplierError::NoConvergence)?;
-    Ok(schur.complex_eigenvalues().iter().copied().collect())
+    nanotap_arithmetic::eigenvalues(&balanced).ok_or(MultiplierError::NoConvergence)
 }
 
 /// Eigenvalues of a graded product by QR sweeps over the factors.

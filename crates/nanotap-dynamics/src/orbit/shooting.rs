@@ -178,6 +178,10 @@ fn check<M: StroboscopicMap>(
     Ok(())
 }
 
+/// How often discrete entries are set anew at one place: where they do not come to rest, the
+/// residual says so.
+const MOST_SETTINGS: usize = 3;
+
 /// The segments of an orbit with their residuals and Jacobians.
 pub(crate) struct Segments {
     pub(crate) d: usize,
@@ -188,6 +192,8 @@ pub(crate) struct Segments {
     /// Largest entry of any state, the guess's included: an orbit at the origin
     /// has no scale of its own.
     pub(crate) scale: f64,
+    /// How many of the last entries of a state are whole numbers that the map sets.
+    discrete: usize,
     state: Vec<f64>,
 }
 
@@ -200,12 +206,46 @@ impl Segments {
             residuals: vec![0.0; n * d],
             jacobians: vec![DMatrix::zeros(d, d); n],
             scale: 0.0,
+            discrete: 0,
             state: vec![0.0; d],
         }
     }
 
-    /// Residuals, and Jacobians if wanted, at the present points.
+    /// Residuals, and Jacobians if wanted, at the present points, of which discrete entries are
+    /// set to what the map makes of them.
     fn evaluate<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        jacobians: bool,
+    ) -> Result<(), MapFailure> {
+        self.discrete = map.discrete_entries();
+        self.evaluate_points(map, jacobians)?;
+        for _ in 0..MOST_SETTINGS {
+            if !self.set_discrete_entries() {
+                break;
+            }
+            self.evaluate_points(map, jacobians)?;
+        }
+        Ok(())
+    }
+
+    /// Sets discrete entries to what the map made of the points before; false if they were that.
+    fn set_discrete_entries(&mut self) -> bool {
+        let (d, n) = (self.d, self.n);
+        let mut changed = false;
+        for k in 0..n {
+            for i in d - self.discrete..d {
+                let off = self.residuals[k * d + i];
+                if off != 0.0 {
+                    self.points[(k + 1) % n * d + i] += off;
+                    changed = true;
+                }
+            }
+        }
+        changed
+    }
+
+    fn evaluate_points<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
         jacobians: bool,
@@ -474,6 +514,7 @@ impl Segments {
             stability: multipliers.stability(),
             multipliers: multipliers.values,
             log_determinant: multipliers.log_determinant,
+            discrete: self.discrete,
         })
     }
 }

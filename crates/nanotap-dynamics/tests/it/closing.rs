@@ -3,7 +3,27 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{ShootingError, ShootingOptions, Stability, StroboscopicMap, close_orbit};
 
-use crate::systems::{Focus, Henon, Logistic, System};
+use crate::systems::{Flagged, Focus, Henon, Logistic, System};
+
+/// From a guess whose flag is not the orbit's Newton takes it from the map; flags are no part of
+/// distances. Fixed points: μ below 1, μ + 1/50 above.
+#[test]
+fn entries_that_the_map_sets_are_taken_from_it() {
+    let options = ShootingOptions::default();
+    let closed = |mu: f64, guess: [f64; 2]| {
+        close_orbit(&mut System(Flagged(mu)), &guess, 1, &options).unwrap()
+    };
+    let below = closed(0.9, [0.8, 0.0]);
+    let above = closed(1.1, [0.9, 0.0]);
+    for (orbit, x, flag) in [(&below, 0.9, 0.0), (&above, 1.12, 1.0)] {
+        assert!((orbit.states[0][0] - x).abs() < 1e-15);
+        assert_eq!(orbit.states[0][1], flag);
+        assert!((orbit.scale() - x).abs() < 1e-15);
+    }
+    assert!((above.distance_to(&below).1 - 0.22).abs() < 1e-15);
+    // A flag that is not the orbit's at the start either.
+    assert!(closed(0.9, [0.95, 1.0]).is_same_as(&below));
+}
 
 #[test]
 fn the_henon_fixed_point_closes_to_rounding() {

@@ -9,7 +9,9 @@ use nanotap_dynamics::{
 };
 use rayon::ThreadPoolBuilder;
 
-use crate::systems::{Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System, TwoShells};
+use crate::systems::{
+    ChaosBesideRest, Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System, TwoShells,
+};
 
 fn starts(low: &[f64], high: &[f64], count: usize) -> Vec<Vec<f64>> {
     StartBox::new(low.to_vec(), high.to_vec())
@@ -124,34 +126,44 @@ fn coexisting_chaos_with_equal_means_is_told_apart() {
     }
 }
 
-/// A start that is recognised to be on known chaos has been watched for the whole transient, and
-/// no longer than it takes to part from a neighbour.
+/// Periods for which the chaotic starts after the first four, which are measured, were watched.
+fn watched_periods(result: &Census) -> Vec<usize> {
+    let chaotic =
+        |index: usize| matches!(result.attractors[index].kind, AttractorKind::Chaotic { .. });
+    let outcomes = result.outcomes_by_start[4..].iter();
+    let periods = outcomes.filter_map(|outcome| match outcome {
+        StartOutcome::Attractor { index, periods } if chaotic(*index) => Some(*periods),
+        _ => None,
+    });
+    periods.collect()
+}
+
+/// A start that is recognised to be on known chaos is watched no longer where no stable orbit is
+/// known, and for eight times the 64 periods at least after which escapes are counted where one is.
 #[test]
-fn recognised_chaos_is_watched_for_the_whole_transient() {
+fn chaos_beside_a_stable_orbit_is_watched_for_several_transients() {
     let options = CensusOptions {
         pilots: 4,
         ..CensusOptions::default()
     };
     let henon = Henon { a: 1.4, b: 0.3 };
-    let result = taken(henon, &starts(&[-0.5, -0.2], &[0.5, 0.2], 40), &options);
-    let watched = |range: std::ops::Range<usize>| -> Vec<usize> {
-        let outcomes = result.outcomes_by_start[range].iter();
-        let periods = outcomes.filter_map(|outcome| match outcome {
-            StartOutcome::Attractor { periods, .. } => Some(*periods),
-            _ => None,
-        });
-        periods.collect()
-    };
-    let transient = options.classify.max_transient;
-    let measured = transient + options.classify.lyapunov.min_periods;
-    assert!(watched(0..4).iter().all(|&periods| periods >= measured));
-    let recognised = watched(4..40);
+    let alone = taken(henon, &starts(&[-0.5, -0.2], &[0.5, 0.2], 40), &options);
+    let recognised = watched_periods(&alone);
     assert!(!recognised.is_empty());
     assert!(
         recognised
             .iter()
-            .all(|periods| (transient..measured).contains(periods)),
+            .all(|periods| (256..8 * 64).contains(periods)),
         "{recognised:?}"
+    );
+    let both = starts(&[-0.9, -1.5], &[0.9, 1.5], 60);
+    let beside = taken(ChaosBesideRest, &both, &options);
+    assert_eq!(beside.attractors.len(), 2);
+    let watched = watched_periods(&beside);
+    assert!(!watched.is_empty());
+    assert!(
+        watched.iter().all(|&periods| periods >= 8 * 64),
+        "{watched:?}"
     );
 }
 
@@ -180,6 +192,17 @@ fn transient_chaos_has_its_exact_lifetime() {
     );
     assert!((transient.lifetime.mean / exact - 1.0).abs() < 0.15);
     assert!(transient.unescaped.count > 0);
+    // Where starts escape, the others are watched for as long as a start may be in transit.
+    let whole = options.classify.max_transient;
+    assert!(
+        result
+            .outcomes_by_start
+            .iter()
+            .all(|outcome| match outcome {
+                StartOutcome::TransientChaos { periods } => *periods >= whole,
+                _ => true,
+            })
+    );
     assert_eq!(
         transient.destinations,
         vec![(0, transient.lifetime.escapes)]

@@ -7,6 +7,8 @@ use nanotap_dynamics::{DMatrix, MapFamily, StroboscopicMap, Tangency};
 /// A map given by formulas.
 pub(crate) trait Formula: Clone + Send + Sync {
     const DIMENSION: usize;
+    /// How many of the last entries are whole numbers that the map sets.
+    const DISCRETE: usize = 0;
     fn image(&self, x: &[f64], out: &mut [f64]);
     fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>);
     /// Derivative with respect to the family's parameter.
@@ -30,6 +32,10 @@ impl<F: Formula> StroboscopicMap for System<F> {
 
     fn period(&self) -> f64 {
         1.0
+    }
+
+    fn discrete_entries(&self) -> usize {
+        F::DISCRETE
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
@@ -394,6 +400,55 @@ impl Formula for TwoShells {
         out[(0, 1)] = 0.0;
         out[(1, 0)] = 0.0;
         out[(1, 1)] = -0.5;
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+    }
+}
+
+/// x → x/2 + μ/2, and whether the image lies above 1: the fixed point is μ, its flag 1 for μ > 1.
+/// With the flag set the image is a hundredth further on, as of a neck that pulls.
+#[derive(Clone, Debug)]
+pub(crate) struct Flagged(pub f64);
+
+impl Formula for Flagged {
+    const DIMENSION: usize = 2;
+    const DISCRETE: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = 0.5 * (x[0] + self.0) + 0.01 * x[1];
+        out[1] = if out[0] > 1.0 { 1.0 } else { 0.0 };
+    }
+    fn jacobian(&self, _x: &[f64], out: &mut DMatrix<f64>) {
+        out.fill(0.0);
+        out[(0, 0)] = 0.5;
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = 0.5;
+        out[1] = 0.0;
+    }
+}
+
+/// Ulam's map where the second number is negative, which stays so and goes to −1; a fixed point at
+/// (0, 1) for the others.
+#[derive(Clone, Debug)]
+pub(crate) struct ChaosBesideRest;
+
+impl Formula for ChaosBesideRest {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let side = 1f64.copysign(x[1]);
+        out[0] = if side > 0.0 {
+            0.5 * x[0]
+        } else {
+            1.0 - 2.0 * x[0] * x[0]
+        };
+        out[1] = side + 0.5 * (x[1] - side);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = if x[1] > 0.0 { 0.5 } else { -4.0 * x[0] };
+        out[(0, 1)] = 0.0;
+        out[(1, 0)] = 0.0;
+        out[(1, 1)] = 0.5;
     }
     fn derivative(&self, _x: &[f64], out: &mut [f64]) {
         out.fill(0.0);

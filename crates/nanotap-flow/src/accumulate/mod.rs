@@ -31,7 +31,7 @@
 //! }
 //! let duration = accumulator.duration();
 //! println!("{} {}", accumulator.extremum(highest), accumulator.integral(mean) / duration);
-//! println!("{}", accumulator.fourier(first).norm() * 2.0 / duration);
+//! println!("{}", accumulator.fourier(first).norm_sqr().sqrt() * 2.0 / duration);
 //! # Ok::<(), nanotap_flow::FlowError>(())
 //! ```
 //!

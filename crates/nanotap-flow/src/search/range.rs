@@ -112,21 +112,24 @@ fn extend_with<S: Simd>(
     points: &mut Points,
 ) {
     followed.follow::<S>(table, signal);
+    let reach = length.min(table.reach());
+    if reach < length {
+        by_certified_steps(reach, length, signal, length, range);
+    }
     let Some(coarse) = &table.coarse else {
         let mut search =
-            RangeSearch::new::<S>(&table.fine, signal, followed, 0.0, length, points, range);
+            RangeSearch::new::<S>(&table.fine, signal, followed, 0.0, reach, points, range);
         while let Some(open) = search.next_open::<S>(points, range) {
             extend_within::<S>(&open, table.is_complete(), signal, length, range);
         }
         return;
     };
-    let mut walk =
-        RangeSearch::new::<S>(&coarse.grid, signal, followed, 0.0, length, points, range);
+    let mut walk = RangeSearch::new::<S>(&coarse.grid, signal, followed, 0.0, reach, points, range);
     // The fine grid's points need the space: the coarse walk's are set aside.
     let aside = std::mem::take(points);
     while let Some(open) = walk.next_open::<S>(&aside, range) {
         followed.move_to::<S>(table, &open.interval);
-        let (start, end) = (open.interval.start, open.interval.end.min(length));
+        let (start, end) = (open.interval.start, open.interval.end.min(reach));
         let mut search =
             RangeSearch::new::<S>(&table.fine, signal, followed, start, end, points, range);
         while let Some(open) = search.next_open::<S>(points, range) {
@@ -329,7 +332,10 @@ fn extend_within<S: Simd>(
         match extremum::<S>(open, side, complete, signal, length) {
             Extremum::Value(value) => range.hold(value),
             Extremum::None => {}
-            Extremum::Unknown => by_certified_steps(&open.interval, signal, length, range),
+            Extremum::Unknown => {
+                let Interval { start, end, .. } = open.interval;
+                by_certified_steps(start, end, signal, length, range);
+            }
         }
     }
 }
@@ -417,8 +423,12 @@ fn extremum<S: Simd>(
             continue;
         }
         at += step;
+        if at < 0.0 {
+            // The bound of the third derivative does not hold before the start.
+            return Extremum::Unknown;
+        }
         let value = side * jet.value + step * (rate + step * (0.5 * curvature + step * jerk / 6.0));
-        let inside = at >= 0.0 && at <= length;
+        let inside = at <= length;
         // Concave this far on either side, and beyond that not higher.
         let reach = 0.99 * -(curvature + jerk * step) / jet.third;
         let limit = if inside { value.max(reached) } else { reached } - interval.error;
@@ -460,13 +470,17 @@ fn part(hull: &[f64; 6], from: f64, to: f64) -> f64 {
     highest
 }
 
-/// The same from every root of the rate, found by certified steps.
+/// The same from every root of the rate between `start` and `end`, found by certified steps.
 #[cold]
-fn by_certified_steps(interval: &Interval, signal: &Signal, length: f64, range: &mut Range) {
-    let start = interval.start.max(0.0);
-    let width = interval.end.min(length) - start;
+fn by_certified_steps(start: f64, end: f64, signal: &Signal, length: f64, range: &mut Range) {
+    let start = start.max(0.0);
+    let width = end.min(length) - start;
     if width <= 0.0 {
         return;
+    }
+    if start > 0.0 {
+        // A root of the rate just there is no change of sign within.
+        range.hold(signal.at(start));
     }
     let rate = signal.differentiated(length).shifted(start, 1.0, width);
     for s in sign_changes(&rate, width) {

@@ -108,8 +108,11 @@ impl Table {
             .filter(|&&k| kernel.rate(k).modulus() * COARSER < fastest);
         let terms = [fine_terms, slow.count().clamp(1, FOLLOWED[1])];
         let [fine_step, coarse_step] = [step_of(terms[0] - 1, 0), step_of(terms[1] - 1, 1)];
-        let vectors =
-            |length: f64, step: f64| ((length / step / WIDTH as f64) as usize + 1).min(LARGEST);
+        // So many that the last point is not before the end.
+        let vectors = |length: f64, step: f64| {
+            let intervals = (length / step).ceil() as usize;
+            layout::vectors_for(intervals + 1).min(LARGEST)
+        };
         let cost = period / fine_step / WIDTH as f64 * (6 * terms[0] + 20) as f64;
         let single = cost < CHEAP || coarse_step < COARSER * fine_step;
         order.truncate(terms[0]);

@@ -6,7 +6,7 @@ import operator
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -177,13 +177,25 @@ def slice_axis(name: str, value: str | Mapping[str, Any]) -> str:
 _written = json.JSONEncoder(allow_nan=False).encode
 
 
+class _Option(NamedTuple):
+    """What an option takes: kinds of JSON, and that of an array's entries."""
+
+    kinds: frozenset[str]
+    entries: str | None
+
+    @classmethod
+    def of(cls, schema: Mapping[str, Any]) -> "_Option":
+        return cls(frozenset(_kinds(schema)), schema.get("items", {}).get("type"))
+
+
 @cache
-def _studies() -> dict[str, tuple[str, dict[str, Any]]]:
-    """What the progress of each study counts, and the schemas of its options."""
-    return {
-        name: (counted, json.loads(schema)["properties"])
-        for name, _, counted, schema in _nanotap.studies()
-    }
+def _studies() -> dict[str, tuple[str, dict[str, _Option]]]:
+    """What the progress of each study counts, and what its options take."""
+    studies = {}
+    for name, _, counted, schema in _nanotap.studies():
+        options = json.loads(schema)["properties"].items()
+        studies[name] = counted, {key: _Option.of(one) for key, one in options}
+    return studies
 
 
 def counted(study: str) -> str:
@@ -196,12 +208,12 @@ def request(study: str, options: Mapping[str, Any]) -> str:
 
     A value of the wrong type is a `TypeError`; ranges and words are for the library to refuse.
     """
-    schemas = _studies()[study][1]
+    takes = _studies()[study][1]
     given = {
-        name: _plain("from_" if name == "from" else name, value, schemas[name])
+        name: _plain("from_" if name == "from" else name, value, takes[name])
         for name, value in options.items()
         # Only a number cannot be nothing.
-        if value is not None or _kinds(schemas[name]) <= {"integer", "number"}
+        if value is not None or takes[name].kinds <= {"integer", "number"}
     }
     return _written(given)
 
@@ -214,9 +226,9 @@ def _kinds(schema: Mapping[str, Any]) -> set[str]:
     return {kinds} if isinstance(kinds, str) else set(kinds)
 
 
-def _plain(name: str, value: Any, schema: Mapping[str, Any]) -> Any:
+def _plain(name: str, value: Any, takes: _Option) -> Any:
     """A value as JSON has it."""
-    kinds = _kinds(schema)
+    kinds = takes.kinds
     if "boolean" in kinds:
         return bool(value)
     if "object" in kinds:
@@ -226,11 +238,7 @@ def _plain(name: str, value: Any, schema: Mapping[str, Any]) -> Any:
     if "array" in kinds and "integer" in kinds:
         many = [value] if isinstance(value, int | np.integer) else list(value)
         return [whole(name, one) for one in many]
-    if "array" in kinds and schema.get("items", {}).get("type") in (
-        "string",
-        "array",
-        "object",
-    ):
+    if "array" in kinds and takes.entries in ("string", "array", "object"):
         return value
     if "array" in kinds:
         return [_finite(one) for one in row(name, value).tolist()]

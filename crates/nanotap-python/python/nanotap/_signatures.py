@@ -229,7 +229,7 @@ def orbit(
         Samples a drive period in the time series (1 to 1000000).
     derivatives : Sequence[str] | None
         Keys of the case by which to differentiate the orbit and all that is
-        observed of it.
+        observed of it; what stays is what stays in a sweep.
     prove : bool
         Prove in interval arithmetic that it exists, is alone, and is stable or not.
     threads : int | None

@@ -1,8 +1,12 @@
 //! A law written once over numbers with derivatives becomes a [`ForceLaw`].
 
+// Only what is inlined into a function for wide registers gets their instructions.
+#![allow(clippy::inline_always)]
+
 use crate::dual::{Dual, Scalar};
 use crate::law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
 use crate::laws::entry::Entry;
+use crate::linear::wide_registers;
 use std::fmt::Debug;
 
 /// When a branch is left, with a level of the gap named by its place among the constants.
@@ -164,6 +168,47 @@ fn force_of(d: Dual<2>) -> Force {
     }
 }
 
+/// [`ForceLaw::forces`] of a formula.
+#[inline(always)]
+fn forces_at<F: Formula>(
+    law: &Law<F>,
+    branch: usize,
+    gaps: &[f64],
+    rates: &[f64],
+    [values, by_gap, by_rate]: [&mut [f64]; 3],
+) {
+    let n = gaps.len();
+    let (values, by_gap) = (&mut values[..n], &mut by_gap[..n]);
+    let (rates, by_rate) = (&rates[..n], &mut by_rate[..n]);
+    let formula = &law.formula;
+    if !formula.depends_on_rate() {
+        by_rate.fill(0.0);
+        let constants = &law.lifted_gap;
+        let mut fill = |branch: usize| {
+            for i in 0..n {
+                let gap = Dual::variable(gaps[i], 0);
+                let force = formula.force(constants, branch, gap, Dual::constant(0.0));
+                values[i] = force.value;
+                by_gap[i] = force.slopes[0];
+            }
+        };
+        // A branch known to the compiler leaves no choice inside the loop.
+        match branch {
+            0 => fill(0),
+            1 => fill(1),
+            _ => fill(branch),
+        }
+        return;
+    }
+    for i in 0..n {
+        let (gap, rate) = (Dual::variable(gaps[i], 0), Dual::variable(rates[i], 1));
+        let force = formula.force(&law.lifted, branch, gap, rate);
+        values[i] = force.value;
+        by_gap[i] = force.slopes[0];
+        by_rate[i] = force.slopes[1];
+    }
+}
+
 impl<F: Formula> ForceLaw for Law<F> {
     fn parameters(&self) -> Vec<&'static str> {
         self.formula
@@ -195,29 +240,14 @@ impl<F: Formula> ForceLaw for Law<F> {
         self.formula.depends_on_rate()
     }
 
-    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
-        if !self.formula.depends_on_rate() {
-            for (out, gap) in out.iter_mut().zip(gaps) {
-                let gap = Dual::variable(*gap, 0);
-                let force = self
-                    .formula
-                    .force(&self.lifted_gap, branch, gap, Dual::constant(0.0));
-                *out = Force {
-                    value: force.value,
-                    by_gap: force.slopes[0],
-                    by_rate: 0.0,
-                };
-            }
-            return;
-        }
-        for ((out, gap), rate) in out.iter_mut().zip(gaps).zip(rates) {
-            *out = force_of(self.formula.force(
-                &self.lifted,
-                branch,
-                Dual::variable(*gap, 0),
-                Dual::variable(*rate, 1),
-            ));
-        }
+    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: [&mut [f64]; 3]) {
+        wide_registers!([F: Formula] forces_at(
+            law: &Law<F> = self,
+            branch: usize = branch,
+            gaps: &[f64] = gaps,
+            rates: &[f64] = rates,
+            out: [&mut [f64]; 3] = out,
+        ));
     }
 
     fn exits(&self, branch: usize) -> Vec<Exit> {

@@ -64,7 +64,7 @@ impl Formula for Jkr {
         if branch == 0 {
             return S::constant(0.0);
         }
-        let root = contact_radius_root(c, c[0] - gap);
+        let root = contact_radius_root(c, gap);
         let cube = root.square() * root;
         c[5] * cube.square() - c[6] * cube
     }
@@ -90,13 +90,16 @@ impl Formula for Jkr {
     }
 }
 
-/// `√a`, the larger root of `s⁴/R − s √(2πw/E*) = δ`; that of the end beyond it.
-fn contact_radius_root<S: Scalar>(c: &[S], indentation: S) -> S {
-    let (curvature, tension, least) = (c[1].value(), c[2].value(), c[3].value());
-    let delta = indentation.value();
-    if delta <= -3.0 * curvature * least.powi(4) {
+/// `√a`, the larger root of `s⁴/R − s √(2πw/E*) = δ`; that of the end beyond it. The
+/// end is told by the gap itself: from `δ` rounding would at times put it on the root's side, where
+/// the slope has no bound, and derivatives by parameters with it.
+fn contact_radius_root<S: Scalar>(c: &[S], gap: S) -> S {
+    if gap.value() >= c[4].value() {
         return c[3];
     }
+    let indentation = c[0] - gap;
+    let (curvature, tension, least) = (c[1].value(), c[2].value(), c[3].value());
+    let delta = indentation.value();
     // From above the quartic, convex there, lets Newton fall on the root from one side.
     let mut s =
         (delta.max(0.0) / curvature).sqrt().sqrt() + nanotap_arithmetic::cbrt(tension / curvature);
@@ -117,4 +120,39 @@ fn contact_radius_root<S: Scalar>(c: &[S], indentation: S) -> S {
         return c[3];
     }
     start - (cube * s - c[2] * s - indentation) * (1.0 / slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dual::Dual;
+
+    /// Where the neck lets go the force is −(5/6)πwR whatever the modulus (Johnson, Kendall, Roberts
+    /// 1971), on every scale: no rounding of the gap puts the end on the side where the force's slope
+    /// has no bound.
+    #[test]
+    fn at_its_end_the_neck_pulls_with_what_the_work_of_adhesion_says() {
+        for k in 0..400 {
+            let scale = 1.0 + 0.013 * f64::from(k);
+            let (radius, work) = (10.0 * scale, 0.02 / scale);
+            let by = |varied: usize| {
+                let parameters = [100.0, 0.3, 160.0, 0.3, radius, 0.165 * scale, work];
+                let parameters: Vec<Dual<1>> = parameters
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &value)| Dual {
+                        value,
+                        slopes: [f64::from(u8::from(i == varied))],
+                    })
+                    .collect();
+                let c = Jkr.constants(&parameters);
+                let gap = Dual::constant(c[4].value());
+                Jkr.force(&c, 1, gap, Dual::constant(0.0))
+            };
+            let ends = -5.0 / 6.0 * PI * radius;
+            assert!((by(6).value / (ends * work) - 1.0).abs() < 1e-13);
+            assert!((by(6).slopes[0] / ends - 1.0).abs() < 1e-12, "{scale}");
+            assert!(by(0).slopes[0].abs() < 1e-12 * ends.abs() * work, "{scale}");
+        }
+    }
 }

@@ -109,19 +109,22 @@ impl ForceLaw for Sum {
         self.terms.iter().any(|t| t.depends_on_rate())
     }
 
-    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: &mut [Force]) {
-        out.fill(Force::default());
-        let mut own_forces = [Force::default(); MAX_NODES];
-        let own_forces = &mut own_forces[..out.len().min(MAX_NODES)];
+    fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], mut out: [&mut [f64]; 3]) {
+        for sums in &mut out {
+            sums.fill(0.0);
+        }
+        let n = gaps.len().min(MAX_NODES);
+        let mut own_forces = [[0.0; MAX_NODES]; 3];
         for (_, term, own) in self.split(branch) {
             if term.vanishes(own) {
                 continue;
             }
-            term.forces(own, gaps, rates, own_forces);
-            for (sum, force) in out.iter_mut().zip(own_forces.iter()) {
-                sum.value += force.value;
-                sum.by_gap += force.by_gap;
-                sum.by_rate += force.by_rate;
+            let parts = own_forces.each_mut().map(|part| &mut part[..n]);
+            term.forces(own, gaps, rates, parts);
+            for (sums, parts) in out.iter_mut().zip(&own_forces) {
+                for (sum, part) in sums.iter_mut().zip(parts) {
+                    *sum += part;
+                }
             }
         }
     }

@@ -88,6 +88,37 @@ impl Plain<'_> {
         (table.swap_remove(0), error)
     }
 
+    /// Where a level is passed both ways within a step of length `h`: the part of the step after
+    /// which the gap turns, and the guard there.
+    fn dip(
+        &self,
+        guard: Guard,
+        ends: (&[f64], &[f64]),
+        h: f64,
+        to: impl Fn(f64) -> Vec<f64>,
+    ) -> Option<(f64, f64)> {
+        let sign = match guard {
+            Guard::Falls(_) => 1.0,
+            Guard::Rises(_) => -1.0,
+            Guard::Turns | Guard::Own(_) => return None,
+        };
+        let falls = |x: &[f64]| sign * self.gap(x).1 < 0.0;
+        if !falls(ends.0) || falls(ends.1) {
+            return None;
+        }
+        let (mut low, mut high) = (0.0, h);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if falls(&to(middle)) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let least = self.guard(guard, &to(low));
+        (least < 0.0).then_some((low, least))
+    }
+
     /// The state at `end` from `x` at time 0, and the number of switches.
     pub(crate) fn run(&self, x: &mut Vec<f64>, end: f64) -> usize {
         let tolerance = 1e-14 * x.iter().fold(1.0, |m: f64, v| m.max(v.abs()));
@@ -106,11 +137,17 @@ impl Plain<'_> {
             let mut first: Option<usize> = None;
             for (number, exit) in self.law.exits(branch).iter().enumerate() {
                 let value = |x: &[f64]| self.guard(exit.guard, x);
-                if value(&next) >= 0.0 {
-                    continue;
-                }
+                let beyond = if value(&next) < 0.0 {
+                    (taken, value(&next))
+                } else {
+                    let to = |h: f64| self.step(t, x, branch, h).0;
+                    match self.dip(exit.guard, (x, &next), taken, to) {
+                        Some(dip) => dip,
+                        None => continue,
+                    }
+                };
                 // The step that ends on the guard.
-                let (mut a, mut b) = ((0.0, value(x).max(0.0)), (taken, value(&next)));
+                let (mut a, mut b) = ((0.0, value(x).max(0.0)), beyond);
                 for _ in 0..200 {
                     let middle = if a.1 == 0.0 {
                         0.5 * (a.0 + b.0)

@@ -4,6 +4,14 @@
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
+    /// Those of a long run: of the seed that the random tests take from their variable, or else of
+    /// the `usual` one.
+    #[allow(dead_code, reason = "not every test that draws numbers is a long run")]
+    pub(crate) fn of_a_long_run(usual: u64) -> Self {
+        let seed = std::env::var("PROPTEST_RNG_SEED");
+        Self(seed.map_or(usual, |seed| seed.parse().expect("a number")))
+    }
+
     pub(crate) fn next(&mut self) -> f64 {
         self.0 = self
             .0

@@ -38,6 +38,11 @@ pub enum WorkError {
         /// Chunks of the share.
         total: usize,
     },
+    /// It was stopped after the last chunk.
+    #[error(
+        "stopped; every chunk is finished, motions of neighbouring values are still to be tried"
+    )]
+    Neighbours,
     /// The store refused.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -172,7 +177,9 @@ impl From<WorkError> for crate::Error {
     fn from(error: WorkError) -> Self {
         match error {
             WorkError::Store(error) => error.into(),
-            WorkError::Cancelled { .. } => Self::new(crate::ErrorKind::Stopped, error.to_string()),
+            WorkError::Cancelled { .. } | WorkError::Neighbours => {
+                Self::new(crate::ErrorKind::Stopped, error.to_string())
+            }
         }
     }
 }

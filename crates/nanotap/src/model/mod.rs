@@ -412,10 +412,21 @@ pub fn cantilever_tangent(
     parameter: Parameter,
 ) -> Result<SystemTangent, ModelError> {
     let galerkin = Galerkin::new(case)?;
+    let mut tangent = SystemTangent::zeros(&model.system);
+    if parameter == Parameter::Omega {
+        tangent.log_period = -1.0 / case.omega;
+    }
+    if model.nonlinear.is_some() {
+        // Free flight alone.
+        let memory = model.memory > 0;
+        let beam = Beam::new(&galerkin, model.system.drive(), memory)?;
+        let change = beam.derivative(parameter)?;
+        tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
+        return Ok(tangent);
+    }
     let law = ContactLaw::law(case, Some(parameter));
     let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
     let change = beam.derivative(parameter)?;
-    let mut tangent = SystemTangent::zeros(&model.system);
     for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
         tangent.regimes[r] = change.regime(&beam, answer);
     }
@@ -426,9 +437,6 @@ pub fn cantilever_tangent(
     if let Some(left) = &law.left {
         let change = change.combined(&beam, left);
         tangent.resets[1][0] = Some(beam.memory_jump(&change, 0.0));
-    }
-    if parameter == Parameter::Omega {
-        tangent.log_period = -1.0 / case.omega;
     }
     Ok(tangent)
 }
@@ -443,7 +451,11 @@ pub(crate) fn cantilever_model_tangent(
     parameter: Parameter,
 ) -> Result<ModelTangent, ModelError> {
     let galerkin = Galerkin::new(case)?;
-    let law = ContactLaw::law(case, Some(parameter));
+    let law = if model.nonlinear.is_some() {
+        contact::no_sample(model.memory > 0)
+    } else {
+        ContactLaw::law(case, Some(parameter))
+    };
     let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
     let change = beam.derivative(parameter)?;
     let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
@@ -451,8 +463,10 @@ pub(crate) fn cantilever_model_tangent(
         system: cantilever_tangent(case, model, parameter)?,
         base: change.base(&beam),
         force: [&law.flight, &law.contact]
+            .iter()
+            .take(model.force.len())
             .map(|answer| change.combined(&beam, &answer.force))
-            .into(),
+            .collect(),
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),
         second_phase: second_phase.to_radians(),

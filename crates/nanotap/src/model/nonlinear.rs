@@ -123,6 +123,12 @@ impl Nonlinear {
             .unwrap_or_else(|| law.branch_at(gap, rate))
     }
 
+    /// How many of the last entries of a state are whole numbers: the branch of the law, where it
+    /// is remembered.
+    pub(crate) fn discrete_entries(&self) -> usize {
+        usize::from(self.remembers)
+    }
+
     /// Puts `flow` at a state of the model at drive phase 0.
     pub(crate) fn start(&self, flow: &mut Flow, state: &[f64]) -> Result<(), MotionError> {
         let n = self.system.dimension();
@@ -512,6 +518,10 @@ impl NonlinearStrobe {
 
     pub(crate) fn dimension(&self) -> usize {
         self.nonlinear.system.dimension() + usize::from(self.nonlinear.remembers)
+    }
+
+    pub(crate) fn discrete_entries(&self) -> usize {
+        self.nonlinear.discrete_entries()
     }
 
     pub(crate) fn period(&self) -> f64 {

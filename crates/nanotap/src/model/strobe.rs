@@ -102,6 +102,13 @@ impl StroboscopicMap for Strobe {
         }
     }
 
+    fn discrete_entries(&self) -> usize {
+        match &self.0 {
+            Engine::Exact(_) => 0,
+            Engine::Nonlinear(map) => map.discrete_entries(),
+        }
+    }
+
     fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance(state)?),

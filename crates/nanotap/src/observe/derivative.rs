@@ -6,10 +6,12 @@
 //! are read from its derivative; the observables are then read once more, each number with its
 //! derivative beside it. Where the period varies, derivatives are at constant drive phase.
 //!
-//! Under a nonlinear force the orbit's derivative is as exact; what is observed is differenced
-//! along it, good to some six digits.
+//! Under a nonlinear force the same is read off the variation's dense output
+//! ([`gather`](super::varied_motion)). Keys that change the lever's modes, by mass or damping, are the
+//! exception: there the engine's map is differenced, and what is observed with it.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_flow::variation::{Variation, Varied, VariedOutput, Wanted};
@@ -20,16 +22,18 @@ use serde_json::{Map, Value as Json, json};
 
 use super::clearance::Clearance;
 use super::measure::{
-    Beginnings, Found, Measured, Need, Signal, beginnings, contact_regimes, frequency,
+    Beginnings, Found, Measured, Need, Signal, Tone, beginnings, contact_regimes, frequency,
 };
 use super::number::Phasor;
 use super::table::{OBSERVABLES, Observable, Observables, Set};
 use super::value::Value;
+use super::varied_motion::{Change, Gathered, gather};
 use super::watch::measure;
 use crate::case::{Case, CaseError, Key};
 use crate::model::contact::dual::Dual;
+use crate::model::nonlinear::{self, Nonlinear};
 use crate::model::strobe::Strobe;
-use crate::model::{Model, ModelTangent, MotionError, Tangent};
+use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
 
 /// Why an orbit has no derivative.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -73,16 +77,22 @@ impl Derivative {
         observed: &Observables,
         set: Set,
     ) -> Result<Self, DerivativeError> {
-        if model.nonlinear.is_some() {
-            return Self::of_nonlinear(case, model, key, (state, period), set);
-        }
+        let of_map = case.tangent(model, key)?;
+        let start = orbit_derivative(model, of_map.clone(), state, period)?;
+        let under = match (&model.nonlinear, linearised(&of_map)) {
+            (Some(_), None) => {
+                return Self::by_differences(case, key, (state, period), start, set);
+            }
+            (nonlinear, by) => nonlinear.as_ref().zip(by),
+        };
         let tangent = case.model_tangent(model, key)?;
-        let start = orbit_derivative(model, tangent.system.clone().into(), state, period)?;
-        let clearance = observed.beam_clearance_xi;
-        let mut followed = Followed::new(model, &tangent, set, clearance);
-        followed
-            .run(state, &start, period)
-            .map_err(MotionError::from)?;
+        let mut followed = Followed::new(model, &tangent, set, observed.beam_clearance_xi);
+        match under {
+            None => followed
+                .run(state, &start, period)
+                .map_err(MotionError::from)?,
+            Some((nonlinear, by)) => followed.run_under(nonlinear, state, by(&start), period)?,
+        }
         let observables = followed.changes(set);
         let physical = case
             .physical()
@@ -109,17 +119,15 @@ impl Derivative {
         })
     }
 
-    /// The same under a nonlinear force: the orbit's derivative is exact, what is observed of it
-    /// is differenced along it, centrally.
-    fn of_nonlinear(
+    /// The same under a nonlinear force by a key that changes the modes: what is observed of the
+    /// orbit, which changes by `start`, is differenced along it, centrally.
+    fn by_differences(
         case: &Case,
-        model: &Model,
         key: Key,
         (state, period): (&[f64], usize),
+        start: Vec<f64>,
         set: Set,
     ) -> Result<Self, DerivativeError> {
-        let tangent = case.tangent(model, key)?;
-        let start = orbit_derivative(model, tangent, state, period)?;
         let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         let value = case.get(key);
         // What balances the engine's error with the third derivative: the orbit changes by this
@@ -229,7 +237,7 @@ impl JsonSchema for Derivative {
 /// How amplitude and phase (degrees) of the tip's first harmonic change over one drive period that
 /// starts in `state`, closed or not: a column a number of the state, then one a key, `2 × (n + k)`.
 /// `sizes` are those of the numbers of the state, `by` (`n × k`) how the end of the period changes
-/// with the keys. Under a nonlinear force by central differences.
+/// with the keys.
 ///
 /// # Errors
 /// When the flow fails, or the case makes no sense beside the value of a key.
@@ -244,7 +252,7 @@ pub(crate) fn first_harmonic_changes(
     let n = state.len();
     let set = Set::FIRST_HARMONIC;
     let mut rows = DMatrix::zeros(2, n + keys.len());
-    if model.nonlinear.is_none() {
+    let Some(nonlinear) = &model.nonlinear else {
         let mut of = |column: usize, tangent: &ModelTangent, start: &[f64]| {
             let mut followed = Followed::new(model, tangent, set, None);
             followed.run(state, start, 1).map_err(MotionError::from)?;
@@ -263,51 +271,96 @@ pub(crate) fn first_harmonic_changes(
             of(n + k, &case.model_tangent(model, *key)?, &vec![0.0; n])?;
         }
         return Ok(rows);
-    }
-    let mut difference = |column: usize, step: f64, low: Observables, high: Observables| {
-        let turn = (high.phase - low.phase + 180.0).rem_euclid(360.0) - 180.0;
-        rows[(0, column)] = (high.first_harmonic - low.first_harmonic) / (2.0 * step);
-        rows[(1, column)] = turn / (2.0 * step);
     };
+    let mut changes = Vec::new();
+    // Columns of the changes; those with a parameter stand last.
+    let mut columns = Vec::new();
     for k in 0..n - model.memory {
-        let step = BESIDE * sizes[k];
-        let beside = |side: f64| {
-            let mut from = state.to_vec();
-            from[k] += side * step;
-            measure(model, &from, 1, set)
-        };
-        difference(k, step, beside(-1.0)?, beside(1.0)?);
+        let mut start = vec![0.0; n];
+        start[k] = 1.0;
+        columns.push(k);
+        changes.push(Change {
+            start,
+            parameter: None,
+            log_period: 0.0,
+        });
     }
     for (k, key) in keys.iter().enumerate() {
+        let tangent = case.tangent(model, *key)?;
+        if let Some(by) = linearised(&tangent) {
+            columns.push(n + k);
+            changes.push(by(&vec![0.0; n]));
+            continue;
+        }
         // The same change of the motion, if the key may change so far.
         let change = (0..n).fold(0.0, |m: f64, i| m.max(by[(i, k)].abs() / sizes[i]));
         let value = case.get(*key);
-        // What the motion is linear in, as the drive's strength, may change far.
-        let part = if case.drive_keys().contains(key) {
-            0.1
-        } else {
-            3e-3
-        };
         let farthest = if value == 0.0 {
             1.0
         } else {
-            part * value.abs()
+            3e-3 * value.abs()
         };
         let step = (BESIDE / change).min(farthest);
         let beside = |side: f64| -> Result<Observables, DerivativeError> {
             let there = case.with(*key, value + side * step).model()?;
             Ok(measure(&there, state, 1, set)?)
         };
-        difference(n + k, step, beside(-1.0)?, beside(1.0)?);
+        let (low, high) = (beside(-1.0)?, beside(1.0)?);
+        let turn = (high.phase - low.phase + 180.0).rem_euclid(360.0) - 180.0;
+        rows[(0, n + k)] = (high.first_harmonic - low.first_harmonic) / (2.0 * step);
+        rows[(1, n + k)] = turn / (2.0 * step);
+    }
+    let of_changes = tip_changes(model, nonlinear, state, &changes)?;
+    for (column, [amplitude, phase]) in columns.into_iter().zip(of_changes) {
+        rows[(0, column)] = amplitude;
+        rows[(1, column)] = phase;
     }
     Ok(rows)
 }
 
-/// Part of the amplitude by which a motion changes where its first harmonic is differenced.
+/// How amplitude and phase of the tip's first harmonic over one drive period change.
+fn tip_changes(
+    model: &Model,
+    nonlinear: &Arc<Nonlinear>,
+    state: &[f64],
+    changes: &[Change],
+) -> Result<Vec<[f64; 2]>, MotionError> {
+    let tip = nanotap_volterra::VariedOutput::fixed(nonlinear.output(&model.tip, 0.0));
+    let wanted = Wanted {
+        fouriers: vec![(0, frequency(model, Tone::First))],
+        ..Wanted::default()
+    };
+    let gathered = gather(nonlinear, state, 1, changes, (&[tip], &wanted), None)?;
+    let of = |gathered: &Gathered| {
+        let integral = phasor(gathered.fouriers[0]);
+        let component = integral.times(Dual::constant(2.0) / dual(gathered.duration));
+        [component.norm().derivative, component.lag().derivative]
+    };
+    Ok(gathered.iter().map(of).collect())
+}
+
+/// Part of the amplitude by which a motion changes where its first harmonic is differenced, by keys
+/// that change the modes.
 const BESIDE: f64 = 1e-4;
 
 /// Part of an orbit by which it changes where what is observed is differenced.
 const STEP: f64 = 2e-4;
+
+/// A change of the motion that begins with a change of the state, where the engine knows it.
+type Along<'a> = Box<dyn Fn(&[f64]) -> Change + 'a>;
+
+fn linearised(tangent: &Tangent) -> Option<Along<'_>> {
+    let TangentKind::Nonlinear(nonlinear::Variation::Linearised { change, log_period }) =
+        &tangent.0
+    else {
+        return None;
+    };
+    Some(Box::new(move |start| Change {
+        start: start.to_vec(),
+        parameter: Some(change.clone()),
+        log_period: *log_period,
+    }))
+}
 
 /// dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ.
 fn orbit_derivative(
@@ -339,6 +392,8 @@ struct Followed<'a> {
     model: &'a Model,
     tangent: &'a ModelTangent,
     needs: Vec<(Need, Place)>,
+    /// Each with its output.
+    signals: Vec<Signal>,
     outputs: Vec<VariedOutput>,
     wanted: Wanted,
     clearance: Option<f64>,
@@ -363,28 +418,27 @@ impl<'a> Followed<'a> {
             model,
             tangent,
             needs: Vec::new(),
+            signals: Vec::new(),
             outputs: Vec::new(),
             wanted: Wanted::default(),
             clearance,
             found: None,
         };
-        let mut signals: Vec<Signal> = Vec::new();
         for need in asked.asked {
-            let place = followed.want(need, &mut signals);
+            let place = followed.want(need);
             followed.needs.push((need, place));
         }
         followed
     }
 
-    fn want(&mut self, need: Need, signals: &mut Vec<Signal>) -> Place {
-        let mut channel = |of: &mut Self, signal: Signal| {
-            if let Some(known) = signals.iter().position(|known| *known == signal) {
+    fn want(&mut self, need: Need) -> Place {
+        let channel = |of: &mut Self, signal: Signal| {
+            if let Some(known) = of.signals.iter().position(|known| *known == signal) {
                 return known;
             }
-            signals.push(signal);
-            let output = varied(signal, of.model, of.tangent);
-            of.outputs.push(output);
-            signals.len() - 1
+            of.signals.push(signal);
+            of.outputs.push(varied(signal, of.model, of.tangent));
+            of.signals.len() - 1
         };
         match need {
             Need::Least(signal) | Need::Greatest(signal) => {
@@ -434,10 +488,8 @@ impl<'a> Followed<'a> {
         });
         wanted.integrals.push(outputs.len() - 1);
         wanted.speeds = beginnings(model).collect();
-        if let (Some(xi), Some(beam)) = (self.clearance, &model.beam) {
-            // The base moves as the tip's height does beside the beam's shape.
-            let change = zero.plus(1.0, &tones_of(&self.tangent.base));
-            outputs.push(VariedOutput::same(&model.system, &beam.height(xi), &change));
+        if let Some(height) = self.lowest() {
+            outputs.push(height);
             wanted.extrema.push((outputs.len() - 1, -1.0));
         }
         let mut flow = Flow::new(std::sync::Arc::clone(&model.system));
@@ -454,45 +506,91 @@ impl<'a> Followed<'a> {
             flow.run_period(&mut variation)?;
         }
         variation.finish();
-        self.found = Some(self.read(&variation, period));
+        let mut gathered = Gathered {
+            duration: variation.duration,
+            contact_time: contact_regimes(model)
+                .next()
+                .map_or_else(Varied::default, |_| {
+                    variation.integrals[self.wanted.integrals.len()]
+                }),
+            ..Gathered::default()
+        };
+        for (speed, squares) in variation.speeds.iter().zip(&variation.squared_speeds) {
+            if speed.value > gathered.greatest_speed.value {
+                gathered.greatest_speed = *speed;
+            }
+            gathered.squared_speeds.value += squares.value;
+            gathered.squared_speeds.change += squares.change;
+        }
+        gathered.integrals = variation.integrals;
+        gathered.products = variation.products;
+        gathered.fouriers = variation.fouriers;
+        gathered.extrema = variation.extrema;
+        self.found = Some(self.read(&gathered, period));
         Ok(())
     }
 
-    fn read(&self, variation: &Variation<'_>, period: usize) -> Found<Dual> {
+    /// The same under a nonlinear force.
+    fn run_under(
+        &mut self,
+        nonlinear: &Arc<Nonlinear>,
+        state: &[f64],
+        change: Change,
+        period: usize,
+    ) -> Result<(), MotionError> {
+        let under = |output: &VariedOutput, force: f64| nanotap_volterra::VariedOutput {
+            value: nonlinear.output(&output.value[0], force),
+            changes: vec![nonlinear.output(&output.change[0], 0.0)],
+        };
+        let signals = self.signals.iter().zip(&self.outputs);
+        let mut outputs: Vec<_> = signals
+            .map(|(signal, output)| under(output, signal.force_part(nonlinear)))
+            .collect();
+        let mut wanted = self.wanted.clone();
+        if let Some(height) = self.lowest() {
+            outputs.push(under(&height, 0.0));
+            wanted.extrema.push((outputs.len() - 1, -1.0));
+        }
+        let rate = under(&varied(Signal::HeightRate, self.model, self.tangent), 0.0);
+        let asked = (outputs.as_slice(), &wanted);
+        let gathered = gather(nonlinear, state, period, &[change], asked, Some(&rate))?;
+        self.found = gathered.first().map(|gathered| self.read(gathered, period));
+        Ok(())
+    }
+
+    /// The height of the point of the beam that comes nearest to the sample.
+    fn lowest(&self) -> Option<VariedOutput> {
+        let (xi, beam) = self.clearance.zip(self.model.beam.as_ref())?;
+        // The base moves as the tip's height does beside the beam's shape.
+        let zero = self.model.tip.scaled(0.0);
+        let change = zero.plus(1.0, &tones_of(&self.tangent.base));
+        let system = &self.model.system;
+        Some(VariedOutput::same(system, &beam.height(xi), &change))
+    }
+
+    fn read(&self, gathered: &Gathered, period: usize) -> Found<Dual> {
         let real = |number: Varied<f64>| Phasor {
             re: dual(number),
             im: Dual::default(),
         };
         let value = |place| match place {
-            Place::Extremum(at) => real(variation.extrema[at]),
-            Place::Integral(at) => real(variation.integrals[at]),
-            Place::Product(at) => real(variation.products[at]),
-            Place::Fourier(at) => {
-                let c = variation.fouriers[at];
-                Phasor {
-                    re: Dual::new(c.value.re, c.change.re),
-                    im: Dual::new(c.value.im, c.change.im),
-                }
-            }
+            Place::Extremum(at) => real(gathered.extrema[at]),
+            Place::Integral(at) => real(gathered.integrals[at]),
+            Place::Product(at) => real(gathered.products[at]),
+            Place::Fourier(at) => phasor(gathered.fouriers[at]),
         };
-        let touching = self.wanted.integrals.len();
-        let mut contacts = Beginnings::<Dual>::default();
-        for (speed, squares) in variation.speeds.iter().zip(&variation.squared_speeds) {
-            if speed.value > contacts.greatest_speed.value {
-                contacts.greatest_speed = dual(*speed);
-            }
-            contacts.squared_speeds = contacts.squared_speeds + dual(*squares);
-        }
-        let heights = variation.extrema.get(self.wanted.extrema.len());
+        let heights = gathered.extrema.get(self.wanted.extrema.len());
         let values = self.needs.iter();
         Found {
             values: values.map(|&(need, place)| (need, value(place))).collect(),
-            duration: dual(variation.duration),
+            duration: dual(gathered.duration),
             periods: period as u64,
-            contact_time: contact_regimes(self.model)
-                .next()
-                .map_or_else(Dual::default, |_| dual(variation.integrals[touching])),
-            contacts,
+            contact_time: dual(gathered.contact_time),
+            contacts: Beginnings {
+                greatest_speed: dual(gathered.greatest_speed),
+                squared_speeds: dual(gathered.squared_speeds),
+                ..Beginnings::default()
+            },
             stored: Dual::default(),
             stored_by_sample: Dual::default(),
             clearance: self.clearance.zip(heights).map(|(xi, height)| Clearance {
@@ -514,6 +612,13 @@ impl<'a> Followed<'a> {
 
 const fn dual(number: Varied<f64>) -> Dual {
     Dual::new(number.value, number.change)
+}
+
+fn phasor(number: Varied<nanotap_flow::Complex>) -> Phasor<Dual> {
+    Phasor {
+        re: Dual::new(number.value.re, number.change.re),
+        im: Dual::new(number.value.im, number.change.im),
+    }
 }
 
 /// The tones of an output alone.

@@ -42,12 +42,16 @@ pub(super) enum Signal {
 impl Signal {
     /// What it is in a model with a nonlinear law.
     pub(super) fn reading(self, model: &Model, nonlinear: &Nonlinear) -> nanotap_volterra::Output {
-        let force = match self {
+        nonlinear.output(&self.outputs(model)[0], self.force_part(nonlinear))
+    }
+
+    /// How much of a nonlinear law's force is in it beside its output.
+    pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
+        match self {
             Self::Force => 1.0,
             Self::Power(term) => term.force_part(nonlinear),
             _ => 0.0,
-        };
-        nonlinear.output(&self.outputs(model)[0], force)
+        }
     }
 
     /// What it is in `model`, an entry a regime.

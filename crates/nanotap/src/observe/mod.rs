@@ -20,6 +20,7 @@ pub mod table;
 pub mod time_series;
 mod validity;
 mod value;
+mod varied_motion;
 mod watch;
 
 pub use clearance::Clearance;

@@ -199,6 +199,8 @@ pub struct BranchReport {
     pub branches: Vec<BranchSummary>,
     /// Their points, branch by branch, in order along the arc.
     pub points: Vec<PointReport>,
+    /// How many points between these are not listed.
+    pub points_left_out: usize,
     /// Their bifurcations.
     pub bifurcations: Vec<BifurcationReport>,
     /// Loci in two parameters, if a second one was given.
@@ -214,6 +216,21 @@ pub struct BranchReport {
     /// Of a physical case: what a value of the parameter is to be multiplied with for SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
+}
+
+impl BranchReport {
+    /// Keeps the first and the last point of each branch and every `step`-th from the first.
+    pub fn thin(&mut self, step: usize) {
+        let all = self.points.len();
+        let keeps: Vec<bool> = self
+            .points
+            .chunk_by(|a, b| a.branch == b.branch)
+            .flat_map(|own| (0..own.len()).map(|k| k % step.max(1) == 0 || k + 1 == own.len()))
+            .collect();
+        let mut keeps = keeps.into_iter();
+        self.points.retain(|_| keeps.next().unwrap_or(true));
+        self.points_left_out += all - self.points.len();
+    }
 }
 
 /// One branch.
@@ -542,6 +559,7 @@ fn described(
         to: options.to,
         branches: Vec::new(),
         points: Vec::new(),
+        points_left_out: 0,
         bifurcations: Vec::new(),
         loci: None,
         failures: diagram

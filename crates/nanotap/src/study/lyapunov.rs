@@ -149,6 +149,10 @@ impl StroboscopicMap for Stoppable<'_> {
         self.map.period()
     }
 
+    fn discrete_entries(&self) -> usize {
+        self.map.discrete_entries()
+    }
+
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Unfinished> {
         self.goes_on()?;
         Ok(self.map.advance(state)?)

@@ -457,7 +457,8 @@ pub struct OrbitRequest {
     /// Samples a drive period in the time series
     #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
     pub resolution: usize,
-    /// Keys of the case by which to differentiate the orbit and all that is observed of it
+    /// Keys of the case by which to differentiate the orbit and all that is observed of it;
+    /// what stays is what stays in a sweep
     #[schemars(extend("x-value" = "KEY,…"))]
     pub derivatives: Vec<String>,
     /// Prove in interval arithmetic that it exists, is alone, and is stable or not

@@ -3,9 +3,12 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
+use nanotap::model::strobe::Strobe;
+use nanotap::observe::{Set, measure};
 use nanotap::study::approach::{ApproachOptions, Way, approach};
-use nanotap::study::fit::{Entry, FitReport, FitRequest, Table, fit, residuals};
+use nanotap::study::fit::{Entry, FitReport, FitRequest, FittedParameter, Table, fit, residuals};
 use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
 /// A stiff lever a little above its resonance: two motions at one distance.
 const LEVER: &str = "[model]\nmodes = 2\n[cantilever]\nk = \"42 N/m\"\nf0 = \"330 kHz\"\nQ = 400\n\
@@ -111,43 +114,91 @@ fn fitted(case: &Case, request: &FitRequest) -> FitReport {
 const FREE: [&str; 3] = ["sample.stiffness", "sample.loss_tangent", "gap.offset"];
 const TRUE: [f64; 3] = [30.0, 0.1, 0.0];
 
-/// How many of the 95 % intervals of `repetitions` fits hold the true values.
-fn covered(repetitions: u64, stated: bool) -> [usize; 3] {
+/// How many of the 95 % intervals of `repetitions` fits hold the true values; `table` makes one
+/// repetition's.
+fn covered(
+    repetitions: u64,
+    start: &Case,
+    jumps: bool,
+    table: impl Fn(&mut Noise) -> Table + Sync,
+) -> [usize; 3] {
+    let one = |repetition: u64| {
+        let table = table(&mut Noise(1000 + repetition));
+        let asked = FitRequest {
+            jumps,
+            ..request(vec![table], &FREE)
+        };
+        let report = fitted(start, &asked);
+        assert!(report.fits, "{repetition}: {:?}", report.reason);
+        let holds = |(parameter, truth): (&FittedParameter, f64)| {
+            let [low, high] = parameter.interval;
+            usize::from(low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high))
+        };
+        let mut all = report.parameters.iter().zip(TRUE).map(holds);
+        [(); 3].map(|()| all.next().unwrap())
+    };
+    let all = (0..repetitions).map(one);
+    all.fold([0; 3], |sum, one| std::array::from_fn(|k| sum[k] + one[k]))
+}
+
+/// Of rows on one branch.
+fn covered_tapping(repetitions: u64, stated: bool) -> [usize; 3] {
     let truth = case(LEVER, &[]);
     let start = case(
         LEVER,
         &["sample.stiffness=22 N/m", "sample.loss_tangent=0.12"],
     );
     let curve = curve(&truth, 19.0, 2.0, 12);
-    let mut held = [0; 3];
-    for repetition in 0..repetitions {
-        let mut noise = Noise(1000 + repetition);
-        let table = measured(&curve, &mut noise, [0.05, 0.2], stated);
-        let report = fitted(&start, &request(vec![table], &FREE));
-        assert!(report.fits, "{repetition}: {:?}", report.reason);
-        for ((held, parameter), truth) in held.iter_mut().zip(&report.parameters).zip(TRUE) {
-            let [low, high] = parameter.interval.map(Option::unwrap);
-            *held += usize::from(low <= truth && truth <= high);
+    covered(repetitions, &start, true, |noise| {
+        measured(&curve, noise, [0.05, 0.2], stated)
+    })
+}
+
+/// Of rows on both branches, there and back, 0.8 nm apart from a place that is another in each
+/// repetition: neither jump stands in the middle between its rows.
+fn covered_with_jumps(repetitions: u64, jumps: bool) -> [usize; 3] {
+    const APART: usize = 40;
+    let truth = case(LEVER, &[]);
+    let start = case(LEVER, &["sample.stiffness=24 N/m"]);
+    let dense = curve(&truth, 25.0, 12.0, 651);
+    covered(repetitions, &start, jumps, |noise| {
+        let mut rows = Vec::new();
+        for way in [Way::Approach, Way::Retract] {
+            let from = (noise.uniform() * APART as f64) as usize;
+            let of_way = dense.iter().filter(|row| row.3 == way);
+            rows.extend(of_way.skip(from).step_by(APART).copied());
         }
-    }
-    held
+        measured(&rows, noise, [0.1, 0.5], true)
+    })
 }
 
 #[test]
 fn intervals_hold_the_true_values_as_often_as_they_say() {
     // Of 40 with 95 %, fewer than 33 are found once in 10⁴ (binomial).
-    for held in covered(40, true) {
+    for held in covered_tapping(40, true) {
         assert!(held >= 33, "{held} of 40");
     }
 }
 
+/// In the narrow, bent valley between stiffness and distance: with steps of the Jacobian at the best
+/// values alone 86 of 100 intervals of the distance held it.
 #[test]
-#[ignore = "400 fits, twice: minutes"]
+fn intervals_hold_the_true_values_where_chi2_has_a_bent_valley() {
+    // Of 12 with 95 %, fewer than 8 are found once in 5000 (binomial).
+    for held in covered_with_jumps(12, false) {
+        assert!(held >= 8, "{held} of 12");
+    }
+}
+
+#[test]
+#[ignore = "400 fits, four times: some 20 minutes"]
 fn intervals_hold_the_true_values_in_95_of_100_repetitions() {
-    for stated in [true, false] {
-        let held = covered(400, stated);
-        println!("stated {stated}: {held:?} of 400");
-        for held in held {
+    for kind in [true, false] {
+        let stated = covered_tapping(400, kind);
+        println!("one branch, errors stated {kind}: {stated:?} of 400");
+        let jumps = covered_with_jumps(400, kind);
+        println!("both branches, jumps counted {kind}: {jumps:?} of 400");
+        for held in stated.into_iter().chain(jumps) {
             assert!((372..=388).contains(&held), "{held} of 400");
         }
     }
@@ -288,6 +339,91 @@ fn a_free_amplitude_is_found_from_resonance_curves() {
         let error = parameter.standard_error.unwrap();
         assert!(
             (parameter.value - truth).abs() < 5.0 * error,
+            "{parameter:?}"
+        );
+    }
+}
+
+/// Amplitude and phase against the drive's frequency 15 nm above the sample, swept up and down: the
+/// lever swings freely where it is far from resonance, taps between, and does both over 1.6 kHz
+/// (docs/cases/frequency-sweep.md).
+#[test]
+fn a_resonance_curve_is_fitted_with_both_its_branches() {
+    let truth = case(LEVER, &[]);
+    let key = truth.key("drive.frequency").unwrap();
+    let frequencies: Vec<f64> = (0..19).map(|k| 327e3 + 500.0 * f64::from(k)).collect();
+    let mut columns: Vec<(String, Vec<Entry>)> = [
+        "frequency (kHz)",
+        "amplitude (nm)",
+        "phase (deg)",
+        "direction",
+        "amplitude error (nm)",
+        "phase error (deg)",
+    ]
+    .map(|name| (name.to_owned(), Vec::new()))
+    .to_vec();
+    let mut noise = Noise(61);
+    let mut state = vec![0.0; truth.model().unwrap().dimension()];
+    let down = frequencies.iter().rev().map(|f| (*f, "down"));
+    for (frequency, direction) in frequencies.iter().map(|f| (*f, "up")).chain(down) {
+        let there = truth.with(key, frequency);
+        let model = there.model().unwrap();
+        // Where the motion goes from that at the frequency before, as in a slow sweep.
+        let end = classify(
+            &mut Strobe::new(&model),
+            &state,
+            &ClassifyOptions::default(),
+        );
+        let MotionKind::Periodic(found) = end.kind else {
+            panic!("{frequency}: {:?}", end.kind)
+        };
+        state.clone_from(&found.states[0]);
+        let seen = measure(&model, &state, found.period, Set::ALL).unwrap();
+        let seen = seen.in_si(&there.physical().unwrap().scales);
+        let row = [
+            Entry::Number(1e-3 * frequency),
+            Entry::Number(1e9 * seen.first_harmonic + 0.05 * noise.normal()),
+            Entry::Number(seen.phase + 0.2 * noise.normal()),
+            Entry::Text(direction.to_owned()),
+            Entry::Number(0.05),
+            Entry::Number(0.2),
+        ];
+        for ((_, column), entry) in columns.iter_mut().zip(row) {
+            column.push(entry);
+        }
+    }
+    let table = Table {
+        name: "resonance".to_owned(),
+        columns,
+        lines: Vec::new(),
+    };
+    let start = case(
+        LEVER,
+        &["sample.stiffness=22 N/m", "sample.loss_tangent=0.15"],
+    );
+    let free = ["sample.stiffness", "sample.loss_tangent", "cantilever.Q"];
+    let report = fitted(
+        &start,
+        &FitRequest {
+            profile: false,
+            ..request(vec![table], &free)
+        },
+    );
+    assert!(
+        report.fits && report.remarks.is_empty(),
+        "{:?} {:?}",
+        report.reason,
+        report.remarks
+    );
+    // Upwards it leaves the tapping branch, downwards the free one, at different frequencies.
+    let [up, down] = [&report.jumps[0], &report.jumps[1]];
+    assert_eq!(report.jumps.len(), 2);
+    assert_eq!(up.branches[0], down.branches[1]);
+    assert!(up.fold > down.fold + 500.0, "{up:?} {down:?}");
+    for (parameter, truth) in report.parameters.iter().zip([30.0, 0.1, 400.0]) {
+        let error = parameter.standard_error.unwrap();
+        assert!(
+            (parameter.value - truth).abs() < 4.0 * error,
             "{parameter:?}"
         );
     }
@@ -902,16 +1038,53 @@ fn derivatives_of_a_curve_under_frequency_modulation_are_exact() {
     let at = [29.0, 0.11, 41.0, 331e3, 390.0, 10.3e-9, 1e-10, 2.0, 1.1];
     let steps = [0.03, 1e-4, 0.04, 30.0, 0.4, 1e-12, 1e-12, 0.1, 1e-3];
     derivatives_are_right(&linear, &asked, &at, &steps, 1e-5);
-    // Under a nonlinear law what is observed beside the orbit is differenced.
+    // Under a nonlinear law; by a key that changes the modes what is observed beside the orbit is
+    // differenced.
     let pulling = case(FOLLOWED, &[]);
     let table = modulated(&pulling, [12.0, 9.9], 3, None);
-    let free = [
-        "sample.modulus",
-        "sample.hamaker",
-        "sample.damping",
-        "cantilever.Q",
-    ];
-    let asked = with_columns(request(vec![table], &free));
-    let at = [2.9e9, 2.1e-19, 1.1e-7, 2100.0];
-    derivatives_are_right(&pulling, &asked, &at, &[3e6, 2e-22, 1e-10, 2.0], 1e-4);
+    let free = ["sample.modulus", "sample.hamaker", "sample.damping"];
+    let asked = with_columns(request(vec![table.clone()], &free));
+    let at = [2.9e9, 2.1e-19, 1.1e-7];
+    derivatives_are_right(&pulling, &asked, &at, &[3e6, 2e-22, 1e-10], 1e-5);
+    let asked = with_columns(request(vec![table], &["sample.modulus", "cantilever.Q"]));
+    derivatives_are_right(&pulling, &asked, &[2.9e9, 2100.0], &[3e6, 2.0], 1e-4);
+}
+
+#[test]
+fn curves_of_amplitude_and_of_frequency_shifts_do_not_mix() {
+    let truth = case(FOLLOWED, &[]);
+    let shifts = modulated(&truth, [12.0, 9.9], 3, None);
+    let shifts = Table {
+        columns: shifts
+            .columns
+            .into_iter()
+            .filter(|(name, _)| name.starts_with("zc") || name.starts_with("frequency_shift"))
+            .collect(),
+        ..shifts
+    };
+    let numbers = |values: [f64; 3]| values.map(Entry::Number).to_vec();
+    let amplitudes = Table {
+        name: "am.csv".to_owned(),
+        columns: vec![
+            ("distance (nm)".to_owned(), numbers([12.0, 11.0, 10.0])),
+            ("amplitude (nm)".to_owned(), numbers([10.0, 9.9, 9.5])),
+        ],
+        lines: Vec::new(),
+    };
+    let mut beside = shifts.clone();
+    beside
+        .columns
+        .push(("mean_deflection (pm)".to_owned(), numbers([0.1, 0.2, 0.3])));
+    for (tables, named) in [
+        (vec![shifts, amplitudes], "amplitude"),
+        (vec![beside], "mean_deflection"),
+    ] {
+        let asked = request(tables, &["sample.modulus"]);
+        let refused = fit(&truth, &asked, &Control::default()).unwrap_err();
+        let said = refused.to_string();
+        assert!(
+            said.contains(named) && said.contains("frequency modulation"),
+            "{said}"
+        );
+    }
 }

@@ -109,6 +109,33 @@ fn observed(case: &Case, start: &[f64]) -> (Vec<f64>, Observables) {
     (found.state, seen)
 }
 
+/// A neck of adhesion that comes to last over the moment of drive phase 0: the orbit is the one of
+/// before, with another memory.
+#[test]
+fn an_orbit_is_followed_where_its_neck_comes_to_be_there_at_the_strobe() {
+    let at = |gap: f64| {
+        let jkr = [
+            "tip.radius=10 nm",
+            "sample.law=jkr",
+            "sample.modulus=99.7 MPa",
+            "sample.poisson=0.49",
+            "sample.work_of_adhesion=19.96 mJ/m^2",
+        ];
+        let case = lever((2.8 * 1.030_196_947, 200.0, "75 kHz"), (30.0, gap), &jkr);
+        case.model().unwrap()
+    };
+    let here = orbit(&at(22.0), &OrbitOptions::default()).unwrap();
+    let options = OrbitOptions {
+        period: Some(1),
+        state: Some(here.state.clone()),
+        ..OrbitOptions::default()
+    };
+    let there = orbit(&at(22.1), &options).unwrap();
+    assert_eq!([here.state[2], there.state[2]], [0.0, 1.0]);
+    let grown = there.observables.first_harmonic / here.observables.first_harmonic;
+    assert!((grown - 1.004).abs() < 1e-3, "{grown}");
+}
+
 /// By differences of fourth order, to 1e-6 of each one's size.
 #[test]
 fn derivatives_of_what_is_observed() {
@@ -129,9 +156,18 @@ fn derivatives_of_what_is_observed() {
     let cases = [
         (
             dmt,
-            vec![Key::GapTip, Key::SampleModulus, Key::SampleHamaker],
+            vec![
+                Key::GapTip,
+                Key::SampleModulus,
+                Key::SampleHamaker,
+                Key::DriveForce,
+                Key::DriveFrequency,
+            ],
         ),
-        (voigt, vec![Key::GapTip, Key::SampleViscosity]),
+        (
+            voigt,
+            vec![Key::GapTip, Key::SampleViscosity, Key::DriveFrequency],
+        ),
         (jkr, vec![Key::GapTip, Key::SampleWorkOfAdhesion]),
     ];
     let mut compared = 0;
@@ -143,7 +179,13 @@ fn derivatives_of_what_is_observed() {
             let at = (state.as_slice(), 1);
             let exact = Derivative::of(&case, &model, key, at, &seen, Set::ALL).unwrap();
             let value = case.get(key);
-            let h = 1e-4 * value;
+            // A resonance is narrow.
+            let part = if key == Key::DriveFrequency {
+                1e-6
+            } else {
+                1e-4
+            };
+            let h = part * value;
             let moved =
                 [-2.0, -1.0, 1.0, 2.0].map(|k| observed(&case.with(key, value + k * h), &state).1);
             for (observable, change) in &exact.observables {
@@ -172,6 +214,36 @@ fn derivatives_of_what_is_observed() {
         }
     }
     assert!(compared > 100, "{compared}");
+}
+
+/// One repetition or three of them: means, harmonics, extrema and times change alike.
+#[test]
+fn derivatives_over_several_repetitions() {
+    let case = quick(20.0, 15.0, &DMT);
+    let start = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
+    let (state, seen) = observed(&case, &start.state);
+    let model = case.model().unwrap();
+    for key in [Key::SampleModulus, Key::DriveFrequency] {
+        let of = |periods| {
+            let at = (state.as_slice(), periods);
+            Derivative::of(&case, &model, key, at, &seen, Set::COMMON).unwrap()
+        };
+        let (one, three) = (of(1), of(3));
+        let mut compared = 0;
+        for (observable, change) in &one.observables {
+            let (Some(a), Some(b)) = (change.number(), three.number(observable)) else {
+                continue;
+            };
+            let here = (observable.of)(&seen).number().unwrap_or(0.0).abs() / case.get(key);
+            assert!(
+                (a - b).abs() <= 1e-8 * a.abs().max(here),
+                "{key}, {}: {a:e} {b:e}",
+                observable.name
+            );
+            compared += 1;
+        }
+        assert!(compared > 10, "{compared}");
+    }
 }
 
 /// A bridge that forms at 2h and ruptures at d_r takes 4πγRh ln((1 + d_r/h)/3): its force acts on

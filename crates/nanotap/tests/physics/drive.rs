@@ -138,7 +138,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
             }
             state = advance(&subject, &state);
             // Differences over four drive periods of a stiff spring: their own rounding.
-            let error = worst(&subject, &state);
+            let error = worst(&subject, &state).unwrap();
             assert!(error < 1e-4, "{actuation}: {error:e}");
         }
     }

@@ -17,7 +17,7 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{Control, StroboscopicMap};
 use proptest::prelude::*;
 
-use crate::derivatives::{advance, worst};
+use crate::derivatives::{advance, worst, worst_over};
 use crate::taylor;
 
 /// A lever on a moving surface, driven as in the paper.
@@ -51,8 +51,6 @@ struct Taylor {
 }
 
 const ORDER: usize = 24;
-/// Points of a step at which the sign of the gap is looked at.
-const PARTS: i32 = 64;
 
 impl Taylor {
     fn new(case: &Cantilever) -> Self {
@@ -105,12 +103,18 @@ impl Taylor {
         rows += push;
         flight[(2 * n, 2 * n)] = -own.stiffness / own.damping;
         let fastest = flight.norm().max(contact.norm());
+        // ‖B‖ is far above the spectral radius √‖K‖ of a stiff beam. The surface's own rate in
+        // contact, (k_s + k_v)/(η_s + η_v), may be above it.
+        let rates = [
+            fastest.sqrt(),
+            own.stiffness / own.damping,
+            (own.stiffness + case.alpha4) / (own.damping + case.alpha6),
+        ];
         Self {
             flight,
             contact,
             gap,
-            // ‖B‖ is far above the spectral radius √‖K‖ of a stiff beam.
-            step: 1.0 / fastest.sqrt().max(own.stiffness / own.damping),
+            step: 1.0 / rates.into_iter().fold(0.0, f64::max),
             period: case.period(),
         }
     }
@@ -124,14 +128,16 @@ impl Taylor {
         terms
     }
 
-    /// One period from `state` at drive phase 0, and how many switches it had.
-    fn period(&self, state: &[f64]) -> (Vec<f64>, usize) {
+    /// One period from `state` at drive phase 0; `None` where a touch is so light that rounding
+    /// decides.
+    fn period(&self, state: &[f64]) -> Option<Vec<f64>> {
         let size = self.gap.len();
         let mut y = DVector::zeros(size);
         y.rows_mut(0, state.len()).copy_from_slice(state);
         (y[size - 2], y[size - 1]) = (1.0, 1.0);
-        let (mut t, mut switches) = (0.0, 0);
+        let mut t = 0.0;
         let mut touching = self.gap.dot(&y) < 0.0;
+        let mut switched = false;
         while t < self.period {
             let matrix = if touching {
                 &self.contact
@@ -140,37 +146,89 @@ impl Taylor {
             };
             let length = self.step.min(self.period - t);
             let series = Self::series(matrix, &y);
-            let sign = if touching { -1.0 } else { 1.0 };
+            // The gap's coefficients in parts of the step.
+            let mut power = if touching { -1.0 } else { 1.0 };
             let along: Vec<f64> = series
                 .iter()
-                .map(|term| sign * self.gap.dot(term))
+                .map(|term| {
+                    let c = power * self.gap.dot(term);
+                    power *= length;
+                    c
+                })
                 .collect();
-            let guard = |s: f64| along.iter().rev().fold(0.0, |sum, c| sum * s + c);
-            // Its first zero after the start, at which it may be zero too.
-            let found = (1..=PARTS)
-                .map(|k| length * f64::from(k) / f64::from(PARTS))
-                .find(|s| guard(*s) < 0.0);
-            let Some(beyond) = found else {
-                y = taylor::at(&series, length);
-                t += length;
+            let noise = 1e-13 * self.gap.abs().dot(&y.abs());
+            let root = taylor::first_root(&along, noise, switched)?;
+            switched = root <= 1.0;
+            let part = length * root.min(1.0);
+            y = taylor::at(&series, part);
+            t += part;
+            if !switched {
                 continue;
-            };
-            let (mut low, mut high) = (beyond - length / f64::from(PARTS), beyond);
-            for _ in 0..100 {
-                let middle = 0.5 * (low + high);
-                if guard(middle) < 0.0 {
-                    high = middle;
-                } else {
-                    low = middle;
-                }
             }
-            y = taylor::at(&series, high);
-            t += high;
             touching = !touching;
-            switches += 1;
         }
-        (y.as_slice()[..state.len()].to_vec(), switches)
+        Some(y.as_slice()[..state.len()].to_vec())
     }
+}
+
+/// Three periods from a deflection, a velocity and a place of the surface, each from where the
+/// independent one before came to: errors grow where motions part.
+fn agrees_with_taylor_series(case: &Cantilever, start: [f64; 3]) -> Result<(), TestCaseError> {
+    let modes = case.modes;
+    let mut map = Strobe::new(&Model::cantilever(case).unwrap());
+    let independent = Taylor::new(case);
+    let mut state = vec![0.0; 2 * modes + 1];
+    [state[0], state[modes], state[2 * modes]] = start;
+    for _ in 0..3 {
+        let Some(expected) = independent.period(&state) else {
+            return Err(TestCaseError::reject("rounding decides on a touch"));
+        };
+        map.advance(&mut state).unwrap();
+        for (found, expected) in state.iter().zip(&expected) {
+            prop_assert!((found - expected).abs() < 1e-9, "{state:?}\n{expected:?}");
+        }
+        state = expected;
+    }
+    Ok(())
+}
+
+/// A surface that is much slower on its own than under the tip, which a random case had.
+#[test]
+fn a_surface_that_the_tip_makes_fast_agrees_with_taylor_series() {
+    let surface = MovingSurface {
+        stiffness: 1.0,
+        damping: 0.5,
+        adhesion: 0.0,
+    };
+    let case = Cantilever {
+        alpha4: 98.64580280337232,
+        alpha5: 0.0,
+        alpha6: 0.0,
+        ..lever(1, 16.82298048636555, surface)
+    };
+    let start = [0.31840475061436807, -1.9478145129489097, 0.0];
+    agrees_with_taylor_series(&case, start).unwrap();
+}
+
+/// Just beside a touch that does not come the derivatives are those of what does come; a random
+/// case had differences that reached over it.
+#[test]
+fn derivatives_beside_a_touch_are_those_without_it() {
+    let surface = MovingSurface {
+        damping: 2.131293070042266,
+        adhesion: 0.2833583176635725,
+        ..SURFACE
+    };
+    let case = Cantilever {
+        alpha6: 0.8821265667685139,
+        ..lever(4, 12.37112293626098, surface)
+    };
+    let mut state = vec![0.0; 9];
+    (state[0], state[4]) = (0.05, -1.3688043576034572);
+    let case = Case::from(case);
+    assert_eq!(worst_over(&case, &state, 1e-5), None);
+    let error = worst_over(&case, &state, 1e-6).unwrap();
+    assert!(error < 1e-6, "{error:e}");
 }
 
 proptest! {
@@ -192,20 +250,7 @@ proptest! {
             alpha6: damping,
             ..lever(modes, omega, surface)
         };
-        let mut map = Strobe::new(&Model::cantilever(&case).unwrap());
-        let independent = Taylor::new(&case);
-        let mut state = vec![0.0; 2 * modes + 1];
-        (state[0], state[modes], state[2 * modes]) = (a, v, s);
-        let mut expected = state.clone();
-        // Errors grow where motions part; one period after the other does not let them.
-        for _ in 0..3 {
-            expected = independent.period(&expected).0;
-            map.advance(&mut state).unwrap();
-            for (found, expected) in state.iter().zip(&expected) {
-                prop_assert!((found - expected).abs() < 1e-9, "{state:?}\n{expected:?}");
-            }
-            state.clone_from(&expected);
-        }
+        agrees_with_taylor_series(&case, [a, v, s])?;
     }
 
     /// Jacobians and derivatives to every key, with contacts under way, against differences.
@@ -227,7 +272,8 @@ proptest! {
             && run.end() - e.time > 0.01 && e.time > 0.01));
         // Where contacts are short it is the difference that errs, by up to some 1e-6.
         let error = worst(&Case::from(case), &state);
-        prop_assert!(error < 1e-4, "{error:e}");
+        prop_assume!(error.is_some());
+        prop_assert!(error.unwrap() < 1e-4, "{error:?}");
     }
 
     /// Lengths ten times as large are forces ten times as large: the same motion.

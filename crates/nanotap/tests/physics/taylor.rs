@@ -137,7 +137,7 @@ fn horner(coefficients: &[f64], s: f64) -> f64 {
 /// The first s in [0, 1] at which the polynomial falls below zero, infinity if none; `None` where
 /// it cannot be told from touching. Just after a switch powers that rounding alone has left are
 /// no part of it.
-fn first_root(coefficients: &[f64], noise: f64, switched: bool) -> Option<f64> {
+pub(crate) fn first_root(coefficients: &[f64], noise: f64, switched: bool) -> Option<f64> {
     let size = coefficients.iter().map(|c| c.abs()).sum::<f64>();
     if size == 0.0 {
         return Some(f64::INFINITY);

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Work, table};
@@ -105,9 +105,16 @@ fn whole() -> &'static (Folder, BTreeMap<PathBuf, Vec<u8>>) {
     })
 }
 
+/// Tests that run beside each other in one process have one folder.
+fn alone() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Reads it with one file changed by `damage`, and puts the file back.
 fn damaged(file: &Path, damage: impl FnOnce(Vec<u8>) -> Vec<u8>) {
     let (folder, files) = whole();
+    let _turn = alone();
     let path = folder.join("data");
     let content = &files[file];
     std::fs::write(path.join(file), damage(content.clone())).unwrap();
@@ -153,6 +160,7 @@ proptest! {
 #[test]
 fn the_whole_one_is_read() {
     let (folder, files) = whole();
+    let _turn = alone();
     let path = folder.join("data");
     let store = Store::open(&path).unwrap();
     store.require_all().unwrap();

@@ -8,7 +8,7 @@
 //! everything depends, λ from a pole and Re λ from zero, then keep full relative
 //! accuracy, and a pair may turn from complex to real without any special case.
 
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use nalgebra::{Complex, DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 
 type C = Complex<f64>;
@@ -225,8 +225,7 @@ impl Secular<'_> {
         matrix
             .view_mut((count, count), (count, count))
             .copy_from(&-damping);
-        let schur = Schur::try_new(matrix, f64::EPSILON, 200 * count)?;
-        self.factors_with_roots(schur.complex_eigenvalues().as_slice())
+        self.factors_with_roots(&nanotap_arithmetic::eigenvalues(&matrix)?)
     }
 
     /// Factors with the given roots.

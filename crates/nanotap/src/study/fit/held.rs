@@ -9,7 +9,7 @@
 //! Fails by omission: where the curve has several orbits at a distance, the one is taken that
 //! continues the row before.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
@@ -53,6 +53,18 @@ struct Free {
     frequency: f64,
     strength: f64,
     loss: f64,
+    /// How it changes with the keys that were asked for first: many rows ask for the same.
+    known: OnceLock<FreeChanges>,
+}
+
+type FreeChange = ([f64; 2], Option<f64>);
+
+/// How the free lever changes with keys of the case.
+#[derive(Clone, Debug)]
+struct FreeChanges {
+    keys: Vec<Key>,
+    /// Of frequency and strength, in the model's units, and of the loss in SI.
+    by: Option<Vec<FreeChange>>,
 }
 
 /// Sizes of the model's units in SI; 1 of a dimensionless case.
@@ -160,6 +172,7 @@ impl Loop {
             strength: oscillation.strength * sizes.strength,
             loss: oscillation.loss * sizes.energy,
             oscillation,
+            known: OnceLock::new(),
         })
     }
 
@@ -395,12 +408,11 @@ impl HeldRow {
             phase: free.held.phase,
         };
         let at_row = amplitudes(case, held, keys)?;
-        let at_free = amplitudes(&free.case, free.held, keys)?;
         let changes = held.changes(case, self.driven.clone(), &at_row).ok()?;
-        let of_free = free.oscillation.changes(&free.case, free.held, &at_free);
+        let of_free = free.changes(keys)?;
         let told_here = told(case, free, &self.driven)?;
         let (sizes, free_sizes) = (Sizes::of(case)?, Sizes::of(&free.case)?);
-        let one = |((key, change), by): ((&Key, Driven), [f64; 2])| {
+        let one = |((key, change), (by, loss)): ((&Key, Driven), FreeChange)| {
             let (here, there) = (Sizes::by(case, *key)?, Sizes::by(&free.case, *key)?);
             let oscillation = &free.oscillation;
             let frequency =
@@ -413,11 +425,7 @@ impl HeldRow {
             let relative = (shift - told_here.relative_shift * free_frequency) / free.frequency;
             let ratio = (strength - told_here.drive_ratio * free_strength) / free.strength;
             let rest = told_here.drive_ratio - 1.0 - told_here.relative_shift;
-            let loss = if rest == 0.0 {
-                0.0
-            } else {
-                free.loss_by(*key)?
-            };
+            let loss = if rest == 0.0 { 0.0 } else { loss? };
             let told = Modulated {
                 drive_frequency: frequency,
                 drive_strength: strength,
@@ -429,11 +437,7 @@ impl HeldRow {
             };
             Some((change, told))
         };
-        keys.iter()
-            .zip(changes)
-            .zip(of_free.ok()?)
-            .map(one)
-            .collect()
+        keys.iter().zip(changes).zip(of_free).map(one).collect()
     }
 }
 
@@ -453,6 +457,27 @@ fn amplitudes(case: &Case, held: Held, keys: &[Key]) -> Option<Vec<(Key, f64)>> 
 }
 
 impl Free {
+    /// How it changes with keys of the case.
+    fn changes(&self, keys: &[Key]) -> Option<Vec<FreeChange>> {
+        let all = || FreeChanges {
+            keys: keys.to_vec(),
+            by: self.changes_by(keys),
+        };
+        let known = self.known.get_or_init(all);
+        if known.keys == keys {
+            known.by.clone()
+        } else {
+            all().by
+        }
+    }
+
+    fn changes_by(&self, keys: &[Key]) -> Option<Vec<FreeChange>> {
+        let held = amplitudes(&self.case, self.held, keys)?;
+        let of = self.oscillation.changes(&self.case, self.held, &held);
+        let one = |(key, by): (&Key, [f64; 2])| (by, self.loss_by(*key));
+        Some(keys.iter().zip(of.ok()?).map(one).collect())
+    }
+
     /// How its loss, in SI, changes with a key: a chain of closed forms, whose central difference
     /// is good to ten digits.
     fn loss_by(&self, key: Key) -> Option<f64> {

@@ -4,13 +4,15 @@
 use nalgebra::DMatrix;
 
 use super::problem::{Point, Problem};
-use super::solve::{LeastSquares as _, Solution};
+use super::solve::{LeastSquares as _, Solution, minimise};
 use super::statistics::Information;
 
 /// Looks at the profile on each side.
 const LOOKS: usize = 6;
 /// Steps of the other parameters at each look.
 const STEPS: usize = 4;
+/// What a step must promise of chi2 to be taken.
+const FLAT: f64 = 1e-3;
 /// How well the quantile is met, in standard errors.
 const CLOSE: f64 = 0.01;
 
@@ -62,11 +64,7 @@ fn end(
             })
             .collect();
         let gained = problem.point(&x, (&best.x, &best.point)).and_then(|point| {
-            let lost = |point: &Point| point.iter().filter(|row| row.lost).count();
-            if lost(&point) > lost(&best.point) {
-                return None;
-            }
-            let least = least(problem, x, point, &best.jacobian, k)?;
+            let least = least(problem, x, point, best, k)?;
             Some((least - best.cost).max(0.0).sqrt())
         });
         // Where a branch ends the profile has a wall.
@@ -92,20 +90,58 @@ fn end(
     (value >= low && value <= high).then_some(value)
 }
 
-/// The least chi2 with parameter `k` held, from a point near it, by steps with the Jacobian at
-/// the best values: chi2 is flat there, so that a few of them do.
+/// The least chi2 with parameter `k` held, from a point near it; `None` where rows have no orbit
+/// that had one.
+///
+/// By steps with the Jacobian at the best values, which is good near by; where these do not end in
+/// a minimum, because the valley of chi2 bends, by a fit of the others.
 fn least(
+    problem: &Problem<'_>,
+    x: Vec<f64>,
+    point: Point,
+    best: &Solution<Point>,
+    k: usize,
+) -> Option<f64> {
+    let lost = |point: &Point| point.iter().filter(|row| row.lost).count();
+    let most = lost(&best.point);
+    if lost(&point) > most {
+        return None;
+    }
+    let steps = few_steps(problem, x, point, &best.jacobian, k)?;
+    if steps.least.is_some() {
+        return steps.least;
+    }
+    let held = steps.x[k];
+    let parameters = problem.parameters.iter().enumerate();
+    let bounds: Vec<(f64, f64)> = parameters
+        .map(|(j, p)| if j == k { (held, held) } else { p.bounds })
+        .collect();
+    let solution = minimise(problem, steps.x, steps.point, &bounds, FLAT)?;
+    (lost(&solution.point) <= most).then_some(solution.cost)
+}
+
+/// Where a few steps led.
+struct Steps {
+    x: Vec<f64>,
+    point: Point,
+    /// chi2 there, if no further step promises to make it less.
+    least: Option<f64>,
+}
+
+/// As far as a few steps with a Jacobian of near by come.
+fn few_steps(
     problem: &Problem<'_>,
     mut x: Vec<f64>,
     mut point: Point,
     jacobian: &DMatrix<f64>,
     k: usize,
-) -> Option<f64> {
+) -> Option<Steps> {
     let others = jacobian.clone().remove_column(k);
     let mut residuals = problem.residuals(&x, &point);
     let mut cost = residuals.norm_squared();
     if others.ncols() == 0 {
-        return Some(cost);
+        let least = Some(cost);
+        return Some(Steps { x, point, least });
     }
     // What the data do not determine stays where it is.
     let mut normal = others.tr_mul(&others);
@@ -113,10 +149,12 @@ fn least(
         normal[(j, j)] = (1.0 + 1e-10) * normal[(j, j)] + f64::MIN_POSITIVE;
     }
     let factor = normal.lu();
+    let mut least = None;
     for _ in 0..STEPS {
         let step = factor.solve(&others.tr_mul(&residuals))?;
         let promised = cost - (&residuals - &others * &step).norm_squared();
-        if promised.is_nan() || promised <= 1e-3 {
+        if promised.is_nan() || promised <= FLAT {
+            least = Some(cost);
             break;
         }
         let mut next = x.clone();
@@ -124,7 +162,9 @@ fn least(
             let (low, high) = problem.parameters[index].bounds;
             next[index] = (x[index] - step).clamp(low, high);
         }
-        let at = problem.point(&next, (&x, &point))?;
+        let Some(at) = problem.point(&next, (&x, &point)) else {
+            break;
+        };
         let then = problem.residuals(&next, &at);
         if then.norm_squared() >= cost {
             break;
@@ -132,5 +172,5 @@ fn least(
         (x, point, cost) = (next, at, then.norm_squared());
         residuals = then;
     }
-    Some(cost)
+    Some(Steps { x, point, least })
 }

@@ -11,7 +11,7 @@
 //! not: at a lever's resonance without damping, and at folds of the resonance curve.
 
 use nalgebra::{DMatrix, DVector};
-use nanotap_dynamics::{MultiplierError, Multipliers, PeriodicOrbit};
+use nanotap_dynamics::{MultiplierError, Multipliers, PeriodicOrbit, StroboscopicMap as _};
 
 use crate::case::{Case, CaseError, Key};
 use crate::model::strobe::Strobe;
@@ -403,6 +403,7 @@ impl At {
             stability: multipliers.stability(),
             multipliers: multipliers.values,
             log_determinant: multipliers.log_determinant,
+            discrete: Strobe::new(&self.model).discrete_entries(),
             states: vec![self.driven.state],
         };
         Ok(HeldOrbit {

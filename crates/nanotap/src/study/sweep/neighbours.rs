@@ -61,8 +61,7 @@ impl Sweep {
             _ => Vec::new(),
         };
         if control.is_cancelled() {
-            let (finished, total) = (store.chunks(), store.chunks());
-            return Err(WorkError::Cancelled { finished, total });
+            return Err(WorkError::Neighbours);
         }
         let text = serde_json::to_string(&found).unwrap_or_default();
         Ok(store.write_beside(FILE, text.as_bytes())?)

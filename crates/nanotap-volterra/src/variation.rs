@@ -1,0 +1,508 @@
+//! How what is read off a run changes with its initial state and with parameters.
+//!
+//! A step's variation is a motion of the same modes under a variation of the force that is a
+//! polynomial as the force itself is, and so it has the same dense output. Integrals over the run
+//! change by the integral of the integrand's change, by the quadrature that gives their values, and
+//! where steps move by what the integrand is at their ends; extrema by the change of the output
+//! where it is extreme. Nothing here is a difference.
+
+use crate::flow::Flow;
+use crate::kernel::TimeMap;
+use crate::quadrature::{derivative, gauss_legendre, series};
+use crate::tangent::{Forced, Parameter, StepChange, Tangents};
+use crate::trajectory::{Node, Output, POINTS, Piece, Trajectory};
+use crate::{Complex, VolterraError};
+use nalgebra::{DMatrix, RowDVector};
+
+/// A recorded run with how it changes, a column each change.
+#[derive(Clone, Debug)]
+pub struct Variation {
+    motion: Trajectory,
+    pieces: Vec<StepChange>,
+    /// Of the last columns.
+    parameters: Vec<Forced>,
+    count: usize,
+    /// By how much the end of the run moves.
+    end: Vec<f64>,
+    /// How the state changes there, at its time.
+    at_end: DMatrix<f64>,
+}
+
+/// An output with how it changes at constant state and time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VariedOutput {
+    /// The output.
+    pub value: Output,
+    /// Its change, a column each (empty: none).
+    pub changes: Vec<Output>,
+}
+
+impl VariedOutput {
+    /// An output that is the same whatever changes.
+    pub const fn fixed(value: Output) -> Self {
+        Self {
+            value,
+            changes: Vec::new(),
+        }
+    }
+}
+
+/// Outputs at a place of the motion. Changes are relative to the step, which may move: at a fixed
+/// place of it, not at a fixed time.
+#[derive(Clone, Debug)]
+pub struct Reading<'a> {
+    /// When.
+    pub time: f64,
+    /// Weight in integrals over time; 0 at the ends of steps.
+    pub weight: f64,
+    /// At the ends of a step: how much more of an integral's range the step has there as each
+    /// column changes, seen from the step.
+    pub widening: &'a [f64],
+    /// By how much the step moves in time, a column each.
+    pub shifts: &'a [f64],
+    /// Of every output.
+    pub values: &'a [f64],
+    /// Of every output its changes, one after the other.
+    pub changes: &'a [f64],
+}
+
+impl Reading<'_> {
+    /// The change of output number `output` with column `column`.
+    pub fn change(&self, output: usize, column: usize) -> f64 {
+        self.changes[output * self.shifts.len() + column]
+    }
+}
+
+/// An extremum or another number at a moment of the motion, with its changes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// The number.
+    pub value: f64,
+    /// Its change with each column.
+    pub changes: Vec<f64>,
+}
+
+/// An output in modal coordinates, ready to be read.
+struct Reader {
+    row: Vec<f64>,
+    constant: f64,
+    tones: Vec<Complex>,
+    force: f64,
+    changes: Vec<ChangeReader>,
+}
+
+/// Its change with one column, beside what the change of the motion does.
+struct ChangeReader {
+    row: Vec<f64>,
+    constant: f64,
+    /// What grows like `1` and like `t`.
+    tones: Vec<[Complex; 2]>,
+    force: f64,
+}
+
+impl Flow {
+    /// Runs to time `end`, which moves by `moves` as the columns change, and keeps the motion and
+    /// how it changes: with `starts` (a column a change of the state at the start), the last of
+    /// which come with `parameters`.
+    ///
+    /// # Errors
+    /// As [`Flow::record_until`], and when sizes do not fit.
+    pub fn record_with_changes(
+        &mut self,
+        end: f64,
+        moves: &[f64],
+        starts: &DMatrix<f64>,
+        parameters: &[Parameter],
+    ) -> Result<Variation, VolterraError> {
+        if moves.len() != starts.ncols() {
+            return Err(VolterraError::Shape {
+                what: "the moves of the end",
+                found: moves.len(),
+                expected: starts.ncols(),
+            });
+        }
+        let system = self.system.clone();
+        let mut tangents = Tangents::new(&system, starts, parameters, self.time())?.keeping();
+        let mut motion = Trajectory::empty(system.clone());
+        self.run(end, &mut (&mut tangents, &mut motion))?;
+        Ok(Variation {
+            at_end: tangents.at_end(&system, self.time()),
+            motion: motion.whole()?,
+            pieces: tangents.kept.unwrap_or_default(),
+            parameters: tangents.parameters,
+            count: starts.ncols(),
+            end: moves.to_vec(),
+        })
+    }
+}
+
+impl Variation {
+    /// The motion.
+    pub const fn motion(&self) -> &Trajectory {
+        &self.motion
+    }
+
+    /// How the state changes at the end of the run, at its time, a column each.
+    pub const fn at_end(&self) -> &DMatrix<f64> {
+        &self.at_end
+    }
+
+    /// The changes of parameter and drive of a column.
+    fn forced(&self, column: usize) -> Option<&Forced> {
+        let plain = self.count - self.parameters.len();
+        column.checked_sub(plain).map(|k| &self.parameters[k])
+    }
+
+    /// By how much the boundary after piece number `piece` moves with a column.
+    fn boundary(&self, piece: usize, column: usize) -> f64 {
+        if piece + 1 == self.pieces.len() {
+            return self.end[column];
+        }
+        let ends = &self.pieces[piece].ends;
+        ends.get(column).copied().unwrap_or(0.0)
+    }
+
+    /// By how much the start (0) or the end (1) of a piece moves, seen from the piece.
+    fn edge(&self, piece: usize, end: bool, column: usize) -> f64 {
+        let boundary = match (end, piece) {
+            (true, _) => self.boundary(piece, column),
+            (false, 0) => 0.0,
+            (false, _) => self.boundary(piece - 1, column),
+        };
+        boundary - self.pieces[piece].shifts[column]
+    }
+
+    /// By how much the time that the motion spends on steps of some branches of the law changes
+    /// with a column.
+    pub fn time_on(&self, column: usize, inside: impl Fn(usize) -> bool) -> f64 {
+        let pieces = self.motion.pieces.iter().enumerate();
+        pieces
+            .filter(|(_, piece)| inside(piece.branch))
+            .map(|(k, _)| self.edge(k, true, column) - self.edge(k, false, column))
+            .sum()
+    }
+
+    fn reader(&self, output: &VariedOutput) -> Reader {
+        let system = &self.motion.system;
+        let kernel = system.kernel();
+        let forced = system.forced();
+        let modal = |row: &RowDVector<f64>| -> Vec<f64> {
+            (row * kernel.modes().right()).iter().copied().collect()
+        };
+        let of = |row: &RowDVector<f64>, k: usize| -> Complex {
+            let response = row.iter().zip(forced.tones[k].iter());
+            response.map(|(r, z)| z * *r).sum()
+        };
+        let own = |output: &Output, k: usize| output.tones.get(k).copied().unwrap_or_default();
+        let count = system.drive().tones.len();
+        let value = &output.value;
+        let row = modal(&value.row);
+        let constant = value.offset + (&value.row * &forced.constant)[0];
+        let change = |column: usize| {
+            let mut reader = ChangeReader {
+                row: Vec::new(),
+                constant: 0.0,
+                tones: vec![[Complex::default(); 2]; count],
+                force: 0.0,
+            };
+            if let Some(by) = self.forced(column) {
+                let along =
+                    |z: &[Complex]| -> Complex { row.iter().zip(z).map(|(r, z)| z * *r).sum() };
+                reader.constant += row
+                    .iter()
+                    .zip(by.constant.iter())
+                    .map(|(r, y)| r * y)
+                    .sum::<f64>();
+                for (k, tone) in reader.tones.iter_mut().enumerate() {
+                    let turn = Complex::new(0.0, by.frequencies[k]);
+                    tone[0] += along(by.tones[k][0].as_slice());
+                    tone[1] += along(by.tones[k][1].as_slice()) + turn * own(value, k);
+                }
+            }
+            if let Some(of_output) = output.changes.get(column) {
+                if of_output.row.iter().any(|r| *r != 0.0) {
+                    reader.row = modal(&of_output.row);
+                    reader.constant += (&of_output.row * &forced.constant)[0];
+                    for (k, tone) in reader.tones.iter_mut().enumerate() {
+                        tone[0] += of(&of_output.row, k);
+                    }
+                }
+                reader.constant += of_output.offset;
+                for (k, tone) in reader.tones.iter_mut().enumerate() {
+                    tone[0] += own(of_output, k);
+                }
+                reader.force = of_output.force;
+            }
+            reader
+        };
+        Reader {
+            constant,
+            tones: (0..count)
+                .map(|k| of(&value.row, k) + own(value, k))
+                .collect(),
+            force: value.force,
+            changes: (0..self.count).map(change).collect(),
+            row,
+        }
+    }
+
+    /// Visits the nodes of a quadrature of the whole motion and the ends of its steps, in order of
+    /// time, dense enough for a factor that oscillates with the angular frequency `omega`.
+    pub fn visit(&self, outputs: &[VariedOutput], omega: f64, mut take: impl FnMut(&Reading<'_>)) {
+        let system = &self.motion.system;
+        let (kernel, tones) = (system.kernel(), &system.drive().tones);
+        let readers: Vec<Reader> = outputs.iter().map(|output| self.reader(output)).collect();
+        let (places, weights) = gauss_legendre(POINTS);
+        let n = kernel.nodes;
+        let mut phasors = vec![Complex::default(); tones.len()];
+        let mut values = vec![0.0; outputs.len()];
+        let mut changes = vec![0.0; outputs.len() * self.count];
+        let mut widening = vec![0.0; self.count];
+        // The motion, then its changes.
+        let (mut modal, mut coefficients) = (Vec::new(), Vec::new());
+        for (index, (piece, of)) in self.motion.pieces.iter().zip(&self.pieces).enumerate() {
+            let panels = self.motion.panels(piece, omega);
+            let width = piece.end / panels as f64;
+            let inner = (0..panels).flat_map(|panel| {
+                let nodes = places.iter().zip(&weights);
+                nodes.map(move |(x, w)| (width * (panel as f64 + x), w * width))
+            });
+            modal.clear();
+            modal.extend_from_slice(&piece.modal);
+            modal.extend_from_slice(&of.modal);
+            coefficients.clear();
+            if !of.coefficients.is_empty() {
+                coefficients.extend_from_slice(&piece.coefficients);
+                coefficients.extend_from_slice(&of.coefficients);
+            }
+            let mut last = 0.0;
+            for (u, weight) in [(0.0, 0.0)]
+                .into_iter()
+                .chain(inner)
+                .chain([(piece.end, 0.0)])
+            {
+                kernel.between_all(
+                    piece.map,
+                    piece.length,
+                    [last, u],
+                    &mut modal,
+                    &coefficients,
+                );
+                last = u;
+                let time = piece.start + piece.map.time(piece.length, u);
+                for (phasor, tone) in phasors.iter_mut().zip(tones) {
+                    let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
+                    *phasor = Complex::new(cos, sin);
+                }
+                let dimension = kernel.modes().dimension();
+                let (own, varied) = modal.split_at(dimension);
+                for (o, reader) in readers.iter().enumerate() {
+                    let force = series(&piece.coefficients, u);
+                    values[o] = reader.value(own, &phasors, force);
+                    for (column, of_column) in varied.chunks_exact(dimension).enumerate() {
+                        let by_force = of.coefficients.get(column * n..(column + 1) * n);
+                        let change = Motion {
+                            modal: own,
+                            force,
+                            change: of_column,
+                            by_force: if reader.force == 0.0 {
+                                0.0
+                            } else {
+                                by_force.map_or(0.0, |c| series(c, u))
+                            },
+                            time,
+                            shift: of.shifts[column],
+                        };
+                        let turns = tones.iter().map(|tone| tone.frequency);
+                        changes[o * self.count + column] =
+                            reader.change(column, &change, &phasors, turns);
+                    }
+                }
+                let edge = if weight == 0.0 { Some(u != 0.0) } else { None };
+                for (column, wider) in widening.iter_mut().enumerate() {
+                    *wider = match edge {
+                        None => 0.0,
+                        Some(true) => self.edge(index, true, column),
+                        Some(false) => -self.edge(index, false, column),
+                    };
+                }
+                take(&Reading {
+                    time,
+                    weight: weight * piece.map.rate(piece.length, u),
+                    widening: &widening,
+                    shifts: &of.shifts,
+                    values: &values,
+                    changes: &changes,
+                });
+            }
+        }
+    }
+
+    /// The least and the largest value of an output over the run, ends included, with their
+    /// changes; `nodes` are those of the motion ([`Trajectory::nodes`]).
+    pub fn range(&self, nodes: &[Node], output: &VariedOutput) -> [Moment; 2] {
+        let reader = self.reader(output);
+        self.motion
+            .extremes(nodes, &output.value)
+            .map(|place| Moment {
+                value: place.value,
+                changes: self.changes_at(&reader, place.piece, place.u),
+            })
+    }
+
+    /// An output just before every switch of the law for which `wanted` says so, by the branches
+    /// before and after it.
+    pub fn before_switches(
+        &self,
+        output: &VariedOutput,
+        wanted: impl Fn(usize, usize) -> bool,
+    ) -> Vec<Moment> {
+        let reader = self.reader(output);
+        let pieces = &self.motion.pieces;
+        let switches = (0..self.pieces.len().saturating_sub(1)).filter(|k| {
+            !self.pieces[*k].ends.is_empty() && wanted(pieces[*k].branch, pieces[*k + 1].branch)
+        });
+        switches
+            .map(|k| {
+                let sample = pieces[k].sample(&self.motion.system, pieces[k].end);
+                Moment {
+                    value: self.motion.read(&output.value, &sample).0,
+                    changes: self.changes_at(&reader, k, pieces[k].end),
+                }
+            })
+            .collect()
+    }
+
+    /// The change with every column of an output where it is extreme, or at an end of a step.
+    fn changes_at(&self, reader: &Reader, index: usize, u: f64) -> Vec<f64> {
+        let (Some(piece), Some(of)) = (self.motion.pieces.get(index), self.pieces.get(index))
+        else {
+            return vec![f64::NAN; self.count];
+        };
+        let system = &self.motion.system;
+        let (kernel, tones) = (system.kernel(), &system.drive().tones);
+        let (n, dimension) = (kernel.nodes, kernel.modes().dimension());
+        let time = piece.start + piece.map.time(piece.length, u);
+        let phasors: Vec<Complex> = tones
+            .iter()
+            .map(|tone| {
+                let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
+                Complex::new(cos, sin)
+            })
+            .collect();
+        let silent = vec![0.0; n];
+        let at = |start: &[f64], coefficients: &[f64]| {
+            let mut modal = vec![0.0; dimension];
+            kernel.partial(piece.map, piece.length, u, start, coefficients, &mut modal);
+            modal
+        };
+        let own = at(&piece.modal, &piece.coefficients);
+        let force = series(&piece.coefficients, u);
+        let edge = if u == 0.0 {
+            Some(false)
+        } else {
+            (u >= piece.end).then_some(true)
+        };
+        let one = |column: usize| {
+            let coefficients = of
+                .coefficients
+                .get(column * n..(column + 1) * n)
+                .unwrap_or(&silent);
+            let start = &of.modal[column * dimension..(column + 1) * dimension];
+            let change = Motion {
+                modal: &own,
+                force,
+                change: &at(start, coefficients),
+                by_force: series(coefficients, u),
+                time,
+                shift: of.shifts[column],
+            };
+            let turns = tones.iter().map(|tone| tone.frequency);
+            let change = reader.change(column, &change, &phasors, turns);
+            // Between its ends a step has the extremum where the output does not change in time.
+            let moved = edge.map_or(0.0, |end| self.edge(index, end, column));
+            if moved == 0.0 {
+                change
+            } else {
+                change + moved * self.rate(reader, piece, u, &own, &phasors)
+            }
+        };
+        (0..self.count).map(one).collect()
+    }
+
+    /// How fast an output changes in time at an end of a step.
+    fn rate(
+        &self,
+        reader: &Reader,
+        piece: &Piece,
+        u: f64,
+        modal: &[f64],
+        phasors: &[Complex],
+    ) -> f64 {
+        let system = &self.motion.system;
+        let slope = Tangents::slope(system, modal, series(&piece.coefficients, u));
+        let mut rate: f64 = reader.row.iter().zip(&slope).map(|(r, s)| r * s).sum();
+        for ((tone, z), phasor) in system.drive().tones.iter().zip(&reader.tones).zip(phasors) {
+            rate -= tone.frequency * (z * phasor).im;
+        }
+        if reader.force != 0.0 {
+            let mut first = vec![0.0; piece.coefficients.len()];
+            derivative(&piece.coefficients, &mut first);
+            let by_time = piece.map.rate(piece.length, u);
+            rate += reader.force
+                * if by_time == 0.0 {
+                    // Where u runs like the root of time the force sets in without a slope in u.
+                    let mut second = vec![0.0; first.len()];
+                    derivative(&first, &mut second);
+                    let bend = if piece.map == TimeMap::End { -2.0 } else { 2.0 };
+                    series(&second, u) / (bend * piece.length)
+                } else {
+                    series(&first, u) / by_time
+                };
+        }
+        rate
+    }
+}
+
+/// A motion and one change of it at an instant.
+struct Motion<'a> {
+    modal: &'a [f64],
+    force: f64,
+    change: &'a [f64],
+    by_force: f64,
+    time: f64,
+    /// By how much the step moves.
+    shift: f64,
+}
+
+impl Reader {
+    fn value(&self, modal: &[f64], phasors: &[Complex], force: f64) -> f64 {
+        let own: f64 = self.row.iter().zip(modal).map(|(r, y)| r * y).sum();
+        let tones: f64 = self
+            .tones
+            .iter()
+            .zip(phasors)
+            .map(|(z, phasor)| (z * phasor).re)
+            .sum();
+        self.constant + own + tones + self.force * force
+    }
+
+    fn change(
+        &self,
+        column: usize,
+        motion: &Motion<'_>,
+        phasors: &[Complex],
+        turns: impl Iterator<Item = f64>,
+    ) -> f64 {
+        let by = &self.changes[column];
+        let dot = |row: &[f64], y: &[f64]| row.iter().zip(y).map(|(r, y)| r * y).sum::<f64>();
+        let mut sum = by.constant + dot(&self.row, motion.change) + dot(&by.row, motion.modal);
+        sum += self.force * motion.by_force + by.force * motion.force;
+        let tones = by.tones.iter().zip(&self.tones).zip(phasors).zip(turns);
+        for ((([own, secular], z), phasor), turn) in tones {
+            let moving = z * Complex::new(0.0, turn * motion.shift);
+            sum += ((own + secular * motion.time + moving) * phasor).re;
+        }
+        sum
+    }
+}

@@ -1,5 +1,5 @@
-//! The worked cases and tutorials of the documentation: every command of `docs/cases/*.md` and
-//! `docs/tutorials/*.md` is run as it stands there, and every number is compared, so that they
+//! The worked cases, tutorials and theory of the documentation: every command of `docs/cases/*.md`,
+//! `docs/tutorials/*.md` and `docs/theory/*.md` is run as it stands there, and every number is compared, so that they
 //! cannot rot.
 //!
 //! A `console` block has the commands, each a line that begins with `$ nanotap`; the table that
@@ -16,7 +16,8 @@ use crate::util::Folder;
 /// Every file of the documents that are followed.
 fn documents() -> Vec<PathBuf> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
-    let files = ["cases", "tutorials"].map(|folder| std::fs::read_dir(docs.join(folder)).unwrap());
+    let files = ["cases", "tutorials", "theory"]
+        .map(|folder| std::fs::read_dir(docs.join(folder)).unwrap());
     let files = files.into_iter().flatten();
     files.map(|entry| entry.unwrap().path()).collect()
 }
@@ -122,14 +123,18 @@ fn no_document_is_left_out() {
         names,
         [
             "README.md",
+            "README.md",
             "approach-curve.md",
+            "beam.md",
             "bistable.md",
             "capillary.md",
+            "contact.md",
             "dforce.md",
             "dynamicist.md",
             "fit-adhesion.md",
             "fit-frequency-modulation.md",
             "fit.md",
+            "flow.md",
             "fm-lever-on-polystyrene.md",
             "frequency-modulation.md",
             "frequency-sweep.md",
@@ -137,6 +142,9 @@ fn no_document_is_left_out() {
             "measured-modes.md",
             "microscopist.md",
             "moving-surface.md",
+            "nonlinear.md",
+            "observables.md",
+            "orbits.md",
             "period-doubling.md",
             "samples.md",
             "stiff-lever.md",
@@ -161,6 +169,8 @@ follows! {
     fit_of_sticky_and_wet_samples: "fit-adhesion.md", 2 commands, 10 numbers;
     fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
     frequency_modulation: "frequency-modulation.md", 3 commands, 21 numbers;
+    the_theory_of_the_beam: "beam.md", 3 commands, 6 numbers;
+    the_theory_of_the_observables: "observables.md", 1 commands, 3 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_bistable_lever: "bistable.md", 2 commands, 9 numbers;
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;

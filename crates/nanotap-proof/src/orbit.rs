@@ -19,7 +19,7 @@ use crate::flight::{Ends, stays_positive};
 use crate::interval::Interval;
 use crate::matrix::{Matrix, dot};
 use crate::multipliers::{self, Multipliers};
-use crate::system::{Reset, System, Transition};
+use crate::system::{HarmonicVector, Reset, System, Transition};
 
 /// An approximate periodic orbit.
 #[derive(Clone, Debug, PartialEq)]
@@ -635,15 +635,7 @@ fn reset_state(
     before: &[Interval],
     phasors: &[crate::Rectangle],
 ) -> Vec<Interval> {
-    match &exit.reset {
-        None => before.to_vec(),
-        Some(Reset { matrix, offset }) => matrix
-            .apply(before)
-            .iter()
-            .zip(offset.at(phasors))
-            .map(|(&x, o)| x + o)
-            .collect(),
-    }
+    jumped(exit, before, |offset| offset.at(phasors))
 }
 
 /// How fast the state after a switch changes with its time: R f⁻ + ρ̇.
@@ -653,12 +645,23 @@ fn reset_rate(
     arrival: &[Interval],
     phasors: &[crate::Rectangle],
 ) -> Vec<Interval> {
+    jumped(exit, arrival, |offset| {
+        offset.rate(&system.frequencies, phasors)
+    })
+}
+
+/// R x + o, with what the reset's offset contributes; x itself where nothing jumps.
+fn jumped(
+    exit: &Transition,
+    x: &[Interval],
+    contributes: impl FnOnce(&HarmonicVector) -> Vec<Interval>,
+) -> Vec<Interval> {
     match &exit.reset {
-        None => arrival.to_vec(),
+        None => x.to_vec(),
         Some(Reset { matrix, offset }) => matrix
-            .apply(arrival)
+            .apply(x)
             .iter()
-            .zip(offset.rate(&system.frequencies, phasors))
+            .zip(contributes(offset))
             .map(|(&x, o)| x + o)
             .collect(),
     }

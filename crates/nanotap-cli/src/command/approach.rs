@@ -351,9 +351,10 @@ fn modulated(
     text.push_str(&thinned(&table, step, report));
     text.push_str(&motion::paragraph(modulation.multipliers));
     for setpoint in modulation.setpoints.iter().flatten() {
+        let shift = setpoint.modulation.map_or(f64::NAN, |m| m.frequency_shift);
         text.push_str(&motion::paragraph(&format!(
             "Δf = {} on {} at {}",
-            shown(Kind::Frequency, setpoint.modulation.frequency_shift),
+            shown(Kind::Frequency, shift),
             setpoint.way.name(),
             shown(Kind::Length, setpoint.gap)
         )));

@@ -292,11 +292,18 @@ fn equilibria_table(all: &[Equilibrium], view: &Physical) -> String {
             format!("{stability}{contact}"),
         ]);
     }
-    format!(
+    let mut text = format!(
         "\n  {}\n{}",
         style::bold("where the lever rests without a drive"),
         table.render()
-    )
+    );
+    let mut stable = all.iter().filter(|e| e.stable);
+    if view.cantilever.alpha5 > 0.0 && stable.all(|e| e.contact && e.deflection < 0.0) {
+        text.push_str(&motion::paragraph(
+            "the sample pulls harder than the lever holds back: it snaps in, and rests in contact only",
+        ));
+    }
+    text
 }
 
 /// The force laws with their quantities.

@@ -3,7 +3,7 @@
 use nanotap::case::Case;
 
 /// The modal stiffness over the static one, β₁⁴/12 of a clamped-free beam.
-const MODAL: f64 = 12.362_363_368_400_15 / 12.0;
+pub(crate) const MODAL: f64 = 12.362_363_368_400_15 / 12.0;
 /// Joules in an electronvolt.
 pub(crate) const EV: f64 = 1.602_176_634e-19;
 

@@ -9,7 +9,7 @@ use nanotap::study::frequency_modulation::{Driven, FreeOscillation, Held, Modula
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::request::read;
 
-use crate::common::{DMT, HERTZ, air, lever};
+use crate::common::{DMT, HERTZ, MODAL, air, lever};
 
 /// The lever of the reference: 40 N/m, a tip of 10 nm under van der Waals' force.
 fn reference(q: f64, amplitude: f64, gap: f64) -> Case {
@@ -367,6 +367,75 @@ fn a_shift_tells_its_distances() {
     }
     assert!(found[0].gap > found[1].gap);
     assert!(at(-5e4).is_empty());
+    // The motion there is the orbit study's under the drive that is told.
+    let (one, drive) = (&found[1], found[1].modulation_si.unwrap());
+    let (seen, told) = (again(&case, one).observables, one.observables.unwrap());
+    assert!(told.peak_force > 0.0);
+    assert!((seen.peak_force / told.peak_force - 1.0).abs() < 1e-6);
+    assert!((seen.first_harmonic / told.first_harmonic - 1.0).abs() < 1e-8);
+    let force = drive.drive_strength / scales.force;
+    assert!((force / one.modulation.unwrap().drive_strength - 1.0).abs() < 1e-14);
+}
+
+/// The base of a lever of low quality moves as far as a tenth of the deflection and more: the tip
+/// comes nearer than it is deflected, and base and deflection answer a force in one ratio no
+/// longer. A hundredth of the attraction leaves a hundredth of what is of second order.
+#[test]
+fn the_first_order_takes_a_driven_base_into_account() {
+    for phase in [70.0, 90.0] {
+        let off = |hamaker: &str| {
+            let sample = [
+                "sample.law=van-der-waals",
+                hamaker,
+                "tip.radius=10 nm",
+                "drive.actuation=base",
+            ];
+            let case = lever((40.0, 5.0, "100 kHz"), (10.0, 11.5), &sample);
+            let unit = 1e-9 / case.physical().unwrap().scales.length;
+            let options = ApproachOptions {
+                from: Some(12.0 * unit),
+                to: Some(11.5 * unit),
+                points: 2,
+                phase: Some(phase),
+                ..ApproachOptions::default()
+            };
+            let report = approach(&case, &options, &Control::default()).unwrap();
+            let (_, found) = nearest(&report);
+            found.relative_shift / found.first_order_shift.unwrap() - 1.0
+        };
+        let (strong, weak) = (off("sample.hamaker=2e-19 J"), off("sample.hamaker=2e-21 J"));
+        assert!(strong.abs() < 0.02, "{phase}: {strong}");
+        assert!((weak / strong).abs() < 0.02, "{phase}: {weak} {strong}");
+    }
+}
+
+/// Whether a neck is there at drive phase 0 changes by a leap along the curve, at which none of its
+/// orbits is lost.
+#[test]
+fn a_neck_at_drive_phase_0_loses_no_orbit() {
+    let neck = [
+        "modes=2",
+        "drive.actuation=base",
+        "tip.radius=10 nm",
+        "sample.law=jkr",
+        "sample.modulus=46.6371 MPa",
+        "sample.poisson=0.49",
+        "sample.work_of_adhesion=168.764 mJ/m^2",
+    ];
+    let case = lever((2.8 * MODAL, 10.6016, "75 kHz"), (30.0, 20.0), &neck);
+    let options = ApproachOptions {
+        to: Some(-10e-9 / case.physical().unwrap().scales.length),
+        points: 20,
+        phase: Some(68.7),
+        ..ApproachOptions::default()
+    };
+    let report = approach(&case, &options, &Control::default()).unwrap();
+    let told = report.modulation.as_ref().unwrap();
+    assert!(told.ended.is_empty() && told.jumps.is_empty(), "{told:?}");
+    assert!(report.returned && report.hysteresis.is_empty());
+    let necks = |p: &&ApproachPoint| p.orbit.as_ref().unwrap().states[0].last() == Some(&1.0);
+    let count = report.table.iter().filter(necks).count();
+    assert!(count > 0 && count < report.table.len(), "{count}");
 }
 
 /// The force that Sader and Jarvis find from the shifts is the law's to the 5 % that their

@@ -228,13 +228,8 @@ impl Loop {
                 ),
             };
             let mut walk = HeldWalk::new(&case, held, start, far);
-            let orbit = match walk.step(gap, &Control::default()).ok()? {
-                Stepped::On(orbit) => orbit,
-                Stepped::Jumped(orbit, _) => {
-                    branch += 1;
-                    orbit
-                }
-            };
+            let Stepped { orbit, breaks } = walk.step(gap, &Control::default()).ok()?;
+            branch += breaks.len();
             last = Some((besides, gap, orbit.driven()));
             Self::seen(problem, &case, &of_row, orbit, branch)
         };

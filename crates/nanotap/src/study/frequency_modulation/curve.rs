@@ -6,7 +6,7 @@ use super::average::sader_jarvis;
 use super::walk::{HeldWalk, Stepped};
 use super::{
     Averages, Driven, Ended, FreeOscillation, Held, HeldOrbit, Jump, Modulated, ModulationReport,
-    OPEN_LOOP, ShiftSetpoint,
+    OPEN_LOOP,
 };
 use crate::case::{Case, Key};
 use crate::model::contact::ContactLaw;
@@ -89,9 +89,16 @@ pub fn modulated_approach(
                 stepped => stepped,
             };
             let orbit = match stepped {
-                Ok(Stepped::On(orbit)) => orbit,
-                Ok(Stepped::Jumped(orbit, from)) => {
-                    jumps.push(Jump { way, from, to: gap });
+                Ok(Stepped { orbit, breaks }) => {
+                    missed = 0;
+                    let before = failed.take().filter(|_| breaks.is_empty());
+                    jumps.extend(before.map(|before| Jump {
+                        way,
+                        from: before.gap,
+                        to: gap,
+                    }));
+                    let breaks = breaks.into_iter();
+                    jumps.extend(breaks.map(|[from, to]| Jump { way, from, to }));
                     orbit
                 }
                 Err(error) => {
@@ -107,14 +114,6 @@ pub fn modulated_approach(
                     continue;
                 }
             };
-            if let Some(before) = failed.take() {
-                jumps.push(Jump {
-                    way,
-                    from: before.gap,
-                    to: gap,
-                });
-                missed = 0;
-            }
             let amplitude = walk.held(gap).amplitude;
             table.push(curve.point(way, gap, orbit, amplitude)?);
             walk.keep(closest, reach);
@@ -132,10 +131,8 @@ pub fn modulated_approach(
     if closest.is_none() {
         invert(&mut table, &free);
     }
-    if let Some(view) = case.physical() {
-        for point in &mut table {
-            point.modulation_si = point.modulation.map(|m| m.in_si(&view.scales));
-        }
+    for point in &mut table {
+        curve.tell_in_si(point);
     }
     let setpoints = options
         .shift
@@ -197,22 +194,16 @@ impl Curve<'_> {
         shift: f64,
         table: &[ApproachPoint],
         control: &Control<'_>,
-    ) -> Vec<ShiftSetpoint> {
+    ) -> Vec<ApproachPoint> {
         let pairs = table.windows(2).filter(|pair| pair[0].way == pair[1].way);
         let crossed =
             pairs.filter(|pair| (excess(&pair[0], shift) > 0.0) != (excess(&pair[1], shift) > 0.0));
         let found = crossed.filter_map(|pair| {
             let way = pair[0].way;
             let (gap, held, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
-            let modulation = self.modulated(&orbit, held.amplitude, gap);
-            let view = self.case.physical();
-            Some(ShiftSetpoint {
-                way,
-                gap,
-                zc: view.map(|view| gap * view.scales.length),
-                modulation,
-                modulation_si: view.map(|view| modulation.in_si(&view.scales)),
-            })
+            let mut point = self.point(way, gap, orbit, held.amplitude).ok()?;
+            self.tell_in_si(&mut point);
+            Some(point)
         });
         found.collect()
     }
@@ -240,7 +231,7 @@ impl Curve<'_> {
             } else {
                 straight
             };
-            let (Stepped::On(orbit) | Stepped::Jumped(orbit, _)) = walk.step(gap, control).ok()?;
+            let orbit = walk.step(gap, control).ok()?.orbit;
             let off = orbit.frequency - self.free.frequency - shift;
             let near =
                 off.abs() <= 1e-11 * shift.abs() || (high.0 - low.0).abs() <= 1e-13 * gap.abs();
@@ -277,7 +268,16 @@ impl Curve<'_> {
             Some(_) => self.case.get(Key::StopStiffness),
             None => self.case.get(Key::Alpha4),
         };
-        Averages::new(&self.model, spring, amplitude, self.free.stiffness)
+        // The tip feels its own motion, a driven base's included.
+        let swing = self.free.with_amplitude(amplitude).swing;
+        Averages::new(&self.model, spring, swing, self.free.stiffness)
+    }
+
+    /// Adds what frequency modulation tells in SI.
+    fn tell_in_si(&self, point: &mut ApproachPoint) {
+        if let Some(view) = self.case.physical() {
+            point.modulation_si = point.modulation.map(|m| m.in_si(view));
+        }
     }
 
     fn point(
@@ -336,7 +336,7 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
         if curve.len() < 3 {
             continue;
         }
-        let forces = sader_jarvis(&curve, free.amplitude, free.stiffness);
+        let forces = sader_jarvis(&curve, free.swing, free.stiffness);
         for (point, force) in table.iter_mut().filter(of_way).zip(forces) {
             if let Some(modulation) = &mut point.modulation {
                 modulation.sader_jarvis_force = Some(force);

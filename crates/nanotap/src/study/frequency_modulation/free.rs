@@ -26,12 +26,16 @@ pub struct FreeOscillation {
     pub frequency: f64,
     /// Strength of the drive that gives the amplitude there.
     pub strength: f64,
+    /// Amplitude of the tip's own motion at the drive's frequency, a driven base's included.
+    pub swing: f64,
     /// How far the tip swings towards the sample.
     pub reach: f64,
     /// What the lever's own damping takes in a period.
     pub loss: f64,
-    /// Stiffness of the mode at the tip: −(ω/2) ∂Re(1/G)/∂ω of the answer G to a force at the
-    /// tip, half of what a change of it would change the frequency by.
+    /// Stiffness k by which the frequency answers a force F₁ cos at the tip that is in phase with
+    /// the tip's own motion of amplitude Z: Δf/f₀ = −F₁/(2kZ) to first order. Where the base is at
+    /// rest and the phase 90° that is −(ω/2) ∂Re(1/G)/∂ω of the answer G to such a force, the
+    /// stiffness of the mode.
     pub stiffness: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
@@ -94,6 +98,8 @@ impl FreeOscillation {
             },
         )?;
         let seen = measure(&closed.model, &closed.orbit.states[0], 1, Set::ALL)?;
+        let swing = seen.tip_motion.unwrap_or(held.amplitude);
+        let lag = seen.tip_motion_phase.unwrap_or(held.phase);
         let mut state = closed.orbit.states[0].clone();
         // A sample's memory is at rest.
         state.resize(case.model()?.dimension(), 0.0);
@@ -102,9 +108,10 @@ impl FreeOscillation {
             phase: held.phase,
             frequency: b,
             strength,
+            swing,
             reach: FreeMotion::of(&model).reach,
             loss: seen.energy_balance.drive_work,
-            stiffness: stiffness(&alone, b)?,
+            stiffness: stiffness(&alone, b, held, [strength, swing, lag])?,
             state,
         })
     }
@@ -118,6 +125,7 @@ impl FreeOscillation {
         Self {
             amplitude,
             strength: share * self.strength,
+            swing: share * self.swing,
             reach: share * self.reach,
             loss: share * share * self.loss,
             state: self.state.iter().map(|x| share * x).collect(),
@@ -223,18 +231,36 @@ fn inverse_response(case: &Case, frequency: f64) -> Result<Complex, HeldError> {
     Ok(Complex::new(cos, sin) / free.amplitude)
 }
 
-fn stiffness(case: &Case, frequency: f64) -> Result<f64, HeldError> {
-    let case = match case.cantilever() {
+/// [`FreeOscillation::stiffness`] with the drive of this strength, of which the tip swings by
+/// `swing` and lags by `lag` degrees.
+///
+/// Of the deflection y = G_d s + G F at a drive s and a force F at the tip, the phase φ is held:
+/// Im(A e^(−iφ)/G_d) = Im(G F/G_d), of which the left hand is zero at the free frequency.
+fn stiffness(
+    case: &Case,
+    frequency: f64,
+    held: Held,
+    [strength, swing, lag]: [f64; 3],
+) -> Result<f64, HeldError> {
+    let at_tip = match case.cantilever() {
         Some(cantilever) => Case::from(Cantilever {
             actuation: Actuation::Tip,
             ..cantilever.clone()
         }),
         None => case.clone(),
     };
+    let turned = |degrees: f64| {
+        let (sin, cos) = nanotap_arithmetic::sin_cos(degrees.to_radians());
+        Complex::new(cos, -sin)
+    };
+    let across = |frequency: f64| -> Result<f64, HeldError> {
+        Ok((inverse_response(case, frequency)? * turned(held.phase)).im)
+    };
     let step = 1e-5;
-    let high = inverse_response(&case, frequency * (1.0 + step))?;
-    let low = inverse_response(&case, frequency * (1.0 - step))?;
-    Ok(-0.25 * (high.re - low.re) / step)
+    let slope =
+        (across(frequency * (1.0 + step))? - across(frequency * (1.0 - step))?) / (2.0 * step);
+    let answer = turned(lag - held.phase) / inverse_response(&at_tip, frequency)?;
+    Ok(-0.5 * held.amplitude / strength * held.amplitude / swing * slope / answer.im)
 }
 
 /// The steady motion of a linear system, at drive phase 0.

@@ -67,6 +67,9 @@ pub enum HeldError {
         "the equations for orbit, frequency and strength are singular: the orbit turns back here"
     )]
     Singular,
+    /// The curve breaks off again and again.
+    #[error("the orbits with this amplitude and phase break off again and again on the way")]
+    Breaks,
     /// Newton found nothing.
     #[error(
         "Newton finds no orbit with this amplitude and phase: after {iterations} steps the \
@@ -134,6 +137,9 @@ const STEPS: usize = 40;
 const SHORTEST: f64 = 1.0 / 64.0;
 /// A residual above this, relative, is no orbit.
 const CLOSED: f64 = 1e-9;
+/// How often entries of a state that are whole numbers, as whether a neck is there, are taken from
+/// the map at one place: where they do not come to rest, the residual says so.
+const MOST_SETTINGS: usize = 3;
 /// A step may change frequency and strength by this part of themselves.
 const FARTHEST: [f64; 2] = [0.1, 0.9];
 
@@ -274,9 +280,19 @@ impl Held {
             .collect::<Result<Vec<_>, _>>()?;
         let n = model.dimension();
         let mut map = Strobe::with_tangents(&model, tangents);
+        let mut driven = driven;
         let mut end = driven.state.clone();
         let (mut jacobian, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
         map.advance_with_derivatives(&mut end, &mut jacobian, &mut by)?;
+        let whole = n - map.discrete_entries();
+        for _ in 0..MOST_SETTINGS {
+            if end[whole..] == driven.state[whole..] {
+                break;
+            }
+            driven.state[whole..].copy_from_slice(&end[whole..]);
+            end.copy_from_slice(&driven.state);
+            map.advance_with_derivatives(&mut end, &mut jacobian, &mut by)?;
+        }
         let seen = measure(&model, &driven.state, 1, Set::FIRST_HARMONIC)?;
         let sizes = self.sizes(&model, driven.frequency);
         let mut residual = DVector::zeros(n + 2);

@@ -23,9 +23,10 @@ pub use held::{Driven, Held, HeldError, HeldOrbit};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::approach::Way;
+use super::approach::{ApproachPoint, Way};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
-use crate::case::physical::{Kind, Scales};
+use crate::case::physical::{Kind, Physical};
+use crate::model::parameter::Parameter;
 
 /// What frequency modulation tells at one distance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -46,7 +47,8 @@ pub struct Modulated {
     /// Least distance of a sinusoidal oscillation, a driven base's motion included, in the model's
     /// unit of length.
     pub closest: f64,
-    /// Δf/f₀ to first order in the law's static force.
+    /// Δf/f₀ to first order in the law's static force, of which a rigid stop and a surface that
+    /// moves have none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_order_shift: Option<f64>,
     /// Δf/f₀ by Giessibl's formula for an amplitude that is large against the force's range.
@@ -92,6 +94,8 @@ impl Modulated {
 pub struct ModulatedInSi {
     /// Frequency of the drive, Hz.
     pub frequency: f64,
+    /// Strength of the drive: its force, N, or a driven base's amplitude, m.
+    pub drive_strength: f64,
     /// Frequency shift Δf, Hz.
     pub frequency_shift: f64,
     /// Energy that the sample takes in a period as the excitation tells it, J.
@@ -111,10 +115,13 @@ pub struct ModulatedInSi {
 
 impl Modulated {
     /// In SI.
-    pub fn in_si(&self, scales: &Scales) -> ModulatedInSi {
+    pub fn in_si(&self, view: &Physical) -> ModulatedInSi {
+        let scales = &view.scales;
+        let strength = scales.of(Parameter::Alpha2, view.cantilever.actuation);
         let energy = self.drive_dissipation * scales.energy;
         ModulatedInSi {
             frequency: self.drive_frequency * scales.frequency,
+            drive_strength: self.drive_strength * strength,
             frequency_shift: self.frequency_shift * scales.frequency,
             drive_dissipation: energy,
             drive_dissipation_ev: energy / JOULES_PER_ELECTRONVOLT,
@@ -204,7 +211,8 @@ pub struct ModulationReport {
     pub free_frequency_hz: Option<f64>,
     /// Strength of its drive, in the model's unit.
     pub free_strength: f64,
-    /// Stiffness of the mode at the tip, in the model's unit.
+    /// Stiffness by which the frequency answers the sample: of the mode at the tip, where the base
+    /// is at rest, in the model's unit.
     pub stiffness: f64,
     /// What the free lever loses in a period at this amplitude, in the model's unit.
     pub free_loss: f64,
@@ -215,9 +223,10 @@ pub struct ModulationReport {
     /// What the multipliers are of.
     pub multipliers: &'static str,
     /// The distances at which the frequency shift has the asked value, on each way in the order
-    /// in which they are met: the first is where a loop that holds the shift stops.
+    /// in which they are met, with the motion there: the first is where a loop that holds the shift
+    /// stops.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub setpoints: Option<Vec<ShiftSetpoint>>,
+    pub setpoints: Option<Vec<ApproachPoint>>,
     /// Where it changed by a jump.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jumps: Vec<Jump>,
@@ -240,23 +249,6 @@ pub struct Jump {
     pub from: f64,
     /// The first behind it.
     pub to: f64,
-}
-
-/// A distance at which the frequency shift has the asked value.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ShiftSetpoint {
-    /// On which way.
-    pub way: Way,
-    /// The distance, in the model's unit of length.
-    pub gap: f64,
-    /// The distance in m, of a physical case.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub zc: Option<f64>,
-    /// What frequency modulation tells there.
-    pub modulation: Modulated,
-    /// The same in SI, of a physical case.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub modulation_si: Option<ModulatedInSi>,
 }
 
 /// Where a curve ended.

@@ -13,21 +13,26 @@ pub(crate) struct HeldWalk<'a> {
     closest: Option<(f64, f64)>,
     /// How many numbers at the end of the state are the sample's.
     memory: usize,
+    /// Where the walk began.
+    first: (f64, Driven),
     /// The last two orbits, each with its distance.
     last: Option<(f64, Driven)>,
     before: Option<(f64, Driven)>,
 }
 
-/// How a step ended.
-pub(crate) enum Stepped {
-    /// On the same curve.
-    On(HeldOrbit),
-    /// On another one, past this distance.
-    Jumped(HeldOrbit, f64),
+/// The end of a step.
+pub(crate) struct Stepped {
+    /// The orbit there.
+    pub(crate) orbit: HeldOrbit,
+    /// The stretches on the way over which the curve broke off, each from its last distance to the
+    /// first at which another orbit goes on.
+    pub(crate) breaks: Vec<[f64; 2]>,
 }
 
 /// Halvings of a step before the curve is given up.
 const HALVINGS: i32 = 14;
+/// Breaks of the curve that are passed in one step.
+const BREAKS: usize = 4;
 /// A step that changes the state by more than this part of the amplitude, or frequency and
 /// strength by more than this part of themselves, beyond what was foreseen is made shorter.
 const UNFORESEEN: f64 = 0.2;
@@ -39,6 +44,7 @@ impl<'a> HeldWalk<'a> {
             held,
             closest: None,
             memory: 0,
+            first: (far, start.clone()),
             last: Some((far, start)),
             before: None,
         }
@@ -93,6 +99,7 @@ impl<'a> HeldWalk<'a> {
         let whole = target - start;
         let shortest = whole.abs() * 0.5_f64.powi(HALVINGS);
         let (mut at, mut step) = (start, whole);
+        let mut breaks = Vec::new();
         loop {
             let next = if (target - at).abs() <= step.abs() {
                 target
@@ -112,37 +119,57 @@ impl<'a> HeldWalk<'a> {
                     self.memory = orbit.model.memory;
                     self.before = self.last.replace((next, orbit.driven()));
                     if next.to_bits() == target.to_bits() {
-                        return Ok(Stepped::On(orbit));
+                        return Ok(Stepped { orbit, breaks });
                     }
                     at = next;
                     step *= 2.0;
                 }
                 _ if step.abs() > shortest && !control.is_cancelled() => step *= 0.5,
-                Ok((_, false)) => return self.jump(target, at, None),
-                Err(error) => return self.jump(target, at, Some(error)),
+                found => {
+                    if breaks.len() == BREAKS || control.is_cancelled() {
+                        return Err(found.err().unwrap_or(HeldError::Breaks));
+                    }
+                    let (next, orbit) = self.beyond(target, at, shortest, found.err())?;
+                    breaks.push([at, next]);
+                    if next.to_bits() == target.to_bits() {
+                        return Ok(Stepped { orbit, breaks });
+                    }
+                    (at, step) = (next, next - at);
+                }
             }
         }
     }
 
-    /// Another orbit at `target`, where the curve breaks off at `at`.
-    fn jump(
+    /// Another orbit beyond `at`, where the curve breaks off: at `target`, or else as far before it
+    /// as Newton finds one from the last orbit or from the first.
+    fn beyond(
         &mut self,
         target: f64,
         at: f64,
+        shortest: f64,
         failed: Option<HeldError>,
-    ) -> Result<Stepped, HeldError> {
-        let guess = self
-            .last
-            .as_ref()
-            .map_or_else(Driven::nothing, |known| self.resized(known, target));
-        let case = self.case.with(self.case.gap_key(), target);
-        match self.held(target).close(&case, &guess) {
-            Ok(orbit) => {
-                self.before = None;
-                self.last = Some((target, orbit.driven()));
-                Ok(Stepped::Jumped(orbit, at))
+    ) -> Result<(f64, HeldOrbit), HeldError> {
+        let mut failed = failed;
+        let mut next = target;
+        loop {
+            let case = self.case.with(self.case.gap_key(), next);
+            let known = self.last.iter().chain([&self.first]);
+            let guesses: Vec<Driven> = known.map(|known| self.resized(known, next)).collect();
+            for guess in guesses {
+                match self.held(next).close(&case, &guess) {
+                    Ok(orbit) => {
+                        self.memory = orbit.model.memory;
+                        self.before = None;
+                        self.last = Some((next, orbit.driven()));
+                        return Ok((next, orbit));
+                    }
+                    Err(error) => failed = failed.or(Some(error)),
+                }
             }
-            Err(error) => Err(failed.unwrap_or(error)),
+            if (next - at).abs() <= shortest {
+                return Err(failed.unwrap_or(HeldError::Breaks));
+            }
+            next = at + 0.5 * (next - at);
         }
     }
 

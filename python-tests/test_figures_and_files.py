@@ -173,6 +173,21 @@ def test_the_approach_goes_both_ways(physical):
     drawn(plot.show(with_branches))
 
 
+def test_the_shift_is_drawn_against_the_amplitude(physical):
+    """One least distance: the amplitude falls with the distance, and is the axis."""
+    ds = nanotap.approach(
+        physical, fm=True, closest="-1 nm", from_="19 nm", to="7 nm", points=4
+    )
+    held = json.loads(ds.attrs["modulation"])
+    assert held["closest"] * physical.physical.length_unit == pytest.approx(-1e-9)
+    assert (ds.physical_frequency_shift > 0).all()
+    amplitude = ds.physical_A.sel(way="approach").values
+    assert amplitude[-1] / amplitude[0] == pytest.approx(2.5, rel=1e-9)
+    picture = drawn(plot.approach(ds))
+    assert len(picture.axes) == 3
+    assert "amplitude" in picture.axes[-1].get_xlabel()
+
+
 def test_the_terminals_own_picture_is_to_be_had(regular, tmp_path):
     out = tmp_path / "s.zarr"
     nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=out)

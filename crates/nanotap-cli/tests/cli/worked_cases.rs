@@ -168,7 +168,7 @@ follows! {
     fit: "fit.md", 7 commands, 41 numbers;
     fit_of_sticky_and_wet_samples: "fit-adhesion.md", 2 commands, 10 numbers;
     fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
-    frequency_modulation: "frequency-modulation.md", 3 commands, 21 numbers;
+    frequency_modulation: "frequency-modulation.md", 3 commands, 23 numbers;
     the_theory_of_the_beam: "beam.md", 3 commands, 6 numbers;
     the_theory_of_the_observables: "observables.md", 1 commands, 3 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;

@@ -297,8 +297,9 @@ fn equilibria_table(all: &[Equilibrium], view: &Physical) -> String {
         style::bold("where the lever rests without a drive"),
         table.render()
     );
-    let mut stable = all.iter().filter(|e| e.stable);
-    if view.cantilever.alpha5 > 0.0 && stable.all(|e| e.contact && e.deflection < 0.0) {
+    let drawn_in = |e: &Equilibrium| e.contact && e.deflection < 0.0;
+    let mut stable = all.iter().filter(|e| e.stable).peekable();
+    if view.cantilever.alpha5 > 0.0 && stable.peek().is_some() && stable.all(drawn_in) {
         text.push_str(&motion::paragraph(
             "the sample pulls harder than the lever holds back: it snaps in, and rests in contact only",
         ));

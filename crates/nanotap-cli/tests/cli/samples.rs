@@ -140,3 +140,28 @@ fn two_tones_are_driven_and_read() {
     let period = 4.0 * std::f64::consts::TAU / 2.6;
     assert!((case["period"].as_f64().unwrap() / period - 1.0).abs() < 1e-14);
 }
+
+/// A hundred times the Hamaker constant of dForce's example: 1 nm above the sample its attraction
+/// is stiffer than the lever of 0.87 N/m, up to the contact; 18 nm above it is not.
+#[test]
+fn a_lever_that_snaps_in_is_said_to() {
+    let folder = Folder::new();
+    folder.write(
+        "lever.toml",
+        include_str!("../../../../docs/cases/dforce-dmt.toml"),
+    );
+    let says = |gap: &str| {
+        let run = folder.run(&[
+            "case",
+            "lever.toml",
+            "--set",
+            "sample.hamaker=3e-18 J",
+            "--set",
+            gap,
+        ]);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        run.stdout.contains("snaps in")
+    };
+    assert!(says("gap.tip=1 nm"));
+    assert!(!says("gap.tip=18 nm"));
+}

@@ -8,12 +8,15 @@
 //! At a fold w (DPⁿ − 1) = 0 for a vector w, so that of Pⁿ(x; λ, θ) = x, differentiated along
 //! the folds, w leaves w·∂Pⁿ/∂λ dλ + w·∂Pⁿ/∂θ dθ = 0: the derivative of the place is exact too.
 //!
+//! Over a sample so hard that the fold is the grazing to rounding, that place is taken.
+//!
 //! Fails by omission: jumps where a branch loses its stability in another way, and those at
 //! which the data, not the model, are on no branch.
 
 use nalgebra::SymmetricEigen;
 use nanotap_dynamics::{
-    BifurcationKind, ContinuationOptions, Control, Direction, PeriodicOrbit, continue_orbit,
+    BifurcationKind, BranchEnd, ContinuationOptions, Control, Direction, PeriodicOrbit,
+    continue_orbit,
 };
 
 use crate::case::{Case, Family, Key};
@@ -97,16 +100,31 @@ impl Fold {
         };
         let branch = continue_orbit(&family, at, orbit, way, &options, &Control::default()).ok()?;
         let stability = |kind: &BifurcationKind| !matches!(kind, BifurcationKind::Grazing { .. });
-        let first = branch
-            .bifurcations
-            .into_iter()
-            .find(|b| stability(&b.kind))?;
-        (first.kind == BifurcationKind::Fold).then(|| Self {
-            at: first.parameter,
+        let at = |parameter: f64, orbit: PeriodicOrbit| Self {
+            at: parameter,
             lost: false,
-            case: base.with(swept.key, first.parameter),
-            orbit: first.orbit,
-        })
+            case: base.with(swept.key, parameter),
+            orbit,
+        };
+        let mut bifurcations = branch.bifurcations.into_iter();
+        // Over a stiff sample the fold is so near to the grazing that the branch's turn is not
+        // seen, only that a multiplier passes +1, or nothing beyond the grazing at all.
+        match bifurcations.find(|b| stability(&b.kind)) {
+            Some(first) => {
+                let ends = matches!(
+                    first.kind,
+                    BifurcationKind::Fold | BifurcationKind::Crossing
+                );
+                ends.then(|| at(first.parameter, first.orbit))
+            }
+            None => match branch.end {
+                BranchEnd::Grazing { parameter } => {
+                    let last = branch.points.into_iter().next_back()?;
+                    Some(at(parameter, last.orbit))
+                }
+                _ => None,
+            },
+        }
     }
 
     /// The same where it is no more.
@@ -159,8 +177,11 @@ mod tests {
         Case::parse(Some(source), &words).unwrap()
     }
 
-    /// Where the tapping motion ends as the sample is moved away.
-    fn end(case: &Case) -> Fold {
+    /// Where the motion at a distance (nm) ends as the sample is moved, with a jump between two
+    /// others.
+    fn end_between(case: &Case, at: f64, between: [f64; 2]) -> Option<Fold> {
+        let at = 1e-9 * at;
+        let case = case.with(Key::GapTip, at);
         let model = case.model().unwrap();
         let rest = vec![0.0; model.dimension()];
         let end = classify(&mut Strobe::new(&model), &rest, &ClassifyOptions::default());
@@ -177,10 +198,27 @@ mod tests {
             curve: 0,
             rows: [0, 1],
             first: 0,
-            between: [15e-9, 16e-9],
+            between: between.map(|nm| 1e-9 * nm),
             reach: 20e-9,
         };
-        Fold::beyond(case, &swept, (15e-9, &orbit), (&jump, 0.0)).unwrap()
+        Fold::beyond(&case, &swept, (at, &orbit), (&jump, 0.0))
+    }
+
+    /// Where the tapping motion ends as the sample is moved away.
+    fn end(case: &Case) -> Fold {
+        end_between(case, 15.0, [15.0, 16.0]).unwrap()
+    }
+
+    /// The free lever swings by 20 nm about a base that moves by 20 nm/Q: it touches at 19.974 nm,
+    /// and over a hard sample its motion ends there, within a picometre.
+    #[test]
+    fn free_motion_ends_over_samples_of_any_stiffness() {
+        for stiffness in ["30 N/m", "300 N/m", "2 kN/m", "20 kN/m", "200 kN/m"] {
+            let hard = lever(&[&format!("sample.stiffness={stiffness}")]);
+            let fold = end_between(&hard, 21.0, [20.0, 19.5]);
+            let at = fold.expect(stiffness).at;
+            assert!((at - 19.974_4e-9).abs() < 2e-12, "{stiffness}: {at}");
+        }
     }
 
     #[test]

@@ -473,7 +473,15 @@ impl Problem<'_> {
     /// The derivatives of that residual.
     fn jump_derivatives(&self, effects: &[Vec<Effects>], point: &Point, index: usize) -> Vec<f64> {
         let (jump, fold) = (&self.jumps[index], &point.folds[index]);
-        let still = || vec![0.0; self.parameters.len()];
+        let offset = |parameter: &Parameter| {
+            let is_offset = parameter.target == Target::Place(0) && parameter.is_of(jump.curve);
+            f64::from(u8::from(is_offset))
+        };
+        // A place that does not move is read with its offset all the same.
+        let still = || {
+            let parameters = self.parameters.iter();
+            parameters.map(|p| -offset(p) / jump.error()).collect()
+        };
         let Some(fold) = fold.as_ref().filter(|fold| !fold.lost) else {
             return still();
         };
@@ -497,8 +505,7 @@ impl Problem<'_> {
                     Some(by * by_key[at])
                 })
                 .sum();
-            let offset = f64::from(u8::from(parameter.target == Target::Place(0)));
-            (sum - offset) / jump.error()
+            (sum - offset(parameter)) / jump.error()
         };
         self.parameters.iter().enumerate().map(slope).collect()
     }

@@ -10,7 +10,7 @@ use super::data::Data;
 use super::jumps::Jump;
 use super::parameters::{self, Parameter};
 use super::problem::Problem;
-use super::profile;
+use super::profile::{Profile, profile};
 use super::report::{
     CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, OtherOrbit,
     Reading, Undetermined,
@@ -18,6 +18,10 @@ use super::report::{
 use super::search::{Found, Search, UNLIKELY, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
 
+/// What chi2 may be lower beside the best values.
+const DEEPER: f64 = 0.1;
+/// Times that a fit goes on from where its profile found a lower chi2.
+const DEEPER_ROUNDS: usize = 4;
 /// Rows of which a remark speaks singly.
 const SAID: usize = 8;
 
@@ -33,11 +37,9 @@ impl Search<'_> {
     /// parameters, and values of rows without an orbit as missed by their column's spread.
     fn criteria(&self, found: &Found) -> [f64; 2] {
         let rows = self.problem.data.rows();
+        let point = &found.solution.point;
         // Another law may have no fold to compare: the jumps are left out.
-        let problem = self.problem_of(found);
-        let (x, point) = (&found.solution.x, &found.solution.point);
-        let jumps = (0..found.jumps.len()).map(|k| problem.jump_residual(x, point, k).powi(2));
-        let mut deviance = found.solution.cost - jumps.sum::<f64>();
+        let mut deviance = found.solution.cost - self.squared_jumps(found);
         let mut estimated = vec![false; found.noise.len()];
         for (row, point) in rows.zip(point.iter()) {
             for (column, noise) in found.noise.iter().enumerate() {
@@ -58,27 +60,16 @@ impl Search<'_> {
     }
 
     /// All that was found, from so many starts.
-    pub(super) fn report(&self, found: &Found, starts: usize) -> FitReport {
+    pub(super) fn report(&self, found: Found, starts: usize) -> FitReport {
+        let (found, intervals) = self.with_intervals(found);
+        let found = &found;
         let (case, data) = (self.problem.case, self.problem.data);
         let parameters = self.problem.parameters;
         let problem = self.problem_of(found);
         let (x, point) = (&found.solution.x, &found.solution.point);
-        let sizes: Vec<f64> = parameters
-            .iter()
-            .zip(x)
-            .map(|(p, value)| match p.target {
-                parameters::Target::Key(_) if *value != 0.0 => value.abs(),
-                _ => p.size,
-            })
-            .collect();
-        let information = information(&found.solution.jacobian, &sizes);
+        let information = self.information(found);
         let given = self.all_given();
-        let width = if given {
-            student(f64::INFINITY)
-        } else {
-            student(self.freedom(found) as f64)
-        };
-        let fitted = self.fitted(&problem, found, &information, width);
+        let fitted = Self::fitted(&problem, found, &information, intervals);
         let p_value = given.then(|| self.probability(found));
         let columns: Vec<FittedColumn> = data
             .columns
@@ -148,25 +139,75 @@ impl Search<'_> {
         }
     }
 
+    /// What the Jacobian at the best values says of the parameters.
+    fn information(&self, found: &Found) -> Information {
+        let parameters = self.problem.parameters.iter();
+        let sizes: Vec<f64> = parameters
+            .zip(&found.solution.x)
+            .map(|(p, value)| match p.target {
+                parameters::Target::Key(_) if *value != 0.0 => value.abs(),
+                _ => p.size,
+            })
+            .collect();
+        information(&found.solution.jacobian, &sizes)
+    }
+
+    /// The intervals of the parameters. Where chi2 is found to be lower beside the best values than
+    /// there, the fit goes on from that place.
+    fn with_intervals(&self, mut found: Found) -> (Found, Vec<[Option<f64>; 2]>) {
+        let mut rounds = DEEPER_ROUNDS;
+        loop {
+            let information = self.information(&found);
+            let width = if self.all_given() {
+                student(f64::INFINITY)
+            } else {
+                student(self.freedom(&found) as f64)
+            };
+            if !self.request.profile || self.control.is_cancelled() {
+                let values = found.solution.x.iter().zip(&information.errors);
+                let symmetric = values.map(|(value, error)| {
+                    [-1.0, 1.0].map(|side| error.map(|error| value + side * width * error))
+                });
+                let intervals = symmetric.collect();
+                return (found, intervals);
+            }
+            let problem = self.problem_of(&found);
+            let deeper = if rounds > 0 { DEEPER } else { f64::INFINITY };
+            match profile(&problem, &found.solution, &information, width, deeper) {
+                Profile::Intervals(intervals) => return (found, intervals),
+                Profile::Lower(x) => {
+                    rounds -= 1;
+                    match self.fine(x) {
+                        Some(better) if self.is_better(&better, &found) => found = better,
+                        _ => rounds = 0,
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a fit describes as much of the data better than another.
+    fn is_better(&self, this: &Found, other: &Found) -> bool {
+        let deviance = |of: &Found| self.criteria(of)[0] + self.squared_jumps(of);
+        this.jumps.len() >= other.jumps.len() && deviance(this) < deviance(other)
+    }
+
+    /// What the places of jumps add to chi2.
+    fn squared_jumps(&self, found: &Found) -> f64 {
+        let problem = self.problem_of(found);
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let jumps = (0..found.jumps.len()).map(|k| problem.jump_residual(x, point, k).powi(2));
+        jumps.sum()
+    }
+
     fn fitted(
-        &self,
         problem: &Problem<'_>,
         found: &Found,
         information: &Information,
-        width: f64,
+        intervals: Vec<[Option<f64>; 2]>,
     ) -> Vec<FittedParameter> {
         let data = problem.data;
         let x = &found.solution.x;
-        let intervals = if self.request.profile && !self.control.is_cancelled() {
-            profile::intervals(problem, &found.solution, information, width)
-        } else {
-            x.iter()
-                .zip(&information.errors)
-                .map(|(value, error)| {
-                    [-1.0, 1.0].map(|side| error.map(|error| value + side * width * error))
-                })
-                .collect()
-        };
         let all = problem.parameters.iter().zip(x).zip(intervals);
         all.zip(&information.errors)
             .map(|(((parameter, value), interval), error)| FittedParameter {

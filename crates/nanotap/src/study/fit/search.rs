@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
                 .remedy("change the case, or give {bounds} and more {starts}")
             }
         })?;
-        Ok(self.report(&best, tried))
+        Ok(self.report(best, tried))
     }
 
     /// The case's own values, then others within the bounds, or within a factor of four.
@@ -177,7 +177,7 @@ impl<'a> Search<'a> {
     }
 
     /// From there to the minimum in standard errors.
-    fn fine(&self, mut x: Vec<f64>) -> Option<Found> {
+    pub(super) fn fine(&self, mut x: Vec<f64>) -> Option<Found> {
         let mut noise = self.rough_noise();
         let mut found: Option<Found> = None;
         let mut steps = 0;

@@ -2,7 +2,8 @@
 //!
 //! minimise ½|r(x)|² over low ≤ x ≤ high. A step solves (JᵀJ + λD²) p = −Jᵀr for the parameters
 //! that no bound holds, D the largest column norms seen (Moré 1978), λ as Nielsen has it
-//! (IMM-REP-1999-05); steps end at the bounds. The kept crate `levenberg-marquardt` knows no
+//! (IMM-REP-1999-05); steps end at the bounds. What cannot be zero goes by its logarithm, so that
+//! a stiffness changes by orders of magnitude in few steps and never its sign. The kept crate `levenberg-marquardt` knows no
 //! bounds and stands on another version of nalgebra.
 //!
 //! Fails by stopping in a local minimum: that is what several starts are for.
@@ -31,34 +32,156 @@ pub(super) struct Solution<P> {
     pub(super) point: P,
     /// |r|².
     pub(super) cost: f64,
+    residuals: DVector<f64>,
     pub(super) jacobian: DMatrix<f64>,
     pub(super) iterations: usize,
 }
 
 /// Most steps, taken or refused.
 const MOST_STEPS: usize = 60;
+/// Damping at which no step is left.
+const MOST_DAMPING: f64 = 1e16;
+/// Change of a logarithm in one step, at most.
+const MOST_FOLD: f64 = 2.0;
+/// A value that changes the residuals, in standard errors, by less than this is nothing.
+const NOTHING: f64 = 1e-3;
+
+/// Whether a value goes by its logarithm: one that is positive and cannot be negative.
+fn by_logarithm(x: f64, low: f64) -> bool {
+    low >= 0.0 && x > 0.0
+}
+
+/// Where a step leads from `x`, whose lower bound is `low`.
+pub(super) fn stepped(x: f64, step: f64, low: f64) -> f64 {
+    if by_logarithm(x, low) {
+        x * nanotap_arithmetic::exp(step / x)
+    } else {
+        x + step
+    }
+}
+
+/// The step that leads from `x` to another value.
+pub(super) fn step_between(x: f64, to: f64, low: f64) -> f64 {
+    if by_logarithm(x, low) {
+        x * nanotap_arithmetic::ln(to / x)
+    } else {
+        to - x
+    }
+}
+
+/// Where a step leads that ends at the bounds.
+pub(super) fn moved(x: f64, step: f64, (low, high): (f64, f64)) -> f64 {
+    let most = if by_logarithm(x, low) {
+        MOST_FOLD * x
+    } else {
+        f64::INFINITY
+    };
+    stepped(x, step.clamp(-most, most), low).clamp(low, high)
+}
+
+/// The slope of a step at `x` in parts of its slope at `from`, which is the same by the logarithm.
+pub(super) fn slope_kept(from: f64, x: f64, low: f64) -> f64 {
+    if by_logarithm(x, low) && from > 0.0 {
+        x / from
+    } else {
+        1.0
+    }
+}
 
 /// Minimises from `x` until a step promises less than
 /// `enough` of |r|², or a part of 1e−10 of it.
 pub(super) fn minimise<L: LeastSquares>(
     problem: &L,
-    mut x: Vec<f64>,
+    x: Vec<f64>,
     mut point: L::Point,
     bounds: &[(f64, f64)],
     enough: f64,
 ) -> Option<Solution<L::Point>> {
+    let residuals = problem.residuals(&x, &point);
+    let jacobian = problem.jacobian(&x, &mut point)?;
+    let start = Solution {
+        cost: residuals.norm_squared(),
+        x,
+        point,
+        residuals,
+        jacobian,
+        iterations: 0,
+    };
+    let found = descend(problem, start, bounds, enough);
+    Some(match without_nothing(problem, &found, bounds) {
+        Some(bare) => descend(problem, bare, bounds, enough),
+        None => found,
+    })
+}
+
+/// With what is as good as nothing at its bound: a logarithm never comes to zero.
+fn without_nothing<L: LeastSquares>(
+    problem: &L,
+    found: &Solution<L::Point>,
+    bounds: &[(f64, f64)],
+) -> Option<Solution<L::Point>> {
+    let Solution { x, jacobian, .. } = found;
+    let is_nothing = |j: usize| {
+        let shows = x[j] * jacobian.column(j).norm();
+        bounds[j].0 == 0.0 && x[j] > 0.0 && shows < NOTHING
+    };
+    if !(0..x.len()).any(is_nothing) {
+        return None;
+    }
+    let bare: Vec<f64> = (0..x.len())
+        .map(|j| if is_nothing(j) { 0.0 } else { x[j] })
+        .collect();
+    let mut point = problem.point(&bare, (x, &found.point))?;
+    let residuals = problem.residuals(&bare, &point);
+    let cost = residuals.norm_squared();
+    if cost > found.cost + NOTHING * NOTHING {
+        return None;
+    }
+    let jacobian = problem.jacobian(&bare, &mut point)?;
+    Some(Solution {
+        cost,
+        x: bare,
+        point,
+        residuals,
+        jacobian,
+        iterations: found.iterations,
+    })
+}
+
+/// Levenberg and Marquardt's steps from a point.
+fn descend<L: LeastSquares>(
+    problem: &L,
+    from: Solution<L::Point>,
+    bounds: &[(f64, f64)],
+    enough: f64,
+) -> Solution<L::Point> {
+    let Solution {
+        mut x,
+        mut point,
+        mut residuals,
+        mut jacobian,
+        mut iterations,
+        ..
+    } = from;
     let count = x.len();
-    let mut residuals = problem.residuals(&x, &point);
-    let mut jacobian = problem.jacobian(&x, &mut point)?;
     let mut scale = DVector::from_element(count, 0.0);
     let (mut damping, mut growth) = (1e-3, 2.0);
-    let mut iterations = 0;
     for _ in 0..MOST_STEPS {
         let cost = residuals.norm_squared();
-        let gradient = jacobian.tr_mul(&residuals);
+        // In units of which a step is one of the logarithm.
+        let unit = |j: usize| {
+            if by_logarithm(x[j], bounds[j].0) {
+                x[j]
+            } else {
+                1.0
+            }
+        };
+        let mut slopes = jacobian.clone();
         for j in 0..count {
-            scale[j] = jacobian.column(j).norm().max(scale[j]);
+            slopes.column_mut(j).scale_mut(unit(j));
+            scale[j] = slopes.column(j).norm().max(scale[j]);
         }
+        let gradient = slopes.tr_mul(&residuals);
         // A bound holds a parameter that would leave it; so does what nothing depends on.
         let free: Vec<usize> = (0..count)
             .filter(|&j| {
@@ -71,19 +194,32 @@ pub(super) fn minimise<L: LeastSquares>(
         if free.is_empty() {
             break;
         }
-        let Some(step) = marquardt(&jacobian, &residuals, &free, &scale, damping) else {
+        let Some(step) = marquardt(&slopes, &residuals, &free, &scale, damping) else {
             damping *= 10.0;
             continue;
         };
         let mut tried = x.clone();
         for (k, &j) in free.iter().enumerate() {
-            tried[j] = (x[j] + step[k]).clamp(bounds[j].0, bounds[j].1);
+            tried[j] = moved(x[j], step[k] * unit(j), bounds[j]);
         }
-        let taken = DVector::from_fn(count, |j, _| tried[j] - x[j]);
-        let linear = &residuals + &jacobian * &taken;
+        let taken = DVector::from_fn(count, |j, _| {
+            step_between(x[j], tried[j], bounds[j].0) / unit(j)
+        });
+        let linear = &residuals + &slopes * &taken;
         let promised = cost - linear.norm_squared();
         if promised <= enough.max(1e-10 * cost) || taken.iter().all(|t| *t == 0.0) {
-            break;
+            // A step that ended at a bound, or at the most by which a logarithm may change, may
+            // promise less than a shorter one.
+            let whole = free
+                .iter()
+                .zip(step.iter())
+                .all(|(&j, step)| (taken[j] - step).abs() <= 1e-9 * step.abs());
+            if whole || damping > MOST_DAMPING {
+                break;
+            }
+            damping *= growth;
+            growth *= 2.0;
+            continue;
         }
         let better = problem.point(&tried, (&x, &point)).and_then(|at| {
             let residuals = problem.residuals(&tried, &at);
@@ -102,18 +238,19 @@ pub(super) fn minimise<L: LeastSquares>(
         } else {
             damping *= growth;
             growth *= 2.0;
-            if damping > 1e16 {
+            if damping > MOST_DAMPING {
                 break;
             }
         }
     }
-    Some(Solution {
+    Solution {
         cost: residuals.norm_squared(),
         x,
         point,
+        residuals,
         jacobian,
         iterations,
-    })
+    }
 }
 
 /// The step of the free parameters: least squares of [J; √λ D] p = [−r; 0] by QR.
@@ -145,4 +282,55 @@ fn marquardt(
     let scaled = qr.r().solve_upper_triangular(&projected)?;
     let step = DVector::from_fn(columns, |k, _| scaled[k] / scale[free[k]]);
     step.iter().all(|s| s.is_finite()).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deflections a/(1 + 10/k) + 0.1 c a² under loads a, where no c ≥ 0 fits.
+    struct Springs;
+
+    const LOADS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
+    const TRUE: [f64; 2] = [3.0, -0.1];
+
+    impl Springs {
+        fn deflections(x: &[f64]) -> [f64; 4] {
+            LOADS.map(|load| load / (1.0 + 10.0 / x[0]) + 0.1 * x[1] * load * load)
+        }
+    }
+
+    impl LeastSquares for Springs {
+        type Point = ();
+
+        fn point(&self, _x: &[f64], _from: (&[f64], &())) -> Option<()> {
+            Some(())
+        }
+
+        fn residuals(&self, x: &[f64], _point: &()) -> DVector<f64> {
+            let (a, b) = (Self::deflections(x), Self::deflections(&TRUE));
+            DVector::from_fn(4, |k, _| a[k] - b[k])
+        }
+
+        fn jacobian(&self, x: &[f64], _point: &mut ()) -> Option<DMatrix<f64>> {
+            let by_stiffness = 10.0 / (x[0] + 10.0).powi(2);
+            Some(DMatrix::from_fn(4, 2, |i, j| {
+                LOADS[i] * if j == 0 { by_stiffness } else { 0.1 * LOADS[i] }
+            }))
+        }
+    }
+
+    #[test]
+    fn stiffnesses_far_off_and_what_is_not_there_are_found() {
+        let bounds = [(0.0, f64::INFINITY); 2];
+        for stiffness in [1e-3, 1e3] {
+            let start = vec![stiffness, 0.5];
+            let found = minimise(&Springs, start, (), &bounds, 1e-16).unwrap();
+            // With c = 0 the least squares of 1/(1 + 10/k) are Σ a d/Σ a² = 3/13 − 1/30.
+            let ratio = 3.0 / 13.0 - 1.0 / 30.0;
+            let best = 10.0 * ratio / (1.0 - ratio);
+            assert!((found.x[0] / best - 1.0).abs() < 1e-6, "{:?}", found.x);
+            assert_eq!(found.x[1].to_bits(), 0.0f64.to_bits(), "{:?}", found.x);
+        }
+    }
 }

@@ -99,6 +99,9 @@ impl WholeStep {
     }
 }
 
+/// What the sum of a period's steps may miss of it by rounding, in parts of it.
+const ROUNDING: f64 = 1e-12;
+
 impl<'a> FixedStep<'a> {
     /// Starts at state `x`, phase 0, with `steps[r]` steps a drive period in regime `r`.
     ///
@@ -173,8 +176,15 @@ impl<'a> FixedStep<'a> {
         let mut phase = 0.0;
         let mut switches = 0;
         self.phasors.fill(Complex::new(1.0, 0.0));
-        while phase < period * (1.0 - 1e-12) {
-            let step = (period / f64::from(self.steps[self.regime])).min(period - phase);
+        while phase < period * (1.0 - ROUNDING) {
+            let step = period / f64::from(self.steps[self.regime]);
+            let left = period - phase;
+            // What is left of the period is a step but for the rounding of their sum.
+            let step = if left < step - ROUNDING * period {
+                left
+            } else {
+                step
+            };
             match self.whole.get(self.regime) {
                 Some(whole) if whole.length == step => {
                     whole.take(&mut self.phasors, &self.state, &mut self.next);

@@ -272,6 +272,10 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         }
         text.push_str(&table.render());
     }
+    if let Some(branches) = &report.branches {
+        let at = |value| shown(Kind::Length, value);
+        text.push_str(&super::branch::failures(branches, at));
+    }
     for p in report.table.iter().filter(|p| p.reason.is_some()).take(2) {
         text.push_str(&motion::paragraph(&format!(
             "{} at {}: {}",

@@ -171,6 +171,23 @@ fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// What could not be followed or measured, where it stands as `at` writes it.
+pub(super) fn failures(report: &BranchReport, at: impl Fn(f64) -> String) -> String {
+    let mut text = String::new();
+    if !report.failures.is_empty() {
+        let _ = writeln!(text, "\n  {}", style::bold("not followed"));
+    }
+    for failure in &report.failures {
+        text.push_str(&motion::paragraph(&format!(
+            "{} = {}: {}",
+            report.parameter,
+            at(failure.parameter),
+            failure.reason
+        )));
+    }
+    text
+}
+
 fn text(case: &GivenCase, report: &BranchReport) -> String {
     let told = |key, value: f64, digits| {
         case.parameter_unit(key).map_or_else(
@@ -293,16 +310,6 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         }
         text.push_str(&table.render());
     }
-    if !report.failures.is_empty() {
-        let _ = writeln!(text, "\n  {}", style::bold("not followed"));
-        for failure in &report.failures {
-            text.push_str(&motion::paragraph(&format!(
-                "{} = {}: {}",
-                report.parameter,
-                shown(failure.parameter, 8),
-                failure.reason
-            )));
-        }
-    }
+    text.push_str(&failures(report, |value| shown(value, 8)));
     text
 }

@@ -60,8 +60,10 @@ impl FromArgMatches for Arguments {
 
 /// The command of a study.
 fn command_of(entry: &StudyEntry) -> Command {
-    let command = Command::new(entry.name).about(entry.about);
-    CaseArguments::augment_args(command).args(request::arguments(&(entry.request)()))
+    let command = CaseArguments::augment_args(Command::new(entry.name));
+    // What the arguments of the case say of themselves is not what the command is about.
+    let command = command.about(entry.about).long_about(None);
+    command.args(request::arguments(&(entry.request)()))
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

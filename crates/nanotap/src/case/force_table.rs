@@ -99,6 +99,11 @@ impl ForceTable {
                 .collect();
             let &[place] = all.as_slice() else {
                 let found: Vec<&str> = table.columns.iter().map(|(name, _)| &**name).collect();
+                let has = if found.is_empty() {
+                    "none at all".to_owned()
+                } else {
+                    found.join(", ")
+                };
                 let what = if all.is_empty() {
                     "no"
                 } else {
@@ -106,10 +111,8 @@ impl ForceTable {
                 };
                 return Err(ForceTableError::new(
                     format!(
-                        "{} has {what} column `{}`: it has {}",
-                        table.name,
-                        names[0],
-                        found.join(", ")
+                        "{} has {what} column `{}`: it has {has}",
+                        table.name, names[0],
                     ),
                     format!("name it as in `{example}`"),
                 ));

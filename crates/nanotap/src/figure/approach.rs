@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::figure::branch::{
-    BranchMark, BranchPoint, MARKS, Shown, natural_of, runs, scale_of, word,
+    BranchMark, BranchPoint, Shown, natural_of, runs, scale_of, with_marks,
 };
 use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
@@ -295,31 +295,7 @@ impl ApproachPanel {
             let markers = markers.colour(Colour::GREEN).size(0.8);
             panel = panel.with(markers.label("coexists"));
         }
-        // Where there are many, each is to hide little.
-        let size = if self.bifurcations.len() > 12 {
-            1.0
-        } else {
-            1.8
-        };
-        for (kind, shape, colour) in MARKS {
-            let marks: Vec<(f64, f64)> = self
-                .bifurcations
-                .iter()
-                .filter(|b| b.kind == kind)
-                .map(|b| (b.x, b.y))
-                .collect();
-            if !marks.is_empty() {
-                panel = panel.with(
-                    Markers::new(marks)
-                        .shape(shape)
-                        .colour(colour)
-                        .open()
-                        .size(size)
-                        .label(word(kind)),
-                );
-            }
-        }
-        panel
+        with_marks(panel, &self.bifurcations, [1.8, 1.0], 1.0)
     }
 }
 

@@ -74,6 +74,31 @@ pub(crate) const MARKS: [(&str, Shape, Colour); 5] = [
     ("crossing", Shape::Cross, Colour::BLACK),
 ];
 
+/// Bifurcations beyond which marks are the smaller ones.
+const MANY: usize = 12;
+
+/// The bifurcations of each kind as marks: of the first size, where there are many of the second,
+/// so that each hides little; grazings in parts of it.
+pub(crate) fn with_marks(
+    mut panel: Panel,
+    bifurcations: &[BranchMark],
+    [few, many]: [f64; 2],
+    grazing: f64,
+) -> Panel {
+    let size = if bifurcations.len() > MANY { many } else { few };
+    for (kind, shape, colour) in MARKS {
+        let of_kind = bifurcations.iter().filter(|b| b.kind == kind);
+        let marks: Vec<(f64, f64)> = of_kind.map(|b| (b.x, b.y)).collect();
+        if marks.is_empty() {
+            continue;
+        }
+        let part = if kind == "grazing" { grazing } else { 1.0 };
+        let markers = Markers::new(marks).shape(shape).colour(colour).open();
+        panel = panel.with(markers.size(part * size).label(word(kind)));
+    }
+    panel
+}
+
 /// Branches against the parameter, a colour a period, with their bifurcations; beside
 /// them the bifurcation curves in two parameters, if they were traced.
 pub fn branch_figure(
@@ -293,31 +318,7 @@ impl BranchCurves {
             let dashed = nowhere().colour(Colour::GREY).dash(Dash::Dashed).width(0.6);
             panel = panel.with(dashed.label("unstable"));
         }
-        // Where there are many, each is to hide little.
-        let size = if self.bifurcations.len() > 12 {
-            1.1
-        } else {
-            1.6
-        };
-        for (kind, shape, colour) in MARKS {
-            let marks: Vec<(f64, f64)> = self
-                .bifurcations
-                .iter()
-                .filter(|b| b.kind == kind)
-                .map(|b| (b.x, b.y))
-                .collect();
-            if !marks.is_empty() {
-                panel = panel.with(
-                    Markers::new(marks)
-                        .shape(shape)
-                        .colour(colour)
-                        .open()
-                        .size(if kind == "grazing" { 0.7 * size } else { size })
-                        .label(word(kind)),
-                );
-            }
-        }
-        panel
+        with_marks(panel, &self.bifurcations, [1.6, 1.1], 0.7)
     }
 }
 

@@ -27,6 +27,7 @@ pub(crate) struct Beam<'a> {
     galerkin: &'a Galerkin,
     drive: &'a Drive,
     layout: Layout,
+    solve: Solve,
     /// `ẋ = A x + f` in flight, the memory's row zero.
     matrix: DMatrix<f64>,
     forcing: HarmonicVector,
@@ -167,6 +168,7 @@ impl<'a> Beam<'a> {
             galerkin,
             drive,
             layout,
+            solve,
             matrix,
             forcing,
             kick,
@@ -451,10 +453,10 @@ impl<'a> Beam<'a> {
     }
 
     /// The derivative of all this with respect to a parameter.
-    pub(crate) fn derivative(&self, parameter: Parameter) -> Result<BeamTangent, FlowError> {
+    pub(crate) fn derivative(&self, parameter: Parameter) -> BeamTangent {
         let derivative = self.galerkin.derivative(parameter);
         let free = Regime::Free.index();
-        let solve = Solve::new(self.galerkin)?;
+        let solve = &self.solve;
         // ∂(M⁻¹K) = M⁻¹(∂K − ∂M M⁻¹K), and so on.
         let of_matrix = |change: &DMatrix<f64>, of: &DMatrix<f64>| {
             solve.matrix(&(change - &derivative.mass * solve.matrix(of)))
@@ -496,13 +498,13 @@ impl<'a> Beam<'a> {
         let kick = self
             .layout
             .at_velocities(&of_vector(&zero, &galerkin.gap.tip));
-        Ok(BeamTangent {
+        BeamTangent {
             matrix,
             forcing,
             kick,
             height,
             height_rate,
-        })
+        }
     }
 }
 

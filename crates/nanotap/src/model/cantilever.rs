@@ -210,27 +210,30 @@ impl Cantilever {
     /// The parameters that this case has: the paper's (without α6 where the damper is the
     /// relaxing arm's) and those of its contact law, its second tone and its measured modes.
     pub fn parameters(&self) -> Vec<Parameter> {
-        let of_solid = self.contact == ContactLaw::StandardLinearSolid;
-        let of_surface = self.contact == ContactLaw::MovingSurface;
+        Parameter::every().filter(|of| self.has(*of)).collect()
+    }
+
+    /// Whether a parameter has a meaning beside this case's law and drive.
+    fn has(&self, parameter: Parameter) -> bool {
         let of_law = self.law.is_some();
-        Parameter::every()
-            .filter(|parameter| match parameter {
-                Parameter::Alpha4 | Parameter::Alpha6 if of_law => false,
-                Parameter::Alpha6 => !of_solid,
-                Parameter::RelaxationStiffness | Parameter::RelaxationTime => of_solid,
-                Parameter::SurfaceStiffness
-                | Parameter::SurfaceDamping
-                | Parameter::AdhesionForce => of_surface && !of_law,
-                Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
-                Parameter::Mode2Frequency
-                | Parameter::Mode3Frequency
-                | Parameter::Mode2Quality
-                | Parameter::Mode3Quality
-                | Parameter::Mode2Stiffness
-                | Parameter::Mode3Stiffness => self.get(*parameter) != 0.0,
-                _ => true,
-            })
-            .collect()
+        match parameter {
+            Parameter::Alpha4 | Parameter::Alpha6 if of_law => false,
+            Parameter::Alpha6 => self.contact != ContactLaw::StandardLinearSolid,
+            Parameter::RelaxationStiffness | Parameter::RelaxationTime => {
+                self.contact == ContactLaw::StandardLinearSolid
+            }
+            Parameter::SurfaceStiffness | Parameter::SurfaceDamping | Parameter::AdhesionForce => {
+                self.contact == ContactLaw::MovingSurface && !of_law
+            }
+            Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
+            Parameter::Mode2Frequency
+            | Parameter::Mode3Frequency
+            | Parameter::Mode2Quality
+            | Parameter::Mode3Quality
+            | Parameter::Mode2Stiffness
+            | Parameter::Mode3Stiffness => self.get(parameter) != 0.0,
+            _ => true,
+        }
     }
 
     /// The period of the drive: 2π/Ω, or with a second tone the time after which both
@@ -243,7 +246,7 @@ impl Cantilever {
     /// What is wrong with the value of a parameter beside this case's law and drive: one that it
     /// does not have, or one that it cannot do without.
     pub(crate) fn misplaced(&self, parameter: Parameter) -> Option<Reason> {
-        let there = self.parameters().contains(&parameter);
+        let there = self.has(parameter);
         let own = [Parameter::SurfaceStiffness, Parameter::SurfaceDamping];
         if there && own.contains(&parameter) && self.get(parameter) == 0.0 {
             return Some(Reason::BareSurface);

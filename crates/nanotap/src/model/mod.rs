@@ -259,6 +259,14 @@ impl Model {
         })
     }
 
+    /// The equations of the cantilever that this is the model of.
+    fn equations_of(&self, case: &Cantilever) -> Result<Arc<Galerkin>, ModelError> {
+        match &self.power.equations {
+            Some(known) => Ok(Arc::clone(known)),
+            None => Ok(Arc::new(Galerkin::new(case)?)),
+        }
+    }
+
     /// What feeds and drains energy; an entry a regime.
     pub fn power(&self) -> &[Powers] {
         self.power.known.get_or_init(|| {
@@ -411,7 +419,7 @@ pub fn cantilever_tangent(
     model: &Model,
     parameter: Parameter,
 ) -> Result<SystemTangent, ModelError> {
-    let galerkin = Galerkin::new(case)?;
+    let galerkin = model.equations_of(case)?;
     let mut tangent = SystemTangent::zeros(&model.system);
     if parameter == Parameter::Omega {
         tangent.log_period = -1.0 / case.omega;
@@ -420,13 +428,13 @@ pub fn cantilever_tangent(
         // Free flight alone.
         let memory = model.memory > 0;
         let beam = Beam::new(&galerkin, model.system.drive(), memory)?;
-        let change = beam.derivative(parameter)?;
+        let change = beam.derivative(parameter);
         tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
         return Ok(tangent);
     }
     let law = ContactLaw::law(case, Some(parameter));
     let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
-    let change = beam.derivative(parameter)?;
+    let change = beam.derivative(parameter);
     for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
         tangent.regimes[r] = change.regime(&beam, answer);
     }
@@ -450,14 +458,14 @@ pub(crate) fn cantilever_model_tangent(
     model: &Model,
     parameter: Parameter,
 ) -> Result<ModelTangent, ModelError> {
-    let galerkin = Galerkin::new(case)?;
+    let galerkin = model.equations_of(case)?;
     let law = if model.nonlinear.is_some() {
         contact::no_sample(model.memory > 0)
     } else {
         ContactLaw::law(case, Some(parameter))
     };
     let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
-    let change = beam.derivative(parameter)?;
+    let change = beam.derivative(parameter);
     let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
     Ok(ModelTangent {
         system: cantilever_tangent(case, model, parameter)?,

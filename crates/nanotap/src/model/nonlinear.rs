@@ -425,7 +425,7 @@ impl Variation {
         };
         let mut log_period = 0.0;
         for &(parameter, slope) in slopes {
-            add(&mut change, &beam.derivative(parameter)?, slope);
+            add(&mut change, &beam.derivative(parameter), slope);
             if parameter == Parameter::Omega {
                 log_period -= slope / case.omega;
                 for (tone, frequency) in change.tones.iter_mut().zip(drive.frequencies()) {

@@ -374,7 +374,7 @@ pub fn branches_through(
     check(case, options)?;
     let family = case.family(options.key);
     let diagram = assemble_diagram(&family, seeds, &options.diagram(), control);
-    let mut report = described(case, options, &diagram)?;
+    let mut report = described(case, options, &diagram);
     report.cancelled = control.is_cancelled();
     Ok(report)
 }
@@ -421,7 +421,7 @@ pub fn branch(
     } else {
         assemble_diagram(&family, &seeds, &options.diagram(), control)
     };
-    let mut report = described(case, options, &diagram)?;
+    let mut report = described(case, options, &diagram);
     if let Some((key, low, high)) = options.second {
         report.loci = Some(loci(
             case,
@@ -547,11 +547,7 @@ fn census_seeds(
     Ok(found)
 }
 
-fn described(
-    case: &Case,
-    options: &BranchOptions,
-    diagram: &Diagram,
-) -> Result<BranchReport, BranchError> {
+fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchReport {
     let key = options.key;
     let mut report = BranchReport {
         parameter: key.path(),
@@ -595,13 +591,27 @@ fn described(
         report
             .branches
             .push(summary(branch, parent, *depth, end(branch)));
+        // An orbit that grazes may be closed and yet not be measured: the rest stands.
+        let unmeasured = |parameter, what: &str, error: &BranchError| FailureReport {
+            parameter,
+            reason: format!("the {what} is left out, its motion cannot be measured: {error}"),
+        };
         for p in &branch.points {
-            report.points.push(point(case, options, index, p)?);
+            match point(case, options, index, p) {
+                Ok(point) => report.points.push(point),
+                Err(error) => report
+                    .failures
+                    .push(unmeasured(p.parameter, "point", &error)),
+            }
         }
         for b in &branch.bifurcations {
-            report
-                .bifurcations
-                .push(bifurcation(case, options, index, b)?);
+            match bifurcation(case, options, index, b) {
+                Ok(found) => report.bifurcations.push(found),
+                Err(error) => {
+                    let what = kind_name(b.kind);
+                    report.failures.push(unmeasured(b.parameter, what, &error));
+                }
+            }
         }
         // What the user stopped is no failure of the branch.
         let stopped = matches!(branch.end, BranchEnd::Cancelled);
@@ -616,7 +626,7 @@ fn described(
             });
         }
     }
-    Ok(report)
+    report
 }
 
 /// Whether two branches pass through just the same bifurcations, of which there are some.
@@ -964,5 +974,31 @@ impl From<BranchError> for crate::Error {
             }
             other => Self::numerics(other.to_string()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::cantilever::Cantilever;
+
+    #[test]
+    fn a_point_that_cannot_be_measured_does_not_take_the_others_with_it() {
+        let case = Case::from(Cantilever::paper());
+        let options = BranchOptions::over(Key::Omega, 3.0, 3.01);
+        let family = case.family(options.key);
+        let seeds = [(3.0, first_orbit(&case, &options).unwrap())];
+        let mut diagram =
+            assemble_diagram(&family, &seeds, &options.diagram(), &Control::default());
+        let whole = described(&case, &options, &diagram);
+        assert!(whole.failures.is_empty() && whole.points.len() > 2);
+        let branch = &mut diagram.branches[0].branch;
+        branch.points[1].orbit.states[0][0] = f64::NAN;
+        let parameter = branch.points[1].parameter;
+        let rest = described(&case, &options, &diagram);
+        assert_eq!(rest.points.len(), whole.points.len() - 1);
+        assert_eq!(rest.failures.len(), 1);
+        assert_eq!(rest.failures[0].parameter.to_bits(), parameter.to_bits());
+        assert!(rest.failures[0].reason.contains("point is left out"));
     }
 }

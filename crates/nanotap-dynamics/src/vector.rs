@@ -12,6 +12,11 @@ pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()))
 }
 
+/// `a − b`.
+pub(crate) fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x - y).collect()
+}
+
 /// Sum of squares.
 pub(crate) fn sum_of_squares(a: &[f64]) -> f64 {
     a.iter().map(|v| v * v).sum()

@@ -8,6 +8,8 @@
 //! Fails by omission: isolated branches that no seed lies on are not found.
 
 use crate::continuation::bifurcation::BifurcationKind;
+use crate::continuation::follow::solver_for;
+use crate::continuation::passing::lies_between;
 use crate::continuation::switching::switch_at_flip;
 use crate::continuation::{
     Branch, BranchEnd, ContinuationError, ContinuationOptions, Direction, continue_orbit,
@@ -42,7 +44,7 @@ pub struct DiagramBranch {
 /// All branches, and what could not be followed.
 #[derive(Clone, Debug, Default)]
 pub struct Diagram {
-    /// Each seed gives two, one each way; each flip gives one.
+    /// Each seed gives two, one each way, or a closed one; each flip gives one.
     pub branches: Vec<DiagramBranch>,
     /// Seeds and flips that could not be followed: the parameter and the reason.
     pub failures: Vec<(f64, String)>,
@@ -65,10 +67,11 @@ pub fn assemble_diagram<F: MapFamily>(
         if control.is_cancelled() || diagram.branches.len() >= options.max_branches {
             break;
         }
-        if diagram.holds(family, parameter, &orbit) {
+        if diagram.holds(family, parameter, &orbit, &options.continuation) {
             continue;
         }
         for direction in [Direction::Increasing, Direction::Decreasing] {
+            let before = diagram.branches.len();
             let followed = continue_orbit(
                 family,
                 parameter,
@@ -87,6 +90,11 @@ pub fn assemble_diagram<F: MapFamily>(
                 control,
                 &mut waiting,
             );
+            // The way back along a closed branch is the same branch.
+            let closed = |b: &DiagramBranch| matches!(b.branch.end, BranchEnd::Closed);
+            if diagram.branches[before..].first().is_some_and(closed) {
+                break;
+            }
         }
     }
     diagram
@@ -141,10 +149,9 @@ impl Diagram {
             };
             match switch_at_flip(family, &flip, &glimpse, control) {
                 Ok(short) => {
-                    let known = short
-                        .points
-                        .last()
-                        .is_some_and(|p| self.holds(family, p.parameter, &p.orbit));
+                    let known = short.points.last().is_some_and(|p| {
+                        self.holds(family, p.parameter, &p.orbit, &options.continuation)
+                    });
                     if known {
                         continue;
                     }
@@ -168,40 +175,24 @@ impl Diagram {
         }
     }
 
-    /// True if an orbit lies on a branch of the diagram: between two points around
-    /// its parameter, Newton from the interpolated states closes the same orbit.
-    pub fn holds<F: MapFamily>(&self, family: &F, parameter: f64, orbit: &PeriodicOrbit) -> bool {
-        let Ok(mut map) = family.at(parameter) else {
-            return false;
-        };
+    /// True if an orbit lies on a branch of the diagram, at whichever strobe it begins: between
+    /// two points of the branch, Newton from their chord closes the same orbit.
+    pub fn holds<F: MapFamily>(
+        &self,
+        family: &F,
+        parameter: f64,
+        orbit: &PeriodicOrbit,
+        options: &ContinuationOptions,
+    ) -> bool {
+        let mut solver = solver_for(family, orbit, options);
+        let points = orbit.flat();
         let same_period = self
             .branches
             .iter()
             .filter(|b| b.branch.period == orbit.period);
-        for pair in same_period.flat_map(|b| b.branch.points.windows(2)) {
-            let (a, b) = (&pair[0], &pair[1]);
-            let t = (parameter - a.parameter) / (b.parameter - a.parameter);
-            if !(-1e-6..=1.000_001).contains(&t) {
-                continue;
-            }
-            let guess: Vec<f64> = a
-                .orbit
-                .flat()
-                .iter()
-                .zip(&b.orbit.flat())
-                .map(|(x, y)| x + t * (y - x))
-                .collect();
-            let closed = close_orbit_from_points(
-                &mut map,
-                &guess,
-                orbit.period,
-                &ShootingOptions::default(),
-            );
-            if closed.is_ok_and(|c| c.is_same_as(orbit)) {
-                return true;
-            }
-        }
-        false
+        same_period
+            .flat_map(|b| b.branch.points.windows(2))
+            .any(|pair| lies_between(&mut solver, (&pair[0], &pair[1]), (&points, parameter)))
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, Tests, between};
 use crate::continuation::end::dead_end;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
+use crate::continuation::passing::closing;
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::continuation::step::{Rejected, angle, at_range_end, projection, trial};
 use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions};
@@ -134,6 +135,12 @@ pub(crate) fn follow<F: MapFamily>(
             branch.end = BranchEnd::LeftDomain;
             break;
         }
+        let mut taken = projection(solver, &node, &next);
+        let closed = closing(solver, &start, &node, &next, taken);
+        let is_closed = closed.is_some();
+        if let Some((at, end)) = closed {
+            (taken, next) = (at, end);
+        }
         let Some(next_tests) = Tests::new(solver, &next) else {
             step *= 0.5;
             if step < options.min_step {
@@ -146,7 +153,6 @@ pub(crate) fn follow<F: MapFamily>(
             continue;
         };
         let index = branch.points.len() - 1;
-        let taken = projection(solver, &node, &next);
         if let Some((m, at, mut parameter)) = shortest_collapse(solver, &node, &next, taken) {
             // What happens before the meeting still counts.
             if let Ok(near) = solver.along(&node, 0.9 * at) {
@@ -190,13 +196,12 @@ pub(crate) fn follow<F: MapFamily>(
         } else if next.iterations >= 7 {
             step *= 0.7;
         }
-        let closed = branch.points.len() > 8 && is_return(solver, &start, &next, taken);
         if options.state_scale.is_none() {
             solver.rescale(&mut next, least);
         }
         node = next;
         tests = next_tests;
-        if closed {
+        if is_closed {
             branch.end = BranchEnd::Closed;
             break;
         }
@@ -234,24 +239,5 @@ fn point<F: MapFamily>(
         arclength,
         slope: node.slope,
         tangencies: tests.tangencies.clone(),
-    })
-}
-
-/// True if `node` is the first node again, in any phase and in the same direction.
-fn is_return<F: MapFamily>(
-    solver: &BranchSolver<'_, F>,
-    start: &Node,
-    node: &Node,
-    step: f64,
-) -> bool {
-    if (node.parameter - start.parameter).abs() / solver.parameter_scale > 0.6 * step {
-        return false;
-    }
-    let mut turned = node.clone();
-    (0..solver.n).any(|_| {
-        turned.points.rotate_left(solver.d);
-        turned.tangent.rotate_left(solver.d);
-        solver.separation(&turned, start) <= 0.6 * step
-            && solver.product(&turned.tangent, turned.slope, &start.tangent, start.slope) > 0.0
     })
 }

@@ -18,6 +18,7 @@ pub mod diagram;
 mod end;
 mod follow;
 mod meeting;
+mod passing;
 pub(crate) mod solver;
 mod step;
 pub mod switching;
@@ -128,7 +129,7 @@ pub struct Branch {
 pub enum BranchEnd {
     /// The parameter reached an end of its range.
     RangeEnd,
-    /// The branch came back to its first point.
+    /// The branch came back to its first orbit, at any strobe of it.
     Closed,
     /// Its period divided: it ran into a branch of shorter period (at a flip of that
     /// branch, if the period halves).

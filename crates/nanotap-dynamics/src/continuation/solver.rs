@@ -42,6 +42,22 @@ pub(crate) struct Node {
     pub(crate) iterations: usize,
 }
 
+impl Node {
+    /// All points, and the parameter.
+    pub(crate) fn solution(&self) -> (&[f64], f64) {
+        (&self.points, self.parameter)
+    }
+
+    /// Where the tangent leads in a step: no solution yet.
+    pub(crate) fn ahead(&self, step: f64) -> (Vec<f64>, f64) {
+        let points = self.points.iter().zip(&self.tangent);
+        (
+            points.map(|(x, t)| x + step * t).collect(),
+            self.parameter + step * self.slope,
+        )
+    }
+}
+
 /// Why there is no point where one was looked for.
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum CorrectorFailure {
@@ -153,13 +169,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
 
     /// The solution a scaled arclength `step` along the tangent of `from`.
     pub(crate) fn along(&mut self, from: &Node, step: f64) -> Result<Node, CorrectorFailure> {
-        let points: Vec<f64> = from
-            .points
-            .iter()
-            .zip(&from.tangent)
-            .map(|(x, t)| x + step * t)
-            .collect();
-        let parameter = from.parameter + step * from.slope;
+        let (points, parameter) = from.ahead(step);
         let (row, corner) = self.row(&from.tangent, from.slope);
         self.correct(&points, parameter, &row, corner, &row, corner)
     }
@@ -171,12 +181,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         parameter: f64,
     ) -> Result<Node, CorrectorFailure> {
         let step = (parameter - from.parameter) / from.slope;
-        let points: Vec<f64> = from
-            .points
-            .iter()
-            .zip(&from.tangent)
-            .map(|(x, t)| x + step * t)
-            .collect();
+        let (points, _) = from.ahead(step);
         let plane = vec![0.0; self.d];
         let (row, corner) = self.row(&from.tangent, from.slope);
         self.correct(&points, parameter, &plane, 1.0, &row, corner)
@@ -309,9 +314,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         segments.into_orbit(node.residual, error)
     }
 
-    /// Scaled distance of two nodes in (all points, λ).
-    pub(crate) fn separation(&self, a: &Node, b: &Node) -> f64 {
-        (distance(&a.points, &b.points) / self.state_scale)
-            .max((a.parameter - b.parameter).abs() / self.parameter_scale)
+    /// Scaled distance of two solutions in (all points, λ).
+    pub(crate) fn separation(&self, a: (&[f64], f64), b: (&[f64], f64)) -> f64 {
+        (distance(a.0, b.0) / self.state_scale).max((a.1 - b.1).abs() / self.parameter_scale)
     }
 }

@@ -8,6 +8,7 @@
 mod systems;
 
 mod branching;
+mod circling;
 mod classifying;
 mod closing;
 mod counting;

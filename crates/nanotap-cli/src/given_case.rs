@@ -38,8 +38,8 @@ pub(crate) fn at_setpoint(
 }
 
 impl GivenCase {
-    /// The case of the arguments. What puts a physical case in doubt is said; its notes
-    /// are `nanotap case`'s.
+    /// The case of the arguments. What puts a physical case in doubt is said, and what of its file
+    /// does not count; its other notes are `nanotap case`'s.
     pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
         let (case, setpoint) = at_setpoint(command::case_of(arguments)?, output)?;
         if let Some(setpoint) = &setpoint {
@@ -61,6 +61,9 @@ impl GivenCase {
             if remark.severity == Severity::Warning {
                 output.warning(&remark.text);
             }
+        }
+        for replaced in case.replaced() {
+            output.note(&replaced.text);
         }
         Self(case)
     }

@@ -176,10 +176,7 @@ impl CaseCore {
     #[getter]
     fn document_at_setpoint(&self, py: Python<'_>) -> PyResult<String> {
         let (case, report) = self.solved(py)?;
-        let document = SolvedCase {
-            case: CaseDocument::of(case),
-            setpoint_solved: report.clone(),
-        };
+        let document = SolvedCase::of(case, report.clone());
         Ok(serde_json::to_string(&document).map_err(Failure::from)?)
     }
 

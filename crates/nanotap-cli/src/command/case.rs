@@ -2,7 +2,7 @@
 
 use clap::Args;
 use nanotap::ErrorKind;
-use nanotap::case::document::{CaseDocument, equilibria};
+use nanotap::case::document::equilibria;
 use nanotap::case::file as case_file;
 use nanotap::case::physical::force::SampleForce;
 use nanotap::case::physical::{Kind, Physical, Severity};
@@ -40,10 +40,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Err(error) if error.kind == ErrorKind::Numerics => (read, None, Some(error)),
         Err(other) => return Err(other),
     };
-    let document = SolvedCase {
-        case: CaseDocument::of(&case),
-        setpoint_solved,
-    };
+    let document = SolvedCase::of(&case, setpoint_solved);
     if let Some(given) = case.oscillator() {
         if let Some(path) = &arguments.out.out {
             return Err(Failure::input(
@@ -62,6 +59,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
     }
     remark(&numbers, output);
+    for beyond in &document.out_of_range {
+        output.warning(&format!("where the lever rests, {beyond}"));
+    }
     output.result(&document, |document| {
         case.physical().map_or_else(
             || cantilever(case.title(), &numbers),

@@ -165,3 +165,64 @@ fn a_lever_that_snaps_in_is_said_to() {
     assert!(says("gap.tip=1 nm"));
     assert!(!says("gap.tip=18 nm"));
 }
+
+/// dForce's example pressed in: at a distance of −60 nm the lever rests at d = −5.968 nm, where
+/// δ = a0 − d = 6.137 nm is above the radius of 5 nm.
+#[test]
+fn a_lever_that_rests_too_deep_for_its_law_is_warned_of() {
+    let folder = Folder::new();
+    folder.write(
+        "lever.toml",
+        include_str!("../../../../docs/cases/dforce-dmt.toml"),
+    );
+    let pressed = ["case", "lever.toml", "--set", "gap.tip=-60 nm"];
+    let run = folder.run(&pressed);
+    let warned = "warning: where the lever rests, δ/R reaches 1.227";
+    assert!(run.stderr.contains(warned), "{}", run.stderr);
+    let document = folder.run(&[&pressed[..], &["--json"]].concat()).json();
+    let value = document["out_of_range"][0]["value"].as_f64().unwrap();
+    assert!((value - (5.968 + 0.169) / 5.0).abs() < 2e-4, "{value}");
+    let free = folder.run(&["case", "lever.toml"]);
+    assert!(!free.stderr.contains("δ/R"), "{}", free.stderr);
+}
+
+/// Adhesion stated as a force and as a Hamaker constant contradict each other: of a file with
+/// both none is taken; what is set beside the file counts, and that is said.
+#[test]
+fn what_a_setting_takes_the_place_of_is_said() {
+    let folder = Folder::new();
+    folder.write(
+        "lever.toml",
+        include_str!("../../../../docs/cases/dforce-dmt.toml"),
+    );
+    let set = ["lever.toml", "--set", "sample.adhesion_force=5 nN"];
+    let said = "note: sample.adhesion_force, set beside the file, takes the place of its \
+                sample.hamaker = \"3e-20 J\"";
+    for command in ["case", "modes"] {
+        let run = folder.run(&[&[command], &set[..]].concat());
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        assert!(run.stderr.contains(said), "{}", run.stderr);
+        let away = ["--set", "sample.hamaker="];
+        let told = folder.run(&[&[command], &set[..], &away[..]].concat());
+        assert!(!told.stderr.contains("place"), "{}", told.stderr);
+    }
+}
+
+/// A table that is not there ends with advice, in a file and beside it.
+#[test]
+fn a_table_that_is_not_there_is_asked_for() {
+    let folder = Folder::new();
+    let text = include_str!("../../../../docs/cases/dmt-table.toml");
+    folder.write("lever.toml", &text.replace("dmt-curve.csv", "nowhere.csv"));
+    folder.write("dmt-curve.csv", "gap (nm),force (nN)\n0,0\n1,0\n");
+    folder.write("whole.toml", text);
+    for words in [
+        &["case", "lever.toml"][..],
+        &["case", "whole.toml", "--set", "sample.table=nowhere.csv"],
+    ] {
+        let run = folder.run(words);
+        assert_eq!(run.code, 2, "{}", run.stderr);
+        let advice = "help: name a CSV file with columns of gap and force";
+        assert!(run.stderr.contains(advice), "{}", run.stderr);
+    }
+}

@@ -51,6 +51,7 @@ use key::ModelKind;
 use near_name::near_name;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
 use quantities::{Quantities, Slopes};
+use stated::Replaced;
 use units::Units;
 
 use crate::model::cantilever::Cantilever;
@@ -209,7 +210,22 @@ impl Case {
         };
         let mut remarks = view.remarks(quantities.reader());
         remarks.extend(quantities.notes.iter().cloned());
+        remarks.extend(self.replaced());
         remarks
+    }
+
+    /// What its file says and does not count, because a key that was set beside it says the same.
+    pub fn replaced(&self) -> Vec<Remark> {
+        let What::Quantities(quantities) = &self.what else {
+            return Vec::new();
+        };
+        let replaced = quantities.stated.origin.replaced.iter();
+        let words = |Replaced { key, written, by }: &Replaced| {
+            Remark::note(format!(
+                "{by}, set beside the file, takes the place of its {key} = {written}"
+            ))
+        };
+        replaced.map(words).collect()
     }
 
     /// The numbers of the equations that it has.

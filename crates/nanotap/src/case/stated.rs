@@ -141,6 +141,17 @@ pub(crate) struct Said {
     pub(crate) value_place: Place,
 }
 
+/// A value of the file that another key, set beside the file, takes the place of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Replaced {
+    /// The key of the file.
+    pub(crate) key: Key,
+    /// Its value, as it was written.
+    pub(crate) written: String,
+    /// The key that was set.
+    pub(crate) by: Key,
+}
+
 /// The file that places point into, and who said what there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Origin {
@@ -150,6 +161,8 @@ pub(crate) struct Origin {
     pub(crate) headers: Vec<Header>,
     /// Where each value was said.
     pub(crate) said: Vec<(Key, Said)>,
+    /// What the file says and does not count.
+    pub(crate) replaced: Vec<Replaced>,
 }
 
 /// The values that are stated, by key.

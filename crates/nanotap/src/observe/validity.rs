@@ -30,10 +30,21 @@ impl OutOfRange {
 
     /// What the motion with these observables violates; their gap must have been measured.
     pub fn of(model: &Model, seen: &Observables) -> Vec<Self> {
+        Self::within(model, seen.gap_range[0])
+    }
+
+    /// What is violated at any place where the undriven lever rests.
+    pub fn at_rest(model: &Model) -> Vec<Self> {
+        let rests = model.equilibria().into_iter().filter(|e| e.stable);
+        Self::within(model, rests.map(|e| e.gap).fold(f64::INFINITY, f64::min))
+    }
+
+    /// What is violated as near as this to the sample.
+    fn within(model: &Model, least_gap: f64) -> Vec<Self> {
         let Some(nonlinear) = &model.nonlinear else {
             return Vec::new();
         };
-        let remarks = nonlinear.remarks(seen.gap_range[0]).into_iter();
+        let remarks = nonlinear.remarks(least_gap).into_iter();
         let report = |remark: nanotap_volterra::Remark| Self {
             ratio: remark.ratio,
             value: remark.value,

@@ -19,7 +19,7 @@ use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
 use crate::model::strobe::Strobe;
-use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::observe::{Observables, OutOfRange, PhysicalMotion, Set, measure};
 use crate::study::branch::PointReport;
 
 /// Why no distance was chosen.
@@ -233,6 +233,21 @@ pub struct SolvedCase {
     /// How its setpoint was solved, if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setpoint_solved: Option<SetpointReport>,
+    /// What of the range of a nonlinear force law the undriven lever leaves where it rests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub out_of_range: Vec<OutOfRange>,
+}
+
+impl SolvedCase {
+    /// The document of a case at its setpoint.
+    pub fn of(case: &Case, setpoint_solved: Option<SetpointReport>) -> Self {
+        let model = case.model();
+        Self {
+            case: CaseDocument::of(case),
+            setpoint_solved,
+            out_of_range: model.map_or_else(|_| Vec::new(), |model| OutOfRange::at_rest(&model)),
+        }
+    }
 }
 
 /// The distance of a point in words.

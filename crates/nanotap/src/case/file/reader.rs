@@ -9,7 +9,7 @@ use super::refusal;
 use crate::case::force_table::ForceTable;
 use crate::case::key::{Default, Key, ModelKind, Section, Takes};
 use crate::case::quantity::Kind;
-use crate::case::stated::{Origin, Said, Stated, Value};
+use crate::case::stated::{Origin, Replaced, Said, Stated, Value};
 use crate::model::cantilever::{self, Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
@@ -151,6 +151,28 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
     known
 }
 
+/// What the file says and a key that was set beside it takes the place of, unless it was taken
+/// away by its own name.
+fn replaced(document: &Document, known: &Known<'_>) -> Vec<Replaced> {
+    let set = known.iter().filter(|(_, entry)| entry.is_override());
+    let others = set.flat_map(|(&by, _)| by.alternatives().map(move |(key, _)| (by, key)));
+    let mut found: Vec<Replaced> = Vec::new();
+    for (by, key) in others {
+        let named = |entry: &&Entry| entry.table == key.section().name() && entry.key == key.name();
+        // The last that is said of a key counts.
+        let entry = document.entries.iter().rev().find(named);
+        if let Some(entry) = entry
+            && !entry.is_override()
+            && !known.contains_key(&key)
+            && !found.iter().any(|other| other.key == key)
+        {
+            let written = entry.written.clone();
+            found.push(Replaced { key, written, by });
+        }
+    }
+    found
+}
+
 /// The values of `known`, each checked by itself, and where they were said.
 fn stated(document: &Document, known: &Known<'_>, problems: &mut Problems) -> Stated {
     let mut stated = Stated::default();
@@ -158,6 +180,7 @@ fn stated(document: &Document, known: &Known<'_>, problems: &mut Problems) -> St
         source: document.source.clone(),
         headers: document.headers.clone(),
         said: Vec::with_capacity(known.len()),
+        replaced: replaced(document, known),
     };
     for (&key, &entry) in known {
         match value(key, entry) {

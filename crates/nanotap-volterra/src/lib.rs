@@ -130,5 +130,5 @@ pub use modes::Modes;
 pub use step::Statistics;
 pub use system::{Drive, Options, System, Tone};
 pub use tangent::{Parameter, ToneChange};
-pub use trajectory::{Node, Output, Sample, Trajectory};
+pub use trajectory::{Extremum, Node, Output, Sample, Trajectory};
 pub use variation::{Moment, Reading, Variation, VariedOutput};

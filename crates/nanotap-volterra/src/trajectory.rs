@@ -194,6 +194,19 @@ impl Piece {
     }
 }
 
+/// A local extremum of an output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extremum {
+    /// When.
+    pub time: f64,
+    /// The output.
+    pub value: f64,
+    /// Whether it is a maximum.
+    pub largest: bool,
+    /// The branch of the law there.
+    pub branch: usize,
+}
+
 /// Where an output is extreme.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extreme {
@@ -202,6 +215,8 @@ pub(crate) struct Extreme {
     pub(crate) u: f64,
     time: f64,
     pub(crate) value: f64,
+    /// Whether the output falls after it; meaningless at the ends of steps.
+    falls_after: bool,
 }
 
 impl Trajectory {
@@ -416,10 +431,17 @@ impl Trajectory {
         time / (end - start)
     }
 
-    /// The local extrema of an output inside the span, as times and values, in order.
-    pub fn extrema(&self, output: &Output) -> Vec<(f64, f64)> {
+    /// The local extrema of an output inside the span, in order.
+    pub fn extrema(&self, output: &Output) -> Vec<Extremum> {
         let found = self.extrema_among(&self.nodes(), output).into_iter();
-        found.map(|e| (e.time, e.value)).collect()
+        found
+            .map(|e| Extremum {
+                time: e.time,
+                value: e.value,
+                largest: e.falls_after,
+                branch: self.pieces[e.piece].branch,
+            })
+            .collect()
     }
 
     fn extrema_among(&self, nodes: &[Node], output: &Output) -> Vec<Extreme> {
@@ -439,6 +461,7 @@ impl Trajectory {
                         u,
                         time: sample.time,
                         value: self.read(output, &sample).0,
+                        falls_after: last.1 > 0.0,
                     });
                 }
                 last = here;
@@ -466,6 +489,7 @@ impl Trajectory {
             u: 0.0,
             time: 0.0,
             value,
+            falls_after: false,
         });
         let edges = nodes.iter().filter(|node| node.weight == 0.0);
         let edges = edges.map(|node| Extreme {
@@ -473,6 +497,7 @@ impl Trajectory {
             u: node.u,
             time: node.sample.time,
             value: self.read_with(output, &node.sample, &node.field).0,
+            falls_after: false,
         });
         for one in edges.chain(self.extrema_among(nodes, output)) {
             if one.value < ends[0].value {

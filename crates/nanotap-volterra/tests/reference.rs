@@ -293,8 +293,8 @@ fn the_frequency_shift_of_van_der_waals_attraction() {
     let motion = flow.record_until(7.0).unwrap();
     let extrema = motion.extrema(&motion.gap_output());
     // Half an oscillation lasts from turning point to turning point.
-    let outer = extrema.iter().find(|e| e.1 > 10.0).unwrap();
-    let shift = std::f64::consts::PI / outer.0 - 1.0;
+    let outer = extrema.iter().find(|e| e.value > 10.0).unwrap();
+    let shift = std::f64::consts::PI / outer.time - 1.0;
     digits(shift, -8.661882e-5, 1e-11, "frequency shift");
 }
 

@@ -343,13 +343,16 @@ fn time_shift(a: f64, b: f64, n: f64) -> f64 {
     if shift > 0.5 * n { shift - n } else { shift }
 }
 
-/// The tangency nearest to a time.
-fn nearest(tangencies: &[OrbitTangency], time: f64, n: f64) -> Option<(usize, f64)> {
+/// The tangency nearest to one in time; of those at one extremum (which may graze several
+/// switches) that of the nearest value.
+fn nearest(tangencies: &[OrbitTangency], to: OrbitTangency, n: f64) -> Option<(usize, f64)> {
+    let apart = |t: &OrbitTangency| (time_shift(to.time, t.time, n), (t.value - to.value).abs());
     tangencies
         .iter()
-        .map(|t| time_shift(time, t.time, n))
+        .map(apart)
         .enumerate()
-        .min_by(|(_, x), (_, y)| x.abs().total_cmp(&y.abs()))
+        .min_by(|(_, x), (_, y)| (x.0.abs().total_cmp(&y.0.abs())).then(x.1.total_cmp(&y.1)))
+        .map(|(k, (shift, _))| (k, shift))
 }
 
 /// Tangencies whose value changes sign between steps `span.0` and `span.1` from `a`.
@@ -367,18 +370,22 @@ fn grazings<F: MapFamily>(
     let n = solver.n as f64;
     let mut found = 0;
     for (i, t) in first.tangencies.iter().enumerate() {
-        let Some((j, shift)) = nearest(&last.tangencies, t.time, n) else {
+        let Some((j, shift)) = nearest(&last.tangencies, *t, n) else {
             continue;
         };
         let u = last.tangencies[j];
-        let mutual = nearest(&first.tangencies, u.time, n).is_some_and(|(k, _)| k == i);
+        let mutual = nearest(&first.tangencies, u, n).is_some_and(|(k, _)| k == i);
         if !mutual || t.value * u.value >= 0.0 {
             continue;
         }
         let zero = narrow(solver, a, span, (t.value, u.value), |solver, node, at| {
             let fraction = (at - span.0) / (span.1 - span.0);
             let tangencies = solver.tangencies(node).ok()?;
-            let (k, _) = nearest(&tangencies, t.time + shift * fraction, n)?;
+            let expected = OrbitTangency {
+                time: t.time + shift * fraction,
+                value: t.value + (u.value - t.value) * fraction,
+            };
+            let (k, _) = nearest(&tangencies, expected, n)?;
             Some(tangencies[k].value)
         });
         if let Some(zero) = zero {

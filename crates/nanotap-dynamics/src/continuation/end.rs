@@ -64,10 +64,10 @@ fn vanishing<F: MapFamily>(
     b.tangencies
         .iter()
         .filter_map(|t| {
-            let earlier = a
-                .tangencies
-                .iter()
-                .min_by(|x, y| (x.time - t.time).abs().total_cmp(&(y.time - t.time).abs()))?;
+            let earlier = a.tangencies.iter().min_by(|x, y| {
+                let [x, y] = [x, y].map(|e| [e.time - t.time, e.value - t.value].map(f64::abs));
+                x[0].total_cmp(&y[0]).then(x[1].total_cmp(&y[1]))
+            })?;
             let rate = (t.value - earlier.value) / (b.parameter - a.parameter);
             let parameter = b.parameter - t.value / rate;
             parameter

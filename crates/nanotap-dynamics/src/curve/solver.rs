@@ -228,11 +228,11 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         }
     }
 
-    /// The extremum nearest in time to the one followed.
+    /// The extremum nearest in time to the one followed, over the switch that it is nearest to.
     fn tangency(&self, map: &mut F::Map, x: &[f64]) -> Result<Option<OrbitTangency>, MapFailure> {
         let mut state = x.to_vec();
         let mut one = Vec::new();
-        let mut nearest: Option<(f64, OrbitTangency)> = None;
+        let mut nearest: Option<((f64, f64), OrbitTangency)> = None;
         let period = self.n as f64;
         for k in 0..self.n {
             one.clear();
@@ -241,8 +241,9 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
                 let time = k as f64 + t.phase;
                 let apart = (time - self.time).rem_euclid(period);
                 let apart = apart.min(period - apart);
+                let value = t.value;
+                let apart = (apart, value.abs());
                 if nearest.is_none_or(|(best, _)| apart < best) {
-                    let value = t.value;
                     nearest = Some((apart, OrbitTangency { time, value }));
                 }
             }

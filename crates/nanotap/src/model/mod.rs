@@ -17,6 +17,7 @@ pub mod drive_form;
 pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;
+mod grazed;
 pub mod higher_modes;
 mod motion_error;
 pub mod nonlinear;

@@ -22,6 +22,7 @@ use serde::Serialize;
 use crate::model::beam_equations::{Beam, BeamTangent};
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
+use crate::model::grazed::grazed;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
 use crate::model::{Model, ModelError, MotionError};
@@ -603,7 +604,7 @@ impl NonlinearStrobe {
         known.filter(|_| !self.nonlinear.remembers)
     }
 
-    /// The extrema of the gap over a period, as times and values over the contact.
+    /// The extrema of the gap over a period, as times and values over what they can graze.
     pub(crate) fn advance_with_extrema(
         &mut self,
         state: &mut [f64],
@@ -611,11 +612,8 @@ impl NonlinearStrobe {
         self.nonlinear.start(&mut self.flow, state)?;
         let period = self.flow.record_until(self.nonlinear.period)?;
         self.nonlinear.end(&self.flow, state);
-        let Some(contact) = self.nonlinear.contact_gap() else {
-            return Ok(Vec::new());
-        };
-        let extrema = period.extrema(&period.gap_output()).into_iter();
-        Ok(extrema.map(|(time, gap)| (time, gap - contact)).collect())
+        let contact = self.nonlinear.contact_gap();
+        Ok(grazed(&self.nonlinear.system, &period, contact))
     }
 }
 

@@ -8,6 +8,7 @@
 mod common;
 mod derivatives;
 mod frequency_modulation;
+mod grazing;
 mod reference;
 mod refusals;
 mod studies;

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nanotap_volterra::laws::TableLaw;
 use nanotap_volterra::laws::entry::{Dimension, ParameterEntry};
 use nanotap_volterra::laws::polyline::Rows;
+use nanotap_volterra::laws::{self, TableLaw};
 
 use super::error::PhysicalError;
 use super::mapping::Scales;
@@ -103,6 +103,16 @@ pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
     }
 }
 
+/// The nonlinear laws that take a key, in brackets; empty where there are none.
+fn laws_with(key: Key) -> String {
+    let with = |law: &&'static TableLaw| takes(std::slice::from_ref(law), key);
+    let names: Vec<&str> = laws::all().filter(with).map(|law| law.entry.name).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!(" (laws with it: {})", names.join(", "))
+}
+
 /// The key that states a parameter of a law.
 fn key_of(parameter: &ParameterEntry) -> Key {
     match parameter.name {
@@ -154,8 +164,9 @@ impl SampleForce {
                 let reason = if key == Key::SampleAdhesionForce {
                     "it belongs to a law with adhesion, as sample.law = \"dmt\" or \
                      \"moving-surface\""
+                        .into()
                 } else {
-                    "it belongs to a nonlinear force law, as in sample.law = \"dmt\""
+                    format!("it belongs to a nonlinear force law{}", laws_with(key))
                 };
                 Err(reader.impossible(key, reason))
             });
@@ -177,8 +188,9 @@ impl SampleForce {
                 }
             }
             let reason = format!(
-                "it is no part of sample.law = \"{name}\", which takes {}",
-                keys.join(", ")
+                "it is no part of sample.law = \"{name}\", which takes {}{}",
+                keys.join(", "),
+                laws_with(key)
             );
             return Err(reader.impossible(key, reason));
         }

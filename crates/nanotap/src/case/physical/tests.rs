@@ -1108,8 +1108,22 @@ fn samples_have_their_laws() {
 
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
-    let cases: [(&[Entry], &str); 10] = [
+    let cases: [(&[Entry], &str); 12] = [
         (&[("sample", "law", "hertz")], "it is no part of sample.law"),
+        (
+            &[("sample", "thickness", "50 nm")],
+            "it belongs to a nonlinear force law (laws with it: thin-sphere, thin-cone, \
+             thin-punch)",
+        ),
+        (
+            &[
+                ("sample", "law", "hertz"),
+                ("sample", "stiffness", ""),
+                ("sample", "damping", ""),
+                ("sample", "viscosity", "1 Pa s"),
+            ],
+            "(laws with it: voigt-sphere, ",
+        ),
         (&[("sample", "law", "hooke")], "kelvin-voigt"),
         (
             &[("sample", "law", "standard-linear-solid")],

@@ -261,19 +261,22 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
             [None, None] => "not determined".to_owned(),
             [low, high] => format!("{} to {}", end(low), end(high)),
         };
-        let error = p
-            .standard_error
-            .map_or_else(|| "?".to_owned(), |v| quantity(p, v));
-        table.row([
-            name,
-            quantity(p, p.value),
-            error,
-            interval,
-            quantity(p, p.start),
-        ]);
+        // What the data leave open stands where the fit happened to leave it.
+        let value = quantity(p, p.value);
+        let (value, error) = match p.standard_error {
+            Some(error) => (value, quantity(p, error)),
+            None => (format!("({value})"), "not determined".to_owned()),
+        };
+        table.row([name, value, error, interval, quantity(p, p.start)]);
     }
     text.push_str(&table.render());
     text.push('\n');
+    if report.parameters.iter().any(|p| p.standard_error.is_none()) {
+        text.push_str(&motion::paragraph(
+            "A value in brackets is no result: the data do not determine it, and others describe \
+             them as well.",
+        ));
+    }
     let chance = report.p_value.map_or_else(String::new, |p| {
         format!(
             ", exceeded by chance with probability {}",

@@ -315,3 +315,36 @@ fn impossible_levers_are_refused_and_touching_beams_warned_of() {
         shown.stderr
     );
 }
+
+/// Of Hertz's stiffness at an indentation only the product counts: neither value is printed as a
+/// result, that of the distance's offset is.
+#[test]
+fn values_that_data_leave_open_stand_in_brackets() {
+    let folder = Folder::new();
+    for (name, text) in [
+        (
+            "lever.toml",
+            include_str!("../../../../docs/cases/stiff-lever.toml"),
+        ),
+        (
+            "curve.csv",
+            include_str!("../../../../docs/cases/polystyrene-curve.csv"),
+        ),
+    ] {
+        folder.write(name, text);
+    }
+    let free = "sample.modulus,sample.indentation,gap.offset";
+    let run = folder.run(&["fit", "curve.csv", "lever.toml", "--free", free]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let line = |name: &str| run.stdout.lines().find(|line| line.contains(name)).unwrap();
+    for open in ["sample.modulus", "sample.indentation"] {
+        let words: Vec<&str> = line(open).split_whitespace().collect();
+        assert!(
+            words[1].starts_with('(') && words[2].ends_with(')'),
+            "{words:?}"
+        );
+        assert!(line(open).contains("not determined"));
+    }
+    assert!(!line("gap.offset").contains('('));
+    assert!(run.stdout.contains("A value in brackets is no result"));
+}

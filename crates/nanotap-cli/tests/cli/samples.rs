@@ -213,7 +213,7 @@ fn what_a_setting_takes_the_place_of_is_said() {
 fn a_table_that_is_not_there_is_asked_for() {
     let folder = Folder::new();
     let text = include_str!("../../../../docs/cases/dmt-table.toml");
-    folder.write("lever.toml", &text.replace("dmt-curve.csv", "nowhere.csv"));
+    folder.write("lever.toml", text.replace("dmt-curve.csv", "nowhere.csv"));
     folder.write("dmt-curve.csv", "gap (nm),force (nN)\n0,0\n1,0\n");
     folder.write("whole.toml", text);
     for words in [

@@ -229,24 +229,18 @@ pub(crate) fn collapse<F: MapFamily>(
     step: f64,
     m: usize,
 ) -> Option<(f64, f64)> {
-    let d = solver.d;
-    let gap = |node: &Node| -> Vec<f64> {
-        (0..d)
-            .map(|i| node.points[i] - node.points[m * d + i])
-            .collect()
-    };
-    let reference = gap(from);
+    let reference = solver.gap(from, m);
     let square = dot(&reference, &reference);
-    let last = dot(&reference, &gap(to)) / square;
+    let last = dot(&reference, &solver.gap(to, m)) / square;
     if last.is_nan() || last >= 0.0 {
         return None;
     }
-    let zero = narrow(solver, from, (0.0, step), (1.0, last), |_, node, _| {
-        Some(dot(&reference, &gap(node)) / square)
+    let zero = narrow(solver, from, (0.0, step), (1.0, last), |solver, node, _| {
+        Some(dot(&reference, &solver.gap(node, m)) / square)
     });
     if let Some(z) = zero {
         // A difference that only turns by a right angle is no meeting.
-        let left = gap(&z.node);
+        let left = solver.gap(&z.node, m);
         return (dot(&left, &left) <= 0.01 * square).then_some((z.at, z.node.parameter));
     }
     // Both branches meet there, so the corrector may fail: interpolate.

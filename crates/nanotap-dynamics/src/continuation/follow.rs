@@ -10,7 +10,6 @@ use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, Con
 use crate::control::Control;
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
-use crate::vector::norm;
 
 /// Scaled step at which a branch that keeps slipping onto one of shorter period is
 /// taken to have met it.
@@ -26,6 +25,7 @@ pub(crate) fn solver_for<'a, F: MapFamily>(
     BranchSolver::new(
         family,
         orbit.dimension(),
+        orbit.dimension() - orbit.discrete,
         orbit.period,
         options.state_scale.unwrap_or(default),
         options
@@ -81,7 +81,7 @@ pub(crate) fn follow<F: MapFamily>(
     options: &ContinuationOptions,
     control: &Control<'_>,
 ) -> Result<Branch, ContinuationError> {
-    let least = norm(&first.points);
+    let least = solver.size(&first.points);
     let mut tests = tests_at(solver, &first)?;
     let mut arclength = 0.0;
     let mut branch = Branch {
@@ -131,7 +131,7 @@ pub(crate) fn follow<F: MapFamily>(
             }
             continue;
         }
-        if norm(&next.points) > options.bound {
+        if solver.size(&next.points) > options.bound {
             branch.end = BranchEnd::LeftDomain;
             break;
         }

@@ -3,7 +3,7 @@
 use crate::continuation::bifurcation::collapse;
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::map::MapFamily;
-use crate::vector::distance;
+use crate::vector::norm;
 
 /// The first proper divisor of the period whose branch was met, the step and the
 /// parameter there.
@@ -27,8 +27,8 @@ pub(crate) fn slipped<F: MapFamily>(
     from: &Node,
     to: &Node,
 ) -> Option<usize> {
-    let (n, d): (usize, usize) = (solver.n, solver.d);
-    let gap = |node: &Node, m: usize| distance(&node.points[..d], &node.points[m * d..(m + 1) * d]);
+    let n = solver.n;
+    let gap = |node: &Node, m: usize| norm(&solver.gap(node, m));
     (1..n).find(|&m| n.is_multiple_of(m) && gap(to, m) <= 1e-3 * gap(from, m))
 }
 
@@ -40,8 +40,7 @@ pub(crate) fn meeting<F: MapFamily>(
     near: &Node,
     m: usize,
 ) -> Option<f64> {
-    let d = solver.d;
-    let gap = |node: &Node| distance(&node.points[..d], &node.points[m * d..(m + 1) * d]);
+    let gap = |node: &Node| norm(&solver.gap(node, m));
     let ratio = (gap(near) / gap(far)).powi(2);
     (ratio < 0.25).then(|| (near.parameter - ratio * far.parameter) / (1.0 - ratio))
 }

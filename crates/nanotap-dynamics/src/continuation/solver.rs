@@ -11,8 +11,8 @@ use crate::failure::{MapFailure, advance_with_tangencies, finite};
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
-use crate::orbit::shooting::{Segments, ShootingError};
-use crate::vector::{distance, dot, norm};
+use crate::orbit::shooting::{MOST_SETTINGS, Segments, ShootingError, set_discrete_entries};
+use crate::vector::{difference, dot, norm};
 
 /// Newton steps after which a corrector gives up: the caller shortens its step.
 const ITERATIONS: usize = 12;
@@ -73,6 +73,9 @@ pub(crate) enum CorrectorFailure {
 pub(crate) struct BranchSolver<'a, F: MapFamily> {
     pub(crate) family: &'a F,
     pub(crate) d: usize,
+    /// How many entries of a state are continuous: the others, after them, are whole numbers
+    /// that the map sets.
+    pub(crate) continuous: usize,
     pub(crate) n: usize,
     pub(crate) state_scale: f64,
     pub(crate) parameter_scale: f64,
@@ -91,6 +94,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     pub(crate) fn new(
         family: &'a F,
         d: usize,
+        continuous: usize,
         n: usize,
         state_scale: f64,
         parameter_scale: f64,
@@ -99,6 +103,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         Self {
             family,
             d,
+            continuous,
             n,
             state_scale,
             parameter_scale,
@@ -113,7 +118,26 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         }
     }
 
+    /// Largest entry of any state, discrete ones apart.
+    pub(crate) fn size(&self, points: &[f64]) -> f64 {
+        let states = points.chunks(self.d);
+        states.fold(0.0, |size, state| size.max(norm(&state[..self.continuous])))
+    }
+
+    /// The largest residual at the present points, of which discrete entries are set to what the
+    /// map makes of them.
     fn evaluate(&mut self, parameter: f64) -> Result<f64, MapFailure> {
+        let mut residual = self.evaluate_points(parameter)?;
+        for _ in 0..MOST_SETTINGS {
+            if !set_discrete_entries(&mut self.points, &self.residuals, self.d, self.continuous) {
+                break;
+            }
+            residual = self.evaluate_points(parameter)?;
+        }
+        Ok(residual)
+    }
+
+    fn evaluate_points(&mut self, parameter: f64) -> Result<f64, MapFailure> {
         let (d, n) = (self.d, self.n);
         let mut map = self.family.at(parameter).map_err(MapFailure::refused)?;
         for k in 0..n {
@@ -140,18 +164,17 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
 
     /// Scaled scalar product of two directions in (x_0, λ).
     pub(crate) fn product(&self, a: &[f64], slope_a: f64, b: &[f64], slope_b: f64) -> f64 {
-        let d = self.d;
-        dot(&a[..d], &b[..d]) / (self.state_scale * self.state_scale)
+        let c = self.continuous;
+        dot(&a[..c], &b[..c]) / (self.state_scale * self.state_scale)
             + slope_a * slope_b / (self.parameter_scale * self.parameter_scale)
     }
 
     /// The bordering row that measures the component along a direction.
     fn row(&self, tangent: &[f64], slope: f64) -> (Vec<f64>, f64) {
         let square = self.state_scale * self.state_scale;
-        (
-            tangent[..self.d].iter().map(|t| t / square).collect(),
-            slope / (self.parameter_scale * self.parameter_scale),
-        )
+        let mut row: Vec<f64> = tangent[..self.d].iter().map(|t| t / square).collect();
+        row[self.continuous..].fill(0.0);
+        (row, slope / (self.parameter_scale * self.parameter_scale))
     }
 
     /// The solution at a given parameter near `points`; its tangent points towards
@@ -190,7 +213,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     /// Measures the arc in units of this orbit's size from here on, `least` at least: an
     /// orbit that shrinks to nothing would be reached by no number of steps.
     pub(crate) fn rescale(&mut self, node: &mut Node, least: f64) {
-        let scale = norm(&node.points).max(least);
+        let scale = self.size(&node.points).max(least);
         if scale > 0.0 {
             self.state_scale = scale;
             let length = self
@@ -219,7 +242,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         let fixed = row.iter().all(|r| *r == 0.0);
         let mut parameter = parameter;
         let mut residual = self.evaluate(parameter)?;
-        let scale = self.state_scale.max(norm(points));
+        let scale = self.state_scale.max(self.size(points));
         let mut iterations = 0;
         let rounding = ROUNDING * scale;
         while residual > rounding {
@@ -305,7 +328,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         let mut segments = Segments::new(self.d, self.n);
         segments.points.copy_from_slice(&node.points);
         segments.jacobians.clone_from_slice(&node.jacobians);
-        segments.scale = self.state_scale.max(norm(&node.points));
+        segments.scale = self.state_scale.max(self.size(&node.points));
         // At a fold the orbit is not determined by the parameter: say so.
         let error = segments
             .error_estimate()
@@ -314,8 +337,15 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         segments.into_orbit(node.residual, error)
     }
 
+    /// By how much the first state differs from that `m` periods later, discrete entries apart.
+    pub(crate) fn gap(&self, node: &Node, m: usize) -> Vec<f64> {
+        let state = |k: usize| &node.points[k * self.d..][..self.continuous];
+        difference(state(0), state(m))
+    }
+
     /// Scaled distance of two solutions in (all points, λ).
     pub(crate) fn separation(&self, a: (&[f64], f64), b: (&[f64], f64)) -> f64 {
-        (distance(a.0, b.0) / self.state_scale).max((a.1 - b.1).abs() / self.parameter_scale)
+        let points = self.size(&difference(a.0, b.0));
+        (points / self.state_scale).max((a.1 - b.1).abs() / self.parameter_scale)
     }
 }

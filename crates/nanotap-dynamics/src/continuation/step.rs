@@ -80,12 +80,9 @@ pub(crate) fn trial<F: MapFamily>(
         return Err(Rejected::Turn);
     }
     let taken = projection(solver, node, &next);
-    let predicted: Vec<f64> = node.points[..solver.d]
-        .iter()
-        .zip(&node.tangent)
-        .map(|(x, t)| x + taken * t)
-        .collect();
-    let correction = distance(&predicted, &next.points[..solver.d]) / solver.state_scale;
+    let (predicted, _) = node.ahead(taken);
+    let c = solver.continuous;
+    let correction = distance(&predicted[..c], &next.points[..c]) / solver.state_scale;
     if taken <= 0.0 || !forgiving && correction > 0.5 * taken {
         return Err(Rejected::Jump);
     }

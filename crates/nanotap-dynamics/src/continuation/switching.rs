@@ -58,20 +58,17 @@ pub fn switch_at_flip<F: MapFamily>(
         slope: 0.0,
         iterations: 0,
     };
-    let offset = solver.n / 2 * solver.d;
     let mut amplitude = options.initial_step.min(1e-2);
     while amplitude >= 1e-6 {
         if let Ok(node) = solver.along(&start, amplitude) {
-            let gap: Vec<f64> = (0..solver.d)
-                .map(|i| node.points[i] - node.points[offset + i])
-                .collect();
-            let expected: Vec<f64> = start.tangent[..solver.d]
+            let gap = solver.gap(&node, solver.n / 2);
+            let expected: Vec<f64> = start.tangent[..solver.continuous]
                 .iter()
                 .map(|t| 2.0 * amplitude * t)
                 .collect();
             let share = dot(&gap, &expected) / dot(&expected, &expected);
             let inside = (options.range.0..=options.range.1).contains(&node.parameter);
-            if inside && (0.5..1.5).contains(&share) && norm(&node.points) <= options.bound {
+            if inside && (0.5..1.5).contains(&share) && solver.size(&node.points) <= options.bound {
                 return follow(&mut solver, node, options, control);
             }
         }

@@ -180,7 +180,29 @@ fn check<M: StroboscopicMap>(
 
 /// How often discrete entries are set anew at one place: where they do not come to rest, the
 /// residual says so.
-const MOST_SETTINGS: usize = 3;
+pub(crate) const MOST_SETTINGS: usize = 3;
+
+/// Sets the discrete entries of points, those after the `continuous` ones of each, to what the map
+/// made of the points before; false if they were that.
+pub(crate) fn set_discrete_entries(
+    points: &mut [f64],
+    residuals: &[f64],
+    d: usize,
+    continuous: usize,
+) -> bool {
+    let n = points.len() / d;
+    let mut changed = false;
+    for k in 0..n {
+        for i in continuous..d {
+            let off = residuals[k * d + i];
+            if off != 0.0 {
+                points[(k + 1) % n * d + i] += off;
+                changed = true;
+            }
+        }
+    }
+    changed
+}
 
 /// The segments of an orbit with their residuals and Jacobians.
 pub(crate) struct Segments {
@@ -221,28 +243,13 @@ impl Segments {
         self.discrete = map.discrete_entries();
         self.evaluate_points(map, jacobians)?;
         for _ in 0..MOST_SETTINGS {
-            if !self.set_discrete_entries() {
+            let continuous = self.d - self.discrete;
+            if !set_discrete_entries(&mut self.points, &self.residuals, self.d, continuous) {
                 break;
             }
             self.evaluate_points(map, jacobians)?;
         }
         Ok(())
-    }
-
-    /// Sets discrete entries to what the map made of the points before; false if they were that.
-    fn set_discrete_entries(&mut self) -> bool {
-        let (d, n) = (self.d, self.n);
-        let mut changed = false;
-        for k in 0..n {
-            for i in d - self.discrete..d {
-                let off = self.residuals[k * d + i];
-                if off != 0.0 {
-                    self.points[(k + 1) % n * d + i] += off;
-                    changed = true;
-                }
-            }
-        }
-        changed
     }
 
     fn evaluate_points<M: StroboscopicMap>(

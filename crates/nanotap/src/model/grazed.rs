@@ -38,9 +38,10 @@ fn switch_ahead(system: &System, extremum: &Extremum) -> Option<f64> {
             _ => None,
         });
     // The one that is met first.
-    match extremum.largest {
-        true => levels.reduce(f64::min),
-        false => levels.reduce(f64::max),
+    if extremum.largest {
+        levels.reduce(f64::min)
+    } else {
+        levels.reduce(f64::max)
     }
 }
 

@@ -49,3 +49,39 @@ fn a_branch_over_a_bridge_ends_where_its_orbit_turns_as_the_bridge_forms() {
         assert!(rate.abs() < 1e-5, "{rate:e}");
     }
 }
+
+/// On a soft sample that pulls as JKR says, the tip snaps in just at drive phase 0 somewhere on
+/// the branch between the two folds of the bistable region: no end, and no bifurcation. Seeds on
+/// both stable parts are then on one branch.
+#[test]
+fn a_branch_goes_on_where_a_neck_forms_at_drive_phase_0() {
+    let words = [
+        "modes=1",
+        "cantilever.k=2.8 N/m",
+        "cantilever.f0=75 kHz",
+        "cantilever.Q=200",
+        "tip.radius=10 nm",
+        "sample.law=jkr",
+        "sample.modulus=1 GPa",
+        "sample.poisson=0.3",
+        "sample.work_of_adhesion=30 mJ/m^2",
+        "drive.actuation=tip",
+        "drive.frequency=75 kHz",
+        "drive.free_amplitude=20 nm",
+        "gap.tip=18.5 nm",
+    ];
+    let words: Vec<String> = words.map(str::to_owned).into();
+    let case = Case::parse(None, &words).unwrap();
+    let key = Key::find("gap.tip").unwrap();
+    let options = BranchOptions::over(key, 18.5e-9, 22e-9);
+    let up = branch(&case, &options, &Control::default()).unwrap();
+    assert!(up.failures.is_empty(), "{:?}", up.failures);
+    let kinds: Vec<&str> = up.bifurcations.iter().map(|b| b.kind).collect();
+    // Up to the fold, back along the saddles, which lose their neck at that phase, and out of the
+    // range at its lower end.
+    assert_eq!(kinds, ["fold"]);
+    assert!((up.bifurcations[0].parameter - 19.1140744e-9).abs() < 1e-16);
+    let memory = |k: usize| up.points[k].state[2];
+    assert_eq!([memory(0), memory(up.points.len() - 1)], [1.0, 0.0]);
+    assert_eq!(up.branches[0].range[0], 18.5e-9);
+}

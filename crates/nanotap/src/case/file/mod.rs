@@ -150,9 +150,10 @@ pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
 /// The force curve in a file, named at `place`.
 fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
     ForceTable::read(path).map_err(|error| {
-        let help = match error.remedy.is_empty() {
-            true => "name a CSV file with columns of gap and force",
-            false => error.remedy.as_str(),
+        let help = if error.remedy.is_empty() {
+            "name a CSV file with columns of gap and force"
+        } else {
+            error.remedy.as_str()
         };
         Problem::new(place, error.to_string())
             .help(help)

@@ -326,6 +326,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     /// The orbit of a node, with multipliers and error estimate.
     pub(crate) fn orbit(&self, node: &Node) -> Result<PeriodicOrbit, ShootingError> {
         let mut segments = Segments::new(self.d, self.n);
+        segments.discrete = self.d - self.continuous;
         segments.points.copy_from_slice(&node.points);
         segments.jacobians.clone_from_slice(&node.jacobians);
         segments.scale = self.state_scale.max(self.size(&node.points));

@@ -7,7 +7,7 @@ use crate::curve::{CurveOptions, CurvePoint};
 use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
 use crate::map::TwoParameterFamily;
 use crate::orbit::Multipliers;
-use crate::orbit::shooting::Segments;
+use crate::orbit::shooting::{MOST_SETTINGS, Segments, set_discrete_entries};
 use crate::vector::{distance, norm, unit};
 
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.
@@ -50,6 +50,8 @@ pub(super) struct CurveSolver<'a, F> {
     family: &'a F,
     pub(super) kind: BifurcationKind,
     pub(super) d: usize,
+    /// How many entries of a state are continuous; the others are whole numbers that the map sets.
+    pub(super) continuous: usize,
     pub(super) n: usize,
     pub(super) scales: Vec<f64>,
     /// Column and row that border DPⁿ ∓ 1.
@@ -72,6 +74,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
             family,
             kind: point.kind,
             d,
+            continuous: d - point.orbit.discrete,
             n: point.orbit.period,
             scales,
             least: size,
@@ -92,6 +95,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
             .at(parameters[0], parameters[1])
             .map_err(MapFailure::refused)?;
         let mut segments = Segments::new(d, n);
+        segments.discrete = d - self.continuous;
         let mut state = u[..d].to_vec();
         let mut by_parameter = [DVector::zeros(d), DVector::zeros(d)];
         let (mut first, mut second) = (vec![0.0; d], vec![0.0; d]);
@@ -302,7 +306,13 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         let mut last = f64::INFINITY;
         let mut iterations = 0;
         let matrix = loop {
-            let e = self.evaluate(&u).map_err(|e| e.to_string())?;
+            let mut e = self.evaluate(&u).map_err(|e| e.to_string())?;
+            for _ in 0..MOST_SETTINGS {
+                if !set_discrete_entries(&mut u[..d], &e.gap, d, self.continuous) {
+                    break;
+                }
+                e = self.evaluate(&u).map_err(|e| e.to_string())?;
+            }
             let gradient = self.gradient(&u).map_err(|e| e.to_string())?;
             let mut right = DVector::zeros(d + 2);
             for i in 0..d {
@@ -356,11 +366,11 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     }
 
     pub(super) fn product(&self, a: &[f64], b: &[f64]) -> f64 {
-        a.iter()
-            .zip(b)
-            .zip(&self.scales)
-            .map(|((x, y), s)| x * y / (s * s))
-            .sum()
+        let terms = a.iter().zip(b).zip(&self.scales);
+        let measured = terms
+            .enumerate()
+            .filter(|(i, _)| !(self.continuous..self.d).contains(i));
+        measured.map(|(_, ((x, y), s))| x * y / (s * s)).sum()
     }
 
     pub(super) fn point(&self, node: &CurveNode) -> Result<CurvePoint, ContinuationError> {
@@ -383,7 +393,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     /// Measures the state in units of the orbit as it is at `node` from here on, but not
     /// less than at the beginning.
     pub(super) fn rescale(&mut self, node: &mut CurveNode) {
-        let scale = norm(&node.u[..self.d]).max(self.least);
+        let scale = norm(&node.u[..self.continuous]).max(self.least);
         if scale > 0.0 {
             self.scales[..self.d].fill(scale);
             let length = self.product(&node.tangent, &node.tangent).sqrt();

@@ -215,7 +215,7 @@ pub(crate) struct Segments {
     /// has no scale of its own.
     pub(crate) scale: f64,
     /// How many of the last entries of a state are whole numbers that the map sets.
-    discrete: usize,
+    pub(crate) discrete: usize,
     state: Vec<f64>,
 }
 

@@ -73,7 +73,11 @@ fn a_branch_goes_on_where_a_neck_forms_at_drive_phase_0() {
     let words: Vec<String> = words.map(str::to_owned).into();
     let case = Case::parse(None, &words).unwrap();
     let key = Key::find("gap.tip").unwrap();
-    let options = BranchOptions::over(key, 18.5e-9, 22e-9);
+    let frequency = Key::find("drive.frequency").unwrap();
+    let options = BranchOptions {
+        second: Some((frequency, 74.8e3, 75.2e3)),
+        ..BranchOptions::over(key, 18.5e-9, 22e-9)
+    };
     let up = branch(&case, &options, &Control::default()).unwrap();
     assert!(up.failures.is_empty(), "{:?}", up.failures);
     let kinds: Vec<&str> = up.bifurcations.iter().map(|b| b.kind).collect();
@@ -84,4 +88,8 @@ fn a_branch_goes_on_where_a_neck_forms_at_drive_phase_0() {
     let memory = |k: usize| up.points[k].state[2];
     assert_eq!([memory(0), memory(up.points.len() - 1)], [1.0, 0.0]);
     assert_eq!(up.branches[0].range[0], 18.5e-9);
+    // The fold's curve crosses that place, too.
+    let curves = up.loci.unwrap().curves;
+    assert_eq!(curves.len(), 1);
+    assert_eq!(curves[0].ends, ["leaves the window"; 2]);
 }

@@ -32,6 +32,9 @@ pub struct FixedStep<'a> {
     /// `e^{iω_k t}` at the state's phase.
     phasors: Vec<Complex>,
     next: DVector<f64>,
+    /// Work space of a step taken stage by stage: where the field is taken, and the field.
+    stage: DVector<f64>,
+    rate: DVector<f64>,
 }
 
 /// All four stages of a step of one length in one regime. The field `A x + c + Re(z e^{iωt})`
@@ -82,14 +85,12 @@ impl WholeStep {
 
     /// The state after the step from `x`, where the tones are at `phasors`, written to `next`.
     fn take(&self, phasors: &mut [Complex], x: &DVector<f64>, next: &mut DVector<f64>) {
-        next.copy_from(&self.added.constant);
-        for (tone, phasor) in self.added.tones.iter().zip(&*phasors) {
-            for (next, z) in next.iter_mut().zip(tone.iter()) {
-                *next += z.re * phasor.re - z.im * phasor.im;
-            }
-        }
-        for (column, x) in self.matrix.column_iter().zip(x.iter()) {
-            for (next, m) in next.iter_mut().zip(column.iter()) {
+        let next = next.as_mut_slice();
+        self.added
+            .write_where_tones_are(phasors.iter().copied(), next);
+        let columns = self.matrix.as_slice().chunks_exact(next.len());
+        for (column, x) in columns.zip(x.as_slice()) {
+            for (next, m) in next.iter_mut().zip(column) {
                 *next += m * x;
             }
         }
@@ -161,6 +162,8 @@ impl<'a> FixedStep<'a> {
             whole,
             phasors: vec![Complex::new(1.0, 0.0); drive.frequencies().len()],
             next: DVector::zeros(x.len()),
+            stage: DVector::zeros(x.len()),
+            rate: DVector::zeros(x.len()),
         })
     }
 
@@ -195,7 +198,7 @@ impl<'a> FixedStep<'a> {
             }
             phase += step;
             watch(phase, self.state.as_slice());
-            if let Some(next) = self.passed() {
+            if let Some(next) = self.target(self.state.as_slice(), &self.phasors) {
                 self.regime = next;
                 switches += 1;
             }
@@ -203,41 +206,52 @@ impl<'a> FixedStep<'a> {
         switches
     }
 
-    fn passed(&self) -> Option<usize> {
+    /// The regime that a guard of the present one sends the state `x` to, where the tones are at
+    /// `phasors`.
+    fn target(&self, x: &[f64], phasors: &[Complex]) -> Option<usize> {
         self.system.transitions()[self.regime]
             .iter()
-            .find(|e| {
-                e.guard
-                    .where_tones_are(&self.phasors, self.state.as_slice())
-                    <= 0.0
-            })
+            .find(|e| e.guard.where_tones_are(phasors, x) <= 0.0)
             .map(|e| e.target)
     }
 
-    fn field(&self, x: &DVector<f64>, t: f64) -> DVector<f64> {
-        let drive = self.system.drive();
+    /// Writes the field at `self.stage`, where the tones are at `phasors`, to `self.rate`.
+    fn field(&mut self, phasors: &[Complex]) {
         let mut regime = self.regime;
-        if self.switching == Switching::EveryStage {
-            let transitions = &self.system.transitions()[regime];
-            if let Some(e) = transitions
-                .iter()
-                .find(|e| e.guard.at(drive, x.as_slice(), t) <= 0.0)
-            {
-                regime = e.target;
-            }
+        let x = self.stage.as_slice();
+        if self.switching == Switching::EveryStage
+            && let Some(target) = self.target(x, phasors)
+        {
+            regime = target;
         }
-        self.system.regimes()[regime].field(drive, x, t)
+        let regime = &self.system.regimes()[regime];
+        let rate = self.rate.as_mut_slice();
+        let tones = phasors.iter().copied();
+        regime.forcing().write_where_tones_are(tones, rate);
+        self.rate.gemv(1.0, regime.matrix(), &self.stage, 1.0);
     }
 
+    /// A step of length `h` from phase `t`, stage by stage.
     fn step(&mut self, t: f64, h: f64) {
-        let x = &self.state;
-        let k1 = self.field(x, t);
-        let k2 = self.field(&(x + &k1 * (0.5 * h)), t + 0.5 * h);
-        let k3 = self.field(&(x + &k2 * (0.5 * h)), t + 0.5 * h);
-        let k4 = self.field(&(x + &k3 * h), t + h);
-        self.state += (k1 + 2.0 * (k2 + k3) + k4) * (h / 6.0);
-        for (k, phasor) in self.phasors.iter_mut().enumerate() {
-            *phasor = self.system.drive().phasor(k, t + h);
+        let drive = self.system.drive();
+        let tones = 0..drive.frequencies().len();
+        let at = |t: f64| -> Vec<Complex> { tones.clone().map(|k| drive.phasor(k, t)).collect() };
+        let (middle, end) = (at(t + 0.5 * h), at(t + h));
+        let start = std::mem::replace(&mut self.phasors, end.clone());
+        let stages = [
+            (0.0, &start, 1.0),
+            (0.5, &middle, 2.0),
+            (0.5, &middle, 2.0),
+            (1.0, &end, 1.0),
+        ];
+        self.next.copy_from(&self.state);
+        self.rate.fill(0.0);
+        for (part, phasors, weight) in stages {
+            self.stage.copy_from(&self.state);
+            self.stage.axpy(part * h, &self.rate, 1.0);
+            self.field(phasors);
+            self.next.axpy(weight * h / 6.0, &self.rate, 1.0);
         }
+        std::mem::swap(&mut self.state, &mut self.next);
     }
 }

@@ -46,10 +46,18 @@ impl HarmonicVector {
 
     /// Writes the value at time `t` to `value` (length `n`).
     pub(crate) fn write(&self, drive: &Drive, t: f64, value: &mut [f64]) {
+        self.write_where_tones_are((0..self.tones.len()).map(|k| drive.phasor(k, t)), value);
+    }
+
+    /// Writes the value where `e^{iω_k t}` of the tones are `phasors` to `value` (length `n`).
+    pub(crate) fn write_where_tones_are(
+        &self,
+        phasors: impl IntoIterator<Item = Complex>,
+        value: &mut [f64],
+    ) {
         value.copy_from_slice(self.constant.as_slice());
-        for (k, tone) in self.tones.iter().enumerate() {
-            let phasor = drive.phasor(k, t);
-            for (v, z) in value.iter_mut().zip(tone.iter()) {
+        for (tone, phasor) in self.tones.iter().zip(phasors) {
+            for (v, z) in value.iter_mut().zip(tone.as_slice()) {
                 *v += z.re * phasor.re - z.im * phasor.im;
             }
         }
@@ -211,7 +219,7 @@ impl Output {
     }
 
     fn linear_at(&self, x: &[f64]) -> f64 {
-        self.row.iter().zip(x).map(|(r, x)| r * x).sum()
+        self.row.as_slice().iter().zip(x).map(|(r, x)| r * x).sum()
     }
 
     /// Its time derivative along `ẋ = matrix · x + forcing`, again such a scalar.

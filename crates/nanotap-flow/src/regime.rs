@@ -92,9 +92,10 @@ impl Regime {
     ) {
         self.response.write(drive, t, rest);
         q.fill(Complex::new(0.0, 0.0));
-        for ((x, p), left) in x.iter().zip(rest).zip(self.basis.left.column_iter()) {
+        let columns = self.basis.left.as_slice().chunks_exact(q.len().max(1));
+        for ((x, p), left) in x.iter().zip(rest).zip(columns) {
             let own = x - *p;
-            for (q, l) in q.iter_mut().zip(left.iter()) {
+            for (q, l) in q.iter_mut().zip(left) {
                 *q += l * own;
             }
         }
@@ -109,8 +110,9 @@ impl Regime {
         x: &mut [f64],
     ) {
         self.response.write(drive, t, x);
-        for (q, column) in q.into_iter().zip(self.basis.right.column_iter()) {
-            for (x, r) in x.iter_mut().zip(column.iter()) {
+        let columns = self.basis.right.as_slice().chunks_exact(x.len().max(1));
+        for (q, column) in q.into_iter().zip(columns) {
+            for (x, r) in x.iter_mut().zip(column) {
                 *x += r.re * q.re - r.im * q.im;
             }
         }

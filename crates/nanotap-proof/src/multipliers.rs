@@ -122,6 +122,17 @@ impl Multipliers {
                 .total_cmp(&size(a))
                 .then(b.center.im.total_cmp(&a.center.im))
         });
+        // Of two that may be conjugates the upper one first, whatever rounding made of their sizes.
+        for k in 1..discs.len() {
+            let (a, b) = (discs[k - 1], discs[k]);
+            let mirrored = Disc {
+                center: b.center.conj(),
+                ..b
+            };
+            if a.center.im < 0.0 && a.overlaps(&mirrored) {
+                discs.swap(k - 1, k);
+            }
+        }
         Self { discs }
     }
 }

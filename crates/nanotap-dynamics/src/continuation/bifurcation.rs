@@ -79,7 +79,7 @@ pub(crate) struct Tests {
 }
 
 impl Tests {
-    pub(crate) fn new<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Option<Self> {
+    pub(crate) fn new<F: MapFamily>(solver: &mut BranchSolver<'_, F>, node: &Node) -> Option<Self> {
         let multipliers = Multipliers::of_product(&node.jacobians).ok()?.values;
         Some(Self {
             fold: node.slope,
@@ -152,17 +152,29 @@ struct Zero {
     value: f64,
 }
 
-/// Narrows down the sign change of `test` between two steps along the tangent of
-/// `from`: regula falsi (Illinois) with a bisection at every third trial. `None` if
-/// the orbit is lost on the way, or if what changes sign jumps instead of vanishing.
+/// A stretch of a branch: its two ends, and where they lie along the tangent of `from`.
+#[derive(Clone, Copy)]
+struct Stretch<'a> {
+    from: &'a Node,
+    ends: [&'a Node; 2],
+    span: (f64, f64),
+}
+
+/// Narrows down the sign change of `test` over a stretch: regula falsi (Illinois) with a
+/// bisection at every third trial. `None` if the orbit is lost on the way, or if what changes
+/// sign jumps instead of vanishing.
 fn narrow<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
-    from: &Node,
-    span: (f64, f64),
+    Stretch {
+        from,
+        ends: [first, last],
+        span,
+    }: Stretch<'_>,
     values: (f64, f64),
-    mut test: impl FnMut(&BranchSolver<'_, F>, &Node, f64) -> Option<f64>,
+    mut test: impl FnMut(&mut BranchSolver<'_, F>, &Node, f64) -> Option<f64>,
 ) -> Option<Zero> {
     let (mut low, mut high) = span;
+    let (mut below, mut above) = (first.clone(), last.clone());
     let mut weights = values;
     let mut ends = (f64::NAN, f64::NAN);
     let mut best: Option<Zero> = None;
@@ -180,7 +192,7 @@ fn narrow<F: MapFamily>(
         let beside = at + 1e-3 * (high - at);
         let Some((at, node)) = [at, beside]
             .into_iter()
-            .find_map(|at| Some((at, solver.along(from, at).ok()?)))
+            .find_map(|at| Some((at, solver.along_cubic(from, at, [&below, &above]).ok()?)))
         else {
             break;
         };
@@ -189,7 +201,7 @@ fn narrow<F: MapFamily>(
         if best.as_ref().is_none_or(|b| value.abs() <= b.value.abs()) {
             best = Some(Zero {
                 at,
-                node,
+                node: node.clone(),
                 uncertainty: 0.0,
                 value,
             });
@@ -201,9 +213,11 @@ fn narrow<F: MapFamily>(
         if (value > 0.0) == (values.0 > 0.0) {
             (low, ends.0) = (at, parameter);
             weights = (value, 0.5 * weights.1);
+            below = node;
         } else {
             (high, ends.1) = (at, parameter);
             weights = (0.5 * weights.0, value);
+            above = node;
         }
         let size = parameter.abs().max(solver.parameter_scale);
         let fine = (ends.1 - ends.0).abs() <= 1e-13 * size;
@@ -235,7 +249,12 @@ pub(crate) fn collapse<F: MapFamily>(
     if last.is_nan() || last >= 0.0 {
         return None;
     }
-    let zero = narrow(solver, from, (0.0, step), (1.0, last), |solver, node, _| {
+    let stretch = Stretch {
+        from,
+        ends: [from, to],
+        span: (0.0, step),
+    };
+    let zero = narrow(solver, stretch, (1.0, last), |solver, node, _| {
         Some(dot(&reference, &solver.gap(node, m)) / square)
     });
     if let Some(z) = zero {
@@ -254,28 +273,26 @@ pub(crate) fn collapse<F: MapFamily>(
 /// All bifurcations between two neighbouring nodes, in order along the arc.
 pub(crate) fn between<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
-    a: &Node,
-    tests_a: &Tests,
-    tests_b: &Tests,
+    [a, b]: [&Node; 2],
+    [tests_a, tests_b]: [&Tests; 2],
     step: f64,
     after_point: usize,
 ) -> Vec<Bifurcation> {
     let mut zeros: Vec<(BifurcationKind, Zero)> = Vec::new();
-    let whole = (0.0, step);
+    let whole = Stretch {
+        from: a,
+        ends: [a, b],
+        span: (0.0, step),
+    };
     let changes = |x: f64, y: f64| x * y < 0.0;
     if changes(tests_a.fold, tests_b.fold) {
-        let zero = narrow(
-            solver,
-            a,
-            whole,
-            (tests_a.fold, tests_b.fold),
-            |_, node, _| Some(node.slope),
-        );
+        let zero = narrow(solver, whole, (tests_a.fold, tests_b.fold), |_, node, _| {
+            Some(node.slope)
+        });
         zeros.extend(zero.map(|z| (BifurcationKind::Fold, z)));
     } else if changes(tests_a.crossing, tests_b.crossing) {
         let zero = narrow(
             solver,
-            a,
             whole,
             (tests_a.crossing, tests_b.crossing),
             |_, node, _| of_multipliers(node, plus_one),
@@ -283,19 +300,14 @@ pub(crate) fn between<F: MapFamily>(
         zeros.extend(zero.map(|z| (BifurcationKind::Crossing, z)));
     }
     if changes(tests_a.flip, tests_b.flip) {
-        let zero = narrow(
-            solver,
-            a,
-            whole,
-            (tests_a.flip, tests_b.flip),
-            |_, node, _| of_multipliers(node, minus_one),
-        );
+        let zero = narrow(solver, whole, (tests_a.flip, tests_b.flip), |_, node, _| {
+            of_multipliers(node, minus_one)
+        });
         zeros.extend(zero.map(|z| (BifurcationKind::Flip, z)));
     }
     if changes(tests_a.neimark_sacker, tests_b.neimark_sacker) {
         let zero = narrow(
             solver,
-            a,
             whole,
             (tests_a.neimark_sacker, tests_b.neimark_sacker),
             |_, node, _| of_multipliers(node, |m| pair_on_circle(m).0),
@@ -310,7 +322,7 @@ pub(crate) fn between<F: MapFamily>(
             })
         }));
     }
-    grazings(solver, a, tests_a, tests_b, (0.0, step), 8, &mut zeros);
+    grazings(solver, whole, [tests_a, tests_b], 8, &mut zeros);
     zeros.sort_by(|(_, x), (_, y)| x.at.total_cmp(&y.at));
     zeros
         .into_iter()
@@ -349,19 +361,18 @@ fn nearest(tangencies: &[OrbitTangency], to: OrbitTangency, n: f64) -> Option<(u
         .map(|(k, (shift, _))| (k, shift))
 }
 
-/// Tangencies whose value changes sign between steps `span.0` and `span.1` from `a`.
-/// Extrema are matched with each other's nearest in time; if the numbers of negative
-/// ones differ and no match says why, the span is halved, `depth` times at most.
+/// Tangencies whose value changes sign over a stretch. Extrema are matched with each other's
+/// nearest in time; if the numbers of negative ones differ and no match says why, the span is
+/// halved, `depth` times at most.
 fn grazings<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
-    a: &Node,
-    first: &Tests,
-    last: &Tests,
-    span: (f64, f64),
+    stretch: Stretch<'_>,
+    [first, last]: [&Tests; 2],
     depth: usize,
     zeros: &mut Vec<(BifurcationKind, Zero)>,
 ) {
     let n = solver.n as f64;
+    let span = stretch.span;
     let mut found = 0;
     for (i, t) in first.tangencies.iter().enumerate() {
         let Some((j, shift)) = nearest(&last.tangencies, *t, n) else {
@@ -372,7 +383,7 @@ fn grazings<F: MapFamily>(
         if !mutual || t.value * u.value >= 0.0 {
             continue;
         }
-        let zero = narrow(solver, a, span, (t.value, u.value), |solver, node, at| {
+        let zero = narrow(solver, stretch, (t.value, u.value), |solver, node, at| {
             let fraction = (at - span.0) / (span.1 - span.0);
             let tangencies = solver.tangencies(node).ok()?;
             let expected = OrbitTangency {
@@ -398,13 +409,32 @@ fn grazings<F: MapFamily>(
     let negative = |tests: &Tests| tests.tangencies.iter().filter(|t| t.value < 0.0).count();
     if found == 0 && depth > 0 && negative(first) != negative(last) {
         let middle = 0.5 * (span.0 + span.1);
-        let Ok(node) = solver.along(a, middle) else {
+        let Ok(node) = solver.along_cubic(stretch.from, middle, stretch.ends) else {
             return;
         };
         let Some(tests) = Tests::new(solver, &node) else {
             return;
         };
-        grazings(solver, a, first, &tests, (span.0, middle), depth - 1, zeros);
-        grazings(solver, a, &tests, last, (middle, span.1), depth - 1, zeros);
+        let halves = [
+            (
+                Stretch {
+                    ends: [stretch.ends[0], &node],
+                    span: (span.0, middle),
+                    ..stretch
+                },
+                [first, &tests],
+            ),
+            (
+                Stretch {
+                    ends: [&node, stretch.ends[1]],
+                    span: (middle, span.1),
+                    ..stretch
+                },
+                [&tests, last],
+            ),
+        ];
+        for (half, tests) in halves {
+            grazings(solver, half, tests, depth - 1, zeros);
+        }
     }
 }

@@ -5,7 +5,7 @@ use crate::continuation::end::dead_end;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
 use crate::continuation::passing::closing;
 use crate::continuation::solver::{BranchSolver, Node};
-use crate::continuation::step::{Rejected, angle, at_range_end, projection, trial};
+use crate::continuation::step::{Rejected, angle, at_range_end, trial};
 use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions};
 use crate::control::Control;
 use crate::map::MapFamily;
@@ -91,6 +91,7 @@ pub(crate) fn follow<F: MapFamily>(
         end: BranchEnd::PointLimit,
     };
     let start = first.clone();
+    let mut before = None;
     let mut node = first;
     let mut step = options.initial_step;
     while branch.points.len() < options.max_points {
@@ -105,7 +106,7 @@ pub(crate) fn follow<F: MapFamily>(
             branch.end = BranchEnd::RangeEnd;
             break;
         }
-        let mut next = match trial(solver, &node, step, options) {
+        let mut next = match trial(solver, before.as_ref(), &node, step, options) {
             Ok(next) => next,
             Err(Rejected::Vanished { parameter }) => {
                 branch.end = BranchEnd::Vanished { parameter };
@@ -135,7 +136,7 @@ pub(crate) fn follow<F: MapFamily>(
             branch.end = BranchEnd::LeftDomain;
             break;
         }
-        let mut taken = projection(solver, &node, &next);
+        let mut taken = solver.projection(&node, &next);
         let closed = closing(solver, &start, &node, &next, taken);
         let is_closed = closed.is_some();
         if let Some((at, end)) = closed {
@@ -161,7 +162,13 @@ pub(crate) fn follow<F: MapFamily>(
             if let Ok(near) = solver.along(&node, 0.99 * at)
                 && let Some(near_tests) = Tests::new(solver, &near)
             {
-                let found = between(solver, &node, &tests, &near_tests, 0.99 * at, index);
+                let found = between(
+                    solver,
+                    [&node, &near],
+                    [&tests, &near_tests],
+                    0.99 * at,
+                    index,
+                );
                 branch.take(found, options.range);
                 branch
                     .points
@@ -173,7 +180,7 @@ pub(crate) fn follow<F: MapFamily>(
             };
             break;
         }
-        let found = between(solver, &node, &tests, &next_tests, taken, index);
+        let found = between(solver, [&node, &next], [&tests, &next_tests], taken, index);
         branch.take(found, options.range);
         let folds = |b: &Bifurcation| matches!(b.kind, BifurcationKind::Fold);
         if options.until_fold && branch.bifurcations.iter().any(folds) {
@@ -199,7 +206,7 @@ pub(crate) fn follow<F: MapFamily>(
         if options.state_scale.is_none() {
             solver.rescale(&mut next, least);
         }
-        node = next;
+        before = Some(std::mem::replace(&mut node, next));
         tests = next_tests;
         if is_closed {
             branch.end = BranchEnd::Closed;
@@ -218,7 +225,7 @@ impl Branch {
 }
 
 fn tests_at<F: MapFamily>(
-    solver: &BranchSolver<'_, F>,
+    solver: &mut BranchSolver<'_, F>,
     node: &Node,
 ) -> Result<Tests, ContinuationError> {
     Tests::new(solver, node).ok_or(ContinuationError::NoStart {

@@ -11,13 +11,13 @@ use crate::failure::{MapFailure, advance_with_tangencies, finite};
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
-use crate::orbit::shooting::{MOST_SETTINGS, Segments, ShootingError, set_discrete_entries};
+use crate::orbit::shooting::{
+    LAST_STEP, MOST_SETTINGS, ROUNDING, Segments, ShootingError, set_discrete_entries,
+};
 use crate::vector::{difference, dot, norm};
 
 /// Newton steps after which a corrector gives up: the caller shortens its step.
 const ITERATIONS: usize = 12;
-/// Residual, in units of the orbit's scale, that is rounding: Newton cannot mend it.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A tangency somewhere on an orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +88,8 @@ pub(crate) struct BranchSolver<'a, F: MapFamily> {
     step: Vec<f64>,
     state: Vec<f64>,
     system: BlockCyclic,
+    /// The map at the parameter value last asked for.
+    map: Option<(f64, F::Map)>,
 }
 
 impl<'a, F: MapFamily> BranchSolver<'a, F> {
@@ -115,6 +117,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             step: vec![0.0; n * d],
             state: vec![0.0; d],
             system: BlockCyclic::new(d, n),
+            map: None,
         }
     }
 
@@ -122,6 +125,19 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     pub(crate) fn size(&self, points: &[f64]) -> f64 {
         let states = points.chunks(self.d);
         states.fold(0.0, |size, state| size.max(norm(&state[..self.continuous])))
+    }
+
+    /// The map at `parameter`, made unless it is the one last asked for.
+    fn map_at<'b>(
+        family: &F,
+        known: &'b mut Option<(f64, F::Map)>,
+        parameter: f64,
+    ) -> Result<&'b mut F::Map, MapFailure> {
+        let map = match known.take() {
+            Some((at, map)) if at == parameter => map,
+            _ => family.at(parameter).map_err(MapFailure::refused)?,
+        };
+        Ok(&mut known.insert((parameter, map)).1)
     }
 
     /// The largest residual at the present points, of which discrete entries are set to what the
@@ -139,13 +155,13 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
 
     fn evaluate_points(&mut self, parameter: f64) -> Result<f64, MapFailure> {
         let (d, n) = (self.d, self.n);
-        let mut map = self.family.at(parameter).map_err(MapFailure::refused)?;
+        let map = Self::map_at(self.family, &mut self.map, parameter)?;
         for k in 0..n {
             self.state.copy_from_slice(&self.points[k * d..(k + 1) * d]);
             self.family
                 .advance_with_derivatives(
                     parameter,
-                    &mut map,
+                    map,
                     &mut self.state,
                     &mut self.jacobians[k],
                     &mut self.derivatives[k * d..(k + 1) * d],
@@ -197,6 +213,71 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         self.correct(&points, parameter, &row, corner, &row, corner)
     }
 
+    /// As [`Self::along`], begun on the cubic through two nodes of the branch near by, or, where
+    /// that leads nowhere, on the tangent.
+    pub(crate) fn along_cubic(
+        &mut self,
+        from: &Node,
+        step: f64,
+        through: [&Node; 2],
+    ) -> Result<Node, CorrectorFailure> {
+        let begun = self.on_cubic(from, step, through);
+        let (row, corner) = self.row(&from.tangent, from.slope);
+        begun
+            .and_then(|(points, parameter)| {
+                self.correct(&points, parameter, &row, corner, &row, corner)
+                    .ok()
+            })
+            .map_or_else(|| self.along(from, step), Ok)
+    }
+
+    /// Hermite's cubic through two nodes with their tangents, at a scaled arclength `step` along
+    /// the tangent of `from`. None where one of them runs across that tangent.
+    fn on_cubic(&self, from: &Node, step: f64, [a, b]: [&Node; 2]) -> Option<(Vec<f64>, f64)> {
+        // The cosine of the turn from here to there.
+        const ALONG: f64 = 0.5;
+        let rate = |node: &Node| self.product(&node.tangent, node.slope, &from.tangent, from.slope);
+        let (rate_a, rate_b) = (rate(a), rate(b));
+        if !(rate_a >= ALONG && rate_b >= ALONG) {
+            return None;
+        }
+        let (at_a, at_b) = (self.projection(from, a), self.projection(from, b));
+        let length = at_b - at_a;
+        let t = (step - at_a) / length;
+        if !t.is_finite() {
+            return None;
+        }
+        let (left, right) = ((1.0 - t) * (1.0 - t), t * t);
+        let weights = [
+            (1.0 + 2.0 * t) * left,
+            t * left * length / rate_a,
+            (3.0 - 2.0 * t) * right,
+            (t - 1.0) * right * length / rate_b,
+        ];
+        let cubic = |terms: [f64; 4]| dot(&weights, &terms);
+        let points = (0..a.points.len()).map(|i| {
+            if i % self.d < self.continuous {
+                cubic([a.points[i], a.tangent[i], b.points[i], b.tangent[i]])
+            } else {
+                from.points[i]
+            }
+        });
+        Some((
+            points.collect(),
+            cubic([a.parameter, a.slope, b.parameter, b.slope]),
+        ))
+    }
+
+    /// Scaled arclength from one node to the next, along the tangent of the first.
+    pub(crate) fn projection(&self, from: &Node, to: &Node) -> f64 {
+        self.product(
+            &difference(&to.points, &from.points),
+            to.parameter - from.parameter,
+            &from.tangent,
+            from.slope,
+        )
+    }
+
     /// As [`Self::along`], but onto the plane of this parameter, oriented as `from`.
     pub(crate) fn onto_parameter(
         &mut self,
@@ -244,20 +325,22 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         let mut residual = self.evaluate(parameter)?;
         let scale = self.state_scale.max(self.size(points));
         let mut iterations = 0;
-        let rounding = ROUNDING * scale;
-        while residual > rounding {
-            if iterations == ITERATIONS {
-                return Err(CorrectorFailure::NoConvergence);
-            }
-            iterations += 1;
+        loop {
             self.system
                 .factor(&self.jacobians, &self.residuals, Some(&self.derivatives));
             let change = self
                 .system
-                .solve_bordered(row, corner, 0.0, true, &mut self.step)
-                .ok_or(CorrectorFailure::Singular)?;
-            for (x, s) in self.points.iter_mut().zip(&self.step) {
-                *x += s;
+                .solve_bordered(row, corner, 0.0, true, &mut self.step);
+            let closed = residual <= ROUNDING * scale;
+            if closed && (change.is_none() || norm(&self.step) > LAST_STEP * scale) {
+                break;
+            }
+            let change = change.ok_or(CorrectorFailure::Singular)?;
+            let steps = self.step.chunks_exact(self.d);
+            for (point, step) in self.points.chunks_exact_mut(self.d).zip(steps) {
+                for (x, s) in point.iter_mut().zip(step).take(self.continuous) {
+                    *x += s;
+                }
             }
             if !fixed {
                 parameter += change;
@@ -265,20 +348,27 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             if !parameter.is_finite() || self.points.iter().any(|v| !v.is_finite()) {
                 return Err(CorrectorFailure::Singular);
             }
+            if closed {
+                break;
+            }
+            if iterations == ITERATIONS {
+                return Err(CorrectorFailure::NoConvergence);
+            }
+            iterations += 1;
             let before = residual;
             residual = self.evaluate(parameter)?;
             let stalled = residual > 0.5 * before;
             // A step that leaves a solution behind where the map jumps is no rounding.
             let small = before.max(residual) <= self.tolerance * scale;
             if stalled && small {
+                self.system
+                    .factor(&self.jacobians, &self.residuals, Some(&self.derivatives));
                 break;
             }
             if residual > before {
                 return Err(CorrectorFailure::NoConvergence);
             }
         }
-        self.system
-            .factor(&self.jacobians, &self.residuals, Some(&self.derivatives));
         let mut tangent = vec![0.0; self.n * self.d];
         let slope = self
             .system
@@ -303,18 +393,15 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     }
 
     /// Every tangency of an orbit, in order of time.
-    pub(crate) fn tangencies(&self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
-        let mut map = self
-            .family
-            .at(node.parameter)
-            .map_err(MapFailure::refused)?;
+    pub(crate) fn tangencies(&mut self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
+        let map = Self::map_at(self.family, &mut self.map, node.parameter)?;
         let mut found = Vec::new();
         let mut state = vec![0.0; self.d];
         let mut one = Vec::new();
         for k in 0..self.n {
             state.copy_from_slice(&node.points[k * self.d..(k + 1) * self.d]);
             one.clear();
-            advance_with_tangencies(&mut map, &mut state, &mut one)?;
+            advance_with_tangencies(map, &mut state, &mut one)?;
             found.extend(one.iter().map(|t| OrbitTangency {
                 time: k as f64 + t.phase,
                 value: t.value,

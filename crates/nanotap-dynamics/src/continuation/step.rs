@@ -39,9 +39,11 @@ pub(crate) fn at_range_end(node: &Node, options: &ContinuationOptions) -> bool {
         || node.slope < 0.0 && node.parameter <= options.range.0 + margin
 }
 
-/// One step, onto the end of the range if it would lead out.
+/// One step, onto the end of the range if it would lead out. `before` is the node before this
+/// one, if any.
 pub(crate) fn trial<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
+    before: Option<&Node>,
     node: &Node,
     step: f64,
     options: &ContinuationOptions,
@@ -68,7 +70,11 @@ pub(crate) fn trial<F: MapFamily>(
     let next = if let Some(end) = outside(node.parameter + step * node.slope) {
         onto(solver, end)?
     } else {
-        let next = solver.along(node, step).map_err(Rejected::Corrector)?;
+        let next = match before {
+            Some(before) => solver.along_cubic(node, step, [before, node]),
+            None => solver.along(node, step),
+        };
+        let next = next.map_err(Rejected::Corrector)?;
         match outside(next.parameter) {
             Some(end) => onto(solver, end)?,
             None => next,
@@ -79,7 +85,7 @@ pub(crate) fn trial<F: MapFamily>(
     if !forgiving && angle(solver, node, &next) > options.max_angle {
         return Err(Rejected::Turn);
     }
-    let taken = projection(solver, node, &next);
+    let taken = solver.projection(node, &next);
     let (predicted, _) = node.ahead(taken);
     let c = solver.continuous;
     let correction = distance(&predicted[..c], &next.points[..c]) / solver.state_scale;
@@ -107,25 +113,6 @@ fn goes_on(node: &Node, next: &Node) -> bool {
         let jump = (a - b).amax();
         jump <= CONTINUOUS * a.amax()
     })
-}
-
-/// Scaled arclength from one node to the next, along the tangent of the first.
-pub(crate) fn projection<F: MapFamily>(
-    solver: &BranchSolver<'_, F>,
-    from: &Node,
-    to: &Node,
-) -> f64 {
-    let shift: Vec<f64> = to.points[..solver.d]
-        .iter()
-        .zip(&from.points)
-        .map(|(p, q)| p - q)
-        .collect();
-    solver.product(
-        &shift,
-        to.parameter - from.parameter,
-        &from.tangent,
-        from.slope,
-    )
 }
 
 pub(crate) fn angle<F: MapFamily>(solver: &BranchSolver<'_, F>, a: &Node, b: &Node) -> f64 {

@@ -23,7 +23,8 @@ pub struct PeriodicOrbit {
     pub period: usize,
     /// All `period` strobe points `x_0 … x_{n−1}`, `P(x_k) = x_{k+1 mod n}`.
     pub states: Vec<Vec<f64>>,
-    /// Largest entry of `P(x_k) − x_{k+1}` over the orbit, in units of the state.
+    /// Largest entry of `P(x_k) − x_{k+1}` over the orbit, in units of the state, as it was before a
+    /// last step of Newton's within rounding.
     pub residual: f64,
     /// Estimated distance of `states` from the true orbit (largest entry): the
     /// residual and the rounding of one period, carried through the inverse of

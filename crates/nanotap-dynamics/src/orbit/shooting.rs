@@ -178,6 +178,13 @@ fn check<M: StroboscopicMap>(
     Ok(())
 }
 
+/// Residual, in units of the orbit's scale, below which a last step of Newton's is taken and not
+/// looked at: what it leaves is rounding.
+pub(crate) const ROUNDING: f64 = 32.0 * f64::EPSILON;
+/// The longest such step, in the same units: its square is rounding. A longer one is the noise of
+/// an orbit that is hardly determined.
+pub(crate) const LAST_STEP: f64 = 1e-8;
+
 /// How often discrete entries are set anew at one place: where they do not come to rest, the
 /// residual says so.
 pub(crate) const MOST_SETTINGS: usize = 3;
@@ -273,6 +280,16 @@ impl Segments {
         Ok(())
     }
 
+    /// Moves the points by `step`, what is discrete in them apart.
+    fn take(&mut self, step: &[f64]) {
+        let steps = step.chunks_exact(self.d);
+        for (point, step) in self.points.chunks_exact_mut(self.d).zip(steps) {
+            for (x, s) in point.iter_mut().zip(step).take(self.d - self.discrete) {
+                *x += s;
+            }
+        }
+    }
+
     /// Newton until rounding stops it.
     fn converge<M: StroboscopicMap>(
         &mut self,
@@ -296,6 +313,12 @@ impl Segments {
             system.factor(&self.jacobians, &self.residuals, None);
             if system.solve(&mut step).is_none() || step.iter().any(|v| !v.is_finite()) {
                 return Err(self.singular(residual));
+            }
+            if residual <= ROUNDING * self.scale {
+                if norm(&step) <= LAST_STEP * self.scale {
+                    self.take(&step);
+                }
+                return Ok(());
             }
             let merit = sum_of_squares(&self.residuals);
             let mut damping = 1.0;

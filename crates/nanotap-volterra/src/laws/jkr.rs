@@ -146,7 +146,9 @@ mod tests {
                     })
                     .collect();
                 let c = Jkr.constants(&parameters);
-                let gap = Dual::constant(c[4].value());
+                // As the flow holds it there.
+                let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
+                let gap = Dual::constant(Jkr.constants(&values)[4]);
                 Jkr.force(&c, 1, gap, Dual::constant(0.0))
             };
             let ends = -5.0 / 6.0 * PI * radius;

@@ -364,7 +364,8 @@ impl ClearanceSearch {
         self.periods += 1;
     }
 
-    /// The candidates that matter, those with the lowest bounds first.
+    /// The candidates that matter, those with the lowest bounds first; of periods that are one the
+    /// first.
     fn lowest(&mut self) -> Vec<Candidate> {
         let end = self.end;
         let mut all = std::mem::take(&mut self.candidates);
@@ -372,10 +373,13 @@ impl ClearanceSearch {
         all.sort_by(|a, b| a.bound.total_cmp(&b.bound).then(a.period.cmp(&b.period)));
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in all {
-            if kept.len() == MOST_PERIODS {
-                break;
-            }
-            if !kept.iter().any(|known| known.start.is(&candidate.start)) {
+            let same = |known: &&mut Candidate| known.start.is(&candidate.start);
+            if let Some(known) = kept.iter_mut().find(same) {
+                if candidate.period < known.period {
+                    let bound = known.bound;
+                    *known = Candidate { bound, ..candidate };
+                }
+            } else if kept.len() < MOST_PERIODS {
                 kept.push(candidate);
             }
         }

@@ -46,7 +46,7 @@ pub use census::{
 };
 pub use classify::{
     Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,
-    birkhoff_digits, candidate_periods, classify,
+    birkhoff_digits, candidate_periods, classify, classify_beside,
 };
 pub use continuation::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ContinuationError,

@@ -152,13 +152,66 @@ pub struct Chaos {
     /// No stable orbit of a period up to this one was approached.
     pub longest_period: usize,
 }
+
+impl Chaos {
+    /// Seen for so many periods in all: what happens with probability 1/τ a period and did not
+    /// happen in T of them has τ > T/3 at 95 %.
+    pub(crate) fn watched(&mut self, periods: usize) {
+        self.observed = periods;
+        self.lifetime_above = periods as f64 / 3.0;
+    }
+}
+
 /// Follows the motion from `start` until it can be named, within the budgets.
 pub fn classify<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
     options: &ClassifyOptions,
 ) -> Classified {
-    match follow_start(map, start, Known::default(), options) {
+    classify_beside(map, start, &[], options)
+}
+
+/// As [`classify`], where chaotic motions of the map are known: a run from which neighbours part,
+/// and whose strobe states have the means of one of them, is taken to be on it and has its
+/// exponents. It is watched no less long than one whose exponents are measured.
+pub fn classify_beside<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    chaos: &[LyapunovSpectrum],
+    options: &ClassifyOptions,
+) -> Classified {
+    let known = Known {
+        chaos,
+        ..Known::default()
+    };
+    let mut end = ended(follow_start(map, start, known, options), start);
+    if let MotionKind::Chaotic(found) = &mut end.kind
+        && chaos.contains(&found.spectrum)
+    {
+        let measured = &options.lyapunov;
+        let least = options.max_transient + measured.alignment + measured.min_periods;
+        let more = least.saturating_sub(end.periods);
+        match watch(map, &end.state, &[], more, options) {
+            Ok(state) => {
+                end.state = state;
+                end.periods += more;
+                found.watched(end.periods);
+            }
+            Err(other) => {
+                let other = ended(other, start);
+                return Classified {
+                    periods: end.periods + other.periods,
+                    ..other
+                };
+            }
+        }
+    }
+    end
+}
+
+/// What a run that knows no neighbourhood of an orbit ended with.
+fn ended(end: RunEnd, start: &[f64]) -> Classified {
+    match end {
         RunEnd::Classified(end) => *end,
         // No neighbourhood was given, so none can have been entered.
         RunEnd::Entered { periods, .. } => Classified {

@@ -391,12 +391,14 @@ impl<'a> Run<'a> {
     }
 
     fn chaotic(&self, spectrum: LyapunovSpectrum) -> MotionKind {
-        MotionKind::Chaotic(Chaos {
+        let mut chaos = Chaos {
             spectrum,
-            observed: self.periods,
-            lifetime_above: self.periods as f64 / 3.0,
+            observed: 0,
+            lifetime_above: 0.0,
             longest_period: longest(self.options),
-        })
+        };
+        chaos.watched(self.periods);
+        MotionKind::Chaotic(chaos)
     }
 
     /// Exponents of what does not close, looking for an escape after every doubling.

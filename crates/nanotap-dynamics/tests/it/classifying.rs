@@ -1,8 +1,10 @@
 //! The verdict on one start.
 
-use nanotap_dynamics::{ClassifyOptions, LyapunovOptions, MotionKind, UndecidedReason, classify};
+use nanotap_dynamics::{
+    Chaos, ClassifyOptions, LyapunovOptions, MotionKind, UndecidedReason, classify, classify_beside,
+};
 
-use crate::systems::{DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning};
+use crate::systems::{Cubic, DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning};
 
 fn period_of(verdict: &MotionKind) -> usize {
     match verdict {
@@ -195,4 +197,37 @@ fn bad_starts_are_refused() {
             }
         ));
     }
+}
+
+/// The cubic map x → r x − x³ has at r = 5/2 two chaotic motions, each the other's mirror image. A
+/// start on the one that is known has its exponents, and is watched no less long than a start whose
+/// exponents are measured; the one is not taken for the other, nor either for the fixed point that
+/// attracts at r = 3/2.
+#[test]
+fn chaos_that_is_known_is_told_from_other_motions() {
+    let options = ClassifyOptions::default();
+    let mut map = System(Cubic(2.5));
+    let chaotic = |kind: MotionKind| -> Chaos {
+        match kind {
+            MotionKind::Chaotic(chaos) => chaos,
+            other => panic!("not chaotic: {other:?}"),
+        }
+    };
+    let upper = chaotic(classify(&mut map, &[0.3], &options).kind);
+    let lower = chaotic(classify(&mut map, &[-0.3], &options).kind);
+    let known = [lower.spectrum.clone(), upper.spectrum.clone()];
+
+    let beside = classify_beside(&mut map, &[0.5], &known, &options);
+    let measured = &options.lyapunov;
+    let least = options.max_transient + measured.alignment + measured.min_periods;
+    assert!(beside.periods >= least, "{}", beside.periods);
+    let second = chaotic(beside.kind);
+    assert_eq!(second.spectrum, upper.spectrum);
+    assert_eq!(second.observed, beside.periods);
+
+    let unlike = classify_beside(&mut map, &[0.5], &known[..1], &options);
+    assert_ne!(chaotic(unlike.kind).spectrum, lower.spectrum);
+
+    let fixed = classify_beside(&mut System(Cubic(1.5)), &[0.5], &known, &options);
+    assert_eq!(period_of(&fixed.kind), 1);
 }

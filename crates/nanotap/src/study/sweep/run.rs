@@ -1,6 +1,9 @@
 //! One run of a sweep, and the runs of one piece of work.
 
-use nanotap_dynamics::{ClassifyOptions, MotionKind, PeriodicOrbit, StroboscopicMap, classify};
+use nanotap_dynamics::{
+    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap,
+    classify_beside,
+};
 
 use super::{Sweep, SweepOptions};
 use crate::case::Case;
@@ -214,6 +217,8 @@ struct Runner<'a> {
     map: Strobe,
     /// Stable orbits that starts went to.
     known: Vec<PeriodicOrbit>,
+    /// Exponents of chaotic motions that starts went to.
+    chaos: Vec<LyapunovSpectrum>,
     /// What every motion is measured with.
     watcher: Result<Watcher<'a>, MotionError>,
     /// Units to tell observables in, where physical quantities vary.
@@ -228,6 +233,7 @@ impl<'a> Runner<'a> {
             classify: options.classify(),
             map: Strobe::new(model),
             known: Vec::new(),
+            chaos: Vec::new(),
             watcher: Watcher::new(model, Set::COMMON),
         }
     }
@@ -242,7 +248,7 @@ impl<'a> Runner<'a> {
 
     /// The motion that the run was found to go to.
     fn classified(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
-        let classified = classify(&mut self.map, start, &self.classify);
+        let classified = self.beside_known(start);
         let named = Named::of(&classified.kind);
         let outcome = Outcome::named(&named, classified.periods);
         match &named.orbit {
@@ -279,9 +285,20 @@ impl<'a> Runner<'a> {
         if let Some(orbit) = self.known.iter().find(|orbit| is_on(orbit, state)) {
             return Named::of(&MotionKind::Periodic(orbit.clone()));
         }
-        let named = Named::of(&classify(&mut self.map, state, &self.classify).kind);
+        let named = Named::of(&self.beside_known(state).kind);
         self.known.extend(named.orbit.clone());
         named
+    }
+
+    /// What the motion from `state` is, which may be chaos that an earlier start went to.
+    fn beside_known(&mut self, state: &[f64]) -> Classified {
+        let classified = classify_beside(&mut self.map, state, &self.chaos, &self.classify);
+        if let MotionKind::Chaotic(chaos) = &classified.kind
+            && !self.chaos.contains(&chaos.spectrum)
+        {
+            self.chaos.push(chaos.spectrum.clone());
+        }
+        classified
     }
 
     fn watch(&self, from: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {

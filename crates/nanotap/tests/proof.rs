@@ -290,6 +290,43 @@ fn long_unstable_orbits_are_proved() {
     }
 }
 
+/// The table of docs/proof.md: switches exactly, widths within a factor of two.
+#[test]
+fn enclosures_are_as_narrow_as_the_page_says() {
+    let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/proof.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut rows = 0;
+    for row in page.lines().filter(|line| line.starts_with("| Ω = ")) {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let number = |text: &str| -> f64 { text.parse().unwrap() };
+        let orbit: Vec<&str> = cells[0].split(", ").collect();
+        let after = |part: &str, word: &str| part.strip_prefix(word).unwrap().to_owned();
+        let case = case(&[
+            &format!("omega={}", after(orbit[0], "Ω = ")),
+            &format!("modes={}", after(orbit[1], "N = ")),
+        ]);
+        let options = OrbitOptions {
+            period: Some(after(orbit[2], "period ").parse().unwrap()),
+            ..OrbitOptions::default()
+        };
+        let theorem = found(&case, &options).1.theorem.unwrap();
+        assert_eq!(theorem.stability, orbit[3], "{row}");
+        assert_eq!(theorem.switches.len() as f64, number(cells[1]), "{row}");
+        let half = |[low, high]: &[f64; 2]| 0.5 * (high - low);
+        let state = theorem.state.iter().map(half).fold(0.0, f64::max);
+        let multipliers = theorem.multipliers.iter().map(|d| d.radius);
+        for (known, said) in [
+            (state, cells[2]),
+            (multipliers.fold(0.0, f64::max), cells[3]),
+        ] {
+            let ratio = known / number(said);
+            assert!((0.5..2.0).contains(&ratio), "{row}: {known:e}");
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, 6);
+}
+
 /// Undamped motion has its multipliers on the unit circle: the orbit exists, and stability is
 /// not decided.
 #[test]

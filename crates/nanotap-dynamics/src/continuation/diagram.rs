@@ -70,16 +70,23 @@ pub fn assemble_diagram<F: MapFamily>(
         if diagram.holds(family, parameter, &orbit, &options.continuation) {
             continue;
         }
-        for direction in [Direction::Increasing, Direction::Decreasing] {
-            let before = diagram.branches.len();
-            let followed = continue_orbit(
+        let follow = |direction| {
+            continue_orbit(
                 family,
                 parameter,
                 &orbit,
                 direction,
                 &options.continuation,
                 control,
-            );
+            )
+        };
+        let (up, down) = rayon::join(
+            || follow(Direction::Increasing),
+            || follow(Direction::Decreasing),
+        );
+        // The way back along a closed branch is the same branch.
+        let closed = matches!(&up, Ok(branch) if matches!(branch.end, BranchEnd::Closed));
+        for followed in std::iter::once(up).chain((!closed).then_some(down)) {
             diagram.take(
                 family,
                 followed,
@@ -90,11 +97,6 @@ pub fn assemble_diagram<F: MapFamily>(
                 control,
                 &mut waiting,
             );
-            // The way back along a closed branch is the same branch.
-            let closed = |b: &DiagramBranch| matches!(b.branch.end, BranchEnd::Closed);
-            if diagram.branches[before..].first().is_some_and(closed) {
-                break;
-            }
         }
     }
     diagram

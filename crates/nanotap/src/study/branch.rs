@@ -8,6 +8,7 @@ use nanotap_dynamics::{
     PeriodicOrbit, StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit,
     trace_curve,
 };
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -596,21 +597,28 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
             parameter,
             reason: format!("the {what} is left out, its motion cannot be measured: {error}"),
         };
-        for p in &branch.points {
-            match point(case, options, index, p) {
+        let points: Vec<_> = (branch.points.par_iter())
+            .map(|p| {
+                point(case, options, index, p)
+                    .map_err(|error| unmeasured(p.parameter, "point", &error))
+            })
+            .collect();
+        for point in points {
+            match point {
                 Ok(point) => report.points.push(point),
-                Err(error) => report
-                    .failures
-                    .push(unmeasured(p.parameter, "point", &error)),
+                Err(failure) => report.failures.push(failure),
             }
         }
-        for b in &branch.bifurcations {
-            match bifurcation(case, options, index, b) {
+        let bifurcations: Vec<_> = (branch.bifurcations.par_iter())
+            .map(|b| {
+                bifurcation(case, options, index, b)
+                    .map_err(|error| unmeasured(b.parameter, kind_name(b.kind), &error))
+            })
+            .collect();
+        for bifurcation in bifurcations {
+            match bifurcation {
                 Ok(found) => report.bifurcations.push(found),
-                Err(error) => {
-                    let what = kind_name(b.kind);
-                    report.failures.push(unmeasured(b.parameter, what, &error));
-                }
+                Err(failure) => report.failures.push(failure),
             }
         }
         // What the user stopped is no failure of the branch.

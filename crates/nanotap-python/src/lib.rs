@@ -1,7 +1,7 @@
 //! The Python door: what crosses between Python and the library. No physics and no
 //! numerics here, and nothing that Python itself says better.
 //!
-//! Results cross as the JSON documents of the terminal and as numpy arrays; the package
+//! Results cross as the documents of the terminal's JSON and as numpy arrays; the package
 //! `nanotap` makes typed objects, xarray Datasets and pandas tables of them. Work runs on
 //! a thread of its own while the caller waits outside the interpreter lock
 //! ([`watch`]), so that Ctrl-C is heard and a panic becomes an exception.
@@ -14,6 +14,7 @@
 mod case;
 mod columns;
 mod dataset;
+mod document;
 mod failure;
 mod figure;
 mod map;

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 use crate::case::CaseCore;
 use crate::columns::{Column, Entries, columns, entries};
+use crate::document::{document, python};
 use crate::failure::Failure;
 use crate::study::json;
 use crate::watch::{watched, watched_alone};
@@ -74,7 +75,7 @@ fn rows(
     Ok(values)
 }
 
-/// One run: its report, and its time series or, of fixed steps, its curve. Of the time
+/// One run: its document, and its time series or, of fixed steps, its curve. Of the time
 /// series `series_periods` are taken.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
@@ -82,7 +83,7 @@ pub(crate) fn simulate<'py>(
     case: &CaseCore,
     request: &str,
     series_periods: usize,
-) -> PyResult<(String, Table<'py>)> {
+) -> PyResult<(Bound<'py, PyAny>, Table<'py>)> {
     let studied = case.studied(py)?;
     let request: SimulateRequest = read(json(request)?).map_err(Failure::from)?;
     let done = watched_alone(py, None, move |control| {
@@ -99,29 +100,33 @@ pub(crate) fn simulate<'py>(
                 (names, run.curve.concat())
             }
         };
-        Ok((serde_json::to_string(&report)?, names, values))
+        Ok((document(&report)?, names, values))
     })?;
     let (report, names, values) = done.result;
-    Ok((report, table(py, names, values)?))
+    Ok((python(py, &report)?, table(py, names, values)?))
 }
 
-/// The report on a periodic orbit.
+/// The document of a periodic orbit.
 #[pyfunction]
-pub(crate) fn orbit(py: Python<'_>, case: &CaseCore, request: &str) -> PyResult<String> {
+pub(crate) fn orbit<'py>(
+    py: Python<'py>,
+    case: &CaseCore,
+    request: &str,
+) -> PyResult<Bound<'py, PyAny>> {
     let studied = case.studied(py)?;
     let request: OrbitRequest = read(json(request)?).map_err(Failure::from)?;
     // An orbit of a given period may have to be searched for from starts all over.
     let searched = request.period.is_some() && request.state.is_none();
     let work = move |control: &Control<'_>| {
         let found = OrbitStudy::run(&studied, &request, control)?;
-        Ok(serde_json::to_string(&found)?)
+        document(&found)
     };
     let done = if searched {
         watched(py, None, work)?
     } else {
         watched_alone(py, None, work)?
     };
-    Ok(done.result)
+    python(py, &done.result)
 }
 
 /// The time series of so many periods from a state.

@@ -4,7 +4,7 @@
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,6 +17,9 @@ use crate::failure::Failure;
 
 /// Time between two looks at signals and progress.
 const INTERVAL: Duration = Duration::from_millis(50);
+/// How long a message is looked for before its thread goes to sleep: to be woken takes as long as
+/// many a motion, and the next of many calls mostly comes before.
+const AWAKE: Duration = Duration::from_micros(250);
 /// How long work that was told to stop may take to do so. What does not listen is left
 /// alone to end by itself: it holds nothing of Python's.
 const PATIENCE: Duration = Duration::from_millis(900);
@@ -82,7 +85,7 @@ pub(crate) fn watched_alone<R: Send + 'static>(
         let mut stopped: Option<(Instant, PyErr)> = None;
         let mut told = (0, 0);
         loop {
-            let done = match receiver.recv_timeout(INTERVAL) {
+            let done = match soon(&receiver).map_or_else(|| receiver.recv_timeout(INTERVAL), Ok) {
                 Ok(done) => Some(done),
                 Err(RecvTimeoutError::Timeout) => None,
                 Err(RecvTimeoutError::Disconnected) => {
@@ -154,6 +157,20 @@ fn ended<R>(done: Outcome<R>, stopped: Option<PyErr>) -> PyResult<Watched<R>> {
     }
 }
 
+/// A message that is there already, or comes before a thread that waits would go to sleep. Other
+/// threads go first meanwhile.
+fn soon<T>(messages: &Receiver<T>) -> Option<T> {
+    let since = Instant::now();
+    loop {
+        match messages.try_recv() {
+            Ok(message) => return Some(message),
+            Err(TryRecvError::Disconnected) => return None,
+            Err(TryRecvError::Empty) if since.elapsed() > AWAKE => return None,
+            Err(TryRecvError::Empty) => std::thread::yield_now(),
+        }
+    }
+}
+
 /// Work that ends in the message that it is done.
 type Job = Box<dyn FnOnce() -> Box<dyn FnOnce()> + Send>;
 
@@ -187,7 +204,7 @@ fn elsewhere(job: Job) -> io::Result<()> {
             if !stays {
                 return;
             }
-            match jobs.recv() {
+            match soon(&jobs).map_or_else(|| jobs.recv(), Ok) {
                 Ok(next) => job = next,
                 Err(_) => return,
             }

@@ -66,8 +66,7 @@ def simulate(
         else _arguments.count("series", series)
     )
     _refuse_rows(shown, _arguments.count("resolution", options["resolution"]))
-    text, (names, values) = _nanotap.simulate(case._core, request, shown)
-    document: dict[str, Any] = json.loads(text)
+    document, (names, values) = _nanotap.simulate(case._core, request, shown)
     if options["method"] == "rk4":
         return _fixed_step(case, document, names, values)
     return _run_dataset(case, document, names, values)
@@ -88,7 +87,7 @@ def orbit(
     request = _arguments.request("orbit", options)
     resolution = _arguments.count("resolution", options["resolution"])
     _refuse_rows(1, resolution)
-    document: dict[str, Any] = json.loads(_nanotap.orbit(case._core, request))
+    document = _nanotap.orbit(case._core, request)
     state, period = document["state"], document["period"]
 
     def series() -> "xr.Dataset":

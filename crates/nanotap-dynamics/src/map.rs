@@ -38,6 +38,12 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         0
     }
 
+    /// Whether a period takes so much longer than to wake a thread that the periods of an orbit are
+    /// worth computing side by side.
+    fn is_costly(&self) -> bool {
+        false
+    }
+
     /// Replaces `state` (length `dimension`) by `P(state)`.
     ///
     /// # Errors

@@ -12,8 +12,10 @@ use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
 use crate::orbit::shooting::{
-    LAST_STEP, MOST_SETTINGS, ROUNDING, Segments, ShootingError, set_discrete_entries,
+    LAST_STEP, MOST_SETTINGS, ROUNDING, Segments, ShootingError, ends_to_residuals,
+    set_discrete_entries,
 };
+use crate::orbit::side_by_side::side_by_side;
 use crate::vector::{difference, dot, norm};
 
 /// Newton steps after which a corrector gives up: the caller shortens its step.
@@ -86,7 +88,6 @@ pub(crate) struct BranchSolver<'a, F: MapFamily> {
     derivatives: Vec<f64>,
     jacobians: Vec<DMatrix<f64>>,
     step: Vec<f64>,
-    state: Vec<f64>,
     system: BlockCyclic,
     /// The map at the parameter value last asked for.
     map: Option<(f64, F::Map)>,
@@ -115,7 +116,6 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             derivatives: vec![0.0; n * d],
             jacobians: vec![DMatrix::zeros(d, d); n],
             step: vec![0.0; n * d],
-            state: vec![0.0; d],
             system: BlockCyclic::new(d, n),
             map: None,
         }
@@ -154,26 +154,24 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     }
 
     fn evaluate_points(&mut self, parameter: f64) -> Result<f64, MapFailure> {
-        let (d, n) = (self.d, self.n);
-        let map = Self::map_at(self.family, &mut self.map, parameter)?;
-        for k in 0..n {
-            self.state.copy_from_slice(&self.points[k * d..(k + 1) * d]);
-            self.family
-                .advance_with_derivatives(
-                    parameter,
-                    map,
-                    &mut self.state,
-                    &mut self.jacobians[k],
-                    &mut self.derivatives[k * d..(k + 1) * d],
-                )
-                .map_err(MapFailure::refused)?;
-            finite(&self.state)?;
-            finite(self.jacobians[k].as_slice())?;
-            let next = (k + 1) % n;
-            for i in 0..d {
-                self.residuals[k * d + i] = self.state[i] - self.points[next * d + i];
-            }
-        }
+        let (d, family) = (self.d, self.family);
+        let map = Self::map_at(family, &mut self.map, parameter)?;
+        self.residuals.copy_from_slice(&self.points);
+        let ends = self.residuals.chunks_exact_mut(d);
+        let derivatives = self.derivatives.chunks_exact_mut(d);
+        let mut periods: Vec<_> = ends.zip(derivatives).zip(&mut self.jacobians).collect();
+        side_by_side(
+            map,
+            &mut periods,
+            &|map, ((state, derivative), jacobian)| {
+                family
+                    .advance_with_derivatives(parameter, map, state, jacobian, derivative)
+                    .map_err(MapFailure::refused)?;
+                finite(state)?;
+                finite(jacobian.as_slice())
+            },
+        )?;
+        ends_to_residuals(&mut self.residuals, &self.points, d);
         finite(&self.derivatives)?;
         Ok(norm(&self.residuals))
     }
@@ -395,19 +393,18 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
     /// Every tangency of an orbit, in order of time.
     pub(crate) fn tangencies(&mut self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
         let map = Self::map_at(self.family, &mut self.map, node.parameter)?;
-        let mut found = Vec::new();
-        let mut state = vec![0.0; self.d];
-        let mut one = Vec::new();
-        for k in 0..self.n {
-            state.copy_from_slice(&node.points[k * self.d..(k + 1) * self.d]);
-            one.clear();
-            advance_with_tangencies(map, &mut state, &mut one)?;
-            found.extend(one.iter().map(|t| OrbitTangency {
+        let points = node.points.chunks_exact(self.d);
+        let mut periods: Vec<_> = points.map(|point| (point.to_vec(), Vec::new())).collect();
+        side_by_side(map, &mut periods, &|map, (state, found)| {
+            advance_with_tangencies(map, state, found)
+        })?;
+        let found = periods.iter().enumerate().flat_map(|(k, (_, found))| {
+            found.iter().map(move |t| OrbitTangency {
                 time: k as f64 + t.phase,
                 value: t.value,
-            }));
-        }
-        Ok(found)
+            })
+        });
+        Ok(found.collect())
     }
 
     /// The orbit of a node, with multipliers and error estimate.

@@ -4,6 +4,7 @@ pub(crate) mod block_cyclic;
 pub mod multipliers;
 pub mod search;
 pub mod shooting;
+pub(crate) mod side_by_side;
 
 use nalgebra::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;

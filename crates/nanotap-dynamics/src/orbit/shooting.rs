@@ -22,6 +22,7 @@ use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
 use crate::orbit::multipliers::{MultiplierError, Multipliers};
+use crate::orbit::side_by_side::side_by_side;
 use crate::vector::{distance, mix, norm, sum_of_squares};
 
 /// How hard Newton tries.
@@ -211,6 +212,14 @@ pub(crate) fn set_discrete_entries(
     changed
 }
 
+/// What is missing for the periods that end at `ends` to lead from each of the points to the next.
+pub(crate) fn ends_to_residuals(ends: &mut [f64], points: &[f64], d: usize) {
+    let next = points[d..].iter().chain(&points[..d]);
+    for (end, next) in ends.iter_mut().zip(next) {
+        *end -= next;
+    }
+}
+
 /// The segments of an orbit with their residuals and Jacobians.
 pub(crate) struct Segments {
     pub(crate) d: usize,
@@ -223,7 +232,6 @@ pub(crate) struct Segments {
     pub(crate) scale: f64,
     /// How many of the last entries of a state are whole numbers that the map sets.
     pub(crate) discrete: usize,
-    state: Vec<f64>,
 }
 
 impl Segments {
@@ -236,7 +244,6 @@ impl Segments {
             jacobians: vec![DMatrix::zeros(d, d); n],
             scale: 0.0,
             discrete: 0,
-            state: vec![0.0; d],
         }
     }
 
@@ -264,19 +271,17 @@ impl Segments {
         map: &mut M,
         jacobians: bool,
     ) -> Result<(), MapFailure> {
-        let (d, n) = (self.d, self.n);
-        for k in 0..n {
-            self.state.copy_from_slice(&self.points[k * d..(k + 1) * d]);
+        self.residuals.copy_from_slice(&self.points);
+        let ends = self.residuals.chunks_exact_mut(self.d);
+        let mut periods: Vec<_> = ends.zip(&mut self.jacobians).collect();
+        side_by_side(map, &mut periods, &|map, (state, jacobian)| {
             if jacobians {
-                advance_with_jacobian(map, &mut self.state, &mut self.jacobians[k])?;
+                advance_with_jacobian(map, state, jacobian)
             } else {
-                advance(map, &mut self.state)?;
+                advance(map, state)
             }
-            let next = (k + 1) % n;
-            for i in 0..d {
-                self.residuals[k * d + i] = self.state[i] - self.points[next * d + i];
-            }
-        }
+        })?;
+        ends_to_residuals(&mut self.residuals, &self.points, self.d);
         Ok(())
     }
 

@@ -109,6 +109,11 @@ impl StroboscopicMap for Strobe {
         }
     }
 
+    /// Under a nonlinear force.
+    fn is_costly(&self) -> bool {
+        matches!(self.0, Engine::Nonlinear(_))
+    }
+
     fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance(state)?),

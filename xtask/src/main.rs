@@ -100,6 +100,7 @@ fn usage() -> String {
     for step in BESIDE {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
+    text += "  bench        every bench, and docs/benches.md with what came out\n";
     text += "  book         the documents as a site, in target/book/site (--quick: the paper's report too)\n";
     text += "  peers        nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
     text

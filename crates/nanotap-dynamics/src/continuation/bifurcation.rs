@@ -438,3 +438,92 @@ fn grazings<F: MapFamily>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn real(values: &[f64]) -> Vec<Complex<f64>> {
+        values.iter().map(|v| Complex::new(*v, 0.0)).collect()
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+    }
+
+    /// The sign of Π(1 ∓ μ) with the smallest factor: two factors below zero make a product above
+    /// it, and so does a pair.
+    #[test]
+    fn products_over_real_multipliers() {
+        near(plus_one(&real(&[0.75])), 0.25);
+        near(plus_one(&real(&[3.0, 0.5])), -0.5);
+        near(plus_one(&real(&[4.0, 3.0])), 2.0);
+        near(minus_one(&real(&[-3.0, 0.5])), -1.5);
+        near(minus_one(&real(&[-4.0, -1.5])), 0.5);
+        let pair = [Complex::new(1.5, 2.0), Complex::new(1.5, -2.0)];
+        near(plus_one(&pair), 0.5f64.hypot(2.0));
+    }
+
+    /// Π (μ_i μ_j − 1) over the couples, real ones first.
+    #[test]
+    fn products_over_couples_of_multipliers() {
+        let sign = |values: &[f64]| pair_on_circle(&real(values));
+        assert_eq!(sign(&[2.0]), (1.0, None));
+        near(sign(&[2.0, 1.0]).0, 1.0);
+        near(sign(&[2.0, 0.25]).0, -0.5);
+        // 0.8, −0.4 and −0.88.
+        near(sign(&[3.0, 0.6, 0.2]).0, 0.4);
+        // −0.5, −0.8 and −0.975.
+        near(sign(&[2.0, 0.25, 0.1]).0, -0.5);
+        let (p, q) = (Complex::new(0.6, 0.7), Complex::new(-0.9, 0.6));
+        for pair in [[p, p.conj()], [p.conj(), p]] {
+            let mut values = pair.to_vec();
+            // Beside a real one: two couples that are conjugates of each other.
+            for others in [&[][..], &[0.5], &[-20.0]] {
+                values.truncate(2);
+                values.extend(real(others));
+                let (product, found) = pair_on_circle(&values);
+                near(product, -0.15);
+                let (multiplier, factor) = found.unwrap();
+                assert_eq!(multiplier, p);
+                near(factor, -0.15);
+            }
+        }
+        // The pair nearest the circle is that which is named: |q|² − 1 = 0.17, |p|² − 1 = −0.15,
+        // |2 q|² − 1 = 3.68.
+        let of = |values: [Complex<f64>; 4]| {
+            let (product, found) = pair_on_circle(&values);
+            (product, found.unwrap().0)
+        };
+        let (product, named) = of([q, q.conj(), p, p.conj()]);
+        near(product, -0.15);
+        assert_eq!(named, p);
+        let (product, named) = of([q * 2.0, q.conj() * 2.0, q, q.conj()]);
+        near(product, 0.17);
+        assert_eq!(named, q);
+    }
+
+    /// Times on an orbit of period 2 are compared the short way round.
+    #[test]
+    fn the_short_way_round_an_orbit() {
+        for (a, b, shift) in [
+            (0.25, 0.5, 0.25),
+            (0.5, 0.25, -0.25),
+            (1.75, 0.25, 0.5),
+            (0.25, 1.75, -0.5),
+            (0.0, 1.0, 1.0),
+        ] {
+            assert_eq!(time_shift(a, b, 2.0), shift, "{a} {b}");
+        }
+        let tangency = |time, value| OrbitTangency { time, value };
+        let list = [
+            tangency(0.75, 1.0),
+            tangency(1.75, 3.0),
+            tangency(1.75, -2.0),
+        ];
+        assert_eq!(nearest(&list, tangency(0.0, -4.0), 2.0), Some((2, -0.25)));
+        assert_eq!(nearest(&list, tangency(0.0, 4.0), 2.0), Some((1, -0.25)));
+        assert_eq!(nearest(&list, tangency(0.5, 9.0), 2.0), Some((0, 0.25)));
+        assert_eq!(nearest(&[], tangency(0.5, 9.0), 2.0), None);
+    }
+}

@@ -376,6 +376,76 @@ mod tests {
         assert_eq!(m.determinant_defect, 0.0);
     }
 
+    /// Products that overflow or vanish on the way, with factors that undo it; and one that is
+    /// itself beyond the range, or at its lower end.
+    #[test]
+    fn a_long_product_neither_overflows_nor_vanishes() {
+        let scaled = |power: i32| DMatrix::from_element(1, 1, 2f64.powi(power));
+        for power in [10, -10] {
+            let mut factors = vec![scaled(power); 400];
+            factors.extend(vec![scaled(-power); 400]);
+            let m = Multipliers::of_product(&factors).unwrap();
+            assert_eq!(m.values, [Complex::new(1.0, 0.0)]);
+        }
+        let small = Multipliers::of_product(&[scaled(-530), scaled(-530)]).unwrap();
+        assert_eq!(small.values[0].re, 2f64.powi(-530) * 2f64.powi(-530));
+        let large = Multipliers::of_product(&[scaled(700), scaled(700)]);
+        assert_eq!(large, Err(MultiplierError::NotFinite));
+    }
+
+    /// Factors S_{k+1} D_k S_k⁻¹ with S_n = S_0: the multipliers are the products of the diagonals,
+    /// here from 4²⁰ to 0.003²⁰, of which a plain product keeps the first two.
+    #[test]
+    fn known_multipliers_of_factors_that_share_no_directions() {
+        let (n, diagonal) = (20, [4.0, 1.5, -0.1, 0.003]);
+        let frame = |k: usize| {
+            DMatrix::from_fn(4, 4, |i, j| {
+                let chance = crate::vector::unit((16 * k + 4 * i + j) as u64) - 0.5;
+                chance + if i == j { 2.0 } else { 0.0 }
+            })
+        };
+        let factors: Vec<_> = (0..n)
+            .map(|k| {
+                let inverse = frame(k).try_inverse().unwrap();
+                let d = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&diagonal));
+                frame((k + 1) % n) * d * inverse
+            })
+            .collect();
+        let m = Multipliers::of_product(&factors).unwrap();
+        for (value, d) in m.values.iter().zip(diagonal) {
+            assert!((value.re / f64::powi(d, 20) - 1.0).abs() < 1e-10, "{value}");
+            assert!(value.im.abs() < 1e-10 * value.re);
+        }
+    }
+
+    /// Rounding may part pairs of one modulus; real ones before and after stay where they are.
+    #[test]
+    fn pairs_stand_side_by_side() {
+        let p = Complex::new(0.6, 0.8);
+        let q = Complex::new(0.8, 0.6);
+        let real = |x: f64| Complex::new(x, 0.0);
+        let paired = |values: &[Complex<f64>]| {
+            let mut values = values.to_vec();
+            pair_up(&mut values);
+            values
+        };
+        let both = [p, p.conj(), q, q.conj()];
+        assert_eq!(paired(&[p, q, p.conj(), q.conj()]), both);
+        assert_eq!(paired(&[p.conj(), q.conj(), q, p]), both);
+        let among = [real(2.0), p, p.conj(), q, q.conj(), real(0.1), real(0.05)];
+        let parted = [real(2.0), p.conj(), q, p, q.conj(), real(0.1), real(0.05)];
+        assert_eq!(paired(&parted), among);
+    }
+
+    /// A modulus exactly at the margin is marginal on either side.
+    #[test]
+    fn the_margin_itself_is_marginal() {
+        for modulus in [1.0 + MARGIN, 1.0, 1.0 - MARGIN] {
+            let found = stability_of(&[Complex::new(modulus, 0.0)]);
+            assert_eq!(found, Stability::Marginal, "{modulus}");
+        }
+    }
+
     #[test]
     fn bad_factors_are_refused() {
         assert_eq!(Multipliers::of_product(&[]), Err(MultiplierError::Shape));

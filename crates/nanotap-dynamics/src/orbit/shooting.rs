@@ -553,3 +553,70 @@ impl Segments {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segments(d: usize, jacobians: &[DMatrix<f64>]) -> Segments {
+        let mut segments = Segments::new(d, jacobians.len());
+        segments.jacobians = jacobians.to_vec();
+        segments
+    }
+
+    /// Three points of two numbers and a flag: what the map makes of the flag of one belongs to
+    /// the next, what it makes of the last to the first.
+    #[test]
+    fn flags_go_to_the_point_that_follows() {
+        let mut points = [1.0, 2.0, 0.0, 3.0, 4.0, 1.0, 5.0, 6.0, 0.0];
+        let residuals = [0.5, 0.5, 0.0, 0.5, 0.5, 1.0, 0.5, 0.5, 1.0];
+        assert!(set_discrete_entries(&mut points, &residuals, 3, 2));
+        assert_eq!(points, [1.0, 2.0, 1.0, 3.0, 4.0, 1.0, 5.0, 6.0, 1.0]);
+        let settled = [0.5, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5, 0.5, 0.0];
+        assert!(!set_discrete_entries(&mut points, &settled, 3, 2));
+    }
+
+    /// A scaled rotation stretches every vector alike; a matrix of rank one turns all into one
+    /// direction at the first return and stretches it by its trace at the second.
+    #[test]
+    fn growth_of_known_products() {
+        let turn = |size: f64| DMatrix::from_row_slice(2, 2, &[0.6, -0.8, 0.8, 0.6]) * size;
+        let growth = segments(2, &[turn(3.0), turn(0.5), turn(7.0)]).growth();
+        assert!((growth - 10.5).abs() < 1e-13, "{growth}");
+        let rank_one = DMatrix::from_row_slice(2, 2, &[2.0, 6.0, 1.0, 3.0]);
+        let growth = segments(2, &[rank_one]).growth();
+        assert!((growth - 5.0).abs() < 1e-13, "{growth}");
+        assert_eq!(segments(2, &[turn(0.0), turn(1.0)]).growth(), 0.0);
+    }
+
+    #[test]
+    fn the_multiplier_nearest_one() {
+        let diagonal = DMatrix::from_row_slice(2, 2, &[-1.0, 0.0, 0.0, 0.25]);
+        assert_eq!(segments(2, &[diagonal]).distance_from_one(), 0.75);
+    }
+
+    /// 32 ε (|DP| |x| + |P(x)|), entry by entry.
+    #[test]
+    fn rounding_of_every_entry() {
+        let first = DMatrix::from_row_slice(2, 2, &[1.0, -2.0, 0.5, 4.0]);
+        let second = DMatrix::from_row_slice(2, 2, &[0.0, 8.0, -1.0, 0.25]);
+        let mut two = segments(2, &[first, second]);
+        two.points = vec![3.0, -5.0, 7.0, 11.0];
+        let expected = [13.0 + 7.0, 21.5 + 11.0, 88.0 + 3.0, 9.75 + 5.0];
+        assert_eq!(two.rounding(), expected.map(|e| e * 32.0 * f64::EPSILON));
+    }
+
+    /// x → a x + c: a residual r or a rounding error r moves the fixed point by r/|1 − a|.
+    #[test]
+    fn the_error_is_the_answer_to_residual_and_rounding() {
+        let mut one = segments(1, &[DMatrix::from_element(1, 1, 0.5)]);
+        one.points = vec![2.0];
+        one.scale = 2.0;
+        let rounding = 2.0 * 32.0 * f64::EPSILON * 3.0;
+        assert_eq!(one.error_estimate(), Some(rounding));
+        one.residuals = vec![-1e-3];
+        assert_eq!(one.error_estimate(), Some(2e-3));
+        one.jacobians[0][(0, 0)] = 1.0;
+        assert_eq!(one.error_estimate(), None);
+    }
+}

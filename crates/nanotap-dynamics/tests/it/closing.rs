@@ -1,9 +1,12 @@
 //! Newton, minimal periods, multipliers.
 
 use nanotap_arithmetic::ComplexFunctions as _;
-use nanotap_dynamics::{ShootingError, ShootingOptions, Stability, StroboscopicMap, close_orbit};
+use nanotap_dynamics::{
+    DMatrix, DivergenceReason, PeriodicOrbit, ShootingError, ShootingOptions, Stability,
+    StroboscopicMap, close_orbit,
+};
 
-use crate::systems::{Flagged, Focus, Henon, Logistic, System};
+use crate::systems::{Flagged, Focus, Formula, Henon, Logistic, System};
 
 /// From a guess whose flag is not the orbit's Newton takes it from the map; flags are no part of
 /// distances. Fixed points: μ below 1, μ + 1/50 above.
@@ -124,6 +127,212 @@ fn where_there_is_no_orbit_newton_says_so() {
         error,
         ShootingError::Diverged { .. } | ShootingError::Singular { .. }
     ));
+}
+
+/// x → x + c + x², whose fixed points have met at c = 0: how far beyond it is told by the
+/// multiplier where Newton stalls.
+#[derive(Clone, Debug)]
+struct Saddle(f64);
+
+impl Formula for Saddle {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] + self.0 + x[0] * x[0];
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = 1.0 + 2.0 * x[0];
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = 1.0;
+    }
+}
+
+#[test]
+fn a_stall_beside_a_fold_is_told_from_any_other() {
+    let options = ShootingOptions {
+        residual_tolerance: 1e-15,
+        ..ShootingOptions::default()
+    };
+    let stalled = |c: f64, options: &ShootingOptions| {
+        close_orbit(&mut System(Saddle(c)), &[0.1], 1, options).unwrap_err()
+    };
+    match stalled(1e-12, &options) {
+        ShootingError::Singular {
+            distance, residual, ..
+        } => {
+            assert!(distance < 1e-6, "{distance}");
+            assert!((residual / 1e-12 - 1.0).abs() < 0.1, "{residual}");
+        }
+        other => panic!("{other}"),
+    }
+    let reason = |error: ShootingError| match error {
+        ShootingError::Diverged { reason, .. } => reason,
+        other => panic!("{other}"),
+    };
+    let far = reason(stalled(1e-3, &options));
+    assert_eq!(far, DivergenceReason::NoDescent);
+    let unexplained = ShootingOptions {
+        explains_stalls: false,
+        ..options
+    };
+    let near = reason(stalled(1e-12, &unexplained));
+    assert_eq!(near, DivergenceReason::NoDescent);
+}
+
+/// Where every orbit is shifted by the same amount none closes, and a multiplier is 1.
+#[derive(Clone, Debug)]
+struct Shift;
+
+impl Formula for Shift {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] + 0.125;
+        out[1] = 0.5 * x[1];
+    }
+    fn jacobian(&self, _x: &[f64], out: &mut DMatrix<f64>) {
+        out.copy_from(&DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.5]));
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+    }
+}
+
+#[test]
+fn a_shift_is_singular() {
+    let error = close_orbit(
+        &mut System(Shift),
+        &[0.5, 0.5],
+        1,
+        &ShootingOptions::default(),
+    );
+    let Err(ShootingError::Singular { distance, .. }) = error else {
+        panic!("{error:?}")
+    };
+    assert_eq!(distance, 0.0);
+}
+
+/// x → x − atan x: Newton's full step from beyond 1.3917 leads away from 0 (the well-known
+/// example), a shorter one does not.
+#[derive(Clone, Debug)]
+struct Arctangent;
+
+impl Formula for Arctangent {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] - x[0].atan();
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = 1.0 - 1.0 / (1.0 + x[0] * x[0]);
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = 0.0;
+    }
+}
+
+#[test]
+fn steps_that_lead_away_are_shortened() {
+    for start in [1.5, 5.0, 20.0] {
+        let found = close_orbit(
+            &mut System(Arctangent),
+            &[start],
+            1,
+            &ShootingOptions::default(),
+        );
+        assert!(found.unwrap().states[0][0].abs() < 1e-12);
+    }
+}
+
+/// The fixed point 3/4 of the full logistic map has the multiplier −2.
+#[test]
+fn unstable_orbits_are_left_where_they_are_not_wanted() {
+    let closed = |max_growth: f64| {
+        let options = ShootingOptions {
+            max_growth,
+            ..ShootingOptions::default()
+        };
+        close_orbit(&mut System(Logistic(4.0)), &[0.76], 1, &options)
+    };
+    let Err(ShootingError::Diverged {
+        iterations, reason, ..
+    }) = closed(1.5)
+    else {
+        panic!("closed")
+    };
+    assert_eq!((iterations, reason), (0, DivergenceReason::Unstable));
+    assert!((closed(3.0).unwrap().multipliers[0].re + 2.0).abs() < 1e-14);
+}
+
+/// The Hénon map in other units, each result rounded to 40 bits of them, as of a map that is
+/// integrated to a tolerance.
+#[derive(Clone, Debug)]
+struct Coarse(f64);
+
+impl Formula for Coarse {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let bits = 2f64.powi(40);
+        Henon { a: 0.3, b: 0.3 }.image(&[x[0] / self.0, x[1] / self.0], out);
+        for value in out {
+            *value = self.0 * ((*value * bits).round() / bits);
+        }
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        Henon { a: 0.3, b: 0.3 }.jacobian(&[x[0] / self.0, x[1] / self.0], out);
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+    }
+}
+
+#[test]
+fn the_accuracy_asked_for_is_of_the_orbits_own_size() {
+    let exact = Henon { a: 0.3, b: 0.3 }.fixed_point();
+    for unit in [1e-6, 1.0, 1e6] {
+        for max_iterations in [40, 4] {
+            let options = ShootingOptions {
+                max_iterations,
+                ..ShootingOptions::default()
+            };
+            let guess = [0.9 * unit, 0.3 * unit];
+            let orbit = close_orbit(&mut System(Coarse(unit)), &guess, 1, &options).unwrap();
+            assert!((orbit.states[0][0] / unit - exact[0]).abs() < 1e-11);
+            assert!(orbit.error < 1e-11 * unit);
+        }
+    }
+    let options = ShootingOptions {
+        max_iterations: 1,
+        ..ShootingOptions::default()
+    };
+    let error = close_orbit(&mut System(Coarse(1e6)), &[5e6, 0.0], 1, &options).unwrap_err();
+    let ShootingError::Diverged {
+        iterations, reason, ..
+    } = error
+    else {
+        panic!("{error}")
+    };
+    assert_eq!((iterations, reason), (1, DivergenceReason::TooManySteps));
+}
+
+/// Orbits of period 2 beside each other: the smallest over shifts of the largest distance, and of
+/// equal ones the first.
+#[test]
+fn the_distance_of_orbits_is_over_all_their_states() {
+    let fixed = close_orbit(
+        &mut System(Logistic(2.8)),
+        &[0.6],
+        1,
+        &ShootingOptions::default(),
+    )
+    .unwrap();
+    let orbit = |states: [f64; 2]| PeriodicOrbit {
+        period: 2,
+        states: states.iter().map(|x| vec![*x]).collect(),
+        ..fixed.clone()
+    };
+    assert_eq!(orbit([0.0, 5.0]).distance_to(&orbit([0.0, 1.0])), (0, 4.0));
+    assert_eq!(orbit([0.0, 5.0]).distance_to(&orbit([4.0, 0.5])), (1, 1.0));
+    assert_eq!(orbit([0.0, 1.0]).distance_to(&orbit([0.5, 0.5])), (0, 0.5));
+    assert_eq!(orbit([0.0, 1.0]).distance_to(&fixed), (0, f64::INFINITY));
 }
 
 /// Every point of a rigid rotation by a rational angle is periodic: not isolated.

@@ -74,3 +74,60 @@ pub(crate) fn approaches<M: StroboscopicMap>(
     Ok(highest.windows(2).all(|w| w[1] < w[0])
         && nanotap_arithmetic::ln(highest[3] / highest[0]) <= wanted)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+    use crate::orbit::{ShootingOptions, close_orbit};
+
+    /// x → f(|x|) x on a line, with f'(0) f(0) = 0.999 for the orbit at rest.
+    #[derive(Clone)]
+    struct Line(fn(f64) -> f64);
+
+    impl StroboscopicMap for Line {
+        type Error = Infallible;
+
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+            state[0] *= (self.0)(state[0].abs());
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Infallible> {
+            jacobian[(0, 0)] = (self.0)(state[0].abs());
+            self.advance(state)
+        }
+    }
+
+    fn from_one(factor: fn(f64) -> f64) -> bool {
+        let mut map = Line(factor);
+        let rest = close_orbit(&mut map, &[0.0], 1, &ShootingOptions::default()).unwrap();
+        assert_eq!(rest.spectral_radius(), factor(0.0));
+        approaches(&mut map, &[1.0], &rest).unwrap()
+    }
+
+    /// Beyond 1/2 the distance falls by another factor than at rest: at three fifths of the rate
+    /// that is an approach, at two fifths and less it may be one to something else.
+    #[test]
+    fn an_approach_falls_at_half_the_linear_rate_at_least() {
+        assert!(from_one(|_| 0.999));
+        assert!(from_one(|x| if x > 0.5 { 0.9994 } else { 0.999 }));
+        assert!(!from_one(|x| if x > 0.5 { 0.9996 } else { 0.999 }));
+        assert!(!from_one(|x| if x > 0.5 { 1.0 } else { 0.999 }));
+        assert!(!from_one(|x| if x > 0.5 { 1.5 } else { 0.999 }));
+        assert!(from_one(|_| 0.5));
+    }
+}

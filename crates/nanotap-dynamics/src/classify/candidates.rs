@@ -70,6 +70,25 @@ mod tests {
         assert_eq!(candidate_periods(&strobe, 1, 16)[0].period, 2);
     }
 
+    /// States of two numbers, of which the first alone repeats sooner.
+    #[test]
+    fn every_entry_of_a_state_repeats() {
+        let strobe: Vec<f64> = (0..24u32)
+            .flat_map(|k| [f64::from(k % 2), f64::from(k % 4)])
+            .collect();
+        let found = candidate_periods(&strobe, 2, 8);
+        assert_eq!((found[0].period, found[0].closure), (4, 0.0));
+    }
+
+    /// A period of more than half the sequence is judged on all states that have one before them:
+    /// 1 comes back after 5, but neither 9 nor 4 does.
+    #[test]
+    fn a_long_period_is_judged_on_all_there_is() {
+        let strobe = [9.0, 4.0, 1.0, 30.0, 60.0, 5.0, 7.0, 1.0];
+        let found = candidate_periods(&strobe, 1, 5);
+        assert!(found.iter().all(|c| c.period != 5 || c.closure >= 3.0));
+    }
+
     #[test]
     fn too_short_or_empty_sequences_give_nothing() {
         assert!(candidate_periods(&[], 3, 8).is_empty());

@@ -76,3 +76,93 @@ fn vanishing<F: MapFamily>(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::continuation::solver::tests::{bare, solver};
+    use crate::continuation::{OrbitTangency, step};
+    use crate::orbit::{PeriodicOrbit, Stability};
+
+    fn at(parameter: f64, tangencies: &[(f64, f64)]) -> BranchPoint {
+        BranchPoint {
+            parameter,
+            orbit: PeriodicOrbit {
+                period: 1,
+                states: vec![vec![0.5]],
+                residual: 0.0,
+                error: 0.0,
+                multipliers: Vec::new(),
+                log_determinant: 0.0,
+                stability: Stability::Marginal,
+                discrete: 0,
+            },
+            arclength: 0.0,
+            slope: 1.0,
+            tangencies: tangencies
+                .iter()
+                .map(|&(time, value)| OrbitTangency { time, value })
+                .collect(),
+        }
+    }
+
+    /// Two extrema that fall in proportion to the parameter, and two at one time, of which each
+    /// goes on from that of its own value. A point too near for a rate is passed over.
+    #[test]
+    fn extrema_are_extrapolated_to_zero() {
+        let points = [
+            at(0.1, &[(0.2, 0.4), (0.6, 3.0), (0.6, -1.0)]),
+            at(0.2 - 1e-9, &[(0.2, 7.0), (0.6, 7.0), (0.6, -7.0)]),
+            at(0.2, &[(0.22, 0.3), (0.61, 2.9), (0.61, -0.8)]),
+        ];
+        let found = vanishing(&solver(1), &points);
+        let expected = [(0.5, 0.22, 0.3), (3.1, 0.61, 2.9), (0.6, 0.61, -0.8)];
+        assert_eq!(found.len(), 3);
+        for (f, e) in found.iter().zip(expected) {
+            assert!((f.0 - e.0).abs() < 1e-12, "{f:?} {e:?}");
+            assert_eq!((f.1, f.2), (e.1, e.2));
+        }
+        assert!(vanishing(&solver(1), &points[..1]).is_empty());
+    }
+
+    /// A branch that stops 1e-7 short of where an extremum vanishes has grazed; 1e-5 short it is
+    /// cut.
+    #[test]
+    fn a_branch_that_stops_at_a_touch_has_grazed() {
+        for (short, grazes) in [(1e-7, true), (1e-5, false)] {
+            let mut branch = Branch {
+                period: 1,
+                points: vec![
+                    at(2.0, &[(0.25, 1.0 + short), (0.75, 1.0)]),
+                    at(3.0, &[(0.25, short), (0.75, 1.5)]),
+                ],
+                bifurcations: Vec::new(),
+                end: BranchEnd::RangeEnd,
+            };
+            let node = Node {
+                jacobians: vec![DMatrix::from_element(1, 1, -1.0)],
+                ..bare(3.0, &[2.0 / 3.0])
+            };
+            let end = dead_end(&solver(1), &mut branch, &node, &step::Rejected::Turn);
+            if !grazes {
+                assert!(
+                    matches!(end, BranchEnd::StepTooSmall { parameter, .. } if parameter == 3.0)
+                );
+                assert!(branch.bifurcations.is_empty());
+                continue;
+            }
+            let BranchEnd::Grazing { parameter } = end else {
+                panic!("{end}")
+            };
+            assert!((parameter - 3.0 - short).abs() < 1e-12);
+            let [grazing] = &branch.bifurcations[..] else {
+                panic!()
+            };
+            assert_eq!(grazing.kind, BifurcationKind::Grazing { time: 0.25 });
+            assert!((grazing.uncertainty - short).abs() < 1e-12);
+            assert_eq!(grazing.after_point, 1);
+        }
+    }
+}

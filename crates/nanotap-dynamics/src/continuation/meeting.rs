@@ -44,3 +44,40 @@ pub(crate) fn meeting<F: MapFamily>(
     let ratio = (gap(near) / gap(far)).powi(2);
     (ratio < 0.25).then(|| (near.parameter - ratio * far.parameter) / (1.0 - ratio))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::continuation::solver::tests::{bare, solver};
+
+    /// Both points of the logistic map's orbit of period 2, which is born at r = 3.
+    fn doubled(r: f64) -> Node {
+        let root = ((r + 1.0) * (r - 3.0)).sqrt();
+        bare(r, &[r + 1.0 + root, r + 1.0 - root].map(|x| x / (2.0 * r)))
+    }
+
+    /// The gap is √((r + 1)(r − 3))/r: its square is nearly straight beside r = 3, where it
+    /// vanishes.
+    #[test]
+    fn a_doubled_branch_points_to_where_it_was_born() {
+        let solver = solver(2);
+        for (far, near) in [(3.004, 3.0004), (3.001, 3.0002)] {
+            let met = meeting(&solver, &doubled(far), &doubled(near), 1).unwrap();
+            let curvature: f64 = (far - 3.0) * (near - 3.0);
+            assert!((met - 3.0).abs() < curvature, "{met}");
+        }
+        // Too far from it yet: the gap has hardly shrunk.
+        assert_eq!(meeting(&solver, &doubled(3.04), &doubled(3.02), 1), None);
+    }
+
+    #[test]
+    fn a_gap_that_vanishes_in_one_step_is_a_slip() {
+        let node = |points: &[f64]| bare(3.0, points);
+        let from = node(&[0.1, 0.6, 0.2, 0.9]);
+        let whole = [0.3, 0.5, 0.3 + 1e-5, 0.5];
+        assert_eq!(slipped(&solver(4), &from, &node(&whole)), Some(2));
+        let fixed = [0.3, 0.3 + 1e-5, 0.3, 0.3];
+        assert_eq!(slipped(&solver(4), &from, &node(&fixed)), Some(1));
+        assert_eq!(slipped(&solver(4), &from, &from), None);
+    }
+}

@@ -434,3 +434,91 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         (points / self.state_scale).max((a.1 - b.1).abs() / self.parameter_scale)
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+    use crate::map::StroboscopicMap;
+
+    /// x → r x (1 − x), for the tests of this folder.
+    #[derive(Clone)]
+    pub(crate) struct Logistic(pub(crate) f64);
+
+    impl StroboscopicMap for Logistic {
+        type Error = Infallible;
+
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+            state[0] *= self.0 * (1.0 - state[0]);
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Infallible> {
+            jacobian[(0, 0)] = self.0 * (1.0 - 2.0 * state[0]);
+            self.advance(state)
+        }
+    }
+
+    pub(crate) struct LogisticFamily;
+
+    impl MapFamily for LogisticFamily {
+        type Map = Logistic;
+        type Error = Infallible;
+
+        fn at(&self, parameter: f64) -> Result<Logistic, Infallible> {
+            Ok(Logistic(parameter))
+        }
+
+        fn advance_with_derivatives(
+            &self,
+            _parameter: f64,
+            map: &mut Logistic,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+            derivative: &mut [f64],
+        ) -> Result<(), Infallible> {
+            derivative[0] = state[0] * (1.0 - state[0]);
+            map.advance_with_jacobian(state, jacobian)
+        }
+    }
+
+    /// A solver for orbits of period `n`, in the units of the states and of the parameter.
+    pub(crate) fn solver(n: usize) -> BranchSolver<'static, LogisticFamily> {
+        BranchSolver::new(&LogisticFamily, 1, 1, n, 1.0, 1.0, 1e-10)
+    }
+
+    /// A solution without its derivatives.
+    pub(crate) fn bare(parameter: f64, points: &[f64]) -> Node {
+        Node {
+            parameter,
+            points: points.to_vec(),
+            jacobians: Vec::new(),
+            residual: 0.0,
+            tangent: vec![0.0; points.len()],
+            slope: 0.0,
+            iterations: 0,
+        }
+    }
+
+    /// The largest over points and parameter, each in its unit.
+    #[test]
+    fn separations_are_measured_in_their_units() {
+        let solver = BranchSolver::new(&LogisticFamily, 1, 1, 2, 4.0, 0.25, 1e-10);
+        let (a, b) = ([1.0, 2.0], [3.0, 1.0]);
+        assert_eq!(solver.separation((&a, 0.0), (&b, 0.0)), 0.5);
+        assert_eq!(solver.separation((&a, 0.5), (&b, 0.25)), 1.0);
+    }
+}

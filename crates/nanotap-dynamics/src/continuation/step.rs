@@ -122,3 +122,60 @@ pub(crate) fn angle<F: MapFamily>(solver: &BranchSolver<'_, F>, a: &Node, b: &No
             .clamp(-1.0, 1.0),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::continuation::solver::tests::bare;
+
+    /// An orbit as large as its parameter, taken to zero along its tangent.
+    #[test]
+    fn an_orbit_as_large_as_its_drive_is_a_point_without_it() {
+        let at = |offset: f64| Node {
+            tangent: vec![3.0, -2.0],
+            slope: 0.5,
+            ..bare(0.25, &[1.5 + offset, -1.0])
+        };
+        assert!(is_point_at(&at(0.0), 0.0));
+        assert!(is_point_at(&at(1e-6), 0.0));
+        assert!(!is_point_at(&at(1e-5), 0.0));
+        assert!(!is_point_at(&at(0.0), 0.125));
+        assert!(!is_point_at(&at(0.0), -0.25));
+    }
+
+    #[test]
+    fn a_branch_goes_on_while_its_derivative_does() {
+        let with = |entry: f64| Node {
+            jacobians: vec![DMatrix::from_row_slice(1, 2, &[40.0, entry])],
+            ..bare(0.0, &[0.0])
+        };
+        assert!(goes_on(&with(1.0), &with(4.9)));
+        assert!(!goes_on(&with(1.0), &with(5.1)));
+    }
+
+    /// Only on the way out of the range, within rounding of its end.
+    #[test]
+    fn a_range_ends_where_it_is_left() {
+        let options = ContinuationOptions::over(100.0, 300.0);
+        for (parameter, slope, ends) in [
+            (300.0, 1.0, true),
+            (300.0, -1.0, false),
+            (300.0 - 1e-10, 1.0, true),
+            (300.0 - 3e-10, 1.0, false),
+            (100.0, -1.0, true),
+            (100.0, 1.0, false),
+            (100.0 + 1e-10, -1.0, true),
+            (100.0 + 3e-10, -1.0, false),
+            (300.0, 0.0, false),
+            (100.0, 0.0, false),
+        ] {
+            let node = Node {
+                slope,
+                ..bare(parameter, &[0.0])
+            };
+            assert_eq!(at_range_end(&node, &options), ends, "{parameter} {slope}");
+        }
+    }
+}

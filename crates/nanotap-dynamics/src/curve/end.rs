@@ -146,3 +146,121 @@ fn second_condition(kind: BifurcationKind, orbit: &PeriodicOrbit) -> Option<&'st
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Complex;
+
+    use super::*;
+    use crate::orbit::Stability;
+
+    fn orbit(multipliers: &[(f64, f64)]) -> PeriodicOrbit {
+        PeriodicOrbit {
+            period: 1,
+            states: vec![vec![0.0; multipliers.len()]],
+            residual: 0.0,
+            error: 0.0,
+            multipliers: multipliers
+                .iter()
+                .map(|(re, im)| Complex::new(*re, *im))
+                .collect(),
+            log_determinant: 0.0,
+            stability: Stability::Marginal,
+            discrete: 0,
+        }
+    }
+
+    /// Kuznetsov, "Elements of Applied Bifurcation Theory", tables of bifurcations of maps of
+    /// codimension two: which multipliers lie on the circle together.
+    #[test]
+    fn two_conditions_at_once_have_a_name() {
+        use BifurcationKind::{Crossing, Flip, Fold};
+        let torus = BifurcationKind::NeimarkSacker { angle: 1.0 };
+        let grazing = BifurcationKind::Grazing { time: 0.5 };
+        let one = (1.01, 0.0);
+        let minus = (-1.01, 0.0);
+        let pair = [(0.6, 0.8), (0.6, -0.8)];
+        let inside = [(0.3, 0.4), (0.3, -0.4)];
+        let with = |first: &[(f64, f64)], rest: &[(f64, f64)]| orbit(&[first, rest].concat());
+        for (kind, orbit, what) in [
+            (
+                torus,
+                orbit(&[(0.999, 0.01), (0.999, -0.01)]),
+                Some("1:1 resonance"),
+            ),
+            (
+                torus,
+                orbit(&[(-0.999, 0.01), (-0.999, -0.01)]),
+                Some("1:2 resonance"),
+            ),
+            (torus, orbit(&pair), None),
+            (torus, with(&[one], &pair), None),
+            (torus, with(&[minus], &pair), None),
+            (Fold, orbit(&[one, one]), Some("double fold")),
+            (Crossing, orbit(&[one, one]), Some("double fold")),
+            (Fold, orbit(&[one, minus]), Some("flip")),
+            (Fold, with(&[one], &pair), Some("Neimark–Sacker point")),
+            (Fold, with(&[one], &inside), None),
+            (Fold, orbit(&[one, (0.5, 0.0)]), None),
+            (Fold, with(&[one], &[(1.2, 0.8), (1.2, -0.8)]), None),
+            (Flip, orbit(&[minus, minus]), Some("double flip")),
+            (Flip, orbit(&[minus, one]), Some("fold")),
+            (Flip, with(&[minus], &pair), Some("Neimark–Sacker point")),
+            (Flip, with(&[minus], &inside), None),
+            (grazing, orbit(&[minus]), Some("flip")),
+            (grazing, orbit(&[one]), Some("fold")),
+            (grazing, orbit(&pair), Some("Neimark–Sacker point")),
+            (grazing, orbit(&[(0.9, 0.0), (-0.9, 0.0)]), None),
+        ] {
+            assert_eq!(
+                second_condition(kind, &orbit),
+                what,
+                "{kind:?} {:?}",
+                orbit.multipliers
+            );
+        }
+    }
+
+    /// One touch is a grazing on a curve of folds; on a curve of grazings it takes another.
+    #[test]
+    fn a_touch_ends_a_curve() {
+        let end = |kind, values: &[f64]| {
+            let tangencies: Vec<_> = values
+                .iter()
+                .map(|value| OrbitTangency {
+                    time: 0.5,
+                    value: *value,
+                })
+                .collect();
+            let quiet = orbit(&[(0.5, 0.0)]);
+            CurveEnd::at_last_point(kind, (1.0, 2.0), &quiet, &tangencies, "why".into())
+        };
+        let grazes = CurveEnd::Grazing {
+            first: 1.0,
+            second: 2.0,
+        };
+        let lost = CurveEnd::StepTooSmall {
+            first: 1.0,
+            second: 2.0,
+            reason: "why".into(),
+        };
+        let on_a_grazing = BifurcationKind::Grazing { time: 0.5 };
+        assert_eq!(end(BifurcationKind::Fold, &[-4.0, 3e-3]), grazes);
+        assert_eq!(end(BifurcationKind::Fold, &[-4.0, 5e-3]), lost);
+        assert_eq!(end(BifurcationKind::Fold, &[]), lost);
+        assert_eq!(end(on_a_grazing, &[-4.0, 3e-3]), lost);
+        assert_eq!(end(on_a_grazing, &[-4.0, 3e-3, -3e-3]), grazes);
+        assert_eq!(
+            [&grazes, &lost, &CurveEnd::Window].map(CurveEnd::meets),
+            [Some("grazing"), Some("cut"), None]
+        );
+        assert!(!grazes.is_failure() && lost.is_failure());
+        let codimension = CurveEnd::CodimensionTwo {
+            what: "fold",
+            first: 1.0,
+            second: 2.0,
+        };
+        assert_eq!(codimension.meets(), Some("codimension two"));
+        assert!(!codimension.is_failure());
+    }
+}

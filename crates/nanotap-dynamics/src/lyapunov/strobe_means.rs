@@ -75,3 +75,22 @@ pub(crate) fn sampled(state: &[f64], sample: &mut [f64]) {
 pub(crate) fn agree(difference: f64, error: f64, scale: f64, periods: f64) -> bool {
     difference.abs() <= 6.0 * error + 20.0 * scale / periods
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 10 ± 30 and a constant: the mean state, and deviations of 30 and, for what does not move, a
+    /// millionth of it.
+    #[test]
+    fn means_and_deviations_of_two_states() {
+        let states: Vec<f64> = (0..64)
+            .flat_map(|k| [if k % 2 == 0 { 40.0 } else { -20.0 }, 5.0])
+            .collect();
+        let means = StrobeMeans::of(&states, 2);
+        assert_eq!(means.mean_state(), [10.0, 5.0]);
+        let deviations = means.deviations();
+        assert!((deviations[0] - 30.0).abs() < 1e-12);
+        assert!((deviations[1] - 30e-6).abs() < 1e-12, "{}", deviations[1]);
+    }
+}

@@ -1,10 +1,12 @@
 //! Continuation, bifurcation points and branch switching, against closed forms.
 
+use std::convert::Infallible;
+
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     BifurcationKind, Branch, BranchEnd, ContinuationError, ContinuationOptions, Control, DMatrix,
-    Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability, close_orbit, continue_orbit,
-    switch_at_flip,
+    Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability, StroboscopicMap, Tangency,
+    close_orbit, continue_orbit, switch_at_flip,
 };
 
 use crate::systems::{
@@ -298,6 +300,102 @@ fn a_hard_grazing_is_located() {
         };
         let b = branch(&family, -0.2, &[-0.3], 1, 1.0, (-0.3, 0.3));
         near(&parameters(&b, GRAZING), &[0.0], 1e-9);
+    }
+}
+
+/// x → (x + μ)/2 with the fixed point μ, and extrema of several switching functions along it.
+#[derive(Clone, Debug)]
+struct Watched(f64);
+
+impl StroboscopicMap for Watched {
+    type Error = Infallible;
+
+    fn dimension(&self) -> usize {
+        1
+    }
+
+    fn period(&self) -> f64 {
+        1.0
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+        state[0] = 0.5 * (state[0] + self.0);
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Infallible> {
+        jacobian[(0, 0)] = 0.5;
+        self.advance(state)
+    }
+
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), Infallible> {
+        let x = state[0];
+        let mut extrema = vec![
+            // Its time goes with the parameter.
+            (0.2 + 0.1 * x, x - 0.3),
+            // Two switches at one extremum.
+            (0.45, x - 0.8),
+            (0.45, 3.0),
+            (0.7, 0.5 - x),
+            // Comes round past the strobe at x = 0.4.
+            ((0.9 + 0.25 * x) % 1.0, x - 0.62),
+        ];
+        // A minimum and a maximum are born, both away from zero.
+        if x > 0.66 {
+            extrema.extend([(0.31, 2.0), (0.33, 2.5)]);
+        }
+        extrema.sort_by(|a, b| a.0.total_cmp(&b.0));
+        tangencies.extend(
+            extrema
+                .into_iter()
+                .map(|(phase, value)| Tangency { phase, value }),
+        );
+        self.advance(state)
+    }
+}
+
+struct WatchedFamily;
+
+impl MapFamily for WatchedFamily {
+    type Map = Watched;
+    type Error = Infallible;
+
+    fn at(&self, parameter: f64) -> Result<Watched, Infallible> {
+        Ok(Watched(parameter))
+    }
+
+    fn advance_with_derivatives(
+        &self,
+        _parameter: f64,
+        map: &mut Watched,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivative: &mut [f64],
+    ) -> Result<(), Infallible> {
+        derivative[0] = 0.5;
+        map.advance_with_jacobian(state, jacobian)
+    }
+}
+
+/// Each extremum grazes where its own value vanishes, at its own time, whichever others are near.
+#[test]
+fn extrema_that_move_meet_and_are_born_are_told_apart() {
+    let b = branch(&WatchedFamily, 0.05, &[0.05], 1, 1.0, (0.05, 1.0));
+    near(&parameters(&b, GRAZING), &[0.3, 0.5, 0.62, 0.8], 1e-12);
+    assert_eq!(b.bifurcations.len(), 4);
+    for (found, exact) in b.bifurcations.iter().zip([0.23, 0.7, 0.055, 0.45]) {
+        let BifurcationKind::Grazing { time } = found.kind else {
+            panic!()
+        };
+        assert!((time - exact).abs() < 1e-12, "{time} {exact}");
     }
 }
 

@@ -1,8 +1,12 @@
 //! Lyapunov spectra and Birkhoff averages.
 
-use nanotap_dynamics::{LyapunovOptions, birkhoff_digits, lyapunov_spectrum};
+use std::convert::Infallible;
 
-use crate::systems::{Focus, Henon, Logistic, System, Turning, thrown};
+use nanotap_dynamics::{
+    DMatrix, LyapunovOptions, LyapunovSpectrum, StroboscopicMap, birkhoff_digits, lyapunov_spectrum,
+};
+
+use crate::systems::{Focus, Formula, Henon, Logistic, System, Turning, thrown};
 
 fn fixed(periods: usize) -> LyapunovOptions {
     LyapunovOptions {
@@ -27,6 +31,190 @@ fn the_henon_attractor_has_the_published_spectrum() {
     assert!((s.exponents[0] + s.exponents[1] - 0.3f64.ln()).abs() < 1e-10);
     // 1 + 0.41922/1.62319.
     assert!((s.kaplan_yorke_dimension() - 1.2583).abs() < 2e-3);
+}
+
+/// A map with one Jacobian for all states, whose log|det| is known by other means.
+#[derive(Clone)]
+struct Constant {
+    jacobian: DMatrix<f64>,
+    log_determinant: Option<f64>,
+}
+
+impl StroboscopicMap for Constant {
+    type Error = Infallible;
+
+    fn dimension(&self) -> usize {
+        self.jacobian.nrows()
+    }
+
+    fn period(&self) -> f64 {
+        1.0
+    }
+
+    fn advance(&mut self, _state: &mut [f64]) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        _state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Infallible> {
+        jacobian.copy_from(&self.jacobian);
+        Ok(())
+    }
+
+    fn advance_with_jacobian_and_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<Option<f64>, Infallible> {
+        self.advance_with_jacobian(state, jacobian)?;
+        Ok(self.log_determinant)
+    }
+}
+
+fn exponents_of(entries: &[f64], log_determinant: Option<f64>) -> LyapunovSpectrum {
+    let d = entries.len().isqrt();
+    let mut map = Constant {
+        jacobian: DMatrix::from_row_slice(d, d, entries),
+        log_determinant,
+    };
+    lyapunov_spectrum(&mut map, &mut vec![0.0; d], &fixed(64)).unwrap()
+}
+
+/// (1, 1/2) (1, 1)ᵀ, of rank one, stretches by 3/2: what is left of a determinant of 3/2 e⁻⁶⁰, which
+/// no Jacobian in double precision shows, belongs to the direction that is lost in rounding. One
+/// that is not lost keeps its measured length.
+#[test]
+fn what_a_jacobian_has_lost_the_determinant_gives_back() {
+    let first = 1.5f64.ln();
+    let lost = exponents_of(&[1.0, 1.0, 0.5, 0.5], Some(first - 60.0));
+    assert!((lost.exponents[0] - first).abs() < 1e-13);
+    assert!(
+        (lost.exponents[1] + 60.0).abs() < 1e-12,
+        "{:?}",
+        lost.exponents
+    );
+    assert!((lost.log_determinant - (first - 60.0)).abs() < 1e-12);
+    let seen = exponents_of(&[2.0, 0.0, 0.0, 0.5], Some(-0.25));
+    assert!((seen.exponents[1] + 2f64.ln()).abs() < 1e-13);
+    assert_eq!(seen.log_determinant, -0.25);
+    // Without other means it is the Jacobian's: 3 · 4 − 2 · 1.
+    let own = exponents_of(&[3.0, 2.0, 1.0, 4.0], None);
+    assert!((own.log_determinant - 10f64.ln()).abs() < 1e-13);
+}
+
+/// Directions that are mapped to nothing leave the others theirs.
+#[test]
+fn directions_that_vanish_leave_the_others_theirs() {
+    let s = exponents_of(&[0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0], None);
+    assert!(
+        (s.exponents[0] - 2f64.ln()).abs() < 1e-12,
+        "{:?}",
+        s.exponents
+    );
+    let nothing = f64::MIN_POSITIVE.ln();
+    assert!((s.exponents[1] - nothing).abs() < 1e-9);
+    assert!((s.exponents[2] - nothing).abs() < 1e-9);
+}
+
+/// x → −ρ x: the mean is zero to all digits, the mean square falls by ρ²ᵀ from one stretch of T to
+/// the next, about ρᵀ e^(±…) in the middle of each; in units of the squared spread, 4.
+#[test]
+fn a_slow_spiral_has_no_torus_s_mean_squares() {
+    let mut map = Constant {
+        jacobian: DMatrix::from_element(1, 1, 0.0),
+        log_determinant: None,
+    };
+    // At rest there is nothing to tell: all digits.
+    assert_eq!(birkhoff_digits(&mut map, &mut [3.0], 100).unwrap(), 16.0);
+    let mut spiral = System(Alternating {
+        rho: 0.9999,
+        noise: 0.0,
+        unit: 1.0,
+    });
+    let digits = birkhoff_digits(&mut spiral, &mut [1.0, 0.0], 1000).unwrap();
+    let expected = -((0.9999f64.powi(1000) - 0.9999f64.powi(3000)) / 4.0).log10();
+    assert!((digits - expected).abs() < 0.02, "{digits} {expected}");
+}
+
+/// x → −ρ x beside a number in chaos that is `noise` in size (Ulam's map), both in a unit.
+#[derive(Clone, Debug)]
+struct Alternating {
+    rho: f64,
+    noise: f64,
+    unit: f64,
+}
+
+impl Formula for Alternating {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = -self.rho * x[0];
+        let size = self.noise * self.unit;
+        out[1] = if size == 0.0 {
+            0.0
+        } else {
+            size * (1.0 - 2.0 * (x[1] / size).powi(2))
+        };
+    }
+    fn jacobian(&self, _x: &[f64], out: &mut DMatrix<f64>) {
+        out.fill(0.0);
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+    }
+}
+
+/// A coordinate of a ten-thousand-millionth of the others' motion is rounding, one of a hundredth
+/// is not, in any unit.
+#[test]
+fn what_hardly_moves_has_no_say_in_any_unit() {
+    for unit in [1.0, 1e-6, 1e6] {
+        let digits = |noise: f64| {
+            let mut map = System(Alternating {
+                rho: 1.0,
+                noise,
+                unit,
+            });
+            birkhoff_digits(&mut map, &mut [unit, 0.3 * noise * unit], 1000).unwrap()
+        };
+        assert!(digits(1e-11) > 14.0, "{unit}: {}", digits(1e-11));
+        assert!(digits(1e-2) < 5.0, "{unit}: {}", digits(1e-2));
+    }
+}
+
+/// A turn about a centre far off has the digits of one about the origin, but for those that its
+/// states have lost.
+#[test]
+fn a_mean_far_from_zero_costs_no_digits() {
+    let (s, c) = 2.4f64.sin_cos();
+    let centre = 1e6;
+    let mut x = [centre + 1.0, centre];
+    let mut map = System(Shifted { s, c, centre });
+    assert!(birkhoff_digits(&mut map, &mut x, 2000).unwrap() > 8.0);
+}
+
+#[derive(Clone, Debug)]
+struct Shifted {
+    s: f64,
+    c: f64,
+    centre: f64,
+}
+
+impl Formula for Shifted {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let (u, v) = (x[0] - self.centre, x[1] - self.centre);
+        out[0] = self.centre + self.c * u - self.s * v;
+        out[1] = self.centre + self.s * u + self.c * v;
+    }
+    fn jacobian(&self, _x: &[f64], out: &mut DMatrix<f64>) {
+        out.fill(0.0);
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+    }
 }
 
 #[test]

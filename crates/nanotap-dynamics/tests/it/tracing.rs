@@ -207,6 +207,91 @@ fn a_neimark_sacker_locus() {
     check(&locus, (-0.2, 0.3), |c| 2.0 / (1.0 + c), 1e-11);
 }
 
+/// The trace there is a − 1: both multipliers come to 1 at a = 3, c = −1/3, where the curve ends.
+#[test]
+fn a_neimark_sacker_locus_ends_in_its_resonance() {
+    let plane: Plane<Shifted> = Plane {
+        make: Shifted,
+        second: |_, _, out| {
+            out[0] = 1.0;
+            out[1] = 0.0;
+        },
+    };
+    let family: Family<Shifted> = Family(|a| Shifted(a, 0.0));
+    let point = first_of(
+        &family,
+        1.6,
+        &[0.3, 0.3],
+        Direction::Increasing,
+        (1.4, 2.6),
+        |k| matches!(k, BifurcationKind::NeimarkSacker { .. }),
+    );
+    let options = CurveOptions::over((1.2, 4.0), (-0.6, 0.3));
+    let locus = trace_curve(&plane, &point, 0.0, &options, &Control::default()).unwrap();
+    let resonance = locus.ends.iter().find_map(|end| match end {
+        CurveEnd::CodimensionTwo {
+            what,
+            first,
+            second,
+        } => Some((*what, *first, *second)),
+        _ => None,
+    });
+    let (what, a, c) = resonance.unwrap();
+    assert_eq!(what, "1:1 resonance");
+    assert!(
+        (a - 3.0).abs() < 1e-2 && (c + 1.0 / 3.0).abs() < 1e-2,
+        "{a} {c}"
+    );
+    assert!(locus.ends.contains(&CurveEnd::Window));
+}
+
+/// x → x + (1 − a² − b² − (x − 2)²)/4: the fixed points meet on the circle a² + b² = 1.
+#[derive(Clone, Debug)]
+struct Sphere(f64, f64);
+
+impl Formula for Sphere {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let rest = 1.0 - self.0 * self.0 - self.1 * self.1;
+        out[0] = x[0] + 0.25 * (rest - (x[0] - 2.0).powi(2));
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = 1.0 - 0.5 * (x[0] - 2.0);
+    }
+    fn derivative(&self, _x: &[f64], out: &mut [f64]) {
+        out[0] = -0.5 * self.0;
+    }
+}
+
+#[test]
+fn a_closed_curve_of_folds_closes() {
+    let plane: Plane<Sphere> = Plane {
+        make: Sphere,
+        second: |map, _, out| out[0] = -0.5 * map.1,
+    };
+    let family: Family<Sphere> = Family(|a| Sphere(a, 0.25));
+    let fold = first_of(
+        &family,
+        0.1,
+        &[2.9],
+        Direction::Increasing,
+        (-2.0, 2.0),
+        |k| *k == BifurcationKind::Fold,
+    );
+    let options = CurveOptions::over((-2.0, 2.0), (-3.0, 3.0));
+    let locus = trace_curve(&plane, &fold, 0.25, &options, &Control::default()).unwrap();
+    assert_eq!(locus.ends, [CurveEnd::Closed, CurveEnd::Closed]);
+    let mut turned: f64 = 0.0;
+    for pair in locus.points.windows(2) {
+        let (p, q) = (&pair[0], &pair[1]);
+        assert!((q.first.hypot(q.second) - 1.0).abs() < 1e-11);
+        turned += (p.first * q.second - q.first * p.second).asin();
+    }
+    // Once round each way, and up to a step beyond.
+    let rounds = turned.abs() / std::f64::consts::TAU;
+    assert!((1.9..2.2).contains(&rounds), "{rounds}");
+}
+
 #[test]
 fn boxes_that_do_not_hold_the_start_are_refused() {
     let family: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
@@ -225,6 +310,23 @@ fn boxes_that_do_not_hold_the_start_are_refused() {
     ] {
         let options = CurveOptions::over(first, second);
         assert!(trace_curve(&HENON, &flip, 0.3, &options, &Control::default()).is_err());
+    }
+    let good = CurveOptions::over((0.0, 1.0), (0.0, 1.0));
+    let with = |min_step, initial_step, max_step| CurveOptions {
+        min_step,
+        initial_step,
+        max_step,
+        ..good.clone()
+    };
+    for bad in [
+        CurveOptions::over((0.0, f64::INFINITY), (0.0, 1.0)),
+        with(0.0, 1e-3, 1e-2),
+        with(1e-2, 1e-3, 1e-2),
+        with(1e-8, 1e-1, 1e-2),
+        with(1e-8, 1e-3, f64::INFINITY),
+        with(f64::NAN, 1e-3, 1e-2),
+    ] {
+        assert!(trace_curve(&HENON, &flip, 0.3, &bad, &Control::default()).is_err());
     }
 }
 

@@ -40,3 +40,17 @@ pub(crate) fn mix(mut z: u64) -> u64 {
 pub(crate) fn unit(z: u64) -> f64 {
     (mix(z) >> 11) as f64 * 2f64.powi(-53)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first numbers of splitmix64 from 0 and 1234567, as its authors' C code gives them
+    /// (<https://prng.di.unimi.it/splitmix64.c>).
+    #[test]
+    fn mixing_is_splitmix64() {
+        assert_eq!(mix(0), 0xe220_a839_7b1d_cdaf);
+        assert_eq!(mix(0x9e37_79b9_7f4a_7c15), 0x6e78_9e6a_a1b9_65f4);
+        assert_eq!(mix(1_234_567), 6_457_827_717_110_365_317);
+    }
+}

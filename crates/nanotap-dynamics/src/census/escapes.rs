@@ -90,3 +90,43 @@ impl Escapes {
         (observed as f64 - from).max(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn escapes(escaped: &[usize], unescaped: &[usize]) -> Escapes {
+        Escapes {
+            after: 64.0,
+            escaped: escaped.iter().copied().enumerate().collect(),
+            unescaped: unescaped.to_vec(),
+        }
+    }
+
+    #[test]
+    fn three_relaxations_pass_and_64_periods_at_least() {
+        assert_eq!(Escapes::after(10.0), 64.0);
+        assert_eq!(Escapes::after(100.0), 300.0);
+    }
+
+    /// From 64 to the shortest watch that counts, 164, a quarter is 25 periods.
+    #[test]
+    fn the_first_quarter_of_what_all_were_watched_for() {
+        assert_eq!(escapes(&[], &[164, 464, 30]).early(), 89.0);
+        assert_eq!(escapes(&[], &[30]).early(), 64.0);
+        assert_eq!(escapes(&[70], &[164]).exposure_without_escape(189), 100.0);
+        assert_eq!(escapes(&[], &[164]).exposure_without_escape(189), 125.0);
+    }
+
+    /// A quarter of 10,000 periods was watched when the last start escaped. At the rate of n starts
+    /// in those 2500 periods 3 n more are expected in the 7500 since, and none of them comes with
+    /// probability e^(−3n): above 1 % for one, below for two.
+    #[test]
+    fn escapes_that_stop_early_are_weighed() {
+        assert!(!escapes(&[], &[30]).chaos_lasts());
+        assert!(escapes(&[], &[65]).chaos_lasts());
+        assert!(!escapes(&[70], &[10_064]).chaos_lasts());
+        assert!(escapes(&[70, 75], &[10_064]).chaos_lasts());
+        assert!(!escapes(&[70, 75, 2600], &[10_064]).chaos_lasts());
+    }
+}

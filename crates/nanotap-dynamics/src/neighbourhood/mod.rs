@@ -285,3 +285,132 @@ fn sample_direction(sample: usize, direction: &mut [f64]) {
         *v /= length;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+    use crate::orbit::{ShootingOptions, close_orbit};
+
+    /// x → r x (1 − x), or every state where it is.
+    #[derive(Clone)]
+    enum Line {
+        Logistic(f64),
+        Still,
+    }
+
+    impl StroboscopicMap for Line {
+        type Error = Infallible;
+
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+            if let Self::Logistic(r) = self {
+                state[0] *= *r * (1.0 - state[0]);
+            }
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Infallible> {
+            jacobian[(0, 0)] = match self {
+                Self::Logistic(r) => *r * (1.0 - 2.0 * state[0]),
+                Self::Still => 1.0,
+            };
+            self.advance(state)
+        }
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
+
+    /// The orbit of period 2 at r = 3.2 has the multiplier 4 + 2 r − r² = 0.16: 0.4 per period. The
+    /// norm's rate is half way from there to 1, the ball's half way from the norm's.
+    #[test]
+    fn a_ball_tells_its_times_from_its_multiplier() {
+        let mut map = Line::Logistic(3.2);
+        let orbit = close_orbit(&mut map, &[0.5], 2, &ShootingOptions::default()).unwrap();
+        let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        assert_eq!(ball.period(), 2);
+        near(ball.rate(), 0.79);
+        let centre = orbit.states[0][0];
+        let half = ball.extents()[0];
+        assert!(ball.contains(&[centre + 0.999 * half]) && ball.contains(&[centre - 0.999 * half]));
+        assert!(!ball.contains(&[centre + 1.001 * half]));
+        // In one dimension the norm is the distance in some unit.
+        near(
+            ball.radius() / ball.norm.distance(&[centre + half], &[centre]),
+            1.0,
+        );
+        let per_period = -0.4f64.ln();
+        near(
+            ball.periods_away(&[centre + 16.0 * half]),
+            16f64.ln() / per_period,
+        );
+        assert_eq!(ball.periods_away(&[centre + 0.5 * half]), 0.0);
+        near(ball.expected_entry(&[16.0 * half]), 16f64.ln() / per_period);
+        assert_eq!(ball.expected_entry(&[0.5 * half]), 0.0);
+        near(
+            ball.relaxation(&[16.0 * half]),
+            -2.0 * 16f64.ln() / 0.79f64.ln(),
+        );
+    }
+
+    /// What stays where it is does not come nearer; at the orbit itself nothing can.
+    #[test]
+    fn a_ball_holds_what_comes_nearer() {
+        let mut map = Line::Logistic(3.2);
+        let orbit = close_orbit(&mut map, &[0.5], 2, &ShootingOptions::default()).unwrap();
+        let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let (centre, half) = (orbit.states[0][0], ball.extents()[0]);
+        let mut scratch = [0.0];
+        let mut holds = |map: &mut Line, x: f64| ball.holds(map, &[x], &mut scratch).unwrap();
+        assert!(holds(&mut map, centre + 0.9 * half));
+        assert!(!holds(&mut map, centre + 1.1 * half));
+        assert!(!holds(&mut Line::Still, centre + 0.9 * half));
+        assert!(!holds(&mut Line::Still, centre + 1e-3 * half));
+        assert!(holds(&mut Line::Still, centre));
+    }
+
+    /// The axes both ways, then unit vectors that favour no side.
+    #[test]
+    fn directions_are_spread_over_the_sphere() {
+        let mut direction = [0.0; 3];
+        for axis in 0..3 {
+            for (k, sign) in [1.0, -1.0].into_iter().enumerate() {
+                sample_direction(2 * axis + k, &mut direction);
+                let mut expected = [0.0; 3];
+                expected[axis] = sign;
+                assert_eq!(direction, expected);
+            }
+        }
+        let count = 2000;
+        let (mut mean, mut square) = ([0.0; 3], [0.0; 3]);
+        for sample in 6..6 + count {
+            sample_direction(sample, &mut direction);
+            let length: f64 = direction.iter().map(|x| x * x).sum();
+            assert!((length - 1.0).abs() < 1e-14);
+            for i in 0..3 {
+                mean[i] += direction[i] / count as f64;
+                square[i] += direction[i] * direction[i] / count as f64;
+            }
+        }
+        // Means 0 ± 0.013, mean squares 1/3 ± 0.007 (one standard error).
+        assert!(mean.iter().all(|m| m.abs() < 0.06), "{mean:?}");
+        assert!(
+            square.iter().all(|s| (s - 1.0 / 3.0).abs() < 0.03),
+            "{square:?}"
+        );
+    }
+}

@@ -302,6 +302,33 @@ fn every_orbit_of_the_full_logistic_map_is_found() {
     }
 }
 
+/// Newton that may take three steps closes nothing from afar, but from where a chaotic run nearly
+/// repeats: the fixed point in the Hénon attractor.
+#[test]
+fn orbits_are_found_where_a_run_nearly_repeats() {
+    let henon = Henon { a: 1.4, b: 0.3 };
+    let found = |run: usize, bound: f64| {
+        let search = OrbitSearch {
+            max_period: 1,
+            run,
+            bound,
+            shooting: ShootingOptions {
+                max_iterations: 3,
+                ..ShootingOptions::default()
+            },
+        };
+        let start = vec![vec![0.1, 0.1]];
+        find_orbits(&System(henon.clone()), &start, &search, &Control::default())
+    };
+    assert!(found(0, 1e8).is_empty());
+    assert!(found(20_000, 1.0).is_empty());
+    let orbits = found(20_000, 1e8);
+    let fixed = &orbits[0];
+    assert_eq!(fixed.period, 1);
+    assert!((fixed.states[0][0] - henon.fixed_point()[0]).abs() < 1e-9);
+    assert_eq!(orbits.len(), 1);
+}
+
 /// The ball of the cubic map at x* = √(r−1) contracts where |f'| < 1, that is for
 /// x² > (r−1)/3 and x² < (r+1)/3; no larger ball may pass.
 #[test]

@@ -4,7 +4,7 @@ use nanotap_dynamics::{
     BasinOptions, Basins, CensusOptions, Control, Label, Slice, SliceAxis, StartBox, census,
 };
 
-use crate::systems::{Cubic, Formula, Henon, System};
+use crate::systems::{ChaosBesideRest, Cubic, Formula, Henon, System};
 use nanotap_dynamics::DMatrix;
 
 /// Two uncoupled cubic maps: four attractors in the four quadrants.
@@ -110,6 +110,50 @@ fn chaotic_attractors_are_labelled_by_their_box() {
     // The middle of the picture is in the attractor's basin, a far corner is not.
     assert_eq!(labels[10 * 21 + 10], Label::Attractor(0));
     assert_eq!(labels[0], Label::Unbounded);
+}
+
+/// What rests beside a chaotic attractor is not in the box of its states, whose sides along the
+/// resting coordinate have no length.
+#[test]
+fn what_is_beside_a_chaotic_attractor_is_not_in_its_box() {
+    let map = System(ChaosBesideRest);
+    let starts = vec![vec![0.1, -1.0]];
+    let found = census(
+        &map,
+        &starts,
+        &CensusOptions::default(),
+        &Control::default(),
+    );
+    let slice = Slice::new(vec![0.0, 0.0], axis(0, -0.9, 0.9, 4), axis(1, -1.0, 1.0, 2)).unwrap();
+    let options = BasinOptions {
+        max_periods: 500,
+        ..BasinOptions::default()
+    };
+    let basins = Basins::new(&map, slice, &found.attractors, options).unwrap();
+    let labels = basins.chunk(&mut map.clone(), 0..8);
+    assert_eq!(labels[..4], [Label::Attractor(0); 4]);
+    assert_eq!(labels[4..], [Label::Unsettled; 4]);
+}
+
+/// Row by row, the first axis fastest.
+#[test]
+fn a_slice_counts_its_points_row_by_row() {
+    let slice = Slice::new(
+        vec![7.0, 7.0, 7.0],
+        axis(2, 0.0, 1.0, 3),
+        axis(0, 10.0, 40.0, 4),
+    )
+    .unwrap();
+    assert_eq!(slice.len(), 12);
+    assert!(!slice.is_empty());
+    let state = |index: usize| {
+        let mut out = [0.0; 3];
+        slice.state(index, &mut out);
+        out
+    };
+    assert_eq!(state(1), [10.0, 7.0, 0.5]);
+    assert_eq!(state(5), [20.0, 7.0, 1.0]);
+    assert_eq!(state(9), [40.0, 7.0, 0.0]);
 }
 
 #[test]

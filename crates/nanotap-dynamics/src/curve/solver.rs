@@ -10,6 +10,9 @@ use crate::orbit::Multipliers;
 use crate::orbit::shooting::{MOST_SETTINGS, Segments, set_discrete_entries};
 use crate::vector::{distance, norm, unit};
 
+/// Part of the unit in which its branch was followed up to which an orbit has no size of its own.
+const NO_SIZE: f64 = 1e-6;
+
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.
 #[derive(Clone, Debug)]
 pub(super) struct CurveNode {
@@ -65,7 +68,12 @@ pub(super) struct CurveSolver<'a, F> {
 impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     pub(super) fn new(family: &'a F, point: &Bifurcation, options: &CurveOptions) -> Self {
         let d = point.orbit.dimension();
-        let size = point.orbit.scale();
+        let mut size = point.orbit.scale();
+        // An orbit at the origin has no size: that by which it moves along its branch is its unit.
+        let moved = norm(&point.node.tangent);
+        if size <= NO_SIZE * moved {
+            size = moved;
+        }
         let mut scales = vec![if size > 0.0 { size } else { 1.0 }; d];
         scales.push(options.first.1 - options.first.0);
         scales.push(options.second.1 - options.second.0);

@@ -245,35 +245,54 @@ fn a_neimark_sacker_locus_ends_in_its_resonance() {
     assert!(locus.ends.contains(&CurveEnd::Window));
 }
 
-/// x → x + (1 − a² − b² − (x − 2)²)/4: the fixed points meet on the circle a² + b² = 1.
+/// x → x + (1 − a² − b² − (x − c)²)/4: the fixed points meet at c on the circle a² + b² = 1.
 #[derive(Clone, Debug)]
-struct Sphere(f64, f64);
+struct Sphere {
+    a: f64,
+    b: f64,
+    c: f64,
+}
 
 impl Formula for Sphere {
     const DIMENSION: usize = 1;
     fn image(&self, x: &[f64], out: &mut [f64]) {
-        let rest = 1.0 - self.0 * self.0 - self.1 * self.1;
-        out[0] = x[0] + 0.25 * (rest - (x[0] - 2.0).powi(2));
+        let rest = 1.0 - self.a * self.a - self.b * self.b;
+        out[0] = x[0] + 0.25 * (rest - (x[0] - self.c).powi(2));
     }
     fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
-        out[(0, 0)] = 1.0 - 0.5 * (x[0] - 2.0);
+        out[(0, 0)] = 1.0 - 0.5 * (x[0] - self.c);
     }
     fn derivative(&self, _x: &[f64], out: &mut [f64]) {
-        out[0] = -0.5 * self.0;
+        out[0] = -0.5 * self.a;
     }
 }
 
+/// Once round each way, wherever the orbits are; at the origin they have no size of their own.
 #[test]
 fn a_closed_curve_of_folds_closes() {
+    type Make = fn(f64, f64) -> Sphere;
+    let at_two: (Make, fn(f64) -> Sphere) = (
+        |a, b| Sphere { a, b, c: 2.0 },
+        |a| Sphere { a, b: 0.25, c: 2.0 },
+    );
+    let at_origin: (Make, fn(f64) -> Sphere) = (
+        |a, b| Sphere { a, b, c: 0.0 },
+        |a| Sphere { a, b: 0.25, c: 0.0 },
+    );
+    for ((make, line), c) in [(at_two, 2.0), (at_origin, 0.0)] {
+        goes_round(make, line, c);
+    }
+}
+
+fn goes_round(make: fn(f64, f64) -> Sphere, line: fn(f64) -> Sphere, c: f64) {
     let plane: Plane<Sphere> = Plane {
-        make: Sphere,
-        second: |map, _, out| out[0] = -0.5 * map.1,
+        make,
+        second: |map, _, out| out[0] = -0.5 * map.b,
     };
-    let family: Family<Sphere> = Family(|a| Sphere(a, 0.25));
     let fold = first_of(
-        &family,
+        &Family(line),
         0.1,
-        &[2.9],
+        &[c + 0.9],
         Direction::Increasing,
         (-2.0, 2.0),
         |k| *k == BifurcationKind::Fold,
@@ -287,7 +306,7 @@ fn a_closed_curve_of_folds_closes() {
         assert!((q.first.hypot(q.second) - 1.0).abs() < 1e-11);
         turned += (p.first * q.second - q.first * p.second).asin();
     }
-    // Once round each way, and up to a step beyond.
+    // Up to a step beyond on either way.
     let rounds = turned.abs() / std::f64::consts::TAU;
     assert!((1.9..2.2).contains(&rounds), "{rounds}");
 }

@@ -198,6 +198,21 @@ mod tests {
         }
     }
 
+    /// States given before do not change what is drawn, and every size has draws of its own.
+    #[test]
+    fn given_states_leave_the_draws_as_they_are() {
+        let drawn = StartSet::spread(&square(), &[0.0, 0.0], &[1.0, 1.0, 1.0], 0).unwrap();
+        assert_eq!(drawn.seed(), 0);
+        assert!(!drawn.is_empty());
+        let more = drawn.clone().with_given([vec![9.0, 9.0], vec![8.0, 8.0]]);
+        let starts: Vec<_> = (0..30).map(|k| drawn.start(k).unwrap()).collect();
+        for (k, start) in starts.iter().enumerate() {
+            assert_eq!(more.start(k + 2).as_ref(), Some(start));
+            assert!(!starts[..k].contains(start));
+        }
+        assert_eq!(StartSet::drawn(square(), 3).seed(), 3);
+    }
+
     #[test]
     fn given_states_end() {
         let set = StartSet::given(vec![vec![1.0], vec![2.0]]);

@@ -10,7 +10,8 @@ use nanotap_dynamics::{
 use rayon::ThreadPoolBuilder;
 
 use crate::systems::{
-    ChaosBesideRest, Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System, TwoShells,
+    ChaosBesideRest, Cubic, Focus, Formula, Henon, Logistic, Nested, OpenTent, System, Turning,
+    TwoShells,
 };
 
 fn starts(low: &[f64], high: &[f64], count: usize) -> Vec<Vec<f64>> {
@@ -300,6 +301,24 @@ fn every_orbit_of_the_full_logistic_map_is_found() {
         };
         assert!((orbit.spectral_radius() / expected - 1.0).abs() < 1e-9);
     }
+}
+
+/// One invariant circle is one attractor, from wherever it is come to.
+#[test]
+fn a_torus_is_counted_once() {
+    let result = taken(
+        Turning {
+            angle: 2.4,
+            gain: 0.2,
+        },
+        &starts(&[-1.2, -1.2], &[1.2, 1.2], 12),
+        &CensusOptions::default(),
+    );
+    assert_eq!(result.attractors.len(), 1);
+    assert!(matches!(
+        result.attractors[0].kind,
+        AttractorKind::QuasiPeriodic(_)
+    ));
 }
 
 /// Newton that may take three steps closes nothing from afar, but from where a chaotic run nearly

@@ -92,6 +92,20 @@ fn a_window_keeps_its_period() {
     }
 }
 
+/// Three columns of two rows: 0 1 2 above 3 4 5.
+#[test]
+fn values_beside_a_value_of_a_grid() {
+    let beside = grid_neighbours(&[3, 2]);
+    let found: Vec<_> = (0..6).map(beside).collect();
+    let exact: [&[usize]; 6] = [&[1, 3], &[0, 2, 4], &[1, 5], &[4, 0], &[3, 5, 1], &[4, 2]];
+    assert_eq!(found, exact);
+    let along = grid_neighbours(&[3]);
+    assert_eq!(
+        (0..3).map(along).collect::<Vec<_>>(),
+        [vec![1], vec![0, 2], vec![1]]
+    );
+}
+
 /// Small motions known at one corner of a plane are known all over it.
 #[test]
 fn a_plane_fills_from_one_corner() {
@@ -119,6 +133,7 @@ fn a_plane_fills_from_one_corner() {
         )
     };
     let one = filled();
+    assert_eq!(one.len(), 30);
     for (k, value) in one.iter().enumerate() {
         let (r, s) = (first[k % 6], second[k / 6]);
         let points = fixed_points(value);

@@ -9,7 +9,7 @@ use nanotap_dynamics::{
     trace_curve,
 };
 
-use crate::systems::{Family, Formula, Grazing, Henon, Logistic, System};
+use crate::systems::{Cubic, Family, Formula, Grazing, Henon, Logistic, System};
 
 /// A family in two parameters with its second derivative.
 struct Plane<F> {
@@ -396,5 +396,35 @@ fn the_logistic_diagram_assembles_from_one_attractor() {
     assert_eq!(flips.len(), known.len(), "{flips:?}");
     for (f, k) in flips.iter().zip(known) {
         assert!((f - k).abs() < 2e-10, "{f} {k}");
+    }
+}
+
+/// The two fixed points ±√(r − 1) of the cubic map are mirror images with one multiplier 3 − 2r, and
+/// branches of their own; one that is given twice is followed once.
+#[test]
+fn mirror_images_are_branches_of_their_own() {
+    let family: Family<Cubic> = Family(Cubic);
+    let seed = |x: f64| {
+        let mut map = family.at(1.5).unwrap();
+        let orbit = close_orbit(&mut map, &[x], 1, &ShootingOptions::default()).unwrap();
+        (1.5, orbit)
+    };
+    let options = DiagramOptions {
+        continuation: ContinuationOptions::over(1.2, 1.9),
+        doublings: 0,
+        max_branches: 100,
+    };
+    let seeds = [seed(0.7), seed(-0.7), seed(0.7)];
+    let diagram = assemble_diagram(&family, &seeds, &options, &Control::default());
+    let mut ends: Vec<f64> = diagram
+        .branches
+        .iter()
+        .map(|b| b.branch.points.last().unwrap().orbit.states[0][0])
+        .collect();
+    ends.sort_by(f64::total_cmp);
+    let exact = [-0.9f64.sqrt(), -0.2f64.sqrt(), 0.2f64.sqrt(), 0.9f64.sqrt()];
+    assert_eq!(ends.len(), 4, "{ends:?}");
+    for (end, exact) in ends.iter().zip(exact) {
+        assert!((end - exact).abs() < 1e-12, "{end} {exact}");
     }
 }

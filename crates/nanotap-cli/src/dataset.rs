@@ -96,7 +96,7 @@ impl DatasetArguments {
                 store.chunks()
             ));
         }
-        let done = progress::watched(output, noun, |control| {
+        let done = progress::watched(noun, |control| {
             let work = Work {
                 share: self.chunk,
                 threads,

@@ -25,14 +25,11 @@ impl Deref for GivenCase {
 }
 
 /// The case at its setpoint and how that was solved, if it leaves the distance to one.
-pub(crate) fn at_setpoint(
-    case: Case,
-    output: &Output,
-) -> Result<(Case, Option<SetpointReport>), Failure> {
+pub(crate) fn at_setpoint(case: Case) -> Result<(Case, Option<SetpointReport>), Failure> {
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    Ok(progress::watched(output, "distances", |control| {
+    Ok(progress::watched("distances", |control| {
         setpoint::at_setpoint(case, control)
     })??)
 }
@@ -41,7 +38,7 @@ impl GivenCase {
     /// The case of the arguments. What puts a physical case in doubt is said, and what of its file
     /// does not count; its other notes are `nanotap case`'s.
     pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
-        let (case, setpoint) = at_setpoint(command::case_of(arguments)?, output)?;
+        let (case, setpoint) = at_setpoint(command::case_of(arguments)?)?;
         if let Some(setpoint) = &setpoint {
             output.note(&setpoint.remark().text);
         }

@@ -4,6 +4,7 @@
 
 mod arguments;
 mod command;
+mod command_line;
 mod dataset;
 mod failure;
 mod file;
@@ -23,7 +24,7 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 
-use arguments::Arguments;
+use command_line::Arguments;
 use output::Output;
 
 fn main() -> ExitCode {
@@ -32,7 +33,9 @@ fn main() -> ExitCode {
     if arguments.force {
         file::force();
     }
-    progress::begin(&output);
+    if !output.is_quiet() {
+        progress::begin();
+    }
     let result = command::run(&arguments.command, &output);
     progress::end();
     match result {

@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use nanotap::control::Control;
 
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Whether somebody pressed Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -45,8 +44,8 @@ struct Counted {
 }
 
 /// From now on a line says that the program works, and how far it is, until [`end`].
-pub(crate) fn begin(output: &Output) {
-    if output.is_quiet() || !std::io::stderr().is_terminal() {
+pub(crate) fn begin() {
+    if !std::io::stderr().is_terminal() {
         return;
     }
     line().ended = false;
@@ -74,7 +73,6 @@ pub(crate) fn end() {
 /// Does `work` with a control that counts on the line and stops at Ctrl-C; a second Ctrl-C ends
 /// the program at once. `noun` is what is counted.
 pub(crate) fn watched<R>(
-    _output: &Output,
     noun: &'static str,
     work: impl FnOnce(&Control<'_>) -> R,
 ) -> Result<R, Failure> {

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use crate::App;
 use crate::answer::Refusal;
-use crate::motion::{Start, model_of};
+use crate::asked::{Start, model_of};
 use crate::preset::Wanted;
 
 /// Longest period of the unstable orbits that are looked for.

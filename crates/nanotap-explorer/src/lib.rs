@@ -15,9 +15,11 @@
 )]
 
 mod answer;
+mod asked;
 mod assets;
 mod census;
 mod clicks;
+mod commands;
 mod export;
 mod figures;
 mod film;

@@ -27,11 +27,11 @@ use serde_json::{Map, Value, json};
 
 use crate::App;
 use crate::answer::Refusal;
+use crate::asked::{Start, model_of};
 use crate::clicks::{self, Axis, Height};
-use crate::export::{study_command, study_python};
+use crate::commands::{study_command, study_python};
 use crate::figures::drawn;
 use crate::maps::{self, Shows};
-use crate::motion::{Start, model_of};
 use crate::preset::Wanted;
 use crate::scratch::Scratch;
 

@@ -2,7 +2,7 @@
 
 use crate::colour::Colour;
 use crate::raster::{EMBEDDED_DPI, Raster, shaded};
-use crate::scene::{Path, Point, Rect, Segment, Stroke};
+use crate::shape::{Path, Point, Rect, Segment, Stroke};
 
 /// Equal dots on the page, mm.
 #[derive(Debug, Clone)]

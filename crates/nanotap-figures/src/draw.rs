@@ -2,16 +2,19 @@
 
 use crate::cloud::Cloud;
 use crate::colour::Colour;
-use crate::layer::{CategoryMap, Heatmap, Layer, Line, Markers, Note, Place, Points, Shape, Side};
+use crate::layer::{CategoryMap, Heatmap, Layer, Line, Markers, Points};
 use crate::layout::{self, Spot};
 use crate::legend;
 use crate::marks::Marks;
+use crate::note;
 use crate::polyline;
 use crate::prepared::{ColourBar, Frame, Prepared};
 use crate::raster::Raster;
-use crate::scene::{Point, Rect, Scene, Segment, Stroke};
+use crate::scene::{Item, Scene};
+use crate::shape::{Point, Rect, Segment, Stroke};
 use crate::style::{EDGE, INK, Style};
-use crate::text::{Across, MM_PER_POINT, PlacedWords, Upright, Words};
+use crate::symbol::{disc, marker, strokes};
+use crate::text::{Across, MM_PER_POINT, Upright, Words};
 
 /// Steps of a colour scale: a palette's worth.
 const STEPS: usize = 255;
@@ -133,7 +136,7 @@ fn layer(
                 tops.iter().map(|p| (Point::new(p.x, foot), *p)).collect();
             if !lines.is_empty() {
                 let stroke = Stroke::solid(0.8 * MM_PER_POINT, colour);
-                scene.stroke(legend::strokes(&lines), stroke, Some(frame.rect));
+                scene.stroke(strokes(&lines), stroke, Some(frame.rect));
             }
             for top in tops.into_iter().filter(|p| frame.rect.contains(*p)) {
                 scene.fill(disc(top, 0.65), colour, None);
@@ -160,7 +163,7 @@ fn layer(
                 scene.fill(area.outline(), colour, Some(frame.rect));
             }
         }),
-        Layer::Note(note) => scene.group("note", "", |s| draw_note(s, frame, note, style)),
+        Layer::Note(note) => scene.group("note", "", |s| note::draw(s, frame, note, style)),
     }
 }
 
@@ -191,7 +194,7 @@ fn draw_points(scene: &mut Scene, frame: &Frame, points: &Points, colour: Colour
         .filter(|p| bounds.contains(*p))
         .collect();
     if !visible.is_empty() {
-        scene.items.push(crate::scene::Item::Cloud(Cloud {
+        scene.items.push(Item::Cloud(Cloud {
             points: visible,
             radius,
             colour,
@@ -215,86 +218,6 @@ fn draw_markers(scene: &mut Scene, frame: &Frame, markers: &Markers, colour: Col
                 markers.edge,
             );
         }
-    }
-}
-
-/// A circle.
-pub(crate) fn disc(centre: Point, radius: f64) -> Vec<Segment> {
-    // Four cubic arcs with the usual handle length come within 0.03 % of a circle.
-    let handle = 0.552_284_75 * radius;
-    let at = |x: f64, y: f64| Point::new(centre.x + x, centre.y + y);
-    vec![
-        Segment::Move(at(radius, 0.0)),
-        Segment::Cubic(at(radius, handle), at(handle, radius), at(0.0, radius)),
-        Segment::Cubic(at(-handle, radius), at(-radius, handle), at(-radius, 0.0)),
-        Segment::Cubic(at(-radius, -handle), at(-handle, -radius), at(0.0, -radius)),
-        Segment::Cubic(at(handle, -radius), at(radius, -handle), at(radius, 0.0)),
-        Segment::Close,
-    ]
-}
-
-/// A marker of the given size (mm); the shapes look equally large.
-pub(crate) fn marker(
-    scene: &mut Scene,
-    at: Point,
-    shape: Shape,
-    size: f64,
-    colour: Colour,
-    open: bool,
-    edge: bool,
-) {
-    let half = size / 2.0;
-    let p = |x: f64, y: f64| Point::new(at.x + x * half, at.y + y * half);
-    let polygon = |corners: &[(f64, f64)]| {
-        let mut segments: Vec<Segment> = corners
-            .iter()
-            .enumerate()
-            .map(|(i, &(x, y))| {
-                if i == 0 {
-                    Segment::Move(p(x, y))
-                } else {
-                    Segment::Line(p(x, y))
-                }
-            })
-            .collect();
-        segments.push(Segment::Close);
-        segments
-    };
-    let line = (0.18 * size).clamp(0.1, 0.4);
-    let outline = match shape {
-        Shape::Circle => disc(at, half),
-        Shape::Square => polygon(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)]),
-        Shape::Triangle => polygon(&[(0.0, -1.15), (1.05, 0.75), (-1.05, 0.75)]),
-        Shape::Diamond => polygon(&[(0.0, -1.25), (1.1, 0.0), (0.0, 1.25), (-1.1, 0.0)]),
-        Shape::Cross | Shape::Plus => {
-            let arms = if shape == Shape::Cross {
-                [(p(-0.8, -0.8), p(0.8, 0.8)), (p(-0.8, 0.8), p(0.8, -0.8))]
-            } else {
-                [(p(-1.1, 0.0), p(1.1, 0.0)), (p(0.0, -1.1), p(0.0, 1.1))]
-            };
-            if edge {
-                scene.stroke(
-                    legend::strokes(&arms),
-                    Stroke::solid(2.2 * line, Colour::WHITE),
-                    None,
-                );
-            }
-            scene.stroke(legend::strokes(&arms), Stroke::solid(line, colour), None);
-            return;
-        }
-    };
-    if edge {
-        scene.stroke(
-            outline.clone(),
-            Stroke::solid(3.0 * line, Colour::WHITE),
-            None,
-        );
-    }
-    if open {
-        scene.fill(outline.clone(), Colour::WHITE, None);
-        scene.stroke(outline, Stroke::solid(line, colour), None);
-    } else {
-        scene.fill(outline, colour, None);
     }
 }
 
@@ -383,7 +306,7 @@ fn grid(
             row.reverse();
         }
     }
-    scene.items.push(crate::scene::Item::Raster(Raster {
+    scene.items.push(Item::Raster(Raster {
         rect: Rect {
             left: a.x.min(b.x),
             right: a.x.max(b.x),
@@ -395,112 +318,6 @@ fn grid(
         rows: rows.len(),
         pixels: rows.concat(),
     }));
-}
-
-/// A place of a note on the page.
-pub(crate) fn note_point(frame: &Frame, place: Place) -> Option<Point> {
-    match place {
-        Place::Data(x, y) => frame.place((x, y)),
-        Place::Panel(x, y) if x.is_finite() && y.is_finite() => Some(Point::new(
-            frame.rect.left + x * frame.rect.width(),
-            frame.rect.bottom - y * frame.rect.height(),
-        )),
-        Place::Panel(..) => None,
-    }
-}
-
-/// The words of a note where they go: kept inside the panel if they start there.
-fn note_words(frame: &Frame, note: &Note, style: &Style) -> Option<PlacedWords> {
-    let at = note_point(frame, note.at)?;
-    let words = Words::set(&note.text, style.legend, false);
-    let gap = style.pad;
-    let (across, upright, dx, dy) = match note.side {
-        Side::Right => (Across::Left, Upright::Middle, gap, 0.0),
-        Side::Left => (Across::Right, Upright::Middle, -gap, 0.0),
-        Side::Above => (Across::Centre, Upright::Bottom, 0.0, -0.5 * gap),
-        Side::Below => (Across::Centre, Upright::Top, 0.0, gap),
-        Side::Centre => (Across::Centre, Upright::Middle, 0.0, 0.0),
-    };
-    let mut placed = words.place(
-        Point::new(at.x + dx, at.y + dy),
-        across,
-        upright,
-        note.colour.unwrap_or(Colour::BLACK),
-    );
-    let room = frame.rect.grown(-gap);
-    if frame.rect.contains(at) && placed.words.width <= room.width() {
-        placed.origin.x = placed
-            .origin
-            .x
-            .clamp(room.left, room.right - placed.words.width);
-        placed.origin.y = placed.origin.y.clamp(
-            room.top + placed.words.cap_height(),
-            room.bottom - placed.words.descent(),
-        );
-    }
-    Some(placed)
-}
-
-/// The box that a note's words fill.
-pub(crate) fn note_area(frame: &Frame, note: &Note, style: &Style) -> Option<Rect> {
-    let placed = note_words(frame, note, style)?;
-    (placed.words.width > 0.0).then(|| Rect {
-        left: placed.origin.x,
-        right: placed.origin.x + placed.words.width,
-        top: placed.origin.y - placed.words.cap_height(),
-        bottom: placed.origin.y + placed.words.descent(),
-    })
-}
-
-fn draw_note(scene: &mut Scene, frame: &Frame, note: &Note, style: &Style) {
-    if let (Some(from), Some(to)) = (
-        note_point(frame, note.at),
-        note.tip.and_then(|tip| note_point(frame, tip)),
-    ) {
-        arrow(scene, from, to, note.colour.unwrap_or(Colour::BLACK));
-    }
-    if let Some(placed) = note_words(frame, note, style) {
-        if !placed.words.runs.is_empty() {
-            // A white edge keeps the words readable over data.
-            let halo = Stroke {
-                round: true,
-                ..Stroke::solid(0.6, Colour::WHITE.alpha(0.8))
-            };
-            scene.stroke(placed.outline(), halo, None);
-        }
-        scene.words(placed);
-    }
-}
-
-fn arrow(scene: &mut Scene, from: Point, to: Point, colour: Colour) {
-    let length = from.distance(to);
-    if length < 1e-6 {
-        return;
-    }
-    let head = 1.5f64.min(length);
-    let (ux, uy) = ((to.x - from.x) / length, (to.y - from.y) / length);
-    let back = |along: f64, aside: f64| {
-        Point::new(
-            to.x - along * ux - aside * uy,
-            to.y - along * uy + aside * ux,
-        )
-    };
-    scene.line(
-        from,
-        back(0.8 * head, 0.0),
-        Stroke::solid(0.6 * MM_PER_POINT, colour),
-    );
-    scene.fill(
-        vec![
-            Segment::Move(to),
-            Segment::Line(back(head, 0.3 * head)),
-            Segment::Line(back(0.8 * head, 0.0)),
-            Segment::Line(back(head, -0.3 * head)),
-            Segment::Close,
-        ],
-        colour,
-        None,
-    );
 }
 
 /// The box, its marks, their words and the labels.
@@ -613,7 +430,7 @@ fn mark_lines(
             .iter()
             .map(|share| line(*share, style.minor_mark)),
     );
-    legend::strokes(&lines)
+    strokes(&lines)
 }
 
 /// Draws a colour bar right of `edge`; returns the new edge.
@@ -631,7 +448,7 @@ fn colour_bar(scene: &mut Scene, bar: &ColourBar, panel: Rect, edge: f64, style:
             .rev()
             .map(|i| bar.map.at(i as f64 / STEPS as f64))
             .collect();
-        scene.items.push(crate::scene::Item::Raster(Raster {
+        scene.items.push(Item::Raster(Raster {
             rect,
             clip: rect,
             columns: 1,

@@ -5,7 +5,7 @@ use crate::error::FigureError;
 use crate::legend::{self, Stand};
 use crate::marks::Marks;
 use crate::prepared::Prepared;
-use crate::scene::Rect;
+use crate::shape::Rect;
 use crate::style::{EDGE, Style};
 use crate::text::Words;
 

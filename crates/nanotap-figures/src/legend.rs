@@ -1,12 +1,14 @@
 //! The legend: its size, its place, its drawing.
 
 use crate::colour::Colour;
-use crate::draw;
-use crate::layer::{Layer, Place};
+use crate::layer::Layer;
+use crate::note;
 use crate::panel::Legend;
 use crate::prepared::{Entry, Frame, Prepared, Sample};
-use crate::scene::{Point, Rect, Scene, Segment, Stroke};
+use crate::scene::Scene;
+use crate::shape::{Point, Rect, Stroke};
 use crate::style::{INK, Style};
+use crate::symbol::{disc, marker};
 use crate::text::{Across, Upright, Words};
 
 /// Where the legend goes once the panel's size is known.
@@ -193,11 +195,11 @@ impl Occupancy {
                 }
                 Layer::Note(note) => {
                     for place in [Some(note.at), note.tip].into_iter().flatten() {
-                        if let Some(at) = note_point(frame, place) {
+                        if let Some(at) = note::point(frame, place) {
                             seen.mark(at);
                         }
                     }
-                    if let Some(area) = draw::note_area(frame, note, style) {
+                    if let Some(area) = note::area(frame, note, style) {
                         let mut y = area.top;
                         while y <= area.bottom {
                             seen.mark_line(Point::new(area.left, y), Point::new(area.right, y));
@@ -251,10 +253,6 @@ impl Occupancy {
                 .any(|column| self.cells[row * Self::COLUMNS + column])
         })
     }
-}
-
-fn note_point(frame: &Frame, place: Place) -> Option<Point> {
-    draw::note_point(frame, place)
 }
 
 /// Draws the legend of a panel in `rect`; `above` is the bottom of the rows above the panel, and
@@ -327,10 +325,10 @@ fn draw_entry(
             scene.line(from, to, stroke);
         }
         Sample::Dot { diameter } => {
-            scene.fill(draw::disc(centre, diameter / 2.0), entry.colour, None);
+            scene.fill(disc(centre, diameter / 2.0), entry.colour, None);
         }
         Sample::Marker { shape, size, open } => {
-            draw::marker(scene, centre, *shape, *size, entry.colour, *open, false);
+            marker(scene, centre, *shape, *size, entry.colour, *open, false);
         }
         Sample::Stem => {
             scene.line(
@@ -339,7 +337,7 @@ fn draw_entry(
                 Stroke::solid(0.25, entry.colour),
             );
             scene.fill(
-                draw::disc(Point::new(centre.x, middle - 0.5), 0.5),
+                disc(Point::new(centre.x, middle - 0.5), 0.5),
                 entry.colour,
                 None,
             );
@@ -364,12 +362,4 @@ fn draw_entry(
     let words = Words::set(&entry.label, style.legend, false);
     let at = Point::new(left + sample + style.pad, middle);
     scene.words(words.place(at, Across::Left, Upright::Middle, INK));
-}
-
-/// A cross stroke for markers without an inside.
-pub(crate) fn strokes(lines: &[(Point, Point)]) -> Vec<Segment> {
-    lines
-        .iter()
-        .flat_map(|&(a, b)| [Segment::Move(a), Segment::Line(b)])
-        .collect()
 }

@@ -45,7 +45,9 @@ mod layout;
 mod legend;
 mod map;
 mod marks;
+mod note;
 mod numbers;
+mod page;
 mod panel;
 mod pdf;
 mod pixels;
@@ -54,19 +56,26 @@ mod prepared;
 mod raster;
 mod resolve;
 mod scene;
+mod shape;
 mod style;
 mod svg;
+mod symbol;
 mod text;
 pub mod ticks;
 
 pub use axis::{Axis, ROUNDING, Range, Scale};
 pub use colour::{Colour, Colourmap, LINES, Motion, category};
 pub use error::FigureError;
-pub use figure::{DOUBLE_COLUMN, DPI, Figure, MADE_BY, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
+pub use figure::{DOUBLE_COLUMN, Figure, ONE_AND_A_HALF_COLUMNS, SINGLE_COLUMN};
 pub use layer::{
     Band, Bars, Category, CategoryMap, Dash, Heatmap, Layer, Line, Markers, Note, Place, Points,
     Rule, Shape, Side, Stems,
 };
 pub use map::{AxisMap, PanelMap};
+pub use page::DPI;
 pub use panel::{Legend, Panel};
 pub use text::mathtext;
+
+/// What every picture says it was made by: a comment in SVG, the software of PNG, the producer
+/// of PDF.
+pub const MADE_BY: &str = "nanotap";

@@ -7,11 +7,12 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::types::{LineCapStyle, LineJoinStyle};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect as Box, Ref, TextStr};
 
+use crate::MADE_BY;
 use crate::colour::Colour;
-use crate::figure::MADE_BY;
 use crate::pixels;
 use crate::raster::{EMBEDDED_DPI, Raster};
-use crate::scene::{Item, Path, Point, Rect, Scene, Segment};
+use crate::scene::{Item, Scene};
+use crate::shape::{Path, Point, Rect, Segment};
 use crate::text::MM_PER_POINT;
 
 const CATALOG: i32 = 1;

@@ -7,7 +7,8 @@ use tiny_skia::{
 
 use crate::colour::Colour;
 use crate::raster::{self, Raster};
-use crate::scene::{Item, Path, Point, Rect, Scene, Segment};
+use crate::scene::{Item, Scene};
+use crate::shape::{Path, Point, Rect, Segment};
 
 /// Lines of more corners are drawn piece by piece on a layer of their own: the time to draw one grows
 /// with the square of its corners.
@@ -304,7 +305,7 @@ mod tests {
             })
             .collect();
         assert!(pieces(&segments).len() >= 3);
-        let stroke = crate::scene::Stroke::solid(0.3, Colour::BLUE.alpha(0.5));
+        let stroke = crate::shape::Stroke::solid(0.3, Colour::BLUE.alpha(0.5));
         let path = Path {
             segments,
             fill: None,

@@ -1,6 +1,6 @@
 //! Lines of very many corners made short without a visible change.
 
-use crate::scene::{Point, Rect, Segment};
+use crate::shape::{Point, Rect, Segment};
 
 /// Corners closer than this to a straight line are left out, mm: a third of a dot at 1200 dpi.
 const TOLERANCE: f64 = 0.007;

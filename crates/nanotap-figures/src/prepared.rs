@@ -5,7 +5,7 @@ use crate::colour::{self, Colour};
 use crate::layer::{Dash, Layer, Shape};
 use crate::panel::Panel;
 use crate::resolve;
-use crate::scene::{Point, Rect};
+use crate::shape::{Point, Rect};
 use crate::text::MM_PER_POINT;
 
 /// What a legend shows beside a label.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::MADE_BY;
 use crate::colour::Colour;
-use crate::figure::MADE_BY;
-use crate::scene::Rect;
+use crate::shape::Rect;
 
 /// Resolution of pixels embedded in vector formats, dots per inch: what journals ask of line art
 /// combined with halftones.

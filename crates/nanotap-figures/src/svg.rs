@@ -9,12 +9,13 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
+use crate::MADE_BY;
 use crate::colour::Colour;
-use crate::figure::MADE_BY;
 use crate::font::Glyph;
 use crate::pixels;
 use crate::raster::{EMBEDDED_DPI, Raster};
-use crate::scene::{Item, Path, Point, Rect, Scene, Segment};
+use crate::scene::{Item, Scene};
+use crate::shape::{Path, Point, Rect, Segment};
 use crate::text::PlacedWords;
 
 /// Stands for the page's own prefix of identifiers until the whole page is known.

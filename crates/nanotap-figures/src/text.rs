@@ -2,7 +2,7 @@
 
 use crate::colour::Colour;
 use crate::font::{CAP_HEIGHT, Cut, DESCENT, Glyph};
-use crate::scene::{Point, Segment};
+use crate::shape::{Point, Segment};
 
 /// Millimetres in a typographer's point.
 pub(crate) const MM_PER_POINT: f64 = 25.4 / 72.0;

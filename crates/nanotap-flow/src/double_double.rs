@@ -4,15 +4,16 @@
 //! Error-free sums and products after Dekker and Knuth.
 
 use crate::Complex;
-use crate::signal::Signal;
 
+/// A sum of two doubles, the second below the rounding of the first.
 #[derive(Clone, Copy)]
-struct Dd(f64, f64);
+pub(crate) struct Dd(pub(crate) f64, pub(crate) f64);
 
 impl Dd {
     const ZERO: Self = Self(0.0, 0.0);
 
-    fn new(a: f64) -> Self {
+    /// A double.
+    pub(crate) fn new(a: f64) -> Self {
         Self(a, 0.0)
     }
 
@@ -24,19 +25,19 @@ impl Dd {
     }
 
     /// The exact product of two doubles.
-    fn two_product(a: f64, b: f64) -> Self {
+    pub(crate) fn two_product(a: f64, b: f64) -> Self {
         let p = a * b;
         Self(p, a.mul_add(b, -p))
     }
 
-    fn add(self, other: Self) -> Self {
+    pub(crate) fn add(self, other: Self) -> Self {
         let s = Self::two_sum(self.0, other.0);
         let t = Self::two_sum(self.1, other.1);
         let u = Self::two_sum(s.0, s.1 + t.0);
         Self::two_sum(u.0, u.1 + t.1)
     }
 
-    fn multiply(self, other: Self) -> Self {
+    pub(crate) fn multiply(self, other: Self) -> Self {
         let p = Self::two_product(self.0, other.0);
         Self::two_sum(p.0, p.1 + (self.0 * other.1 + self.1 * other.0))
     }
@@ -50,19 +51,20 @@ impl Dd {
     }
 }
 
+/// Real and imaginary part.
 #[derive(Clone, Copy)]
-struct ComplexDd(Dd, Dd);
+pub(crate) struct ComplexDd(pub(crate) Dd, pub(crate) Dd);
 
 impl ComplexDd {
-    fn new(z: Complex) -> Self {
+    pub(crate) fn new(z: Complex) -> Self {
         Self(Dd::new(z.re), Dd::new(z.im))
     }
 
-    fn add(self, other: Self) -> Self {
+    pub(crate) fn add(self, other: Self) -> Self {
         Self(self.0.add(other.0), self.1.add(other.1))
     }
 
-    fn multiply(self, other: Self) -> Self {
+    pub(crate) fn multiply(self, other: Self) -> Self {
         Self(
             self.0
                 .multiply(other.0)
@@ -72,7 +74,7 @@ impl ComplexDd {
     }
 
     /// `e^z` by halving the argument, a Taylor sum, and squaring back.
-    fn exp(self) -> Self {
+    pub(crate) fn exp(self) -> Self {
         let size = self.0.0.abs() + self.1.0.abs();
         let halvings = if size > 0.02 {
             nanotap_arithmetic::log2(size / 0.02).ceil() as i32
@@ -98,25 +100,6 @@ impl ComplexDd {
         }
         sum.add(Self(Dd::new(1.0), Dd::ZERO))
     }
-}
-
-/// The value of a signal at `s` with an error of the order of 1e-28 of its terms.
-pub(crate) fn signal_value(signal: &Signal, s: f64) -> f64 {
-    let exponential =
-        |rate: Complex| ComplexDd(Dd::two_product(rate.re, s), Dd::two_product(rate.im, s)).exp();
-    let mut sum = Dd::new(signal.constant);
-    for (rate, a) in signal.terms() {
-        sum = sum.add(ComplexDd::new(a).multiply(exponential(rate)).0);
-    }
-    for term in &signal.powers {
-        let mut power = Dd::new(1.0);
-        for _ in 0..term.power {
-            power = power.multiply(Dd::new(s));
-        }
-        let z = ComplexDd::new(term.amplitude).multiply(exponential(term.rate));
-        sum = sum.add(z.0.multiply(power));
-    }
-    sum.0 + sum.1
 }
 
 #[cfg(test)]

@@ -1,97 +1,12 @@
 //! Running a system: from switch to switch in modal coordinates, one drive period
 //! at a time.
 
+use crate::FlowError;
 use crate::motion::Motion;
-use crate::regime::Regime;
+pub use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::search::Statistics;
-use crate::simd::ComplexVector;
-use crate::system::{Switch, System};
-use crate::{Complex, FlowError};
+use crate::system::System;
 use std::sync::Arc;
-
-/// A stretch within one regime and one drive period.
-#[derive(Clone, Copy, Debug)]
-pub struct SegmentView<'a> {
-    /// The system.
-    pub system: &'a System,
-    /// The regime's number.
-    pub regime: usize,
-    /// When it starts, within its drive period (`0 ≤ phase < T`).
-    pub phase: f64,
-    /// How long it lasts.
-    pub length: f64,
-    /// Modal coordinates at its start.
-    pub modal: &'a [Complex],
-    /// `e^{λ_k · length}`.
-    pub factors: &'a [Complex],
-    /// Modal coordinates and the tones' phasors at its start, and what they are multiplied by
-    /// on the way.
-    pub(crate) packed: &'a [ComplexVector],
-    pub(crate) turns: &'a [ComplexVector],
-}
-
-impl SegmentView<'_> {
-    /// The regime.
-    pub fn regime(&self) -> &Regime {
-        &self.system.regimes()[self.regime]
-    }
-}
-
-/// A switch from one regime to another.
-#[derive(Clone, Copy, Debug)]
-pub struct SwitchView<'a> {
-    /// The system.
-    pub system: &'a System,
-    /// The change of modal coordinates.
-    pub switch: &'a Switch,
-    /// The number of the transition taken out of `switch.from`.
-    pub transition: usize,
-    /// Whether it ended chatter: the motion goes on in the sticking regime.
-    pub stuck: bool,
-    /// When it happens, within its drive period.
-    pub phase: f64,
-    /// The guard's rate before it.
-    pub rate: f64,
-    /// Whether the guard only grazed zero, within rounding.
-    pub grazing: bool,
-    /// Modal coordinates before it.
-    pub modal: &'a [Complex],
-}
-
-/// Something that watches a flow: a recorder, a Jacobian, a sensitivity.
-pub trait Observer {
-    /// Whether it watches nothing, so that nothing need be prepared for it.
-    const IDLE: bool = false;
-    /// A stretch within one regime was completed.
-    fn segment(&mut self, segment: &SegmentView<'_>) {
-        let _ = segment;
-    }
-    /// A switch happened.
-    fn switch(&mut self, switch: &SwitchView<'_>) {
-        let _ = switch;
-    }
-    /// A drive period was completed; the phase is zero again.
-    fn period_end(&mut self) {}
-}
-
-impl Observer for () {
-    const IDLE: bool = true;
-}
-
-impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
-    fn segment(&mut self, segment: &SegmentView<'_>) {
-        self.0.segment(segment);
-        self.1.segment(segment);
-    }
-    fn switch(&mut self, switch: &SwitchView<'_>) {
-        self.0.switch(switch);
-        self.1.switch(switch);
-    }
-    fn period_end(&mut self) {
-        self.0.period_end();
-        self.1.period_end();
-    }
-}
 
 /// A motion of a [`System`] with its work space. Cloning shares the system.
 #[derive(Clone, Debug)]

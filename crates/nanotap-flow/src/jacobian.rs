@@ -1,6 +1,6 @@
 //! The derivative of the flow with respect to the state, exact through switches.
 
-use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::regime::Regime;
 use crate::{Complex, Flow, FlowError};
 use nalgebra::{DMatrix, DVector};

@@ -3,7 +3,7 @@
 //! A motion does not hold its system. Whoever runs it lends the system, so that threads which
 //! share one need not count references to it every period.
 
-use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::search::table::Followed;
 use crate::search::{BySteps, Crossing, Start, Statistics, on_table};
 use crate::signal::Signal;

@@ -1,6 +1,6 @@
 //! One linear regime, `ẋ = A x + f(t)` with harmonic `f`, solved in closed form.
 
-use crate::signal::relaxation_masks;
+use crate::relaxation::relaxation_masks;
 use crate::simd::{ComplexVector, Vector, layout};
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
 use nalgebra::{DMatrix, DVector};

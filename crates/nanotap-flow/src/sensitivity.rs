@@ -6,9 +6,9 @@
 //! changes the drive's period is treated in time measured by the drive's phase,
 //! where only `A` and `f` (times the period) change.
 
-use crate::flow::{Observer, SegmentView, SwitchView};
 use crate::harmonic::{HarmonicVector, Output};
 use crate::integral::phi1;
+use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::system::{Reset, System};
 use crate::{Complex, Drive, Flow, FlowError, Regime};
 use nalgebra::{DMatrix, DVector};

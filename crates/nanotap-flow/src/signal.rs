@@ -1,7 +1,9 @@
 //! What any linear output is inside a regime: a constant plus a finite sum of
 //! decaying complex exponentials, with bounds on its derivatives.
 
+use crate::double_double::{ComplexDd, Dd};
 use crate::regime::{Kernel, ModalOutput};
+use crate::relaxation::{RELAXATIONS, relaxation_masks};
 use crate::simd::{self, ComplexVector, Library, Plain, Simd, Vector, Work, layout};
 use crate::{Complex, Drive, Regime};
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -70,26 +72,6 @@ pub(crate) type Amplitude = [ComplexVector; 3];
 pub(crate) struct Enclosure {
     pub(crate) jet: Jet,
     pub(crate) relaxed: [Jet; RELAXATIONS],
-}
-
-/// How many lower bounds are looked at.
-const RELAXATIONS: usize = 2;
-
-/// How many of `count` terms the lower bounds follow.
-fn followed(count: usize) -> [usize; RELAXATIONS] {
-    [2, if count <= 5 { 3 } else { 4 }]
-}
-
-/// For each of the terms, whose rates have these sizes, 1 in the lower bounds that follow it and
-/// 0 elsewhere.
-pub(crate) fn relaxation_masks(sizes: &[f64]) -> Vec<[f64; RELAXATIONS]> {
-    let mut order: Vec<usize> = (0..sizes.len()).collect();
-    order.sort_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
-    let mut masks = vec![[0.0; RELAXATIONS]; sizes.len()];
-    for (rank, &k) in order.iter().enumerate() {
-        masks[k] = followed(sizes.len()).map(|n| if rank < n { 1.0 } else { 0.0 });
-    }
-    masks
 }
 
 /// Four terms side by side: rates, the complex amplitudes of value, rate and curvature,
@@ -447,7 +429,22 @@ impl Signal {
     /// The value at `s` with an error far below double precision's (about 1e-28 of
     /// the terms' size before it is rounded): which side of zero a tangency lies on.
     pub fn accurate_at(&self, s: f64) -> f64 {
-        crate::double_double::signal_value(self, s)
+        let exponential = |rate: Complex| {
+            ComplexDd(Dd::two_product(rate.re, s), Dd::two_product(rate.im, s)).exp()
+        };
+        let mut sum = Dd::new(self.constant);
+        for (rate, a) in self.terms() {
+            sum = sum.add(ComplexDd::new(a).multiply(exponential(rate)).0);
+        }
+        for term in &self.powers {
+            let mut power = Dd::new(1.0);
+            for _ in 0..term.power {
+                power = power.multiply(Dd::new(s));
+            }
+            let z = ComplexDd::new(term.amplitude).multiply(exponential(term.rate));
+            sum = sum.add(z.0.multiply(power));
+        }
+        sum.0 + sum.1
     }
 
     /// The `order`-th derivative at `s = 0`.

@@ -1,6 +1,6 @@
 //! A recorded motion with closed-form dense output.
 
-use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::regime::ModalOutput;
 use crate::signal::Signal;
 use crate::system::System;

@@ -19,7 +19,7 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::sync::LazyLock;
 
-use crate::flow::{Observer, SegmentView, SwitchView};
+use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::regime::ModalOutput;
 use crate::search::sign_changes;
 use crate::sensitivity::{Propagator, Sensitivity, SystemTangent};

@@ -46,7 +46,7 @@ impl Fast {
         Ok(Self {
             counted,
             attractor,
-            scan: runs.spurious()?,
+            scan: runs.shared(Scan::new)?,
         })
     }
 

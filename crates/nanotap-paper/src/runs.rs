@@ -1,5 +1,6 @@
 //! What several sections need: censuses, each taken once, orbits, and a word on progress.
 
+use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -37,7 +38,7 @@ pub(super) struct Runs<'a> {
     reported: AtomicUsize,
     counts: RefCell<Vec<Rc<Counted>>>,
     found: RefCell<Vec<Found>>,
-    spurious: RefCell<Option<Rc<super::time_step::Scan>>>,
+    shared: RefCell<Vec<Rc<dyn Any>>>,
 }
 
 /// The orbits of a case that one search found.
@@ -56,7 +57,7 @@ impl<'a> Runs<'a> {
             reported: AtomicUsize::new(0),
             counts: RefCell::default(),
             found: RefCell::default(),
-            spurious: RefCell::default(),
+            shared: RefCell::default(),
         }
     }
 
@@ -165,14 +166,19 @@ impl<'a> Runs<'a> {
         Ok(starts.starts(SEED, count))
     }
 
-    /// What fixed time steps make of the paper's case at Ω = 20, computed once.
-    pub(super) fn spurious(&self) -> Result<Rc<super::time_step::Scan>, PaperError> {
-        if let Some(known) = &*self.spurious.borrow() {
-            return Ok(Rc::clone(known));
+    /// What several sections need, made once; there is one of each type.
+    pub(super) fn shared<T: 'static>(
+        &self,
+        make: impl FnOnce(&Self) -> Result<T, PaperError>,
+    ) -> Result<Rc<T>, PaperError> {
+        let known = |one: &Rc<dyn Any>| Rc::clone(one).downcast().ok();
+        let known = self.shared.borrow().iter().find_map(known);
+        if let Some(known) = known {
+            return Ok(known);
         }
-        let scan = Rc::new(super::time_step::Scan::new(self)?);
-        *self.spurious.borrow_mut() = Some(Rc::clone(&scan));
-        Ok(scan)
+        let made = Rc::new(make(self)?);
+        self.shared.borrow_mut().push(made.clone());
+        Ok(made)
     }
 }
 

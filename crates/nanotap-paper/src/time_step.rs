@@ -411,7 +411,7 @@ impl GridMotion {
 
 /// The evidence that long periods at Ω = 20 can come from the time step.
 pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
-    let scan = runs.spurious()?;
+    let scan = runs.shared(Scan::new)?;
     let mut periods: Vec<usize> = scan
         .motions
         .iter()

@@ -10,6 +10,7 @@
 #![allow(clippy::inline_always)]
 
 use crate::VolterraError;
+pub use crate::linear::MAX_NODES;
 use crate::linear::{dot_body, wide_registers};
 use crate::modes::{Block, Modes};
 use crate::quadrature::{
@@ -23,8 +24,6 @@ use std::sync::{Arc, OnceLock};
 pub(crate) const LENGTHS: usize = 72;
 /// Points between the nodes at which the law is compared with the polynomial.
 pub(crate) const CHECKS: usize = 4;
-/// The largest number of nodes of a step.
-pub const MAX_NODES: usize = 32;
 /// Points of the Gauss–Legendre rule of one panel.
 const PANEL_POINTS: usize = 24;
 /// Points of the rule between two nodes of a trajectory's quadrature, which are so near that

@@ -6,7 +6,8 @@
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]
 
-use crate::kernel::MAX_NODES;
+/// The largest number of nodes of a step.
+pub const MAX_NODES: usize = 32;
 
 /// Calls a function (after its generic parameters, in brackets), where the machine has them
 /// compiled for wide registers.

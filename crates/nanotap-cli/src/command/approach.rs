@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::watched(output, ApproachStudy::COUNTED, |control| {
+    let report = progress::watched(ApproachStudy::COUNTED, |control| {
         arguments
             .threads
             .install(|| ApproachStudy::run(&case, &request, control))

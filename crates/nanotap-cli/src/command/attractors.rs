@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.plot.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;
-    let found = progress::watched(output, AttractorsStudy::COUNTED, |control| {
+    let found = progress::watched(AttractorsStudy::COUNTED, |control| {
         arguments
             .threads
             .install(|| AttractorsStudy::run(&case, &request, control))

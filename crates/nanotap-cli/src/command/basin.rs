@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     );
     let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
     arguments.plot.check()?;
-    let basin = progress::watched(output, "starts of the census", |control| {
+    let basin = progress::watched("starts of the census", |control| {
         dataset
             .threads
             .install(|| Basin::new(&case, &options, control))

@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
-    let mut report = progress::watched(output, BranchStudy::COUNTED, |control| {
+    let mut report = progress::watched(BranchStudy::COUNTED, |control| {
         arguments
             .threads
             .install(|| followed(&case, &options, control))

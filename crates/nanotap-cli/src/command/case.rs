@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let read = super::case_of(&arguments.case)?;
     // The case is shown also where no distance has the setpoint, which ends every study of it.
-    let (case, setpoint_solved, unreached) = match at_setpoint(read.clone(), output) {
+    let (case, setpoint_solved, unreached) = match at_setpoint(read.clone()) {
         Ok((case, solved)) => (case, solved, None),
         Err(error) if error.kind == ErrorKind::Numerics => (read, None, Some(error)),
         Err(other) => return Err(other),

@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         request.data.push(Data::read(path)?);
     }
     let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::watched(output, FitStudy::COUNTED, |control| {
+    let report = progress::watched(FitStudy::COUNTED, |control| {
         arguments
             .threads
             .install(|| FitStudy::run(&case, &request, control))

@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         only: arguments.only.clone(),
         quick: arguments.quick,
     };
-    let report = progress::watched(output, "percent", |control| {
+    let report = progress::watched("percent", |control| {
         arguments.threads.install(|| report(&options, control))
     })???;
     let written = report.write(&arguments.out)?;
@@ -132,7 +132,7 @@ mod tests {
         let report = report(&options, &Control::default()).unwrap();
         for check in report.checks() {
             let words = check.rerun.split_whitespace();
-            let parsed = crate::arguments::Arguments::try_parse_from(words);
+            let parsed = crate::command_line::Arguments::try_parse_from(words);
             assert!(
                 parsed.is_ok(),
                 "{}: {}\n{:?}",

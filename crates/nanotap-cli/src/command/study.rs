@@ -74,7 +74,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         GivenCase::of(&arguments.case, output)?
     };
     let request = Value::Object(arguments.given.clone());
-    let document = progress::watched(output, entry.counted, |control| {
+    let document = progress::watched(entry.counted, |control| {
         entry.document(&case, request, control)
     })??;
     let document: Value = serde_json::from_str(&document)

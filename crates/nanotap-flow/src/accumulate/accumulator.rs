@@ -7,8 +7,8 @@ use super::request::{
 };
 use super::stretch::Stretch;
 use crate::Complex;
-use crate::flow::{Observer, SegmentView, SwitchView};
 use crate::integral::{fourier_integral, integral, product_integral};
+use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::search::range::{Extend, Range, RangeWork, extend_by_certified_steps};
 use crate::search::table::Table;
 use crate::signal::Signal;

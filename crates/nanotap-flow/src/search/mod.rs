@@ -28,6 +28,7 @@
 //! `walk` along the points of a `table`; what that cannot decide is left to certified steps
 //! (`steps`). `range` and [`sign_changes()`] look for extrema with the same means.
 
+mod interval;
 pub(crate) mod on_table;
 pub(crate) mod range;
 mod sign_changes;

@@ -1,9 +1,10 @@
 //! The first zero of a tabulated guard: whole flights are certified by its table, and where it
 //! falls through zero one evaluation of the guard is enough.
 
+use super::interval::{FallingZero, Interval};
 use super::steps::{RESOLUTION, quadratic_root};
 use super::table::{Followed, Table};
-use super::walk::{FallingZero, Interval, Span};
+use super::walk::Span;
 use super::{BySteps, Crossing, Start, Statistics};
 use crate::signal::{Jet, Signal};
 use crate::simd::{Simd, Work};

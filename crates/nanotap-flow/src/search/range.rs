@@ -10,9 +10,9 @@
 //! either side, and beyond that the quintic's coefficients are not beyond it. What cannot be
 //! proved so is left to the roots of the rate, found by certified steps.
 
+use super::interval::{Interval, Point};
 use super::sign_changes;
 use super::table::{Followed, Grid, ROUNDING, Table};
-use super::walk::{Interval, Point};
 use crate::regime::Kernel;
 use crate::signal::Signal;
 use crate::simd::{ComplexVector, Simd, Vector, WIDTH, Work, layout};

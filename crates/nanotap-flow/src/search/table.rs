@@ -4,7 +4,7 @@
 //! the slowest terms certifies most of a flight; where it cannot, the interval is looked at on a
 //! finer grid. [`walk`](super::walk) says what is concluded from the points.
 
-use super::walk::Interval;
+use super::interval::Interval;
 use crate::regime::Kernel;
 use crate::signal::{Amplitude, Signal};
 use crate::simd::{self, ComplexVector, Simd, WIDTH, layout};

@@ -1,0 +1,126 @@
+//! The same elsewhere: the line at the terminal, the lines of Python.
+
+use std::fmt::Write as _;
+
+use serde_json::{Map, Value};
+
+use crate::App;
+use crate::answer::Refusal;
+use crate::asked::{Asked, Start};
+use crate::preset::Wanted;
+
+/// What the saved case is called.
+const CASE_FILE: &str = "case.toml";
+
+/// The case file as it is given elsewhere: the one that was named if nothing differs from it,
+/// else the one to save.
+fn case_path(app: &App, case: &Wanted) -> Result<String, Refusal> {
+    let preset = case.preset(app)?;
+    let unchanged = !preset.path.is_empty() && case.words(preset).is_empty();
+    Ok(if unchanged { &preset.path } else { CASE_FILE }.to_owned())
+}
+
+/// The command that gives the same motion.
+pub(crate) fn command(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
+    let mut line = format!("nanotap {study} {}", quoted(&case_path(app, &asked.case)?));
+    let start = Start::parse(&asked.start)?;
+    if let Some(period) = start.period {
+        let _ = write!(line, " --period {period}");
+    }
+    if let Some(state) = &start.state {
+        let _ = write!(line, " --state={}", Start::text(None, state));
+    }
+    Ok(line)
+}
+
+/// The command of a study, by what it was asked for.
+pub(crate) fn study_command(
+    app: &App,
+    case: &Wanted,
+    name: &str,
+    request: &Map<String, Value>,
+) -> Result<String, Refusal> {
+    let mut line = format!("nanotap {name} {}", quoted(&case_path(app, case)?));
+    for (option, value) in request {
+        let flag = option.replace('_', "-");
+        match value {
+            Value::Bool(true) => {
+                let _ = write!(line, " --{flag}");
+            }
+            Value::Array(values) if option == "over" => {
+                for value in values {
+                    let _ = write!(line, " --{flag} {}", quoted(&text(value)));
+                }
+            }
+            Value::Null | Value::Bool(false) => {}
+            Value::Array(values) => {
+                let values: Vec<String> = values.iter().map(text).collect();
+                let _ = write!(line, " --{flag}={}", quoted(&values.join(",")));
+            }
+            other => {
+                let _ = write!(line, " --{flag}={}", quoted(&text(other)));
+            }
+        }
+    }
+    let _ = write!(line, " --plot {name}.svg");
+    Ok(line)
+}
+
+fn text(value: &Value) -> String {
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// A word as a shell takes it as one.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "=:,._/+-".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// The lines of Python that give the same motion.
+pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
+    let path = case_path(app, &asked.case)?;
+    let start = Start::parse(&asked.start)?;
+    let mut options = String::new();
+    if let Some(period) = start.period {
+        let _ = write!(options, ", period={period}");
+    }
+    if let Some(state) = &start.state {
+        let numbers = Start::text(None, state).replace(',', ", ");
+        let _ = write!(options, ", state=[{numbers}]");
+    }
+    Ok(format!(
+        "import nanotap\n\ncase = nanotap.Case.from_file({path:?})\nmotion = nanotap.{study}(case{options})\n"
+    ))
+}
+
+/// The lines of Python that give the same studies.
+pub(crate) fn study_python(
+    app: &App,
+    case: &Wanted,
+    studies: &[(&str, &Map<String, Value>)],
+) -> Result<String, Refusal> {
+    let path = case_path(app, case)?;
+    let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?})\n");
+    for (name, request) in studies {
+        let _ = write!(text, "{name} = nanotap.{name}(case");
+        for (option, value) in *request {
+            // `from` is a word of the language.
+            let option = if option == "from" { "from_" } else { option };
+            let value = match value {
+                Value::Bool(true) => "True".to_owned(),
+                Value::Bool(false) => "False".to_owned(),
+                Value::Null => "None".to_owned(),
+                other => other.to_string(),
+            };
+            let _ = write!(text, ", {option}={value}");
+        }
+        text.push_str(")\n");
+    }
+    Ok(text)
+}

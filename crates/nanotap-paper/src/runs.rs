@@ -280,7 +280,7 @@ impl Counted {
         let theorem = self
             .look(orbit)
             .ok()
-            .and_then(|o| prover.report(&o).theorem);
+            .and_then(|o| prover.report(&o.trajectory, o.period).theorem);
         theorem.map_or_else(String::new, |theorem| match theorem.stability {
             "undecided" => ", proved to exist".to_owned(),
             word => format!(", proved to exist and to be {word}"),

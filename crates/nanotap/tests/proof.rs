@@ -143,7 +143,7 @@ fn case(more: &[&str]) -> Case {
 
 fn found(case: &Case, options: &OrbitOptions) -> (OrbitReport, ProofReport) {
     let orbit = orbit(&case.model().unwrap(), options).unwrap();
-    let proof = Prover::new(case).report(&orbit);
+    let proof = Prover::new(case).report(&orbit.trajectory, orbit.period);
     (orbit, proof)
 }
 
@@ -409,7 +409,9 @@ fn oscillators_with_a_stop_are_proved() {
     };
     let case = Case::from(rigid);
     let orbit = orbit(&case.model().unwrap(), &options).unwrap();
-    let theorem = Prover::new(&case).theorem(&orbit).unwrap();
+    let theorem = Prover::new(&case)
+        .theorem(&orbit.trajectory, orbit.period)
+        .unwrap();
     let speed = theorem.switches[0].state[1];
     assert!((speed.middle() / -0.8 - 0.645_352_178_4).abs() < 1e-9 && speed.radius() < 1e-12);
     assert_eq!(theorem.multipliers.stability(), Stability::Stable);

@@ -13,7 +13,6 @@ mod gather;
 pub mod glossary;
 mod harmonics;
 mod measure;
-pub mod mode_share;
 mod number;
 mod physical_motion;
 pub mod table;

@@ -16,10 +16,10 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitReport, report};
 use crate::study::proof::Prover;
-use crate::study::registry::Study;
 use crate::study::simulate::{Classification, SimulateError, largest_exponent};
 use crate::study::start_box::{box_with, default_box, default_starts};
 use crate::study::value::Intervals;
@@ -210,7 +210,7 @@ impl Attractors {
         let prover = Prover::new(case);
         let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
         for orbit in stable.chain(self.unstable.iter_mut().flatten()) {
-            orbit.proof = Some(prover.report(orbit));
+            orbit.proof = Some(prover.report(&orbit.trajectory, orbit.period));
         }
     }
 

@@ -29,9 +29,9 @@ use crate::dataset::{
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
+use crate::study::kind::DatasetStudy;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
-use crate::study::recipe::Recipe;
-use crate::study::registry::DatasetStudy;
+use crate::study::recipe::{Computation, Recipe};
 use crate::study::simulate::{Classification, SimulateError, starting_state};
 
 /// Most points along an axis, and of a slice.
@@ -434,6 +434,20 @@ impl Basin {
     }
 }
 
+impl Computation for Basin {
+    fn schema(&self) -> &Schema {
+        self.schema()
+    }
+
+    fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
+        self.compute(store, how)
+    }
+
+    fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        self.chunk_files(chunk, control)
+    }
+}
+
 /// Points of a row between two looks at whether to stop.
 const UNSTOPPED: usize = 64;
 
@@ -805,7 +819,7 @@ impl DatasetStudy for BasinStudy {
 
     fn recipe(case: &Case, request: &BasinRequest, control: &Control<'_>) -> Result<Recipe, Error> {
         let basin = Basin::new(case, &request.options()?, control)?;
-        Ok(Recipe::Basin(Box::new(basin)))
+        Ok(Box::new(basin))
     }
 
     fn report(store: &Store) -> Result<Shares, StoreError> {

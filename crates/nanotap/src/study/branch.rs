@@ -17,9 +17,9 @@ use crate::case::{Case, CaseError, Key, ParameterUnit, PlaneFamily};
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::kind::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
-use crate::study::registry::Study;
 use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, key_and_ends};
 

@@ -24,9 +24,9 @@ use crate::model::sample_law::SampleLaw;
 use crate::model::strobe::Strobe;
 use crate::observe::Observables;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
+use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit};
-use crate::study::registry::{Study, cantilever};
 use crate::study::simulate::{Classification, Named};
 use crate::study::value::Amount;
 

@@ -9,11 +9,11 @@ use crate::case::Case;
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
-use crate::observe::mode_share::ReadingsReport;
 use crate::observe::time_series::with_modes;
+use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_PERIOD;
+use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit};
-use crate::study::registry::{Study, cantilever};
 use crate::study::simulate::Classification;
 
 /// A motion at each number of modes.

@@ -18,8 +18,8 @@ use crate::model::recording::each_period;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
+use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIODS;
-use crate::study::registry::Study;
 use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
 
 /// How to measure.

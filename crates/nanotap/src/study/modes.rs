@@ -13,8 +13,8 @@ use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::spectrum::{self, Spectrum, SpectrumError, TipLoad};
+use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_POINTS;
-use crate::study::registry::{Study, cantilever};
 
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]

@@ -22,9 +22,9 @@ use crate::observe::{
     ContactEvent, Derivative, Kept, Observables, OutOfRange, Set, Spectrum, watch,
 };
 use crate::study::in_si::InSi;
+use crate::study::kind::Study;
 use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
 use crate::study::proof::{ProofReport, Prover};
-use crate::study::registry::Study;
 use crate::study::simulate::{Named, SimulateError, starting_state};
 use crate::study::start_box::default_box;
 
@@ -528,7 +528,7 @@ impl Study for OrbitStudy {
             found.derivatives.insert(key.path(), derivative);
         }
         if request.prove {
-            found.proof = Some(Prover::new(case).report(&found));
+            found.proof = Some(Prover::new(case).report(&found.trajectory, found.period));
         }
         let physical = case.physical().map(|resolved| {
             PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved)

@@ -18,7 +18,6 @@ use crate::model::enclosed::{EnclosureError, enclosed, enclosed_oscillator};
 use crate::model::oscillator::{Oscillator, OscillatorParameter};
 use crate::model::recording::Recording;
 use crate::number::shortest;
-use crate::study::orbit::OrbitReport;
 
 /// What was proved of a periodic orbit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -112,21 +111,21 @@ impl Prover {
         Self { system, about }
     }
 
-    /// Proves one orbit.
+    /// Proves one orbit of this period, of which `orbit` is the recording.
     ///
     /// # Errors
     /// [`NotProved`] says why that was not possible.
-    pub fn theorem(&self, orbit: &OrbitReport) -> Result<Theorem, NotProved> {
+    pub fn theorem(&self, orbit: &Recording, period: usize) -> Result<Theorem, NotProved> {
         let system = self.system.as_ref().map_err(Clone::clone)?;
-        let Recording::Exact(trajectory) = &orbit.trajectory else {
+        let Recording::Exact(trajectory) = orbit else {
             return Err(EnclosureError::NotPiecewiseLinear.into());
         };
-        Ok(prove(system, &candidate(trajectory, orbit.period))?)
+        Ok(prove(system, &candidate(trajectory, period))?)
     }
 
     /// The same as a report.
-    pub fn report(&self, orbit: &OrbitReport) -> ProofReport {
-        match self.theorem(orbit) {
+    pub fn report(&self, orbit: &Recording, period: usize) -> ProofReport {
+        match self.theorem(orbit, period) {
             Ok(theorem) => ProofReport {
                 proved: true,
                 statement: statement(&theorem, &self.about),

@@ -1,44 +1,25 @@
 //! Studies of many motions, computed chunk by chunk into a dataset.
 
+use std::fmt::Debug;
+
 use crate::control::Control;
 use crate::dataset::{Schema, Store, Work, WorkError};
-use crate::study::basin::Basin;
-use crate::study::sweep::Sweep;
 
 /// What is computed, checked and ready: its chunks are pure functions of it.
-#[derive(Debug)]
-pub enum Recipe {
-    /// Runs over one or two parameters.
-    Sweep(Box<Sweep>),
-    /// Points of a slice of initial states.
-    Basin(Box<Basin>),
-}
+pub type Recipe = Box<dyn Computation>;
 
-impl Recipe {
+/// The computation of a dataset.
+pub trait Computation: Debug + Send + Sync {
     /// What its dataset holds.
-    pub fn schema(&self) -> &Schema {
-        match self {
-            Self::Sweep(sweep) => sweep.schema(),
-            Self::Basin(basin) => basin.schema(),
-        }
-    }
+    fn schema(&self) -> &Schema;
 
     /// Computes the chunks that `store`, made for its schema, still lacks.
     ///
     /// # Errors
     /// When the work was stopped (what is finished stays), or the store refuses.
-    pub fn compute(&self, store: &Store, work: &Work<'_>) -> Result<(), WorkError> {
-        match self {
-            Self::Sweep(sweep) => sweep.compute(store, work),
-            Self::Basin(basin) => basin.compute(store, work),
-        }
-    }
+    fn compute(&self, store: &Store, work: &Work<'_>) -> Result<(), WorkError>;
 
-    /// The files of one chunk, computed on this thread; `None` when it was stopped.
-    pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
-        match self {
-            Self::Sweep(sweep) => sweep.chunk_files(chunk, control),
-            Self::Basin(basin) => basin.chunk_files(chunk, control),
-        }
-    }
+    /// The files of one chunk, computed on this thread: the same bytes wherever that is. `None`
+    /// when it was stopped, and for a chunk that there is not.
+    fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>>;
 }

@@ -18,9 +18,9 @@ use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError, Values};
 use crate::study::attractors::MOST_STARTS;
+use crate::study::kind::DatasetStudy;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::recipe::Recipe;
-use crate::study::registry::DatasetStudy;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepRequest, class_of, from_neighbours};
 use crate::study::value::Axes;
@@ -335,7 +335,7 @@ impl DatasetStudy for WindowStudy {
     type Report = Window;
 
     fn recipe(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
-        Ok(Recipe::Sweep(Box::new(request.sweep(case)?)))
+        Ok(Box::new(request.sweep(case)?))
     }
 
     fn report(store: &Store) -> Result<Window, StoreError> {

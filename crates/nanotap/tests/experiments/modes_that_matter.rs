@@ -59,7 +59,7 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
     let tolerance = 0.05;
     let found = convergence(&case, 6, tolerance, &options).unwrap();
     let report = &found.readings;
-    let sum = |of: fn(&nanotap::observe::mode_share::ModeShare) -> f64| -> f64 {
+    let sum = |of: fn(&nanotap::study::mode_share::ModeShare) -> f64| -> f64 {
         report.mode_shares.iter().map(of).sum()
     };
     assert!((sum(|s| s.energy) - 1.0).abs() < 1e-12);

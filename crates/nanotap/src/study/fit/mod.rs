@@ -14,14 +14,13 @@
 //! residuals.
 //!
 //! A curve under frequency modulation is one of orbits at held amplitude and phase, with frequency
-//! and strength of the drive as unknowns (`held.rs`).
+//! and strength of the drive as unknowns (`problem/held.rs`).
 //!
 //! Fails by stopping in a local minimum (of which `fits` warns), and where the data lie on a
 //! motion that is not periodic.
 
 mod branches;
 mod data;
-mod held;
 mod jumps;
 mod laws;
 mod parameters;
@@ -46,15 +45,15 @@ pub use report::{
     OtherOrbit, Reading, Undetermined,
 };
 
-use held::Loop;
 use parameters::parameters;
 use problem::Problem;
+use problem::held::Loop;
 use search::Search;
 use solve::LeastSquares as _;
 
 use crate::Error;
 use crate::case::Case;
-use crate::study::registry::Study;
+use crate::study::kind::Study;
 use crate::study::setpoint::at_setpoint;
 use crate::study::value::Intervals;
 

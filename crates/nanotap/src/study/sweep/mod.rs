@@ -27,6 +27,7 @@
 mod dataset;
 mod error;
 mod follow;
+mod motions;
 mod neighbours;
 mod over;
 mod request;
@@ -35,13 +36,13 @@ mod summary;
 
 pub use error::SweepError;
 pub use follow::Follow;
+pub(crate) use motions::{Motions, class_of};
 pub use neighbours::{FromNeighbour, from_neighbours};
 pub use over::{Over, OverError, Spacing};
 pub use request::{SweepRequest, SweepStudy};
 pub use run::Starts;
 pub(crate) use run::nearest;
 pub use summary::Summary;
-pub(crate) use summary::{Motions, class_of};
 
 use nanotap_dynamics::{ClassifyOptions, Control, LyapunovOptions};
 
@@ -49,6 +50,7 @@ use crate::case::Case;
 use crate::dataset::{
     Block, Schema, Store, StoreError, Values, Work, WorkError, chunk_files, work,
 };
+use crate::study::recipe::Computation;
 
 /// How to sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -232,6 +234,20 @@ impl Sweep {
                 // The first parameter varies fastest.
                 over.apply(&case, entry[axis - k])
             })
+    }
+}
+
+impl Computation for Sweep {
+    fn schema(&self) -> &Schema {
+        self.schema()
+    }
+
+    fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
+        self.compute(store, how)
+    }
+
+    fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        self.chunk_files(chunk, control)
     }
 }
 

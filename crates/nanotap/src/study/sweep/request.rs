@@ -9,9 +9,9 @@ use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MOST_STARTS;
+use crate::study::kind::DatasetStudy;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
 use crate::study::recipe::Recipe;
-use crate::study::registry::DatasetStudy;
 use crate::study::value::{Axes, Intervals};
 
 /// What a sweep is asked for.
@@ -130,7 +130,7 @@ impl DatasetStudy for SweepStudy {
     type Report = Summary;
 
     fn recipe(case: &Case, request: &SweepRequest, _: &Control<'_>) -> Result<Recipe, Error> {
-        Ok(Recipe::Sweep(Box::new(request.sweep(case)?)))
+        Ok(Box::new(request.sweep(case)?))
     }
 
     fn report(store: &Store) -> Result<Summary, StoreError> {

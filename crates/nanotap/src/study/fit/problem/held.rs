@@ -13,22 +13,22 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::branches::Rows;
-use super::data::is_distance;
-use super::parameters::Target;
-use super::problem::{Effects, Point, Problem, RowPoint};
+use super::{Effects, Point, Problem, RowPoint};
 use crate::Error;
 use crate::case::physical::Scales;
 use crate::case::{Case, Key};
 use crate::control::Control;
 use crate::model::parameter::Parameter;
 use crate::study::FreeMotion;
+use crate::study::fit::branches::Rows;
+use crate::study::fit::data::is_distance;
+use crate::study::fit::parameters::Target;
 use crate::study::frequency_modulation::walk::{HeldWalk, Stepped};
 use crate::study::frequency_modulation::{Driven, FreeOscillation, Held, HeldOrbit, Modulated};
 
 /// What a loop held.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Loop {
+pub(in crate::study::fit) struct Loop {
     /// Amplitude at the drive's frequency, in m, or in a dimensionless case's own unit.
     amplitude: f64,
     /// Phase behind the drive, degrees.
@@ -37,7 +37,7 @@ pub(super) struct Loop {
 
 /// An orbit with what was held.
 #[derive(Clone, Debug)]
-pub(super) struct HeldRow {
+pub(in crate::study::fit) struct HeldRow {
     driven: Driven,
     case: Case,
     free: Arc<Free>,
@@ -126,7 +126,7 @@ const BEYOND: f64 = 8.0;
 
 impl Loop {
     /// The free amplitude of a case, and a phase.
-    pub(super) fn of(case: &Case, phase: f64) -> Result<Self, Error> {
+    pub(in crate::study::fit) fn of(case: &Case, phase: f64) -> Result<Self, Error> {
         let model = case.model()?;
         let held = Held {
             amplitude: FreeMotion::of(&model).amplitude,
@@ -187,7 +187,11 @@ impl Loop {
 
     /// The orbits at all rows, each continued from the row before, the first of a curve from
     /// far away.
-    pub(super) fn discover(self, problem: &Problem<'_>, x: &[f64]) -> (Point, Vec<Rows>) {
+    pub(in crate::study::fit) fn discover(
+        self,
+        problem: &Problem<'_>,
+        x: &[f64],
+    ) -> (Point, Vec<Rows>) {
         let bases = problem.cases(x);
         let curves = problem.data.curves.par_iter().enumerate();
         let found: Vec<Vec<RowPoint>> = curves
@@ -266,7 +270,7 @@ impl Loop {
 
     /// The orbits at other parameters, from a point already evaluated, to first order where they
     /// go.
-    pub(super) fn follow(
+    pub(in crate::study::fit) fn follow(
         self,
         problem: &Problem<'_>,
         (x, bases): (&[f64], &[Case]),
@@ -320,7 +324,7 @@ impl Loop {
     }
 
     /// The derivatives of drive and state, and of what was measured, by every parameter.
-    pub(super) fn derivatives(
+    pub(in crate::study::fit) fn derivatives(
         problem: &Problem<'_>,
         x: &[f64],
         (curve, point): (usize, &RowPoint),

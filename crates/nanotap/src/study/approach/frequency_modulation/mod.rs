@@ -23,7 +23,7 @@ pub use held::{Driven, Held, HeldError, HeldOrbit};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::approach::{ApproachPoint, Way};
+use super::{ApproachPoint, Way};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::physical::{Kind, Physical};
 use crate::model::parameter::Parameter;

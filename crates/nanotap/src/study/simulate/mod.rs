@@ -1,5 +1,7 @@
 //! One run: the transient thrown away, the motion recorded, observed and named.
 
+pub mod fixed_step;
+
 use std::time::Instant;
 
 pub use nanotap_dynamics::ClassifyOptions;
@@ -15,11 +17,11 @@ use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, Kept, Observables, OutOfRange, Set, watch};
-use crate::study::fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
 use crate::study::in_si::InSi;
+use crate::study::kind::Study;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES};
-use crate::study::registry::Study;
 use crate::study::value::Steps;
+use fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
 
 /// How to run.
 #[derive(Clone, Debug, PartialEq)]

@@ -15,11 +15,13 @@
 //! the beam touches depends on it.
 //!
 //! With [`ApproachOptions::phase`] amplitude and phase are held by frequency and strength of the
-//! drive, as in frequency modulation: see [`frequency_modulation`](super::frequency_modulation).
+//! drive, as in frequency modulation: see [`frequency_modulation`].
 //! Orbits are then continued from distance to distance.
 //!
 //! Fails: a jump is located to a step of the distance only (the fold behind it exactly, where
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
+
+pub mod frequency_modulation;
 
 use nanotap_dynamics::{
     Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, classify, grid_neighbours,
@@ -28,21 +30,21 @@ use nanotap_dynamics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::FreeMotion;
-use super::frequency_modulation::{
-    HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
-};
 use crate::Error;
 use crate::case::{Case, CaseError, Key, ParameterUnit};
 use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
+use crate::study::FreeMotion;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
+use crate::study::kind::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
-use crate::study::registry::Study;
 use crate::study::simulate::{Classification, Named};
 use crate::study::sweep::{SweepOptions, nearest};
 use crate::study::value::Amount;
+use frequency_modulation::{
+    HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
+};
 
 /// How to approach. Distances are in the model's unit of length.
 #[derive(Clone, Debug, PartialEq)]
@@ -328,7 +330,7 @@ pub fn approach(
 }
 
 /// The distances from far to near.
-pub(super) fn distances(
+pub(in crate::study) fn distances(
     free: &FreeMotion,
     options: &ApproachOptions,
 ) -> Result<Vec<f64>, ApproachError> {
@@ -553,7 +555,7 @@ const STRONGEST: f64 = 1e4;
 const DIFFERENT: f64 = 1e-6;
 
 /// The intervals in which the two ways differ; `difference` says by how much two points do.
-pub(super) fn hysteresis(
+pub(in crate::study) fn hysteresis(
     table: &[ApproachPoint],
     difference: impl Fn(&ApproachPoint, &ApproachPoint) -> Option<f64>,
 ) -> Vec<Hysteresis> {
@@ -583,7 +585,7 @@ pub(super) fn hysteresis(
 }
 
 /// The beam's clearance at the nearest distance on the way there.
-pub(super) fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> Option<f64> {
+pub(in crate::study) fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> Option<f64> {
     let nearest = table.iter().rfind(|p| p.way == Way::Approach)?;
     let orbit = nearest.orbit.as_ref()?;
     let mut there = case.with(case.gap_key(), nearest.gap);

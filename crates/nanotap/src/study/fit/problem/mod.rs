@@ -1,5 +1,7 @@
 //! The residuals of measured curves and their exact derivatives.
 
+pub(super) mod held;
+
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -12,12 +14,12 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Derivative, Observables, Set, measure};
 
-use super::branches::{Along, Candidate, Rows, continued, leave_ends, path};
-use super::data::{Column, Data, Row};
-use super::held::{HeldRow, Loop};
-use super::jumps::{Fold, Jump};
-use super::parameters::{Parameter, Target};
-use super::solve::LeastSquares;
+use crate::study::fit::branches::{Along, Candidate, Rows, continued, leave_ends, path};
+use crate::study::fit::data::{Column, Data, Row};
+use crate::study::fit::jumps::{Fold, Jump};
+use crate::study::fit::parameters::{Parameter, Target};
+use crate::study::fit::solve::LeastSquares;
+use held::{HeldRow, Loop};
 
 /// Measured curves, a case and what of it is free.
 #[derive(Clone)]

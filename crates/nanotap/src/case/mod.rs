@@ -24,7 +24,6 @@ mod family;
 pub mod file;
 pub mod force_table;
 pub mod key;
-mod keys;
 pub mod near_name;
 pub mod physical;
 mod quantities;

@@ -17,7 +17,7 @@ use crate::model::contact::dual::Dual;
 use crate::model::contact::law::{Answer, Bilinear, Combination, Law, Square};
 use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Forcing, Galerkin, Gap, Regime};
-use crate::model::higher_modes::Correction;
+use crate::model::measured_modes::Correction;
 use crate::model::parameter::Parameter;
 use crate::model::spectrum::Spectrum;
 use crate::model::{BeamOutputs, Forgetting, Powers, Product};

@@ -6,6 +6,8 @@ use serde::Serialize;
 
 use crate::model::beam::{MAX_MODES, ModeCountError};
 use crate::model::contact::ContactLaw;
+use crate::model::contact::dual::Dual;
+use crate::model::contact::law::Law;
 use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::higher_modes::HigherModes;
@@ -290,6 +292,19 @@ impl Cantilever {
             }
         }
         Ok(())
+    }
+
+    /// A number of the case, with its derivative with respect to `parameter`.
+    pub(crate) fn dual(&self, number: Parameter, parameter: Option<Parameter>) -> Dual {
+        Dual::new(
+            self.get(number),
+            f64::from(u8::from(Some(number) == parameter)),
+        )
+    }
+
+    /// What the sample answers, with the derivative of its numbers with respect to `parameter`.
+    pub(crate) fn contact_law(&self, parameter: Option<Parameter>) -> Law {
+        self.contact.law(|number| self.dual(number, parameter))
     }
 }
 

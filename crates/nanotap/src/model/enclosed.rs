@@ -92,7 +92,7 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     if case.contact == ContactLaw::MovingSurface {
         return Err(EnclosureError::MovingSurface);
     }
-    let law = ContactLaw::law(case, None);
+    let law = case.contact_law(None);
     let beam = EnclosedBeam::new(case, law.has_memory)?;
     let recovers = law.onsets.is_some();
     let gap = beam.combined(&law.gap, exact);

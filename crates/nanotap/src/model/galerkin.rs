@@ -13,7 +13,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm};
 use crate::model::contact::dual::Dual;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
-use crate::model::higher_modes::Correction;
+use crate::model::measured_modes::Correction;
 use crate::model::parameter::Parameter;
 
 /// The two linear regimes of the tip.

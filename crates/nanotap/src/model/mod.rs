@@ -19,6 +19,7 @@ pub mod exact_beam;
 pub mod galerkin;
 mod grazed;
 pub mod higher_modes;
+mod measured_modes;
 mod motion_error;
 pub mod nonlinear;
 pub mod oscillator;
@@ -40,7 +41,6 @@ pub use tangent::ModelTangent;
 use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
-use crate::model::contact::ContactLaw;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::nonlinear::{Equilibrium, Nonlinear, Variation};
 use crate::model::parameter::Parameter;
@@ -204,7 +204,7 @@ impl Model {
         if let Some(law) = &case.law {
             return Self::under(law, galerkin, &drive);
         }
-        let law = ContactLaw::law(case, None);
+        let law = case.contact_law(None);
         let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
         let regimes = vec![
             beam.regime(Regime::Free, &law.flight, true)?,
@@ -282,7 +282,7 @@ impl Model {
                     .map(|beam| vec![beam.powers_in(free, &flight)])
                     .unwrap_or_default();
             }
-            let law = ContactLaw::law(&galerkin.case, None);
+            let law = galerkin.case.contact_law(None);
             Beam::new(galerkin, drive, law.has_memory)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
@@ -433,7 +433,7 @@ pub fn cantilever_tangent(
         tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
         return Ok(tangent);
     }
-    let law = ContactLaw::law(case, Some(parameter));
+    let law = case.contact_law(Some(parameter));
     let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
     let change = beam.derivative(parameter);
     for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
@@ -463,7 +463,7 @@ pub(crate) fn cantilever_model_tangent(
     let law = if model.nonlinear.is_some() {
         contact::no_sample(model.memory > 0)
     } else {
-        ContactLaw::law(case, Some(parameter))
+        case.contact_law(Some(parameter))
     };
     let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
     let change = beam.derivative(parameter);

@@ -23,11 +23,10 @@ use nanotap_flow::{Complex, Flow, FlowError, Output, Trajectory};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::measure::measure_clearance;
 use crate::model::beam::Modes;
 use crate::model::nonlinear::Nonlinear;
 use crate::model::recording::{Recording, read};
-use crate::model::{BeamOutputs, Model, MotionError};
+use crate::model::{BeamOutputs, Model};
 
 /// Where a beam comes nearest to the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -53,15 +52,6 @@ const SAME_MOMENT: f64 = 1e-9;
 const FOLLOWED: f64 = 1e-11;
 
 impl Clearance {
-    /// Over `periods` drive periods from `state` at drive phase 0; `None` if the model is no
-    /// beam.
-    ///
-    /// # Errors
-    /// When the flow fails.
-    pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, MotionError> {
-        measure_clearance(model, state, periods)
-    }
-
     /// Whether another part of the beam than the tip would touch.
     pub fn touches(&self) -> bool {
         self.height <= 0.0

@@ -21,9 +21,8 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value as Json, json};
 
 use super::clearance::Clearance;
-use super::measure::{
-    Beginnings, Found, Measured, Need, Signal, Tone, beginnings, contact_regimes, frequency,
-};
+use super::measure::{beginnings, contact_regimes, frequency};
+use super::measured::{Beginnings, Found, Measured, Need, Signal, Tone};
 use super::number::Phasor;
 use super::table::{OBSERVABLES, Observable, Observables, Set};
 use super::value::Value;

@@ -13,6 +13,7 @@ mod gather;
 pub mod glossary;
 mod harmonics;
 mod measure;
+mod measured;
 mod number;
 mod physical_motion;
 pub mod table;

@@ -15,7 +15,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 use serde_json::Map;
 
-use super::measure::{Measured, Signal, Tone};
+use super::measured::{Measured, Signal, Tone};
 use super::number::{Number as _, Phasor};
 use super::value::{Measurable, Value, Varying};
 use super::{Dimension, EnergyBalance};

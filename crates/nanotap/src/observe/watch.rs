@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nanotap_flow::Flow;
 use nanotap_flow::trajectory::Recorder;
 
+use super::clearance::Clearance;
 use super::contact_event::{ContactEvent, Contacts};
 use super::gather::Gatherer;
 use super::measure::Measurement;
@@ -188,4 +189,19 @@ pub fn measure(
     set: Set,
 ) -> Result<Observables, MotionError> {
     Ok(watch(model, state, periods, set, Kept::default())?.observables)
+}
+
+impl Clearance {
+    /// Over `periods` drive periods from `state` at drive phase 0; `None` if the model is no
+    /// beam.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, MotionError> {
+        let seen = measure(model, state, periods, Set::CLEARANCE)?;
+        let place = seen.beam_clearance.zip(seen.beam_clearance_xi);
+        Ok(place
+            .zip(seen.beam_clearance_period)
+            .map(|((height, xi), period)| Self { height, xi, period }))
+    }
 }

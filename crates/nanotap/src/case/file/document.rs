@@ -134,14 +134,10 @@ impl Document {
             }
         }
         // The reader hands tables out by name; people read them by place.
-        let offset = |place: &Place| match place {
-            Place::Span(span) => span.start,
-            Place::Override(_) | Place::Whole => usize::MAX,
-        };
         document
             .entries
-            .sort_by_key(|entry| offset(&entry.key_place));
-        document.headers.sort_by_key(|header| offset(&header.place));
+            .sort_by_key(|entry| entry.key_place.offset());
+        document.headers.sort_by_key(|header| header.place.offset());
         document.source = Some(source);
         Ok(document)
     }

@@ -36,6 +36,16 @@ pub enum Place {
     Whole,
 }
 
+impl Place {
+    /// Where it stands in the order of reading.
+    pub(super) fn offset(&self) -> usize {
+        match self {
+            Self::Span(span) => span.start,
+            Self::Override(_) | Self::Whole => usize::MAX,
+        }
+    }
+}
+
 /// One thing that is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {

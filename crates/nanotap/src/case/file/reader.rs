@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::document::{Document, Entry, Value as Written};
-use super::problem::{CaseFileError, Place, Problem, Problems, Source};
+use super::problem::{CaseFileError, Problem, Problems, Source};
 use super::refusal;
 use crate::case::force_table::ForceTable;
-use crate::case::key::{Default, Key, ModelKind, Section, Takes};
+use crate::case::key::{Key, ModelKind, Section, Takes};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Origin, Replaced, Said, Stated, Value};
 use crate::model::cantilever::{self, Cantilever, CosineTerm};
@@ -309,19 +309,6 @@ pub(crate) fn modes(stated: &Stated) -> usize {
         .map_or(crate::case::DEFAULT_MODES, |modes| modes as usize)
 }
 
-/// The value of a key that need not be written, with a sample of this law.
-pub(super) fn default_of(key: Key, law: ContactLaw) -> Option<f64> {
-    let solid = law == ContactLaw::StandardLinearSolid;
-    let moves = law == ContactLaw::MovingSurface;
-    match (key, key.entry().default) {
-        (Key::Alpha6, _) if solid => Some(0.0),
-        (Key::RelaxationStiffness | Key::RelaxationTime, _) if !solid => Some(0.0),
-        (Key::SurfaceStiffness | Key::SurfaceDamping, _) if !moves => Some(0.0),
-        (_, Default::Number(value)) => Some(value),
-        _ => None,
-    }
-}
-
 fn cantilever(
     known: &Known<'_>,
     stated: &Stated,
@@ -351,7 +338,7 @@ fn cantilever(
     let mut complete = true;
     for parameter in Parameter::every() {
         let key = Key::of(parameter);
-        let Some(value) = stated.number(key).or_else(|| default_of(key, law)) else {
+        let Some(value) = stated.number(key).or_else(|| key.default_under(law)) else {
             complete = false;
             continue;
         };
@@ -399,7 +386,7 @@ fn oscillator(
             continue;
         }
         let key = Key::of_oscillator(parameter);
-        let default = || default_of(key, ContactLaw::default());
+        let default = || key.default_under(ContactLaw::default());
         let Some(value) = stated.number(key).or_else(default) else {
             complete = false;
             continue;
@@ -413,12 +400,4 @@ fn oscillator(
         }
     }
     complete.then_some(oscillator)
-}
-
-/// Where something stands in the order of reading.
-pub(super) fn offset(place: &Place) -> usize {
-    match place {
-        Place::Span(span) => span.start,
-        Place::Override(_) | Place::Whole => usize::MAX,
-    }
 }

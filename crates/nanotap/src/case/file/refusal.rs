@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use super::document::{Document, Entry, Value};
 use super::problem::{Place, Problem, Problems};
-use super::reader::{default_of, offset};
 use crate::case::key::{Key, ModelKind, Section};
 use crate::case::near_name::near_name;
 use crate::case::stated::quoted;
@@ -145,7 +144,7 @@ pub(super) fn mixed(
         .filter(|(key, _)| !key.is_physical() && !allowed.contains(key))
         .map(|(_, entry)| *entry)
         .collect();
-    foreign.sort_by_key(|entry| offset(&entry.key_place));
+    foreign.sort_by_key(|entry| entry.key_place.offset());
     let Some(first) = foreign.first() else { return };
     let others = match foreign.len() - 1 {
         0 => String::from("is"),
@@ -202,7 +201,7 @@ pub(super) fn missing(
         .keys()
         .filter(needed)
         .filter(|key| !known.contains_key(key) && !meant.contains(key))
-        .filter(|key| default_of(*key, law).is_none())
+        .filter(|key| key.default_under(law).is_none())
         .collect();
     if missing.is_empty() {
         return None;

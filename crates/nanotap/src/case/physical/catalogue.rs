@@ -20,9 +20,9 @@ use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Serialize};
 
+use super::beam_geometry::BeamGeometry;
+use super::elastic::Elastic;
 use super::error::PhysicalError;
-use super::lever::BeamGeometry;
-use super::sample::Elastic;
 use crate::case::key::Key;
 use crate::case::near_name::near_names;
 use crate::case::quantity::{Kind, QuantityError};

@@ -8,15 +8,12 @@
 
 use nalgebra::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use super::error::PhysicalError;
-use super::lever::Lever;
 use super::reader::Reader;
-use super::remark::Remark;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
-use crate::model::higher_modes::HigherModes;
 
 /// Reynolds numbers for which the fit holds.
 const REYNOLDS: [f64; 2] = [1e-6, 1e4];
@@ -48,76 +45,12 @@ impl Fluid {
         self.density * TAU * frequency * width * width / (4.0 * self.viscosity)
     }
 
-    /// The same lever of this width in the fluid. `lever` is that in vacuum; its stiffness and
-    /// tip stay, the beam's mass, first resonance and quality factor become those in the fluid.
-    pub(crate) fn around(
+    /// Γ at a frequency in Hz.
+    pub(super) fn on_lever(
         self,
-        lever: &Lever,
         width: f64,
-        length: f64,
-    ) -> Result<Lever, PhysicalError> {
-        let tip = lever.tip_mass();
-        let unit = PI / 4.0 * self.density * width * width * length;
-        let mut found = *lever;
-        // The added mass falls slowly with the frequency, so that this contracts.
-        for _ in 0..MOST_ITERATIONS {
-            let last = found.f0;
-            let gamma = self.on_lever(width, last)?;
-            found.beam_mass = lever.beam_mass + unit * gamma.re;
-            found = found.with_tip(tip)?;
-            if (found.f0 - last).abs() <= 1e-14 * last {
-                break;
-            }
-        }
-        let gamma = self.on_lever(width, found.f0)?;
-        // The whole damper CL is unit ω Γ_i, and α3 = CL T/(mL).
-        let damper = unit * TAU * found.f0 * gamma.im;
-        let alpha3 = damper * found.time_unit() / found.beam_mass;
-        found.quality_factor = 1.0;
-        found.quality_factor = found.damping() / alpha3;
-        Ok(found)
-    }
-
-    /// Frequency, quality factor and stiffness at the tip of the second and third mode of `lever`,
-    /// which is that in the fluid: each swings with the mass and the damping that Γ has at its own
-    /// frequency. In SI; 0 beyond the `count` modes, and where Γ is not known.
-    pub(crate) fn higher_modes(
-        self,
-        lever: &Lever,
-        width: f64,
-        length: f64,
-        count: usize,
-    ) -> Result<HigherModes, PhysicalError> {
-        let unit = PI / 4.0 * self.density * width * width * length;
-        let dry = lever.beam_mass - unit * self.on_lever(width, lever.f0)?.re;
-        let mut found = HigherModes::NONE;
-        for k in 1..count.min(3) {
-            let (mut frequency, _) = lever.mode(k, lever.beam_mass)?;
-            for _ in 0..MOST_ITERATIONS {
-                let Ok(gamma) = self.on_lever(width, frequency) else {
-                    return Ok(found);
-                };
-                let last = frequency;
-                (frequency, _) = lever.mode(k, dry + unit * gamma.re)?;
-                if (frequency - last).abs() <= 1e-14 * last {
-                    break;
-                }
-            }
-            let Ok(gamma) = self.on_lever(width, frequency) else {
-                return Ok(found);
-            };
-            let mass = dry + unit * gamma.re;
-            let (_, share) = lever.mode(k, mass)?;
-            // The beam's ∫φ² and the tip's φ(1)², of a mode that is 1 at the tip.
-            let modal = mass / share + lever.tip_mass();
-            found.frequency[k - 1] = frequency;
-            found.quality[k - 1] = modal * share / (unit * gamma.im);
-            found.stiffness[k - 1] = modal * (TAU * frequency).powi(2);
-        }
-        Ok(found)
-    }
-
-    fn on_lever(self, width: f64, frequency: f64) -> Result<Complex<f64>, PhysicalError> {
+        frequency: f64,
+    ) -> Result<Complex<f64>, PhysicalError> {
         let reynolds = self.reynolds(width, frequency);
         if (REYNOLDS[0]..=REYNOLDS[1]).contains(&reynolds) {
             return Ok(hydrodynamic_function(reynolds));
@@ -131,24 +64,7 @@ impl Fluid {
             ),
         ))
     }
-
-    /// What follows from it.
-    pub(crate) fn remark(self, lever: &Lever, width: f64) -> Remark {
-        Remark::note(format!(
-            "in a fluid of {} and {} the lever resonates at {} with Q = {} (Re = {}; Sader 1998), a \
-             given f0 is that in vacuum; the second and third mode have mass and damping of their \
-             own (up to Re = 1e4), any beyond those of the first",
-            Kind::Density.format(self.density),
-            Kind::Viscosity.format(self.viscosity),
-            Kind::Frequency.format(lever.f0),
-            Kind::Number.format(lever.quality_factor),
-            Kind::Number.format(self.reynolds(width, lever.f0)),
-        ))
-    }
 }
-
-/// Steps to the resonance in the fluid; each gains about a digit.
-const MOST_ITERATIONS: usize = 60;
 
 /// Γ of a thin rectangular blade at Reynolds number Re = ρωb²/(4η), time as e^{−iωt}.
 pub fn hydrodynamic_function(reynolds: f64) -> Complex<f64> {

@@ -36,8 +36,10 @@
 //! # Ok::<(), nanotap::case::file::CaseFileError>(())
 //! ```
 
+mod beam_geometry;
 pub mod catalogue;
 pub mod drive;
+mod elastic;
 mod error;
 pub mod fluid;
 pub mod force;

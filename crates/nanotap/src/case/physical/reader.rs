@@ -1,6 +1,7 @@
 //! What a physical case states, one quantity at a time.
 
 use super::catalogue::{Catalogue, Lever, Material};
+use super::elastic::Elastic;
 use super::error::PhysicalError;
 use crate::case::force_table::ForceTable;
 use crate::case::key::Key;
@@ -78,5 +79,31 @@ impl<'a> Reader<'a> {
     /// The error that a stated value cannot be.
     pub(crate) fn impossible(self, key: Key, reason: impl Into<String>) -> PhysicalError {
         PhysicalError::impossible(key, self.stated.written(key), reason)
+    }
+
+    /// The stated modulus and Poisson's ratio, with a catalogue's material for what is not.
+    pub(crate) fn elastic(
+        self,
+        [modulus_key, poisson_key]: [Key; 2],
+        material: Option<&Material>,
+    ) -> Result<Option<Elastic>, PhysicalError> {
+        let modulus = self
+            .number(modulus_key)?
+            .or_else(|| material.map(|material| material.elastic.modulus));
+        let poisson = self
+            .number(poisson_key)?
+            .or_else(|| material.map(|material| material.elastic.poisson));
+        match (modulus, poisson) {
+            (Some(modulus), Some(poisson)) => Ok(Some(Elastic { modulus, poisson })),
+            (None, None) => Ok(None),
+            (Some(_), None) => Err(PhysicalError::missing(
+                poisson_key,
+                "a contact needs Poisson's ratio beside the modulus (0.3 to 0.5 for polymers)",
+            )),
+            (None, Some(_)) => Err(PhysicalError::missing(
+                modulus_key,
+                "Poisson's ratio alone says nothing about the contact",
+            )),
+        }
     }
 }

@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::catalogue::Material;
+pub use super::elastic::Elastic;
 use super::error::PhysicalError;
 use super::force::SampleForce;
 use super::reader::Reader;
@@ -14,48 +14,6 @@ use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
 use crate::model::contact::moving_surface::MovingSurface;
-
-/// Elastic constants of an isotropic solid.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Elastic {
-    /// Young's modulus in Pa, above zero.
-    pub modulus: f64,
-    /// Poisson's ratio, from -1 to 0.5, ends left out on the lower side.
-    pub poisson: f64,
-}
-
-impl Elastic {
-    /// E/(1 − ν²): what presses back on a rigid indenter, in Pa.
-    pub fn plane_strain_modulus(self) -> f64 {
-        self.modulus / (1.0 - self.poisson * self.poisson)
-    }
-
-    /// The stated modulus and Poisson's ratio, with a catalogue's material for what is not.
-    pub(crate) fn read(
-        reader: Reader<'_>,
-        [modulus_key, poisson_key]: [Key; 2],
-        material: Option<&Material>,
-    ) -> Result<Option<Self>, PhysicalError> {
-        let modulus = reader
-            .number(modulus_key)?
-            .or_else(|| material.map(|material| material.elastic.modulus));
-        let poisson = reader
-            .number(poisson_key)?
-            .or_else(|| material.map(|material| material.elastic.poisson));
-        match (modulus, poisson) {
-            (Some(modulus), Some(poisson)) => Ok(Some(Self { modulus, poisson })),
-            (None, None) => Ok(None),
-            (Some(_), None) => Err(PhysicalError::missing(
-                poisson_key,
-                "a contact needs Poisson's ratio beside the modulus (0.3 to 0.5 for polymers)",
-            )),
-            (None, Some(_)) => Err(PhysicalError::missing(
-                modulus_key,
-                "Poisson's ratio alone says nothing about the contact",
-            )),
-        }
-    }
-}
 
 /// E* of two solids in contact, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in Pa; without a tip's
 /// constants the tip is rigid.
@@ -313,7 +271,8 @@ fn read_relaxation(reader: Reader<'_>, law: ContactLaw) -> Result<[f64; 2], Phys
 
 fn read_hertz(reader: Reader<'_>, tip: &Tip) -> Result<(Hertz, Elastic), PhysicalError> {
     let material = reader.material(Key::SampleMaterial)?;
-    let elastic = Elastic::read(reader, [Key::SampleModulus, Key::SamplePoisson], material)?
+    let elastic = reader
+        .elastic([Key::SampleModulus, Key::SamplePoisson], material)?
         .ok_or_else(|| {
             PhysicalError::missing(
                 Key::SampleStiffness,

@@ -1,9 +1,9 @@
 //! The tip: its mass, given or from its shape, its radius and what it is made of.
 
 use super::catalogue::Lever as CatalogueLever;
+use super::elastic::Elastic;
 use super::error::PhysicalError;
 use super::reader::Reader;
-use super::sample::Elastic;
 use crate::case::key::Key;
 
 /// A solid tip under the end of the lever.
@@ -83,7 +83,7 @@ impl Tip {
             .number(Key::TipHeight)?
             .or_else(|| lever.and_then(|lever| lever.tip_height));
         let material = reader.material(Key::TipMaterial)?;
-        let elastic = Elastic::read(reader, [Key::TipModulus, Key::TipPoisson], material)?;
+        let elastic = reader.elastic([Key::TipModulus, Key::TipPoisson], material)?;
         let density = reader
             .number(Key::TipDensity)?
             .or_else(|| material.and_then(|material| material.density));

@@ -30,7 +30,6 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::cantilever::Cantilever;
 use crate::model::parameter::Parameter;
 use dual::Dual;
 use law::Law;
@@ -81,11 +80,10 @@ impl ContactLaw {
         }
     }
 
-    /// The law of a case, with the derivative of its numbers with respect to `parameter`.
-    pub(crate) fn law(case: &Cantilever, parameter: Option<Parameter>) -> Law {
-        let dual = |p| Dual::new(case.get(p), f64::from(u8::from(Some(p) == parameter)));
+    /// The law with these numbers.
+    pub(crate) fn law(self, dual: impl Fn(Parameter) -> Dual) -> Law {
         let stiffness = dual(Parameter::Alpha4);
-        match case.contact {
+        match self {
             Self::SpringDamper => spring_damper::law(stiffness, dual(Parameter::Alpha6)),
             Self::KelvinVoigt => kelvin_voigt::law(stiffness, dual(Parameter::Alpha6)),
             Self::StandardLinearSolid => standard_linear_solid::law(

@@ -3,6 +3,8 @@
 //! The entries themselves stand in `keys`, once. Whatever reads, checks,
 //! varies, explains or documents a key asks here.
 
+mod keys;
+
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::LazyLock;
@@ -10,13 +12,14 @@ use std::sync::LazyLock;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
 
-pub use super::keys::Key;
-use super::keys::{ALTERNATIVES, TABLE};
 use super::near_name::near_name;
 use super::quantity::Kind;
 use crate::model::cantilever;
+use crate::model::contact::ContactLaw;
 use crate::model::oscillator::{self, OscillatorParameter};
 use crate::model::parameter::Parameter;
+pub use keys::Key;
+use keys::{ALTERNATIVES, TABLE};
 
 /// A table of a case file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -422,6 +425,19 @@ impl Key {
                 let others = group.ways.iter().filter(move |way| !way.contains(&self));
                 others.flat_map(|way| way.iter().map(|key| (*key, group.reason)))
             })
+    }
+
+    /// Its value where it need not be written, with a sample of this law.
+    pub(crate) fn default_under(self, law: ContactLaw) -> Option<f64> {
+        let solid = law == ContactLaw::StandardLinearSolid;
+        let moves = law == ContactLaw::MovingSurface;
+        match (self, self.entry().default) {
+            (Self::Alpha6, _) if solid => Some(0.0),
+            (Self::RelaxationStiffness | Self::RelaxationTime, _) if !solid => Some(0.0),
+            (Self::SurfaceStiffness | Self::SurfaceDamping, _) if !moves => Some(0.0),
+            (_, Default::Number(value)) => Some(value),
+            _ => None,
+        }
     }
 }
 

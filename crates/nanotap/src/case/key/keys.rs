@@ -6,8 +6,9 @@
 //! A new dimensionless number is an entry here and a field of the equations; a new physical
 //! quantity is an entry here and the line of the mapping that reads it.
 
-use super::key::{Alternatives, Default, Entry, Means, ModelKind, Range, Section, Takes};
-use super::quantity::Kind;
+use super::{Alternatives, Default, Entry, Means, ModelKind, Range, Section, Takes};
+use crate::case::DEFAULT_MODES;
+use crate::case::quantity::Kind;
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::CosineTerm;
 use crate::model::contact::ContactLaw;
@@ -267,8 +268,8 @@ keys! {
         name: "modes",
         symbol: "N",
         takes: Takes::Count(MAX_MODES),
-        default: Default::Number(super::DEFAULT_MODES as f64),
-        example: super::DEFAULT_MODES as f64,
+        default: Default::Number(DEFAULT_MODES as f64),
+        example: DEFAULT_MODES as f64,
         models: CANTILEVER,
         meaning: "number of beam modes",
         ..PLAIN

@@ -6,41 +6,21 @@
 //! the exact beam with tip mass α1 = M/(mL). Any two of k, mL and f₀ give the third once the
 //! tip's mass is known; f₂/f₁ depends on α1 alone and tells it.
 
+mod in_fluid;
+
 use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::error::PhysicalError;
-use super::fluid::Fluid;
-use super::reader::Reader;
-use super::remark::Remark;
-use super::tip::TipMass;
 use crate::case::key::Key;
+pub use crate::case::physical::beam_geometry::BeamGeometry;
+use crate::case::physical::error::PhysicalError;
+use crate::case::physical::fluid::Fluid;
+use crate::case::physical::reader::Reader;
+use crate::case::physical::remark::Remark;
+use crate::case::physical::tip::TipMass;
 use crate::case::quantity::Kind;
 use crate::model::exact_beam;
-
-/// Dimensions of a beam of rectangular cross-section, in m.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BeamGeometry {
-    /// Length L.
-    pub length: f64,
-    /// Width b.
-    pub width: f64,
-    /// Thickness h, in the direction of bending.
-    pub thickness: f64,
-}
-
-impl BeamGeometry {
-    /// k = 3EI/L³ = E b h³/(4 L³) for Young's modulus E in Pa; in N/m.
-    pub fn stiffness(self, modulus: f64) -> f64 {
-        modulus * self.width * (self.thickness / self.length).powi(3) / 4.0
-    }
-
-    /// mL = ϱ L b h for the density ϱ in kg/m³; in kg.
-    pub fn mass(self, density: f64) -> f64 {
-        density * self.length * self.width * self.thickness
-    }
-}
 
 /// What is known of a lever; SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

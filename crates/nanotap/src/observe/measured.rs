@@ -1,0 +1,389 @@
+//! What observables are read from: signals, what is gathered of them, and what follows.
+
+use nanotap_flow::{Complex, Output};
+
+use super::above_rounding;
+use super::clearance::Clearance;
+use super::energy::{EnergyBalance, PowerTerm, balance};
+use super::number::{Number, Phasor};
+use crate::model::Model;
+use crate::model::nonlinear::Nonlinear;
+
+/// A scalar along a motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Signal {
+    /// Tip deflection W.
+    Tip,
+    /// Height of the tip over the undeformed surface, V_T.
+    Height,
+    /// Its rate.
+    HeightRate,
+    /// Force of the sample on the tip.
+    Force,
+    /// Slope at the tip; 0 of an oscillator.
+    Slope,
+    /// A factor of a power that is fed in or taken.
+    Power(PowerTerm),
+}
+
+impl Signal {
+    /// What it is in a model with a nonlinear law.
+    pub(super) fn reading(self, model: &Model, nonlinear: &Nonlinear) -> nanotap_volterra::Output {
+        nonlinear.output(&self.outputs(model)[0], self.force_part(nonlinear))
+    }
+
+    /// How much of a nonlinear law's force is in it beside its output.
+    pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
+        match self {
+            Self::Force => 1.0,
+            Self::Power(term) => term.force_part(nonlinear),
+            _ => 0.0,
+        }
+    }
+
+    /// What it is in `model`, an entry a regime.
+    pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
+        let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
+        match self {
+            Self::Tip => same(&model.tip),
+            Self::Height => same(&model.height),
+            Self::HeightRate => {
+                let drive = model.system.drive();
+                let rate =
+                    |r: &nanotap_flow::Regime| model.height.rate(r.matrix(), r.forcing(), drive);
+                model.system.regimes().iter().map(rate).collect()
+            }
+            Self::Force => model.force.clone(),
+            Self::Slope => same(
+                &model
+                    .beam
+                    .as_ref()
+                    .map_or_else(|| model.tip.scaled(0.0), |beam| beam.slope.clone()),
+            ),
+            Self::Power(term) => term.outputs(model),
+        }
+    }
+}
+
+/// A frequency of the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tone {
+    /// The drive's, of several tones the first.
+    First,
+    /// The second tone's.
+    Second,
+    /// So many times the drive's.
+    Harmonic(u32),
+}
+
+/// What is gathered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Need {
+    Least(Signal),
+    Greatest(Signal),
+    Integral(Signal),
+    Product(Signal, Signal),
+    Fourier(Signal, Tone),
+}
+
+impl Need {
+    /// The signals that it is made of.
+    pub(super) const fn signals(&self) -> (Signal, Option<Signal>) {
+        match *self {
+            Self::Least(signal)
+            | Self::Greatest(signal)
+            | Self::Integral(signal)
+            | Self::Fourier(signal, _) => (signal, None),
+            Self::Product(a, b) => (a, Some(b)),
+        }
+    }
+
+    /// What it is of no time.
+    pub(super) const fn nothing(&self) -> Complex {
+        Complex::new(
+            match self {
+                Self::Least(_) => f64::INFINITY,
+                Self::Greatest(_) => f64::NEG_INFINITY,
+                _ => 0.0,
+            },
+            0.0,
+        )
+    }
+}
+
+/// What observables are read from. Before a run it is empty, and notes what they ask for.
+pub(super) struct Measured<'a, D = f64> {
+    pub(super) model: &'a Model,
+    pub(super) asked: Vec<Need>,
+    pub(super) asked_ends: bool,
+    pub(super) asked_clearance: bool,
+    pub(super) found: Option<Found<D>>,
+}
+
+/// What was gathered of a motion.
+pub(super) struct Found<D> {
+    pub(super) values: Vec<(Need, Phasor<D>)>,
+    pub(super) duration: D,
+    /// Whole drive periods.
+    pub(super) periods: u64,
+    pub(super) contact_time: D,
+    pub(super) contacts: Beginnings<D>,
+    /// Gain of stored energy.
+    pub(super) stored: D,
+    /// The part of it that a nonlinear law stores.
+    pub(super) stored_by_sample: D,
+    pub(super) clearance: Option<Clearance<D>>,
+    /// What an impact takes, as a factor of the square of its speed.
+    pub(super) impact_loss: D,
+    /// Phase of the second tone in rad.
+    pub(super) second_phase: D,
+}
+
+/// The contacts that began.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Beginnings<D> {
+    pub(super) count: u64,
+    pub(super) grazing: u64,
+    pub(super) greatest_speed: D,
+    pub(super) squared_speeds: D,
+}
+
+impl<'a, D: Number> Measured<'a, D> {
+    /// Before the run.
+    pub(super) const fn nothing(model: &'a Model) -> Self {
+        Self {
+            model,
+            asked: Vec::new(),
+            asked_ends: false,
+            asked_clearance: false,
+            found: None,
+        }
+    }
+
+    /// What was gathered; 0 before the run.
+    fn value(&mut self, need: Need) -> Phasor<D> {
+        if let Some(found) = &self.found {
+            let known = found.values.iter().find(|(known, _)| *known == need);
+            let nothing = Phasor {
+                re: D::from(f64::NAN),
+                im: D::default(),
+            };
+            known.map_or(nothing, |(_, value)| *value)
+        } else {
+            if !self.asked.contains(&need) {
+                self.asked.push(need);
+            }
+            Phasor::default()
+        }
+    }
+
+    fn gathered(&self, read: impl Fn(&Found<D>) -> D) -> D {
+        self.found.as_ref().map_or_else(D::default, read)
+    }
+
+    /// The least value of a signal.
+    pub(super) fn least(&mut self, signal: Signal) -> D {
+        self.value(Need::Least(signal)).re
+    }
+
+    /// Its greatest value.
+    pub(super) fn greatest(&mut self, signal: Signal) -> D {
+        self.value(Need::Greatest(signal)).re
+    }
+
+    /// Both.
+    pub(super) fn range(&mut self, signal: Signal) -> [D; 2] {
+        [self.least(signal), self.greatest(signal)]
+    }
+
+    /// The time mean of a signal.
+    pub(super) fn mean(&mut self, signal: Signal) -> D {
+        self.value(Need::Integral(signal)).re / self.duration()
+    }
+
+    /// `∫ a b dt`.
+    fn product(&mut self, a: Signal, b: Signal) -> D {
+        self.value(Need::Product(a, b)).re
+    }
+
+    /// The time mean of the product of two signals.
+    pub(super) fn mean_product(&mut self, a: Signal, b: Signal) -> D {
+        self.product(a, b) / self.duration()
+    }
+
+    /// The component `Re(c e^{iωt})` of a signal at a frequency of the drive.
+    pub(super) fn component(&mut self, signal: Signal, tone: Tone) -> Phasor<D> {
+        let c = self.value(Need::Fourier(signal, tone));
+        let duration = self.duration();
+        Phasor {
+            re: c.re * 2.0 / duration,
+            im: c.im * 2.0 / duration,
+        }
+    }
+
+    /// How long the motion ran.
+    pub(super) fn duration(&self) -> D {
+        self.found
+            .as_ref()
+            .map_or(1.0.into(), |found| found.duration)
+    }
+
+    /// The same in drive periods.
+    pub(super) fn periods(&self) -> f64 {
+        let whole = self.found.as_ref().map_or(0, |found| found.periods);
+        if whole > 0 {
+            whole as f64
+        } else {
+            self.duration().plain() / self.model.period()
+        }
+    }
+
+    /// Time in contact.
+    pub(super) fn contact_time(&self) -> D {
+        self.gathered(|found| found.contact_time)
+    }
+
+    /// The contacts that began.
+    pub(super) fn contacts(&self) -> Beginnings<D> {
+        self.found
+            .as_ref()
+            .map_or_else(Beginnings::default, |found| found.contacts)
+    }
+
+    /// Whether the model is a beam.
+    pub(super) fn is_beam(&self) -> bool {
+        self.model.beam.is_some()
+    }
+
+    /// 1 where the tip deflection points away from the sample, as the cantilever's W does;
+    /// −1 where it points towards it, as an oscillator's x.
+    pub(super) fn along_tip(&self) -> f64 {
+        if self.is_beam() { 1.0 } else { -1.0 }
+    }
+
+    /// Greatest force of the sample on the tip: 0 without contact; impacts of a rigid stop are
+    /// impulses and do not count.
+    pub(super) fn peak_force(&mut self) -> D {
+        self.greatest(Signal::Force).at_least(0.0)
+    }
+
+    /// Least force of the sample on the tip: below zero where it pulls, as the paper's damper
+    /// does on a tip that leaves. A force that vanishes where contact ends is 0.
+    pub(super) fn least_force(&mut self) -> D {
+        const ROUNDING: f64 = 1e-12;
+        let (least, peak) = (self.least(Signal::Force), self.peak_force());
+        if least.plain().abs() <= ROUNDING * peak.plain() {
+            0.0.into()
+        } else {
+            least
+        }
+    }
+
+    /// Greatest depth of the tip below the resting surface, 0 if it never gets there. Under a
+    /// nonlinear law contact begins at its intermolecular distance a0: δ = a0 − d.
+    pub(super) fn indentation(&mut self) -> D {
+        if let Some(nonlinear) = &self.model.nonlinear {
+            let Some(surface) = nonlinear.contact_gap() else {
+                return D::default();
+            };
+            return (-self.least(Signal::Height) + D::from(surface)).at_least(0.0);
+        }
+        (-self.least(Signal::Height)).at_least(0.0)
+    }
+
+    /// Work of the tip on the sample a drive period, −∫ F V̇_T dt, and what impacts take: what
+    /// the sample dissipates, whatever it is made of. 0 where it is the rounding of what the
+    /// contact stores and gives back, force times indentation.
+    pub(super) fn dissipation(&mut self) -> D {
+        let work = self.impacts() + self.work_on_sample();
+        let work = work / self.periods();
+        let (force, depth) = if self.model.nonlinear.is_some() {
+            // An attraction stores without contact.
+            let [near, far] = self.range(Signal::Height);
+            let pull = -self.least(Signal::Force).plain();
+            (
+                self.peak_force().plain().max(pull),
+                (far.plain() - near.plain()),
+            )
+        } else {
+            (self.peak_force().plain(), self.indentation().plain())
+        };
+        if above_rounding(work.plain(), force, depth) == 0.0 {
+            0.0.into()
+        } else {
+            work
+        }
+    }
+
+    /// What the tip gives the sample and does not get back.
+    fn work_on_sample(&mut self) -> D {
+        let stored = self.gathered(|found| found.stored_by_sample);
+        -self.product(Signal::Force, Signal::HeightRate) - stored
+    }
+
+    /// What impacts on a rigid stop take.
+    fn impacts(&self) -> D {
+        self.gathered(|found| found.impact_loss * found.contacts.squared_speeds)
+    }
+
+    /// The component of the tip deflection at the second tone, if there is one, turned back by
+    /// the tone's own phase.
+    pub(super) fn second_tone(&mut self) -> Option<Phasor<D>> {
+        self.model.system.drive().frequencies().get(1)?;
+        let own = self.gathered(|found| found.second_phase);
+        Some(self.component(Signal::Tip, Tone::Second).turned_back(own))
+    }
+
+    /// What an optical lever reads at the drive's frequency: the slope at the tip, taken for a
+    /// deflection as if a static force at the tip had bent the beam. Such a beam has the slope
+    /// 3W/2, so that W is taken to be ⅔ ∂W/∂ξ; the bare beam's first mode, whose slope is
+    /// 1.3765 W, then reads 0.918 W.
+    pub(super) fn optical_lever(&mut self) -> Option<Phasor<D>> {
+        let reads = |m: &mut Self| {
+            let slope = m.component(Signal::Slope, Tone::First);
+            slope.times((2.0 / 3.0).into())
+        };
+        self.is_beam().then(|| reads(self))
+    }
+
+    /// The component of the tip's height at the drive's frequency, of a beam whose base moves:
+    /// deflection and base together. With the base at rest the tip moves as it is deflected.
+    pub(super) fn tip_motion(&mut self) -> Option<Phasor<D>> {
+        let base = &self.model.beam.as_ref()?.base;
+        let moves = base.tones.iter().any(|tone| tone.norm_sqr() > 0.0);
+        moves.then(|| self.component(Signal::Height, Tone::First))
+    }
+
+    /// What the drive feeds in, and what takes it.
+    pub(super) fn energy_balance(&mut self) -> EnergyBalance<D> {
+        self.asked_ends = true;
+        let model = self.model;
+        let mut work = |terms: Vec<PowerTerm>| -> D {
+            terms.into_iter().fold(D::default(), |sum, a| {
+                sum + self.product(Signal::Power(a), Signal::Power(a.other()))
+            })
+        };
+        let beam = work(PowerTerm::of_beam(model));
+        if D::VARIES {
+            // Of a periodic orbit, along which nothing is stored.
+            let sample = self.dissipation() * self.periods();
+            return balance(beam + sample, beam, sample, D::default());
+        }
+        let drive = work(PowerTerm::of_drive(model));
+        let sample = if model.nonlinear.is_some() {
+            self.work_on_sample()
+        } else {
+            work(PowerTerm::of_sample(model))
+        };
+        let stored = self.gathered(|found| found.stored);
+        balance(drive, beam, sample + self.impacts(), stored)
+    }
+
+    /// Where the beam comes nearest to the sample.
+    pub(super) fn clearance(&mut self) -> Option<Clearance<D>> {
+        self.asked_clearance = true;
+        // The beam's end stands a fixed height over the tip.
+        self.least(Signal::Height);
+        self.found.as_ref()?.clearance
+    }
+}

@@ -181,15 +181,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from . import _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
-from ._results import (
-    Attractors,
-    Convergence,
-    Fit,
-    Lyapunov,
-    Modes,
-    Orbit,
-    Record,
-)
+from ._record import Record
+from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit
 
 if TYPE_CHECKING:
     import xarray as xr

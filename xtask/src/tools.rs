@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::{process, wheel};
+use crate::process;
 
 /// The Python of this machine.
 pub(crate) const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
@@ -30,7 +30,7 @@ impl Workspace {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let target = std::env::var_os("CARGO_TARGET_DIR")
             .map_or_else(|| root.join("target"), |target| root.join(target));
-        let interpreter = wheel::interpreter(&root, &target);
+        let interpreter = interpreter(&root, &target);
         Self {
             root,
             cargo,
@@ -167,4 +167,24 @@ impl Environment {
         let folder = if cfg!(windows) { "Scripts" } else { "bin" };
         Command::new(self.folder.join(folder).join(name))
     }
+}
+
+/// The file by which maturin tells PyO3 of the interpreter. Named to every other cargo too,
+/// it keeps the build of PyO3 the same for all of them; without it, each would build anew
+/// what the other has built.
+fn interpreter(root: &Path, target: &Path) -> Option<PathBuf> {
+    const CONTENT: &str = "implementation=CPython\nversion=3.11\n\
+        target_abi=CPython-abi3-3.11\nshared=true\nbuild_flags=\n\
+        suppress_build_script_link_lines=false";
+    let version = process::output(root, Command::new("rustc").arg("-vV"))?;
+    let host = version
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "))?;
+    let folder = target.join("maturin");
+    let path = folder.join(format!("pyo3-config-{host}-3.11-abi3.txt"));
+    if !path.exists() {
+        fs::create_dir_all(folder).ok()?;
+        fs::write(&path, CONTENT).ok()?;
+    }
+    Some(path)
 }

@@ -2,9 +2,8 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-use crate::process::{output, succeeds};
+use crate::process::succeeds;
 use crate::tools::{Environment, Workspace};
 
 /// Builds the wheel and leaves it, alone of its kind, in `target/wheels`.
@@ -79,24 +78,4 @@ pub(crate) fn installed(workspace: &Workspace) -> Result<Environment, String> {
     } else {
         Err("the wheel could not be installed".into())
     }
-}
-
-/// The file by which maturin tells PyO3 of the interpreter. Named to every other cargo too,
-/// it keeps the build of PyO3 the same for all of them; without it, each would build anew
-/// what the other has built.
-pub(crate) fn interpreter(root: &Path, target: &Path) -> Option<PathBuf> {
-    const CONTENT: &str = "implementation=CPython\nversion=3.11\n\
-        target_abi=CPython-abi3-3.11\nshared=true\nbuild_flags=\n\
-        suppress_build_script_link_lines=false";
-    let version = output(root, Command::new("rustc").arg("-vV"))?;
-    let host = version
-        .lines()
-        .find_map(|line| line.strip_prefix("host: "))?;
-    let folder = target.join("maturin");
-    let path = folder.join(format!("pyo3-config-{host}-3.11-abi3.txt"));
-    if !path.exists() {
-        fs::create_dir_all(folder).ok()?;
-        fs::write(&path, CONTENT).ok()?;
-    }
-    Some(path)
 }

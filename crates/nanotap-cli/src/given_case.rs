@@ -2,8 +2,10 @@
 //! failures with advice.
 
 use std::ops::Deref;
+use std::path::PathBuf;
+use std::sync::Arc;
 
-use nanotap::case::physical::{Kind, Severity};
+use nanotap::case::physical::{Catalogue, Kind, Severity};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::study::setpoint::{self, SetpointReport};
@@ -11,7 +13,7 @@ use nanotap::study::setpoint::{self, SetpointReport};
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::{command, number, progress};
+use crate::{number, progress};
 
 /// The case of a command.
 pub(crate) struct GivenCase(Case);
@@ -38,7 +40,7 @@ impl GivenCase {
     /// The case of the arguments. What puts a physical case in doubt is said, and what of its file
     /// does not count; its other notes are `nanotap case`'s.
     pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
-        let (case, setpoint) = at_setpoint(command::case_of(arguments)?)?;
+        let (case, setpoint) = at_setpoint(case_of(arguments)?)?;
         if let Some(setpoint) = &setpoint {
             output.note(&setpoint.remark().text);
         }
@@ -50,7 +52,7 @@ impl GivenCase {
         arguments: &CaseArguments,
         output: &Output,
     ) -> Result<Self, Failure> {
-        Ok(Self::warned(command::case_of(arguments)?, output))
+        Ok(Self::warned(case_of(arguments)?, output))
     }
 
     fn warned(case: Case, output: &Output) -> Self {
@@ -120,4 +122,28 @@ impl GivenCase {
         let modes = number::counted(cantilever.modes, "mode", "modes");
         format!("{modes} at {at}")
     }
+}
+
+/// What the case is called in a heading: its file, or that it was typed.
+fn title(arguments: &CaseArguments) -> String {
+    arguments.file.as_ref().map_or_else(
+        || "the case that was typed".to_owned(),
+        |file| file.display().to_string(),
+    )
+}
+
+/// The built-in catalogue and what these files add to it.
+pub(crate) fn catalogue(files: &[PathBuf]) -> Result<Arc<Catalogue>, Failure> {
+    let mut catalogue = Catalogue::shared();
+    for path in files {
+        Arc::make_mut(&mut catalogue).extend_from_file(path)?;
+    }
+    Ok(catalogue)
+}
+
+/// The case of the arguments, with the built-in catalogue and those that they add.
+pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
+    let catalogue = catalogue(&arguments.catalogue)?;
+    let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
+    Ok(case.called(&title(arguments)))
 }

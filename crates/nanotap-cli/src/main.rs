@@ -4,7 +4,6 @@
 
 mod arguments;
 mod command;
-mod command_line;
 mod dataset;
 mod failure;
 mod file;
@@ -24,7 +23,7 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 
-use command_line::Arguments;
+use command::Arguments;
 use output::Output;
 
 fn main() -> ExitCode {

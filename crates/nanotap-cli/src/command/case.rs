@@ -13,12 +13,13 @@ use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::table::shown_phase;
+use nanotap::study::kind::cantilever as cantilever_of;
 use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase};
 
 use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;
-use crate::given_case::at_setpoint;
+use crate::given_case::{at_setpoint, case_of};
 use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
@@ -33,7 +34,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let read = super::case_of(&arguments.case)?;
+    let read = case_of(&arguments.case)?;
     // The case is shown also where no distance has the setpoint, which ends every study of it.
     let (case, setpoint_solved, unreached) = match at_setpoint(read.clone()) {
         Ok((case, solved)) => (case, solved, None),
@@ -50,21 +51,21 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
         return output.result(&document, |_| oscillator(&case, given));
     }
-    let numbers = super::cantilever_of(&case, "nanotap case")?;
-    write_out(&arguments.out, &numbers)?;
+    let numbers = cantilever_of(&case, "nanotap case")?;
+    write_out(&arguments.out, numbers)?;
     for remark in case.remarks() {
         match remark.severity {
             Severity::Note => output.note(&remark.text),
             Severity::Warning => output.warning(&remark.text),
         }
     }
-    remark(&numbers, output);
+    remark(numbers, output);
     for beyond in &document.out_of_range {
         output.warning(&format!("where the lever rests, {beyond}"));
     }
     output.result(&document, |document| {
         case.physical().map_or_else(
-            || cantilever(case.title(), &numbers),
+            || cantilever(case.title(), numbers),
             |view| {
                 let solved = &document.setpoint_solved;
                 let solved = solved.as_ref().map_or_else(String::new, setpoint);

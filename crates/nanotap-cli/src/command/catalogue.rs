@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::table::{Align, Table};
-use crate::{number, page, style};
+use crate::{given_case, number, page, style};
 
 /// The levers and materials that a case can name.
 #[derive(Args, Debug)]
@@ -33,7 +33,7 @@ struct Listed<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let catalogue = super::catalogue(&arguments.catalogue)?;
+    let catalogue = given_case::catalogue(&arguments.catalogue)?;
     let listed = if arguments.names.is_empty() {
         Listed {
             levers: catalogue.levers().collect(),

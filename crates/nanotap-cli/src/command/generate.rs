@@ -89,14 +89,14 @@ impl What {
 
 fn completions(shell: Shell) -> String {
     let mut text = Vec::new();
-    let mut command = crate::command_line::Arguments::command();
+    let mut command = super::Arguments::command();
     clap_complete::generate(shell, &mut command, "nanotap", &mut text);
     String::from_utf8_lossy(&text).into_owned()
 }
 
 /// The command line, every command of it by its whole name, as in `nanotap-orbit`.
 fn command() -> clap::Command {
-    let mut command = crate::command_line::Arguments::command().disable_help_subcommand(true);
+    let mut command = super::Arguments::command().disable_help_subcommand(true);
     command.build();
     command
 }

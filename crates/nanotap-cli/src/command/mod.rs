@@ -1,4 +1,4 @@
-//! The commands, one a file.
+//! What can be typed, as it was typed: the commands, one a file, which resolve their own arguments.
 
 mod approach;
 mod attractors;
@@ -22,17 +22,53 @@ mod study;
 mod sweep;
 mod window;
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use clap::builder::styling::{AnsiColor, Styles};
+use clap::{Parser, Subcommand};
 
-use clap::Subcommand;
-use nanotap::case::Case;
-use nanotap::case::physical::Catalogue;
-use nanotap::model::cantilever::Cantilever;
-
-use crate::arguments::CaseArguments;
 use crate::failure::Failure;
 use crate::output::Output;
+
+const STYLES: Styles = Styles::styled()
+    .header(AnsiColor::Green.on_default().bold())
+    .usage(AnsiColor::Green.on_default().bold())
+    .literal(AnsiColor::Cyan.on_default().bold())
+    .placeholder(AnsiColor::Cyan.on_default());
+
+const AFTER_HELP: &str = "\
+A case is a TOML file:
+
+    [model]
+    modes = 3
+    alpha1 = 0.1    # tip_mass_ratio
+    alpha2 = 0.1    # drive_amplitude
+    alpha3 = 0.1    # beam_damping
+    alpha4 = 20.0   # contact_stiffness
+    alpha5 = 0.0    # gap
+    alpha6 = 0.2    # contact_damping
+    omega = 2.6     # drive_frequency
+
+Exit codes: 0 done, 1 failed, 2 bad input.";
+
+/// What an AFM cantilever does when its tip taps a sample: every motion, its
+/// stability, and what an experimenter would measure in it.
+#[derive(Debug, Parser)]
+#[command(name = "nanotap", version, styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
+pub(crate) struct Arguments {
+    /// Print one JSON document on standard output, and nothing else there
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+
+    /// Leave out notes and progress; what puts the result in doubt is said all the same
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+
+    /// Replace files that nanotap did not write, too
+    #[arg(long, global = true)]
+    pub(crate) force: bool,
+
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
 
 /// Every command that there is.
 #[derive(Debug, Subcommand)]
@@ -119,39 +155,12 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
     }
 }
 
-/// What the case is called in a heading: its file, or that it was typed.
-pub(crate) fn title(arguments: &CaseArguments) -> String {
-    arguments.file.as_ref().map_or_else(
-        || "the case that was typed".to_owned(),
-        |file| file.display().to_string(),
-    )
-}
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
 
-/// The built-in catalogue and what these files add to it.
-fn catalogue(files: &[PathBuf]) -> Result<Arc<Catalogue>, Failure> {
-    let mut catalogue = Catalogue::shared();
-    for path in files {
-        Arc::make_mut(&mut catalogue).extend_from_file(path)?;
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Arguments::command().debug_assert();
     }
-    Ok(catalogue)
-}
-
-/// The case of the arguments, with the built-in catalogue and those that they add.
-pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
-    let catalogue = catalogue(&arguments.catalogue)?;
-    let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
-    Ok(case.called(&title(arguments)))
-}
-
-/// The dimensionless cantilever of a case, for `command`.
-fn cantilever_of(case: &Case, command: &str) -> Result<Cantilever, Failure> {
-    case.cantilever().cloned().ok_or_else(|| {
-        Failure::input(
-            format!(
-                "{}: `{command}` needs a cantilever; this is an oscillator",
-                case.title()
-            ),
-            "an oscillator has one degree of freedom and no beam modes",
-        )
-    })
 }

@@ -132,7 +132,7 @@ mod tests {
         let report = report(&options, &Control::default()).unwrap();
         for check in report.checks() {
             let words = check.rerun.split_whitespace();
-            let parsed = crate::command_line::Arguments::try_parse_from(words);
+            let parsed = crate::command::Arguments::try_parse_from(words);
             assert!(
                 parsed.is_ok(),
                 "{}: {}\n{:?}",

@@ -21,6 +21,7 @@ from ._datasets import merge, open
 from ._interrupt import Interrupted
 from ._map import Map, Motion, PeriodicOrbit
 from ._nanotap import __version__
+from ._record import Record
 from ._results import (
     Attractor,
     Attractors,
@@ -30,7 +31,6 @@ from ._results import (
     Modes,
     Orbit,
     Paper,
-    Record,
 )
 from ._si import in_si
 from ._signatures import *

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _nanotap
 from ._quantity import in_si, si_unit, text
-from ._results import Record
+from ._record import Record
 
 if TYPE_CHECKING:
     import pandas as pd

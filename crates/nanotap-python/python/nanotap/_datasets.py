@@ -15,7 +15,7 @@ from ._case import Case, Path
 from ._interrupt import Interrupted
 from ._motions import _cased
 from ._progress import bar
-from ._results import Record
+from ._record import Record
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _arguments, _nanotap
 from ._arguments import Floats
 from ._case import Case
-from ._results import Record
+from ._record import Record
 
 
 class Map:

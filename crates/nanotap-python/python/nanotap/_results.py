@@ -1,7 +1,7 @@
 """What results are: objects with the names of the terminal's JSON."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arguments import Floats
+from ._record import Record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,51 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ._case import Case
-
-
-class Record(Mapping[str, Any]):
-    """A part of a document: its entries by name, as items and as attributes."""
-
-    __slots__ = ("_entries",)
-
-    def __init__(self, entries: Mapping[str, Any]) -> None:
-        self._entries = dict(entries)
-
-    def __getitem__(self, name: str) -> Any:
-        value = self._entries[name]
-        if isinstance(value, dict | list):
-            # Wrapped when it is looked at: most of a document never is.
-            value = self._entries[name] = _wrapped(value)
-        return value
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self[name]
-        except KeyError:
-            message = f"there is no `{name}`; there are {', '.join(self._entries)}"
-            raise AttributeError(message) from None
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._entries)
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self._entries})
-
-    def __repr__(self) -> str:
-        inside = ", ".join(f"{key}={value!r}" for key, value in self.items())
-        return f"Record({inside})"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Record, (self.to_dict(),)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The same as plain dictionaries and lists."""
-        return {key: _plain(value) for key, value in self._entries.items()}
 
 
 class Fit(Record):
@@ -127,23 +83,6 @@ class Fit(Record):
 def _of_curve(parameter: Mapping[str, Any]) -> str:
     key, curve = parameter["key"], parameter.get("curve")
     return str(key) if curve is None else f"{key} of {curve}"
-
-
-def _wrapped(value: Any) -> Any:
-    # JSON has no other kinds, and whether something is a Mapping takes long to ask.
-    if type(value) is dict:
-        return Record(value)
-    if type(value) is list and value and type(value[0]) not in (float, int, str):
-        return [_wrapped(entry) for entry in value]
-    return value
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    return value
 
 
 def floats(value: Sequence[Any]) -> Floats:

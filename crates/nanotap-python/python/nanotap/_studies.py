@@ -13,7 +13,8 @@ from ._describe import case_attributes, describe
 from ._interrupt import Interrupted
 from ._motions import _cased, _document, words
 from ._progress import bar
-from ._results import Attractors, Convergence, Fit, Lyapunov, Paper, Record
+from ._record import Record
+from ._results import Attractors, Convergence, Fit, Lyapunov, Paper
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -95,7 +95,7 @@ impl<'a, R: Serialize> Document<'a, R> {
 ///
 /// # Errors
 /// When it is an oscillator.
-pub(crate) fn cantilever<'a>(case: &'a Case, study: &str) -> Result<&'a Cantilever, Error> {
+pub fn cantilever<'a>(case: &'a Case, study: &str) -> Result<&'a Cantilever, Error> {
     case.cantilever().ok_or_else(|| {
         Error::input(
             format!(

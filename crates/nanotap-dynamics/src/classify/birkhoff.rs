@@ -65,3 +65,53 @@ pub fn birkhoff_digits<M: StroboscopicMap>(
     }
     Ok(digits)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// A turn by the golden mean about (1, 1).
+    #[derive(Clone)]
+    struct Turn;
+
+    impl StroboscopicMap for Turn {
+        type Error = std::convert::Infallible;
+
+        fn dimension(&self) -> usize {
+            2
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {
+            let (sin, cos) = (std::f64::consts::TAU * 0.618_033_988_749_895).sin_cos();
+            let [x, y] = [state[0] - 1.0, state[1] - 1.0];
+            state[0] = 1.0 + cos * x - sin * y;
+            state[1] = 1.0 + sin * x + cos * y;
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            _jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Self::Error> {
+            self.advance(state)
+        }
+    }
+
+    /// Digits are relative to the motion: of a circle of radius 10⁻⁶ about (1, 1) rounding leaves
+    /// ten of sixteen.
+    #[test]
+    fn digits_are_those_of_the_motion() {
+        let digits =
+            |radius: f64| birkhoff_digits(&mut Turn, &mut [1.0 + radius, 1.0], 4096).unwrap();
+        assert!(digits(1.0) > 12.0, "{}", digits(1.0));
+        let small = digits(1e-6);
+        assert!((7.0..11.0).contains(&small), "{small}");
+    }
+}

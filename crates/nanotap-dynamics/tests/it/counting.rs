@@ -363,6 +363,12 @@ fn neighbourhoods_stay_within_the_contracting_interval() {
     // |f'| ≤ 3/4, as the rate asks, holds within 0.159; trials lose a factor (3/4)² at most.
     assert!(half > 0.159 * 0.56, "{half}");
     assert!(centre - half > (0.5f64 / 3.0).sqrt() && centre + half < (2.5f64 / 3.0).sqrt());
+    assert!(ball.contains(&[centre + 0.05]));
+    // A return that comes no nearer, here under another map, is refused.
+    let mut scratch = [0.0];
+    let mut holds = |r: f64| ball.holds(&mut System(Cubic(r)), &[centre + 0.05], &mut scratch);
+    assert!(holds(1.5).unwrap());
+    assert!(!holds(1.7).unwrap());
 }
 
 /// Attractors that live in a ten-thousandth of the box are found by starts of all

@@ -8,6 +8,7 @@
     reason = "references are the platform's own functions"
 )]
 
+mod approach;
 mod basin;
 mod cases;
 mod census;

@@ -128,6 +128,26 @@ fn coexisting_chaos_with_equal_means_is_told_apart() {
 }
 
 /// Periods for which the chaotic starts after the first four, which are measured, were watched.
+/// Every start comes to one and the same circle, |z| = 1, and turns on it by the golden mean.
+#[test]
+fn starts_on_one_torus_are_one_attractor() {
+    let map = Turning {
+        angle: std::f64::consts::TAU * 0.618_033_988_749_895,
+        gain: 0.2,
+    };
+    let result = taken(
+        map,
+        &starts(&[0.2, 0.2], &[1.2, 1.2], 12),
+        &CensusOptions::default(),
+    );
+    assert_eq!(result.attractors.len(), 1);
+    assert!(matches!(
+        result.attractors[0].kind,
+        AttractorKind::QuasiPeriodic(_)
+    ));
+    assert!(result.undecided.is_empty());
+}
+
 fn watched_periods(result: &Census) -> Vec<usize> {
     let chaotic =
         |index: usize| matches!(result.attractors[index].kind, AttractorKind::Chaotic { .. });

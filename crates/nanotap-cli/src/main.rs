@@ -15,6 +15,7 @@ mod page;
 mod progress;
 mod request;
 mod series;
+mod study_arguments;
 mod style;
 mod table;
 mod threads;

@@ -7,17 +7,14 @@ use nanotap::case::units::Units;
 use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
-use nanotap::study::attractors::{
-    AttractorReport, Attractors, AttractorsRequest, AttractorsStudy, UnseenReport,
-};
+use nanotap::study::attractors::{AttractorReport, Attractors, AttractorsStudy, UnseenReport};
 use nanotap::study::proof::ProofReport;
 use nanotap::study::registry::Study as _;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
@@ -26,32 +23,22 @@ use crate::{motion, number, progress, style};
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<AttractorsRequest>,
-
+    study: StudyArguments<AttractorsStudy>,
     #[command(flatten)]
     threads: ThreadsArgument,
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
     let found = progress::watched(AttractorsStudy::COUNTED, |control| {
         arguments
             .threads
             .install(|| AttractorsStudy::run(&case, &request, control))
     })???;
-    arguments.out.write(|| csv(&model, &found))?;
+    arguments.study.out.write(|| csv(&model, &found))?;
     arguments
+        .study
         .plot
         .draw(|| attractors_figure(&model, &found, &case.units()))?;
     if found.cancelled {

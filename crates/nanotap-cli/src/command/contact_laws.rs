@@ -2,46 +2,27 @@
 
 use std::fmt::Write as _;
 
-use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
-use nanotap::study::contact_laws::{
-    Comparison, ContactLawsRequest, ContactLawsStudy, SampleMotion,
-};
+use nanotap::study::contact_laws::{Comparison, ContactLawsStudy, SampleMotion};
 use nanotap::study::registry::Study as _;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::{motion, number, style};
 
 /// The same lever and drive on every contact law: what difference the sample makes.
-#[derive(Args, Debug)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<ContactLawsRequest>,
-
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
-}
+pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (request, case) = arguments.read(output)?;
     let result = ContactLawsStudy::run(&case, &request, &Control::default())?;
     arguments.out.write(|| csv(&result, &case.units()))?;
     arguments

@@ -2,43 +2,26 @@
 
 use std::fmt::Write as _;
 
-use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::control::Control;
 use nanotap::figure::motion::convergence_figure;
 use nanotap::observe::table::shown_phase;
-use nanotap::study::convergence::{Convergence, ConvergenceRequest, ConvergenceStudy};
+use nanotap::study::convergence::{Convergence, ConvergenceStudy};
 use nanotap::study::registry::Study as _;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::{motion, number, style};
 
 /// The same motion with N = 1 … K modes: how many are enough.
-#[derive(Args, Debug)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<ConvergenceRequest>,
-
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
-}
+pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (request, case) = arguments.read(output)?;
     let result = ConvergenceStudy::run(&case, &request, &Control::default())?;
     arguments.out.write(|| csv(&result))?;
     arguments

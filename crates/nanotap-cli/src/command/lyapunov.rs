@@ -1,41 +1,24 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
-use clap::Args;
 use nanotap::control::Control;
 use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
-use nanotap::study::lyapunov::{LyapunovReport, LyapunovRequest, LyapunovStudy};
+use nanotap::study::lyapunov::{LyapunovReport, LyapunovStudy};
 use nanotap::study::registry::Study as _;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::{motion, number, style};
 
 /// Lyapunov spectrum with error bars, and a Poincaré section.
-#[derive(Args, Debug)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<LyapunovRequest>,
-
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
-}
+pub(crate) type Arguments = StudyArguments<LyapunovStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let mut request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (mut request, case) = arguments.read(output)?;
     let model = case.model()?;
     let wanted = arguments.out.out.is_some() || arguments.plot.plot.is_some();
     if !wanted {

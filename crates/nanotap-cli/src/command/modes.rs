@@ -2,40 +2,25 @@
 
 use std::fmt::Write as _;
 
-use clap::Args;
 use nanotap::control::Control;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
-use nanotap::study::modes::{ModeTable, ModesRequest, ModesStudy, damping_ratio};
+use nanotap::study::modes::{ModeTable, ModesStudy, damping_ratio};
 use nanotap::study::registry::Study as _;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::{motion, number, style};
 
 /// Mode shapes and frequencies, in free flight and in contact.
-#[derive(Args, Debug)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    case: CaseArguments,
-    #[command(flatten)]
-    request: Request<ModesRequest>,
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
-}
+pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (request, case) = arguments.read(output)?;
     let table = ModesStudy::run(&case, &request, &Control::default())?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     arguments.out.write(|| shapes(&beam, request.points))?;

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use clap::Args;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
@@ -10,39 +9,21 @@ use nanotap::model::Model;
 use nanotap::observe::Set;
 use nanotap::study::fixed_step::FixedStepRun;
 use nanotap::study::registry::Study as _;
-use nanotap::study::simulate::{
-    Classification, SimulateReport, SimulateRequest, SimulateStudy, Simulation,
-};
+use nanotap::study::simulate::{Classification, SimulateReport, SimulateStudy, Simulation};
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::{number, series, style};
 
 /// One run: its steady state, or how it gets there.
-#[derive(Args, Debug)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<SimulateRequest>,
-
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
-}
+pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (request, case) = arguments.read(output)?;
     let model = case.model()?;
     let report = SimulateStudy::run(&case, &request, &Control::default())?;
     let units = case.units();

@@ -1,0 +1,35 @@
+//! What most studies take: a case, a request, and where table and picture go.
+
+use clap::Args;
+use nanotap::study::kind::Study;
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::request::Request;
+
+/// The arguments of a study.
+#[derive(Args, Debug)]
+pub(crate) struct StudyArguments<S: Study> {
+    #[command(flatten)]
+    pub(crate) case: CaseArguments,
+
+    #[command(flatten)]
+    pub(crate) request: Request<S::Request>,
+
+    #[command(flatten)]
+    pub(crate) out: OutArgument,
+    #[command(flatten)]
+    pub(crate) plot: PlotArgument,
+}
+
+impl<S: Study> StudyArguments<S> {
+    /// What is asked for of which case, once it is known that table and picture can be written.
+    pub(crate) fn read(&self, output: &Output) -> Result<(S::Request, GivenCase), Failure> {
+        let request = self.request.read()?;
+        self.out.check()?;
+        self.plot.check()?;
+        Ok((request, GivenCase::of(&self.case, output)?))
+    }
+}

@@ -45,7 +45,7 @@ use nanotap::study::orbit::OrbitError;
 pub use check::{About, Check, Verdict};
 use runs::Runs;
 pub use section::{Picture, Section, Table};
-pub use write::Written;
+pub use write::{Document, Written};
 
 /// What to compute.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use nanotap::dataset::files;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::section::Picture;
-use super::{Check, PaperError, Report, html, markdown};
+use super::{About, Check, PaperError, Report, Verdict, html, markdown};
 
 /// What was written.
 #[derive(Clone, Debug)]
@@ -23,7 +24,42 @@ pub struct Written {
     pub pictures: Vec<PathBuf>,
 }
 
+/// What a report came to and where it is, as the terminal's JSON has it.
+#[derive(Debug, Serialize)]
+pub struct Document<'a> {
+    out: &'a Path,
+    html: &'a Path,
+    markdown: &'a Path,
+    pictures: &'a [PathBuf],
+    quick: bool,
+    reproduced: usize,
+    differs: usize,
+    ambiguous: usize,
+    /// Of those that differ: formulas, numbers and captions as printed.
+    differs_in_print: usize,
+    /// Of those that differ: how the system moves.
+    differs_in_motion: usize,
+    checks: Vec<&'a Check>,
+}
+
 impl Report {
+    /// What it came to, `written` into the folder `out`.
+    pub fn document<'a>(&'a self, out: &'a Path, written: &'a Written) -> Document<'a> {
+        Document {
+            out,
+            html: &written.html,
+            markdown: &written.markdown,
+            pictures: &written.pictures,
+            quick: self.quick,
+            reproduced: self.count(Verdict::Reproduced),
+            differs: self.count(Verdict::Differs),
+            ambiguous: self.count(Verdict::Ambiguous),
+            differs_in_print: self.differing(About::Print),
+            differs_in_motion: self.differing(About::Motion),
+            checks: self.checks().collect(),
+        }
+    }
+
     /// Writes the report into `folder`, which is made if it is not there. Files of other
     /// names in it stay as they are.
     ///

@@ -8,10 +8,9 @@ use nanotap::study::lyapunov::{LyapunovRequest, LyapunovStudy};
 use nanotap::study::registry::{self, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
-use nanotap_paper::{About, Check, Options as PaperOptions, Verdict, report_so_far, section_names};
+use nanotap_paper::{Options as PaperOptions, report_so_far, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use serde::Serialize;
 
 use crate::case::CaseCore;
 use crate::failure::Failure;
@@ -99,22 +98,6 @@ pub(crate) fn lyapunov<'py>(
     Ok((document, PyArray1::from_vec(py, values).reshape(shape)?))
 }
 
-/// The document of the paper's report.
-#[derive(Serialize)]
-struct Paper<'a> {
-    out: &'a PathBuf,
-    html: &'a PathBuf,
-    markdown: &'a PathBuf,
-    pictures: &'a [PathBuf],
-    quick: bool,
-    reproduced: usize,
-    differs: usize,
-    ambiguous: usize,
-    differs_in_print: usize,
-    differs_in_motion: usize,
-    checks: Vec<&'a Check>,
-}
-
 /// The paper computed again, its report and pictures in the folder `out`: JSON, and whether
 /// Ctrl-C stopped it.
 #[pyfunction]
@@ -134,19 +117,7 @@ pub(crate) fn paper(
         let options = PaperOptions { only, quick };
         let (report, _) = install(threads, || report_so_far(&options, control))??;
         let written = report.write(&out)?;
-        Ok(serde_json::to_string(&Paper {
-            out: &out,
-            html: &written.html,
-            markdown: &written.markdown,
-            pictures: &written.pictures,
-            quick: report.quick,
-            reproduced: report.count(Verdict::Reproduced),
-            differs: report.count(Verdict::Differs),
-            ambiguous: report.count(Verdict::Ambiguous),
-            differs_in_print: report.differing(About::Print),
-            differs_in_motion: report.differing(About::Motion),
-            checks: report.checks().collect(),
-        })?)
+        Ok(serde_json::to_string(&report.document(&out, &written))?)
     })?;
     Ok((done.result, done.interrupted))
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use nanotap_paper::{About, Check, Options, Report, Verdict, Written, report, section_names};
+use nanotap_paper::{Document, Options, Report, Written, report, section_names};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -39,20 +39,9 @@ const ENDINGS: [&str; 5] = ["html", "md", "json", "svg", "png"];
 
 /// The JSON document.
 #[derive(Serialize)]
-struct Document<'a> {
-    out: &'a PathBuf,
-    html: &'a PathBuf,
-    markdown: &'a PathBuf,
-    pictures: &'a [PathBuf],
-    quick: bool,
-    reproduced: usize,
-    differs: usize,
-    ambiguous: usize,
-    /// Of those that differ: formulas, numbers and captions as printed.
-    differs_in_print: usize,
-    /// Of those that differ: how the system moves.
-    differs_in_motion: usize,
-    checks: Vec<&'a Check>,
+struct Timed<'a> {
+    #[serde(flatten)]
+    document: Document<'a>,
     seconds: f64,
 }
 
@@ -74,24 +63,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         arguments.threads.install(|| report(&options, control))
     })???;
     let written = report.write(&arguments.out)?;
-    let document = Document {
-        out: &arguments.out,
-        html: &written.html,
-        markdown: &written.markdown,
-        pictures: &written.pictures,
-        quick: report.quick,
-        reproduced: report.count(Verdict::Reproduced),
-        differs: report.count(Verdict::Differs),
-        ambiguous: report.count(Verdict::Ambiguous),
-        differs_in_print: report.differing(About::Print),
-        differs_in_motion: report.differing(About::Motion),
-        checks: report.checks().collect(),
+    let document = Timed {
+        document: report.document(&arguments.out, &written),
         seconds: begun.elapsed().as_secs_f64(),
     };
     output.result(&document, |document| text(document, &report, &written))
 }
 
-fn text(document: &Document<'_>, report: &Report, written: &Written) -> String {
+fn text(document: &Timed<'_>, report: &Report, written: &Written) -> String {
     let mut text = style::bold("the paper computed again");
     text.push('\n');
     for section in &report.sections {

@@ -124,27 +124,12 @@ impl Cantilever {
     }
 
     /// The paper's undamped parameters for Fig. 4, Eq. (24), with Ω = 4.1 and N = 3.
-    pub const fn paper_eq24() -> Self {
+    pub fn paper_eq24() -> Self {
         Self {
-            modes: 3,
-            alpha1: 0.1,
-            alpha2: 0.1,
             alpha3: 0.0,
-            alpha4: 20.0,
-            alpha5: 0.0,
             alpha6: 0.0,
             omega: 4.1,
-            cosine_term: CosineTerm::Corrected,
-            contact: ContactLaw::SpringDamper,
-            law: None,
-            relaxation_stiffness: 0.0,
-            relaxation_time: 0.0,
-            surface: MovingSurface::NONE,
-            actuation: Actuation::Base,
-            tone2_ratio: None,
-            tone2_amplitude: 0.0,
-            tone2_phase: 0.0,
-            higher_modes: HigherModes::NONE,
+            ..Self::paper()
         }
     }
 

@@ -12,7 +12,7 @@ use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Dimension, OBSERVABLES, Observables};
-use nanotap::study::orbit::{OrbitError, OrbitReport, OrbitRequest, orbit};
+use nanotap::study::orbit::{OrbitError, OrbitReport, OrbitRequest, orbit, spectral_radius};
 use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{
     Method, SimulateReport, SimulateRequest, SimulateStudy, Simulation, simulate,
@@ -110,12 +110,11 @@ impl Motion {
     fn words(&self) -> String {
         match self {
             Self::Orbit(orbit) => {
-                let [re, im] = orbit.multipliers.first().copied().unwrap_or_default();
                 format!(
                     "period {}, {}; largest |multiplier| {}",
                     orbit.period,
                     orbit.stability,
-                    Kind::Number.format_digits(nanotap_arithmetic::hypot(re, im), 4)
+                    Kind::Number.format_digits(spectral_radius(&orbit.multipliers), 4)
                 )
             }
             Self::Run(run) => format!("{}: {}", run.classification.name(), run.evidence),

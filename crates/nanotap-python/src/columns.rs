@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use nanotap::study::orbit::spectral_radius;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
@@ -44,11 +45,9 @@ pub(crate) fn entries(mut report: Value) -> Entries {
         };
     };
     if let Some(Value::Array(multipliers)) = report.remove("multipliers") {
-        let radius = multipliers.iter().map(|pair| {
-            let part = |k: usize| pair.get(k).and_then(Value::as_f64).unwrap_or(f64::NAN);
-            (part(0) * part(0) + part(1) * part(1)).sqrt()
-        });
-        let radius = radius.fold(0.0, f64::max);
+        let pair = |pair: &Value| [0, 1].map(|k| pair[k].as_f64().unwrap_or(f64::NAN));
+        let multipliers: Vec<[f64; 2]> = multipliers.iter().map(pair).collect();
+        let radius = spectral_radius(&multipliers);
         all.push(("spectral_radius".into(), Entry::Number(radius)));
     }
     if let Some(Value::Array(rows)) = report.remove("strobe") {

@@ -9,6 +9,7 @@
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]
 
+use crate::Complex;
 use crate::VolterraError;
 pub use crate::linear::MAX_NODES;
 use crate::linear::{dot_body, wide_registers};
@@ -572,6 +573,12 @@ impl Kernel {
             }
             out[s..s + block.size].copy_from_slice(&value[..block.size]);
         }
+    }
+
+    /// What the read-out sees of a complex state.
+    pub(crate) fn read(&self, state: &DVector<Complex>) -> Complex {
+        let terms = self.readout.iter().zip(state.iter());
+        terms.map(|(r, z)| z * *r).sum()
     }
 
     /// Takes the modal coordinates `y` from one place of a step to the next of a trajectory's

@@ -164,19 +164,11 @@ impl System {
             .map(|t| (t.frequency, t.forcing.clone()))
             .collect();
         let response = Response::of(&kernel, &drive.constant, &tones)?;
-        let dot = |z: &DVector<Complex>| -> Complex {
-            kernel
-                .readout
-                .iter()
-                .zip(z.iter())
-                .map(|(r, z)| z * *r)
-                .sum()
-        };
         let gap_tones: Vec<Complex> = drive
             .tones
             .iter()
             .zip(&response.tones)
-            .map(|(tone, y)| tone.gap + dot(y))
+            .map(|(tone, y)| tone.gap + kernel.read(y))
             .collect();
         let mut gap_sizes = [0.0; 2];
         for (tone, amplitude) in drive.tones.iter().zip(&gap_tones) {

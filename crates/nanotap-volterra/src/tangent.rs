@@ -104,14 +104,6 @@ impl Forced {
             })
             .collect();
         let response = Response::of(kernel, &constant, &tones)?;
-        let dot = |z: &DVector<Complex>| -> Complex {
-            kernel
-                .readout
-                .iter()
-                .zip(z.iter())
-                .map(|(r, z)| z * *r)
-                .sum()
-        };
         let gap_constant = parameter.offset
             + kernel
                 .readout
@@ -124,7 +116,12 @@ impl Forced {
             .tones
             .iter()
             .enumerate()
-            .map(|(k, y)| [change(k).gap + dot(y), turn(k) * system.gap_tones[k]])
+            .map(|(k, y)| {
+                [
+                    change(k).gap + kernel.read(y),
+                    turn(k) * system.gap_tones[k],
+                ]
+            })
             .collect();
         let tones = response
             .tones

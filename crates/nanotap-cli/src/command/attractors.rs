@@ -8,6 +8,7 @@ use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
 use nanotap::study::attractors::{AttractorReport, Attractors, AttractorsStudy, UnseenReport};
+use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
 use nanotap::study::registry::Study as _;
 
@@ -167,16 +168,14 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             ("contact (%)", Align::Point),
         ]);
         for orbit in orbits {
-            let moduli = || {
-                orbit
-                    .multipliers
-                    .iter()
-                    .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im))
-            };
+            let moduli = orbit
+                .multipliers
+                .iter()
+                .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im));
             table.row([
                 orbit.period.to_string(),
-                number::significant(moduli().fold(0.0, f64::max), 6),
-                moduli().filter(|m| *m > 1.0).count().to_string(),
+                number::significant(spectral_radius(&orbit.multipliers), 6),
+                moduli.filter(|m| *m > 1.0).count().to_string(),
                 tip(orbit.observables.tip_min, orbit.observables.tip_max, &units),
                 number::significant(100.0 * orbit.observables.contact_fraction, 4),
             ]);

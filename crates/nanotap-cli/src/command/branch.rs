@@ -9,6 +9,7 @@ use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{Set, columns, time_series};
 use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
+use nanotap::study::orbit::spectral_radius;
 use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -162,13 +163,6 @@ fn csv(report: &BranchReport, observed: Set, names: &[String]) -> String {
         }
     }
     csv
-}
-
-fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
-    multipliers
-        .iter()
-        .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im))
-        .fold(0.0, f64::max)
 }
 
 /// What could not be followed or measured, where it stands as `at` writes it.

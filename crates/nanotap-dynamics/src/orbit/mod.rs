@@ -51,6 +51,16 @@ impl PeriodicOrbit {
         self.states.first().map_or(0, Vec::len)
     }
 
+    /// The state at phase 0 that is nearest to `state`, and how near it is; nothing, and not a
+    /// number, of an orbit without states.
+    pub fn nearest(&self, state: &[f64]) -> (&[f64], f64) {
+        self.states
+            .iter()
+            .map(|own| (own.as_slice(), distance(own, state)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or((&[], f64::NAN))
+    }
+
     /// Largest modulus of a multiplier.
     pub fn spectral_radius(&self) -> f64 {
         self.multipliers.first().map_or(0.0, |m| m.modulus())

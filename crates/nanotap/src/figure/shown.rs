@@ -6,6 +6,7 @@ use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::units::prefixed;
 use crate::observe::table::shown_phase;
 use crate::observe::{Dimension, Observable, Observables};
+use crate::study::orbit::spectral_radius;
 
 /// What of an orbit is drawn: an observable that is one number, or what its multipliers say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,10 +60,7 @@ impl Shown {
     /// Its value; not a number where the motion has none.
     pub(crate) fn of(self, observables: &Observables, multipliers: &[[f64; 2]]) -> f64 {
         match self {
-            Self::SpectralRadius => multipliers
-                .iter()
-                .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im))
-                .fold(0.0, f64::max),
+            Self::SpectralRadius => spectral_radius(multipliers),
             Self::Observable(observable) => {
                 let value = (observable.of)(observables).number().unwrap_or(f64::NAN);
                 if self.is_phase() {

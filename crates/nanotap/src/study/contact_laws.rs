@@ -26,7 +26,7 @@ use crate::observe::Observables;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
 use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_PERIOD;
-use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit};
+use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit, spectral_radius};
 use crate::study::simulate::{Classification, Named};
 use crate::study::value::Amount;
 
@@ -311,10 +311,7 @@ fn look(model: &Model, found: OrbitReport) -> OrbitLook {
     let force = found.trajectory.force(model);
     OrbitLook {
         period: found.period,
-        spectral_radius: found
-            .multipliers
-            .first()
-            .map_or(0.0, |[re, im]| nanotap_arithmetic::hypot(*re, *im)),
+        spectral_radius: spectral_radius(&found.multipliers),
         stable: found.stable,
         force_loop: force_loop(&height, &force),
         state: found.state,

@@ -13,7 +13,7 @@ use crate::observe::time_series::with_modes;
 use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_PERIOD;
 use crate::study::mode_share::ReadingsReport;
-use crate::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use crate::study::simulate::Classification;
 
 /// A motion at each number of modes.
@@ -137,10 +137,7 @@ fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
             tip_max: Some(o.observables.tip_max),
             tip_min: Some(o.observables.tip_min),
             contact_fraction: Some(o.observables.contact_fraction),
-            spectral_radius: o
-                .multipliers
-                .first()
-                .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im)),
+            spectral_radius: Some(spectral_radius(&o.multipliers)),
             reason: None,
         },
         Err(reason) => Motion {

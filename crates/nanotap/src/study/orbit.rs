@@ -141,6 +141,14 @@ pub struct OrbitReport {
     pub trajectory: Recording,
 }
 
+/// The largest modulus of a report's multipliers; 0 of none.
+pub fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
+    let moduli = multipliers
+        .iter()
+        .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im));
+    moduli.fold(0.0, f64::max)
+}
+
 /// Most harmonics of the drive frequency that are reported.
 pub const MOST_HARMONICS: usize = 100_000;
 

@@ -40,7 +40,7 @@ use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_th
 use crate::study::kind::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
 use crate::study::simulate::{Classification, Named};
-use crate::study::sweep::{SweepOptions, nearest};
+use crate::study::sweep::SweepOptions;
 use crate::study::value::Amount;
 use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
@@ -418,7 +418,7 @@ impl Walk<'_> {
         // The next motion starts on this one's orbit, not where its decay was when Newton
         // saw the end of it. A motion that ran off is not followed: the next starts from rest.
         self.state = match &met.orbit {
-            Some(orbit) => Some(nearest(orbit, &met.state).to_vec()),
+            Some(orbit) => Some(orbit.nearest(&met.state).0.to_vec()),
             None => (met.classification != Classification::Unbounded).then(|| met.state.clone()),
         };
         Ok(self.observed(way, gap, &model, met))

@@ -63,6 +63,17 @@ impl Parameter {
     pub(super) fn is_of(&self, curve: usize) -> bool {
         self.curve.is_none_or(|own| own == curve)
     }
+
+    /// The derivatives of a row's values by an offset or a scale of a column; zero of others.
+    pub(super) fn direct(&self, values: &[f64]) -> Vec<f64> {
+        let mut by = vec![0.0; values.len()];
+        match self.target {
+            Target::Offset(column) => by[column] = 1.0,
+            Target::Scale(column) => by[column] = values[column],
+            Target::Key(_) | Target::Place(_) => {}
+        }
+        by
+    }
 }
 
 /// The unit of a key in SI, `1` for none.

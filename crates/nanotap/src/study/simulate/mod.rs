@@ -217,7 +217,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         distance_to_orbit: named
             .orbit
             .as_ref()
-            .map(|orbit| nearest_phase(orbit, &record.end).1 / orbit.scale()),
+            .map(|orbit| orbit.nearest(&record.end).1 / orbit.scale()),
         strobe: record.states,
         events: record.events,
         events_left_out,
@@ -277,7 +277,7 @@ fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOpt
     else {
         return classified.periods;
     };
-    let (nearest, distance) = nearest_phase(orbit, &classified.state);
+    let (nearest, distance) = orbit.nearest(&classified.state);
     let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
     let decay = -nanotap_arithmetic::ln(orbit.spectral_radius());
     let rest = (nanotap_arithmetic::ln(distance / near) / decay)
@@ -287,22 +287,6 @@ fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOpt
         state.copy_from_slice(nearest);
     }
     classified.periods + rest.next_multiple_of(orbit.period)
-}
-
-/// The state of an orbit at drive phase 0 that is nearest to `state`, and how near it is.
-fn nearest_phase<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> (&'a [f64], f64) {
-    let distance = |x: &[f64]| {
-        x.iter()
-            .zip(state)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
-    };
-    orbit
-        .states
-        .iter()
-        .map(|x| (x.as_slice(), distance(x)))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or((&[], f64::NAN))
 }
 
 /// Speed of the bare propagation and evaluations of gap or force a period, of the first

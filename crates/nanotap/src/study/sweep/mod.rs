@@ -41,7 +41,6 @@ pub use neighbours::{FromNeighbour, from_neighbours};
 pub use over::{Over, OverError, Spacing};
 pub use request::{SweepRequest, SweepStudy};
 pub use run::Starts;
-pub(crate) use run::nearest;
 pub use summary::Summary;
 
 use nanotap_dynamics::{ClassifyOptions, Control, LyapunovOptions};

@@ -253,7 +253,7 @@ impl<'a> Runner<'a> {
         let outcome = Outcome::named(&named, classified.periods);
         match &named.orbit {
             Some(orbit) => {
-                let from = nearest(orbit, &classified.state);
+                let from = orbit.nearest(&classified.state).0;
                 self.recorded(outcome, from, Some(orbit.period))
             }
             None if named.classification == Classification::Unbounded => (outcome, None),
@@ -272,7 +272,7 @@ impl<'a> Runner<'a> {
         match &named.orbit {
             // What repeats is recorded once.
             Some(orbit) if is_on(orbit, &state) => {
-                let from = nearest(orbit, &state);
+                let from = orbit.nearest(&state).0;
                 self.recorded(outcome, from, Some(orbit.period))
             }
             _ => self.recorded(outcome, &state, None),
@@ -349,24 +349,7 @@ const ARRIVED: f64 = 1e-10;
 
 /// Whether a motion that goes to an orbit has come to it.
 pub(super) fn is_on(orbit: &PeriodicOrbit, state: &[f64]) -> bool {
-    let apart = nearest(orbit, state).iter().zip(state);
-    let distance = apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    distance <= (ARRIVED * orbit.scale()).max(10.0 * orbit.error)
-}
-
-/// The state of the orbit that is nearest to `state`.
-pub(crate) fn nearest<'a>(orbit: &'a PeriodicOrbit, state: &[f64]) -> &'a [f64] {
-    let distance = |x: &Vec<f64>| {
-        x.iter()
-            .zip(state)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
-    };
-    orbit
-        .states
-        .iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .map_or(&[], Vec::as_slice)
+    orbit.nearest(state).1 <= (ARRIVED * orbit.scale()).max(10.0 * orbit.error)
 }
 
 /// What a motion is that the flow could not follow.

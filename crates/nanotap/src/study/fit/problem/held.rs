@@ -336,16 +336,11 @@ impl Loop {
         let columns = &problem.data.columns;
         let parameter = |(k, effects): (usize, &Effects)| -> Option<(Vec<f64>, Vec<f64>)> {
             let mut state = vec![0.0; row.driven.state.len() + 2];
-            let mut by = vec![0.0; columns.len()];
             let of = &problem.parameters[k];
             if !of.is_of(curve) {
-                return Some((state, by));
+                return Some((state, vec![0.0; columns.len()]));
             }
-            match of.target {
-                Target::Offset(column) => by[column] = 1.0,
-                Target::Scale(column) => by[column] = point.values[column],
-                Target::Key(_) | Target::Place(_) => {}
-            }
+            let mut by = of.direct(&point.values);
             for (key, weight) in effects {
                 let (driven, told) = &by_key[keys.iter().position(|other| other == key)?];
                 let drive = [driven.frequency, driven.strength];

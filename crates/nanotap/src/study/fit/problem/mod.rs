@@ -578,16 +578,11 @@ impl Problem<'_> {
         let start = orbit.states.first()?;
         let columns = &self.data.columns;
         let mut state = vec![0.0; start.len()];
-        let mut by = vec![0.0; columns.len()];
         let of = &self.parameters[parameter];
         if !of.is_of(curve) {
-            return Some((state, by));
+            return Some((state, vec![0.0; columns.len()]));
         }
-        match of.target {
-            Target::Offset(column) => by[column] = 1.0,
-            Target::Scale(column) => by[column] = point.values[column],
-            Target::Key(_) | Target::Place(_) => {}
-        }
+        let mut by = of.direct(&point.values);
         let observables = point.observables.as_ref()?;
         for (key, weight) in effects {
             let at = (start.as_slice(), orbit.period);

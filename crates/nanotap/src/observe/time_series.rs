@@ -7,7 +7,9 @@ use nanotap_flow::{Flow, Output};
 
 use crate::model::recording::each_period;
 use crate::model::{Model, MotionError};
-use crate::study::limits::MOST_ROWS;
+
+/// Most rows of a time series, in all: they fill some gigabytes.
+pub const MOST_ROWS: usize = 10_000_000;
 
 /// The columns before the state.
 const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];

@@ -3,7 +3,7 @@
 use crate::relaxation::relaxation_masks;
 use crate::simd::{ComplexVector, Vector, layout};
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use nanotap_arithmetic::ComplexFunctions as _;
 
 /// A linear regime with its spectral basis and its forced response `x_p(t)`; the
@@ -73,11 +73,6 @@ impl Regime {
     /// The forced response `x_p`.
     pub fn response(&self) -> &HarmonicVector {
         &self.response
-    }
-
-    /// The vector field at state `x`, time `t`.
-    pub fn field(&self, drive: &Drive, x: &DVector<f64>, t: f64) -> DVector<f64> {
-        &self.matrix * x + self.forcing.at(drive, t)
     }
 
     /// Modal coordinates of state `x` at time `t`, written to `q`; `rest` is work space, as

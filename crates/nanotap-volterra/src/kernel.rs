@@ -221,6 +221,16 @@ fn weighted<const POINTS: usize>(panel: &Panel<POINTS>, coefficients: &[f64]) ->
     values
 }
 
+/// A block's exponential applied to its coordinates.
+#[inline(always)]
+fn applied(e: [[f64; 2]; 2], y: &[f64]) -> [f64; 2] {
+    let second = y.get(1).copied().unwrap_or(0.0);
+    [
+        e[0][0] * y[0] + e[0][1] * second,
+        e[1][0] * y[0] + e[1][1] * second,
+    ]
+}
+
 #[inline(always)]
 fn exponentials<const POINTS: usize>(
     panel: &Panel<POINTS>,
@@ -547,11 +557,7 @@ impl Kernel {
         for block in self.modes.blocks() {
             let s = block.start;
             let e = block.exp(end);
-            let second = if block.size == 2 { y[s + 1] } else { 0.0 };
-            let mut value = [
-                e[0][0] * y[s] + e[0][1] * second,
-                e[1][0] * y[s] + e[1][1] * second,
-            ];
+            let mut value = applied(e, &y[s..s + block.size]);
             let needed = Self::panels(block, map, h, u);
             if needed != panels.len() {
                 let width = u / needed as f64;
@@ -601,11 +607,7 @@ impl Kernel {
         for block in self.modes.blocks() {
             let y = &mut y[block.start..block.start + block.size];
             let e = block.exp(time);
-            let second = y.get(1).copied().unwrap_or(0.0);
-            let mut value = [
-                e[0][0] * y[0] + e[0][1] * second,
-                e[1][0] * y[0] + e[1][1] * second,
-            ];
+            let mut value = applied(e, y);
             if !silent {
                 let [even, odd] = panel.response(block, &force);
                 let [x, y] = block.turn(even, odd, self.source_of(block));
@@ -644,11 +646,7 @@ impl Kernel {
             let source = self.source_of(block);
             for (k, y) in y.chunks_exact_mut(self.modes.dimension()).enumerate() {
                 let y = &mut y[block.start..block.start + block.size];
-                let second = y.get(1).copied().unwrap_or(0.0);
-                let mut value = [
-                    e[0][0] * y[0] + e[0][1] * second,
-                    e[1][0] * y[0] + e[1][1] * second,
-                ];
+                let mut value = applied(e, y);
                 if let Some(force) = forces.get(k) {
                     let (even, odd) = (dot_body(&even, force), dot_body(&odd, force));
                     let [x, y] = block.turn(even, odd, source);

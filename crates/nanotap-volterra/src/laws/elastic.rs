@@ -7,7 +7,8 @@
 use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::entry::{
-    CONTACT_DISTANCE, Entry, HALF_ANGLE, MODULUS, POISSON, Part, RADIUS, TIP_MODULUS, TIP_POISSON,
+    CONTACT_DISTANCE, Entry, HALF_ANGLE, MODULUS, POISSON, ParameterEntry, Part, RADIUS,
+    TIP_MODULUS, TIP_POISSON,
 };
 use crate::laws::formula::{Edge, Formula, Way};
 
@@ -83,20 +84,22 @@ pub(crate) fn deep(radius: f64, contact: f64, least_gap: f64) -> Vec<Remark> {
 #[derive(Clone, Copy, Debug)]
 pub struct Elastic(pub Shape);
 
+const ROUND: &[ParameterEntry] = &[
+    MODULUS,
+    POISSON,
+    TIP_MODULUS,
+    TIP_POISSON,
+    RADIUS,
+    CONTACT_DISTANCE,
+];
+
 /// Hertz's sphere.
 pub static HERTZ: Entry = Entry {
     name: "hertz",
     words: "elastic sphere on a flat sample",
     formula: "4/3 E* √R δ^(3/2) for δ = a0 − d > 0",
     source: "H. Hertz, J. reine angew. Math. 92, 156 (1881)",
-    parameters: &[
-        MODULUS,
-        POISSON,
-        TIP_MODULUS,
-        TIP_POISSON,
-        RADIUS,
-        CONTACT_DISTANCE,
-    ],
+    parameters: ROUND,
     parts: &[Part::Elasticity],
     conservative: true,
 };
@@ -125,14 +128,7 @@ pub static PUNCH: Entry = Entry {
     words: "flat cylindrical tip on an elastic sample",
     formula: "2 E* R δ for δ = a0 − d > 0",
     source: "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)",
-    parameters: &[
-        MODULUS,
-        POISSON,
-        TIP_MODULUS,
-        TIP_POISSON,
-        RADIUS,
-        CONTACT_DISTANCE,
-    ],
+    parameters: ROUND,
     parts: &[Part::Elasticity],
     conservative: true,
 };

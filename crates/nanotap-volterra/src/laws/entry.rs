@@ -141,7 +141,8 @@ pub struct Entry {
     pub conservative: bool,
 }
 
-const fn parameter(
+/// A parameter as the table tells it.
+pub const fn own(
     name: &'static str,
     words: &'static str,
     dimension: Dimension,
@@ -158,7 +159,7 @@ const fn parameter(
 }
 
 /// Young's modulus of the sample.
-pub const MODULUS: ParameterEntry = parameter(
+pub const MODULUS: ParameterEntry = own(
     "modulus",
     "Young's modulus of the sample",
     Dimension::PRESSURE,
@@ -166,7 +167,7 @@ pub const MODULUS: ParameterEntry = parameter(
     Range::Positive,
 );
 /// Poisson's ratio of the sample.
-pub const POISSON: ParameterEntry = parameter(
+pub const POISSON: ParameterEntry = own(
     "poisson",
     "Poisson's ratio of the sample",
     Dimension::NUMBER,
@@ -174,7 +175,7 @@ pub const POISSON: ParameterEntry = parameter(
     Range::Poisson,
 );
 /// Young's modulus of the tip.
-pub const TIP_MODULUS: ParameterEntry = parameter(
+pub const TIP_MODULUS: ParameterEntry = own(
     "tip_modulus",
     "Young's modulus of the tip",
     Dimension::PRESSURE,
@@ -182,7 +183,7 @@ pub const TIP_MODULUS: ParameterEntry = parameter(
     Range::PositiveOrInfinite,
 );
 /// Poisson's ratio of the tip.
-pub const TIP_POISSON: ParameterEntry = parameter(
+pub const TIP_POISSON: ParameterEntry = own(
     "tip_poisson",
     "Poisson's ratio of the tip",
     Dimension::NUMBER,
@@ -190,7 +191,7 @@ pub const TIP_POISSON: ParameterEntry = parameter(
     Range::Poisson,
 );
 /// The radius of a spherical tip or of a flat punch.
-pub const RADIUS: ParameterEntry = parameter(
+pub const RADIUS: ParameterEntry = own(
     "radius",
     "radius of the tip",
     Dimension::LENGTH,
@@ -198,7 +199,7 @@ pub const RADIUS: ParameterEntry = parameter(
     Range::Positive,
 );
 /// The half angle of a conical tip.
-pub const HALF_ANGLE: ParameterEntry = parameter(
+pub const HALF_ANGLE: ParameterEntry = own(
     "half_angle",
     "half angle of the conical tip",
     Dimension::ANGLE,
@@ -206,7 +207,7 @@ pub const HALF_ANGLE: ParameterEntry = parameter(
     Range::Angle,
 );
 /// The gap at which contact begins.
-pub const CONTACT_DISTANCE: ParameterEntry = parameter(
+pub const CONTACT_DISTANCE: ParameterEntry = own(
     "contact_distance",
     "intermolecular distance a0, the gap at which contact begins",
     Dimension::LENGTH,
@@ -214,7 +215,7 @@ pub const CONTACT_DISTANCE: ParameterEntry = parameter(
     Range::Finite,
 );
 /// Hamaker's constant.
-pub const HAMAKER: ParameterEntry = parameter(
+pub const HAMAKER: ParameterEntry = own(
     "hamaker",
     "Hamaker constant of tip, medium and sample",
     Dimension::ENERGY,
@@ -222,7 +223,7 @@ pub const HAMAKER: ParameterEntry = parameter(
     Range::Finite,
 );
 /// The work of adhesion.
-pub const WORK_OF_ADHESION: ParameterEntry = parameter(
+pub const WORK_OF_ADHESION: ParameterEntry = own(
     "work_of_adhesion",
     "work of adhesion",
     Dimension::SURFACE_ENERGY,
@@ -230,7 +231,7 @@ pub const WORK_OF_ADHESION: ParameterEntry = parameter(
     Range::Positive,
 );
 /// A dynamic viscosity of the sample.
-pub const VISCOSITY: ParameterEntry = parameter(
+pub const VISCOSITY: ParameterEntry = own(
     "viscosity",
     "viscosity of the sample",
     Dimension::VISCOSITY,
@@ -238,20 +239,10 @@ pub const VISCOSITY: ParameterEntry = parameter(
     Range::NotNegative,
 );
 /// The thickness of the sample.
-pub const THICKNESS: ParameterEntry = parameter(
+pub const THICKNESS: ParameterEntry = own(
     "thickness",
     "thickness of the sample on its rigid support",
     Dimension::LENGTH,
     None,
     Range::Positive,
 );
-/// Any other parameter.
-pub const fn own(
-    name: &'static str,
-    words: &'static str,
-    dimension: Dimension,
-    default: Option<f64>,
-    range: Range,
-) -> ParameterEntry {
-    parameter(name, words, dimension, default, range)
-}

@@ -168,16 +168,6 @@ pub struct Schema {
 }
 
 impl Schema {
-    /// Bytes that one chunk takes in memory.
-    pub fn chunk_bytes(&self) -> usize {
-        let an_entry: usize = self
-            .variables
-            .iter()
-            .map(|v| v.stride() * v.kind.size())
-            .sum();
-        an_entry * self.grid.chunk_entries()
-    }
-
     /// The place of the variable called `name`.
     pub fn index_of(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|v| v.name == name)

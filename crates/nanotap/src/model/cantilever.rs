@@ -97,6 +97,34 @@ const LEAST_SURFACE_DAMPING: f64 = 1e-15;
 /// Range of Ω. The 50th mode is at 24,350 and the first at 3.5.
 const OMEGA_RANGE: (f64, f64) = (1e-6, 1e6);
 
+/// Where the value of a parameter stands.
+macro_rules! place {
+    ($case:ident, $parameter:ident $(, $mutable:tt)?) => {
+        match $parameter {
+            Parameter::Alpha1 => &$($mutable)? $case.alpha1,
+            Parameter::Alpha2 => &$($mutable)? $case.alpha2,
+            Parameter::Alpha3 => &$($mutable)? $case.alpha3,
+            Parameter::Alpha4 => &$($mutable)? $case.alpha4,
+            Parameter::Alpha5 => &$($mutable)? $case.alpha5,
+            Parameter::Alpha6 => &$($mutable)? $case.alpha6,
+            Parameter::Omega => &$($mutable)? $case.omega,
+            Parameter::RelaxationStiffness => &$($mutable)? $case.relaxation_stiffness,
+            Parameter::RelaxationTime => &$($mutable)? $case.relaxation_time,
+            Parameter::SurfaceStiffness => &$($mutable)? $case.surface.stiffness,
+            Parameter::SurfaceDamping => &$($mutable)? $case.surface.damping,
+            Parameter::AdhesionForce => &$($mutable)? $case.surface.adhesion,
+            Parameter::Tone2Amplitude => &$($mutable)? $case.tone2_amplitude,
+            Parameter::Tone2Phase => &$($mutable)? $case.tone2_phase,
+            Parameter::Mode2Frequency => &$($mutable)? $case.higher_modes.frequency[0],
+            Parameter::Mode3Frequency => &$($mutable)? $case.higher_modes.frequency[1],
+            Parameter::Mode2Quality => &$($mutable)? $case.higher_modes.quality[0],
+            Parameter::Mode3Quality => &$($mutable)? $case.higher_modes.quality[1],
+            Parameter::Mode2Stiffness => &$($mutable)? $case.higher_modes.stiffness[0],
+            Parameter::Mode3Stiffness => &$($mutable)? $case.higher_modes.stiffness[1],
+        }
+    };
+}
+
 impl Cantilever {
     /// The paper's parameters for Figs. 5–17, Eq. (26), with α1 = 0.1, Ω = 2.6 and N = 3.
     pub const fn paper() -> Self {
@@ -135,55 +163,13 @@ impl Cantilever {
 
     /// The value of a parameter.
     pub const fn get(&self, parameter: Parameter) -> f64 {
-        match parameter {
-            Parameter::Alpha1 => self.alpha1,
-            Parameter::Alpha2 => self.alpha2,
-            Parameter::Alpha3 => self.alpha3,
-            Parameter::Alpha4 => self.alpha4,
-            Parameter::Alpha5 => self.alpha5,
-            Parameter::Alpha6 => self.alpha6,
-            Parameter::Omega => self.omega,
-            Parameter::RelaxationStiffness => self.relaxation_stiffness,
-            Parameter::RelaxationTime => self.relaxation_time,
-            Parameter::SurfaceStiffness => self.surface.stiffness,
-            Parameter::SurfaceDamping => self.surface.damping,
-            Parameter::AdhesionForce => self.surface.adhesion,
-            Parameter::Tone2Amplitude => self.tone2_amplitude,
-            Parameter::Tone2Phase => self.tone2_phase,
-            Parameter::Mode2Frequency => self.higher_modes.frequency[0],
-            Parameter::Mode3Frequency => self.higher_modes.frequency[1],
-            Parameter::Mode2Quality => self.higher_modes.quality[0],
-            Parameter::Mode3Quality => self.higher_modes.quality[1],
-            Parameter::Mode2Stiffness => self.higher_modes.stiffness[0],
-            Parameter::Mode3Stiffness => self.higher_modes.stiffness[1],
-        }
+        *place!(self, parameter)
     }
 
     /// The same case with one parameter changed.
     #[must_use]
     pub fn with(mut self, parameter: Parameter, value: f64) -> Self {
-        *match parameter {
-            Parameter::Alpha1 => &mut self.alpha1,
-            Parameter::Alpha2 => &mut self.alpha2,
-            Parameter::Alpha3 => &mut self.alpha3,
-            Parameter::Alpha4 => &mut self.alpha4,
-            Parameter::Alpha5 => &mut self.alpha5,
-            Parameter::Alpha6 => &mut self.alpha6,
-            Parameter::Omega => &mut self.omega,
-            Parameter::RelaxationStiffness => &mut self.relaxation_stiffness,
-            Parameter::RelaxationTime => &mut self.relaxation_time,
-            Parameter::SurfaceStiffness => &mut self.surface.stiffness,
-            Parameter::SurfaceDamping => &mut self.surface.damping,
-            Parameter::AdhesionForce => &mut self.surface.adhesion,
-            Parameter::Tone2Amplitude => &mut self.tone2_amplitude,
-            Parameter::Tone2Phase => &mut self.tone2_phase,
-            Parameter::Mode2Frequency => &mut self.higher_modes.frequency[0],
-            Parameter::Mode3Frequency => &mut self.higher_modes.frequency[1],
-            Parameter::Mode2Quality => &mut self.higher_modes.quality[0],
-            Parameter::Mode3Quality => &mut self.higher_modes.quality[1],
-            Parameter::Mode2Stiffness => &mut self.higher_modes.stiffness[0],
-            Parameter::Mode3Stiffness => &mut self.higher_modes.stiffness[1],
-        } = value;
+        *place!(self, parameter, mut) = value;
         self
     }
 

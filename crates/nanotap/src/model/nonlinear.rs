@@ -95,11 +95,6 @@ impl Nonlinear {
         })
     }
 
-    /// Whether the law is known to feed and take nothing.
-    pub fn is_conservative(&self) -> bool {
-        self.system.law().conservative()
-    }
-
     /// The branch of the law in a state of the model at drive phase 0: the one that it
     /// remembers, if that can be.
     fn branch(&self, state: &[f64]) -> usize {

@@ -3,10 +3,9 @@
 
 use nanotap_dynamics::{
     AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions,
-    ClassifyOptions, Complex, ContinuationError, ContinuationOptions, Control, CurveOptions,
-    Diagram, DiagramBranch, DiagramOptions, Direction, GlobalOptions, LyapunovOptions,
-    PeriodicOrbit, StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit,
-    trace_curve,
+    ClassifyOptions, ContinuationError, ContinuationOptions, Control, CurveOptions, Diagram,
+    DiagramBranch, DiagramOptions, Direction, GlobalOptions, LyapunovOptions, PeriodicOrbit,
+    StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit, trace_curve,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -19,7 +18,7 @@ use crate::model::{Model, MotionError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::kind::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
-use crate::study::orbit::{OrbitError, OrbitOptions, orbit};
+use crate::study::orbit::{OrbitError, OrbitOptions, orbit, pairs};
 use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, key_and_ends};
 
@@ -664,10 +663,6 @@ fn summary(branch: &Branch, parent: Option<usize>, depth: usize, end: String) ->
         end,
         complete: !branch.end.is_failure(),
     }
-}
-
-fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
-    multipliers.iter().map(|m| [m.re, m.im]).collect()
 }
 
 /// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.

@@ -304,11 +304,7 @@ fn report_on(
         states: orbit.states.clone(),
         residual: orbit.residual,
         error: orbit.error,
-        multipliers: orbit
-            .multipliers
-            .iter()
-            .map(|m: &Complex<f64>| [m.re, m.im])
-            .collect(),
+        multipliers: pairs(&orbit.multipliers),
         stable: orbit.is_stable(),
         stability: orbit.stability.name(),
         determinant_defect: match &seen.recording {
@@ -323,6 +319,11 @@ fn report_on(
         proof: None,
         trajectory: seen.recording,
     })
+}
+
+/// Multipliers as reports list them.
+pub(super) fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
+    multipliers.iter().map(|m| [m.re, m.im]).collect()
 }
 
 /// How far the multipliers of an orbit under a nonlinear force are from Liouville's formula; a

@@ -1,6 +1,7 @@
 //! One linear regime, `ẋ = A x + f(t)` with harmonic `f`, solved in closed form.
 
 use crate::relaxation::relaxation_masks;
+use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, Vector, layout};
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
 use nalgebra::DMatrix;
@@ -14,6 +15,10 @@ pub struct Regime {
     forcing: HarmonicVector,
     basis: SpectralBasis,
     response: HarmonicVector,
+    /// The columns of `L`, packed.
+    packed_left: Vec<ComplexVector>,
+    /// `[Re R, −Im R]`, from modal coordinates to the state.
+    packed_right: LinearMap,
 }
 
 impl Regime {
@@ -47,7 +52,10 @@ impl Regime {
     ) -> Result<Self, FlowError> {
         check(&matrix, &forcing, drive)?;
         let response = forced_response(index, &forcing, drive, &basis)?;
+        let lefts = basis.left.column_iter();
         Ok(Self {
+            packed_left: lefts.flat_map(|l| layout::list(l.as_slice())).collect(),
+            packed_right: LinearMap::of(&basis.stacked_right()),
             matrix,
             forcing,
             basis,
@@ -73,6 +81,16 @@ impl Regime {
     /// The forced response `x_p`.
     pub fn response(&self) -> &HarmonicVector {
         &self.response
+    }
+
+    /// The columns of `L`, one after the other.
+    pub(crate) fn packed_left(&self) -> &[ComplexVector] {
+        &self.packed_left
+    }
+
+    /// From modal coordinates to what they add to the forced response.
+    pub(crate) fn packed_right(&self) -> &LinearMap {
+        &self.packed_right
     }
 
     /// Modal coordinates of state `x` at time `t`, written to `q`; `rest` is work space, as

@@ -10,7 +10,7 @@ use crate::harmonic::{HarmonicVector, Output};
 use crate::integral::phi1;
 use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::system::{Reset, System};
-use crate::{Complex, Drive, Flow, FlowError, Regime};
+use crate::{Complex, Drive, Flow, FlowError, Regime, SpectralBasis};
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 
@@ -103,6 +103,9 @@ pub struct Sensitivity<'a> {
     sources: Vec<Vec<Source>>,
     /// `∂q/∂θ_p` in the present regime.
     modal: Vec<Vec<Complex>>,
+    /// Work space of a stretch.
+    responses: Responses,
+    phasors: Vec<Complex>,
 }
 
 /// `∂A x + ∂f` (times the period's change) in modal coordinates.
@@ -122,17 +125,16 @@ struct Source {
 
 impl Source {
     fn new(regime: &Regime, tangent: &RegimeTangent, log_period: f64) -> Self {
-        let complex = |m: &DMatrix<f64>| m.map(|v| Complex::new(v, 0.0));
         let matrix = &tangent.matrix + regime.matrix() * log_period;
         let forcing = tangent.forcing.plus(log_period, regime.forcing());
-        let (left, right) = (&regime.basis().left, &regime.basis().right);
+        let left = &regime.basis().left;
         let half = Complex::new(0.5, 0.0);
-        let driven = left * complex(&matrix);
+        let [direct, mirrored] = driven(regime.basis(), &matrix);
         // Along the forced response, ∂A x_p + ∂f.
         let harmonic = regime.response().mapped(&matrix).plus(1.0, &forcing);
         Self {
-            direct: &driven * right * half,
-            mirrored: &driven * right.map(|z| z.conj()) * half,
+            direct,
+            mirrored,
             tones: harmonic
                 .tones
                 .iter()
@@ -145,14 +147,110 @@ impl Source {
     }
 }
 
-/// `∫₀^L e^{λ(L−τ)} e^{μτ} dτ`, without overflow or cancellation.
-fn response(lambda: Complex, mu: Complex, length: f64) -> Complex {
-    let (slow, fast) = if lambda.re >= mu.re {
-        (lambda, mu)
-    } else {
-        (mu, lambda)
+/// `½ L ∂A R` and `½ L ∂A R̄`, from products of real matrices.
+fn driven(basis: &SpectralBasis, matrix: &DMatrix<f64>) -> [DMatrix<Complex>; 2] {
+    let m = basis.len();
+    // [Re R, −Im R], and [Re L; Im L] ∂A of it.
+    let moved = matrix * basis.stacked_right();
+    let products = basis.stacked_left() * moved;
+    let entry = |sign: f64| {
+        DMatrix::from_fn(m, m, |k, j| {
+            let (a, b) = (products[(k, j)], products[(k, m + j)]);
+            let (c, d) = (products[(m + k, j)], products[(m + k, m + j)]);
+            Complex::new(0.5 * (a + sign * d), 0.5 * (c - sign * b))
+        })
     };
-    (slow * length).exponential() * phi1((fast - slow) * length) * length
+    [entry(1.0), entry(-1.0)]
+}
+
+/// `|μ − λ| L` from which the difference of two exponentials loses no digit to speak of.
+const APART: f64 = 0.5;
+
+/// `∫₀^L e^{λ(L−τ)} e^{μτ} dτ`, without overflow or cancellation; λ and μ come with `e^{λL}` and
+/// `e^{μL}`.
+fn response(
+    (lambda, from): (Complex, Complex),
+    (mu, to): (Complex, Complex),
+    length: f64,
+) -> Complex {
+    let apart = mu - lambda;
+    if apart.norm_sqr() * length * length >= APART * APART {
+        return (to - from) / apart;
+    }
+    let (slow, apart) = if lambda.re >= mu.re {
+        (from, apart)
+    } else {
+        (to, -apart)
+    };
+    slow * phi1(apart * length) * length
+}
+
+/// The responses of all modes over one length of time to what drives sensitivities.
+#[derive(Clone, Debug, Default)]
+struct Responses {
+    /// A row a mode: to μ = λ_j and its conjugate, to the tones and their conjugates, to a
+    /// constant. Empty where eigenvalues coincide.
+    rows: Vec<Complex>,
+    /// What drives: μ and `e^{μL}`, in this order.
+    drivers: Vec<(Complex, Complex)>,
+}
+
+impl Responses {
+    /// Those over a length of time after which modes have become `factors` times themselves.
+    fn set(&mut self, regime: &Regime, drive: &Drive, length: f64, factors: &[Complex]) {
+        self.rows.clear();
+        self.drivers.clear();
+        if !regime.basis().clusters.is_empty() {
+            return;
+        }
+        let modes = regime
+            .basis()
+            .eigenvalues
+            .iter()
+            .copied()
+            .zip(factors.iter().copied());
+        let tones = drive.frequencies().iter().map(|&frequency| {
+            let rate = Complex::new(0.0, frequency);
+            (rate, (rate * length).exponential())
+        });
+        let both = |(mu, factor): (Complex, Complex)| [(mu, factor), (mu.conj(), factor.conj())];
+        let constant = (Complex::new(0.0, 0.0), Complex::new(1.0, 0.0));
+        self.drivers
+            .extend(modes.clone().chain(tones).flat_map(both));
+        self.drivers.push(constant);
+        for mode in modes {
+            let of = |driver: &(Complex, Complex)| response(mode, *driver, length);
+            self.rows.extend(self.drivers.iter().map(of));
+        }
+    }
+
+    /// Moves `modal`, the sensitivity that belongs to `source`, on over that length; the
+    /// motion began at `q` and the tones at `phasors`.
+    fn carry(
+        &self,
+        modal: &mut [Complex],
+        source: &Source,
+        factors: &[Complex],
+        q: &[Complex],
+        phasors: &[Complex],
+    ) {
+        let rows = self.rows.chunks_exact(self.drivers.len());
+        for (k, ((sigma, factor), row)) in modal.iter_mut().zip(factors).zip(rows).enumerate() {
+            let (modes, rest) = row.split_at(2 * q.len());
+            let mut sum = *sigma * factor;
+            for (j, (q, [direct, mirrored])) in q.iter().zip(modes.as_chunks::<2>().0).enumerate() {
+                sum += source.direct[(k, j)] * q * direct;
+                sum += source.mirrored[(k, j)] * q.conj() * mirrored;
+            }
+            let (turning, constant) = rest.split_at(2 * phasors.len());
+            let turning = turning.as_chunks::<2>().0.iter().zip(phasors);
+            for ([a, b], ([direct, mirrored], phasor)) in source.tones.iter().zip(turning) {
+                sum += a[k] * phasor * direct;
+                sum += b[k] * phasor.conj() * mirrored;
+            }
+            *sigma = sum + source.constant[k] * constant[0];
+        }
+    }
 }
 
 impl<'a> Sensitivity<'a> {
@@ -173,6 +271,8 @@ impl<'a> Sensitivity<'a> {
             tangents,
             sources,
             modal: vec![vec![Complex::new(0.0, 0.0); m]; tangents.len()],
+            responses: Responses::default(),
+            phasors: Vec::new(),
         }
     }
 
@@ -223,13 +323,31 @@ impl<'a> Sensitivity<'a> {
 
 impl Observer for Sensitivity<'_> {
     fn segment(&mut self, segment: &SegmentView<'_>) {
-        let regime = segment.regime();
+        let (regime, drive) = (segment.regime(), segment.system.drive());
+        let (factors, q) = (segment.factors, segment.modal);
+        let simple = regime.basis().clusters.is_empty();
+        if simple {
+            self.responses.set(regime, drive, segment.length, factors);
+            let tones = 0..drive.frequencies().len();
+            self.phasors.clear();
+            self.phasors
+                .extend(tones.map(|t| drive.phasor(t, segment.phase)));
+        }
         for (modal, sources) in self.modal.iter_mut().zip(&self.sources) {
             let source = &sources[segment.regime];
-            if regime.basis().clusters.is_empty() {
-                simple_segment(modal, source, segment);
+            if simple {
+                self.responses
+                    .carry(modal, source, factors, q, &self.phasors);
             } else {
-                augmented_segment(modal, source, segment);
+                augmented_stretch(
+                    modal,
+                    source,
+                    regime,
+                    drive,
+                    segment.phase,
+                    segment.length,
+                    q,
+                );
             }
         }
     }
@@ -300,40 +418,21 @@ pub(crate) struct Propagator<'a> {
     length: f64,
     /// `e^{λ_k · length}`.
     factors: Vec<Complex>,
-    /// `∫₀^L e^{λ_k(L−τ)} e^{μτ} dτ` of μ = λ_j and its conjugate, of the tones and their
-    /// conjugates, and of zero; a row a mode. Empty where eigenvalues coincide.
-    responses: Vec<Vec<Complex>>,
+    responses: Responses,
 }
 
 impl<'a> Propagator<'a> {
     pub(crate) fn new(regime: &'a Regime, drive: &'a Drive, length: f64) -> Self {
-        let lambdas = &regime.basis().eigenvalues;
-        let tones = drive.frequencies().iter().map(|&w| Complex::new(0.0, w));
-        let both = |z: Complex| [z, z.conj()];
-        let rates: Vec<Complex> = lambdas
-            .iter()
-            .copied()
-            .chain(tones)
-            .flat_map(both)
-            .chain([Complex::new(0.0, 0.0)])
-            .collect();
-        let row = |lambda: &Complex| -> Vec<Complex> {
-            rates
-                .iter()
-                .map(|mu| response(*lambda, *mu, length))
-                .collect()
-        };
-        let simple = regime.basis().clusters.is_empty();
+        let lambdas = regime.basis().eigenvalues.iter();
+        let factors: Vec<Complex> = lambdas.map(|l| (l * length).exponential()).collect();
+        let mut responses = Responses::default();
+        responses.set(regime, drive, length, &factors);
         Self {
-            factors: lambdas.iter().map(|l| (l * length).exponential()).collect(),
-            responses: if simple {
-                lambdas.iter().map(row).collect()
-            } else {
-                Vec::new()
-            },
             regime,
             drive,
             length,
+            factors,
+            responses,
         }
     }
 
@@ -358,7 +457,7 @@ impl<'a> Propagator<'a> {
     ) -> Vec<Complex> {
         let source = &of.sources[0][number];
         let mut later = s.to_vec();
-        if self.responses.is_empty() {
+        if !self.regime.basis().clusters.is_empty() {
             augmented_stretch(
                 &mut later,
                 source,
@@ -372,63 +471,14 @@ impl<'a> Propagator<'a> {
         }
         let tones = self.drive.frequencies().len();
         let phasors: Vec<Complex> = (0..tones).map(|t| self.drive.phasor(t, phase)).collect();
-        for (k, sigma) in later.iter_mut().enumerate() {
-            let (modes, rest) = self.responses[k].split_at(2 * q.len());
-            let mut sum = *sigma * self.factors[k];
-            for (j, (q, [direct, mirrored])) in q.iter().zip(modes.as_chunks::<2>().0).enumerate() {
-                sum += source.direct[(k, j)] * q * direct;
-                sum += source.mirrored[(k, j)] * q.conj() * mirrored;
-            }
-            let (turning, constant) = rest.split_at(2 * tones);
-            let turning = turning.as_chunks::<2>().0.iter().zip(&phasors);
-            for ([a, b], ([direct, mirrored], phasor)) in source.tones.iter().zip(turning) {
-                sum += a[k] * phasor * direct;
-                sum += b[k] * phasor.conj() * mirrored;
-            }
-            *sigma = sum + source.constant[k] * constant[0];
-        }
+        self.responses
+            .carry(&mut later, source, &self.factors, q, &phasors);
         later
-    }
-}
-
-/// Closed form, mode by mode.
-fn simple_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<'_>) {
-    let lambdas = &segment.regime().basis().eigenvalues;
-    let drive = segment.system.drive();
-    for (k, sigma) in modal.iter_mut().enumerate() {
-        let lambda = lambdas[k];
-        let mut sum = *sigma * segment.factors[k];
-        for (j, q) in segment.modal.iter().enumerate() {
-            sum += source.direct[(k, j)] * q * response(lambda, lambdas[j], segment.length);
-            sum += source.mirrored[(k, j)]
-                * q.conj()
-                * response(lambda, lambdas[j].conj(), segment.length);
-        }
-        for (t, [direct, mirrored]) in source.tones.iter().enumerate() {
-            let phasor = drive.phasor(t, segment.phase);
-            let omega = Complex::new(0.0, drive.frequencies()[t]);
-            sum += direct[k] * phasor * response(lambda, omega, segment.length);
-            sum += mirrored[k] * phasor.conj() * response(lambda, -omega, segment.length);
-        }
-        sum += source.constant[k] * response(lambda, Complex::new(0.0, 0.0), segment.length);
-        *sigma = sum;
     }
 }
 
 /// The exponential of the state, its sensitivity and the drive as one linear system,
 /// for regimes whose eigenvalues coincide.
-fn augmented_segment(modal: &mut [Complex], source: &Source, segment: &SegmentView<'_>) {
-    augmented_stretch(
-        modal,
-        source,
-        segment.regime(),
-        segment.system.drive(),
-        segment.phase,
-        segment.length,
-        segment.modal,
-    );
-}
-
 fn augmented_stretch(
     modal: &mut [Complex],
     source: &Source,

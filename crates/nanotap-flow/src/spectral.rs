@@ -143,6 +143,30 @@ impl SpectralBasis {
         self.eigenvalues.is_empty()
     }
 
+    /// `[Re R, −Im R]` (`n × 2m`): the state of `[Re q; Im q]`, since `x = Re(R q)`.
+    pub(crate) fn stacked_right(&self) -> DMatrix<f64> {
+        let (n, m) = self.right.shape();
+        DMatrix::from_fn(n, 2 * m, |i, k| {
+            if k < m {
+                self.right[(i, k)].re
+            } else {
+                -self.right[(i, k - m)].im
+            }
+        })
+    }
+
+    /// `[Re L; Im L]` (`2m × n`): `[Re q; Im q]` of the state.
+    pub(crate) fn stacked_left(&self) -> DMatrix<f64> {
+        let (m, n) = self.left.shape();
+        DMatrix::from_fn(2 * m, n, |k, i| {
+            if k < m {
+                self.left[(k, i)].re
+            } else {
+                self.left[(k - m, i)].im
+            }
+        })
+    }
+
     /// Advances `q` by a time `s`, and leaves `e^{λ_k s}` in `factors`.
     pub(crate) fn advance(&self, q: &mut [Complex], s: f64, factors: &mut [Complex]) {
         for (factor, lambda) in factors.iter_mut().zip(&self.eigenvalues) {

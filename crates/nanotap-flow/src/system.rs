@@ -5,6 +5,7 @@ use crate::regime::{Kernel, KernelFrame, ModalOutput, Regime};
 use crate::search::Start;
 use crate::search::table::Table;
 use crate::simd::affine::AffineMap;
+use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, layout};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
@@ -174,7 +175,7 @@ pub struct Switch {
     /// proportional to the guard's rate; then the map is smooth through grazing.
     pub(crate) saltation: Option<DVector<f64>>,
     /// `matrix` with the constant saltation in it: the switch of a Jacobian.
-    pub(crate) tangent: Option<DMatrix<f64>>,
+    pub(crate) tangent: Option<LinearMap>,
     /// Where the state is continuous: the guard's rate after the switch from that before it,
     /// `factor · rate + constant`, where it follows from it alone.
     pub(crate) rate_after: Option<RateAfter>,
@@ -670,24 +671,8 @@ impl System {
 
     fn switch(&self, from: usize, to: usize, reset: Option<&Reset>, guard: &Output) -> Switch {
         let (a, b) = (&self.regimes[from], &self.regimes[to]);
-        let n = self.dimension;
-        let (right, left) = (&a.basis().right, &b.basis().left);
-        let (ma, mb) = (right.ncols(), left.nrows());
-        // x⁻ = Re(R q) = [Re R, −Im R] [Re q; Im q]
-        let from_modal = DMatrix::from_fn(n, 2 * ma, |i, k| {
-            if k < ma {
-                right[(i, k)].re
-            } else {
-                -right[(i, k - ma)].im
-            }
-        });
-        let to_modal = DMatrix::from_fn(2 * mb, n, |k, i| {
-            if k < mb {
-                left[(k, i)].re
-            } else {
-                left[(k - mb, i)].im
-            }
-        });
+        let from_modal = a.basis().stacked_right();
+        let to_modal = b.basis().stacked_left();
         let (matrix, shift) = match reset {
             None => (&to_modal * &from_modal, a.response().clone()),
             Some(reset) => (
@@ -703,7 +688,7 @@ impl System {
             let mut tangent = matrix.clone();
             let row = (&guard.row * &from_modal).transpose();
             tangent.ger(1.0, &(&to_modal * u), &row, 1.0);
-            tangent
+            LinearMap::of(&tangent)
         });
         Switch {
             from,

@@ -6,7 +6,7 @@
 //! the environment picks the first: it is how tests run both.
 //!
 //! [`functions`] has the exponentials, [`layout`] how lists lie in vectors, [`affine`] the
-//! change of coordinates at a switch.
+//! change of coordinates at a switch, [`linear`] the same of a whole matrix.
 
 #[cfg(target_arch = "x86_64")]
 use std::sync::LazyLock;
@@ -16,6 +16,7 @@ pub(crate) mod affine;
 mod avx2;
 mod functions;
 pub(crate) mod layout;
+pub(crate) mod linear;
 mod plain;
 #[cfg(test)]
 mod tests;

@@ -90,7 +90,7 @@ impl Recipe {
             };
             match recipe.compute(&store, &work) {
                 Ok(()) | Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
-                Err(WorkError::Store(error)) => Err(error.into()),
+                Err(error) => Err(nanotap::Error::from(error).into()),
             }
         })?;
         Ok(done.interrupted)
@@ -165,7 +165,7 @@ impl Receiver {
         };
         match self.recipe.compute(&self.store, &work) {
             Ok(()) | Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
-            Err(WorkError::Store(error)) => Err(Failure::from(error).into()),
+            Err(error) => Err(Failure::from(nanotap::Error::from(error)).into()),
         }
     }
 }

@@ -43,6 +43,9 @@ pub enum WorkError {
         "stopped; every chunk is finished, motions of neighbouring values are still to be tried"
     )]
     Neighbours,
+    /// The threads cannot be had.
+    #[error(transparent)]
+    Threads(Box<crate::Error>),
     /// The store refused.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -176,6 +179,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 impl From<WorkError> for crate::Error {
     fn from(error: WorkError) -> Self {
         match error {
+            WorkError::Threads(error) => *error,
             WorkError::Store(error) => error.into(),
             WorkError::Cancelled { .. } | WorkError::Neighbours => {
                 Self::new(crate::ErrorKind::Stopped, error.to_string())

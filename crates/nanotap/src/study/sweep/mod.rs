@@ -50,6 +50,7 @@ use crate::dataset::{
     Block, Schema, Store, StoreError, Values, Work, WorkError, chunk_files, work,
 };
 use crate::study::recipe::Computation;
+use crate::study::threads::install;
 
 /// How to sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,7 +178,9 @@ impl Sweep {
         if store.missing() > 0 {
             return Ok(());
         }
-        self.share(store, &how.control)
+        let threads = Some(how.threads).filter(|threads| *threads > 0);
+        install(threads, || self.share(store, &how.control))
+            .map_err(|error| WorkError::Threads(Box::new(error)))?
     }
 
     /// The files of one chunk, computed on this thread: the same bytes wherever that is.

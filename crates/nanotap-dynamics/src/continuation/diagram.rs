@@ -18,6 +18,7 @@ use crate::control::Control;
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::shooting::{ShootingOptions, close_orbit_from_points};
+use rayon::prelude::*;
 
 /// How a diagram is assembled.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,51 +59,137 @@ pub fn assemble_diagram<F: MapFamily>(
     control: &Control<'_>,
 ) -> Diagram {
     let mut diagram = Diagram::default();
-    let mut waiting: Vec<(f64, PeriodicOrbit, usize)> = seeds
-        .iter()
-        .rev()
-        .map(|(parameter, orbit)| (*parameter, orbit.clone(), 0))
-        .collect();
-    while let Some((parameter, orbit, depth)) = waiting.pop() {
+    let mut waiting: Vec<Waiting> = seeds.iter().rev().map(Waiting::seed).collect();
+    while let Some(next) = waiting.pop() {
         if control.is_cancelled() || diagram.branches.len() >= options.max_branches {
             break;
         }
-        if diagram.holds(family, parameter, &orbit, &options.continuation) {
-            continue;
-        }
-        let follow = |direction| {
-            continue_orbit(
-                family,
-                parameter,
-                &orbit,
-                direction,
-                &options.continuation,
-                control,
-            )
-        };
-        let (up, down) = rayon::join(
-            || follow(Direction::Increasing),
-            || follow(Direction::Decreasing),
+        let others = likely_next(&next, &waiting);
+        let starts: Vec<_> = others.iter().map(|k| waiting[*k].start()).collect();
+        let ((), ways) = rayon::join(
+            || diagram.add(family, next, options, control, &mut waiting),
+            || {
+                let follow = |start: &_| both_ways(family, start, options, control);
+                starts.par_iter().map(follow).collect::<Vec<_>>()
+            },
         );
-        // The way back along a closed branch is the same branch.
-        let closed = matches!(&up, Ok(branch) if matches!(branch.end, BranchEnd::Closed));
-        for followed in std::iter::once(up).chain((!closed).then_some(down)) {
-            diagram.take(
-                family,
-                followed,
-                parameter,
-                None,
-                depth,
-                options,
-                control,
-                &mut waiting,
-            );
+        for (k, ways) in others.into_iter().zip(ways) {
+            waiting[k].followed = Some(ways);
         }
+        waiting = waiting
+            .into_par_iter()
+            .filter_map(|orbit| diagram.lacks(family, orbit, &options.continuation))
+            .collect();
     }
     diagram
 }
 
+/// A branch followed towards greater and smaller parameters.
+type Ways = Box<[Result<Branch, ContinuationError>; 2]>;
+
+/// An orbit whose branch is to be followed, unless it turns out to be known.
+struct Waiting {
+    parameter: f64,
+    orbit: PeriodicOrbit,
+    depth: usize,
+    /// The branch, where a thread had nothing else to do.
+    followed: Option<Ways>,
+    /// How many of the diagram's branches it is known not to lie on.
+    seen: usize,
+}
+
+impl Waiting {
+    fn seed((parameter, orbit): &(f64, PeriodicOrbit)) -> Self {
+        Self {
+            parameter: *parameter,
+            orbit: orbit.clone(),
+            depth: 0,
+            followed: None,
+            seen: 0,
+        }
+    }
+
+    fn start(&self) -> (f64, PeriodicOrbit) {
+        (self.parameter, self.orbit.clone())
+    }
+}
+
+/// Which of those waiting other threads may follow beside `orbit`: those that come next and have
+/// other periods than it and each other, so that they are likely to lie on other branches. Where
+/// one comes to lie on a branch after all, the work was in vain and the diagram is the same.
+fn likely_next(orbit: &Waiting, waiting: &[Waiting]) -> Vec<usize> {
+    let wanted = rayon::current_num_threads() - 1;
+    let mut periods = vec![orbit.orbit.period];
+    let mut chosen = Vec::new();
+    for (k, other) in waiting.iter().enumerate().rev() {
+        if chosen.len() == wanted {
+            break;
+        }
+        let period = other.orbit.period;
+        // One of half the length may be what a branch of doubled period ends at.
+        let alike = |p: &usize| *p == period || *p == 2 * period || 2 * *p == period;
+        if other.followed.is_none() && !periods.iter().any(alike) {
+            periods.push(period);
+            chosen.push(k);
+        }
+    }
+    chosen
+}
+
+/// Follows an orbit both ways.
+fn both_ways<F: MapFamily>(
+    family: &F,
+    (parameter, orbit): &(f64, PeriodicOrbit),
+    options: &DiagramOptions,
+    control: &Control<'_>,
+) -> Ways {
+    let follow = |direction| {
+        let continuation = &options.continuation;
+        continue_orbit(family, *parameter, orbit, direction, continuation, control)
+    };
+    let (up, down) = rayon::join(
+        || follow(Direction::Increasing),
+        || follow(Direction::Decreasing),
+    );
+    Box::new([up, down])
+}
+
 impl Diagram {
+    /// An orbit that waits, if it lies on no branch.
+    fn lacks<F: MapFamily>(
+        &self,
+        family: &F,
+        mut waiting: Waiting,
+        options: &ContinuationOptions,
+    ) -> Option<Waiting> {
+        let new = &self.branches[waiting.seen..];
+        waiting.seen = self.branches.len();
+        let held = hold(new, family, waiting.parameter, &waiting.orbit, options);
+        (!held).then_some(waiting)
+    }
+
+    /// Adds the branch of an orbit, both ways, and what leaves it.
+    fn add<F: MapFamily>(
+        &mut self,
+        family: &F,
+        orbit: Waiting,
+        options: &DiagramOptions,
+        control: &Control<'_>,
+        waiting: &mut Vec<Waiting>,
+    ) {
+        let (parameter, depth) = (orbit.parameter, orbit.depth);
+        let start = orbit.start();
+        let ways = orbit.followed;
+        let [up, down] = *ways.unwrap_or_else(|| both_ways(family, &start, options, control));
+        // The way back along a closed branch is the same branch.
+        let closed = matches!(&up, Ok(branch) if matches!(branch.end, BranchEnd::Closed));
+        for followed in std::iter::once(up).chain((!closed).then_some(down)) {
+            self.take(
+                family, followed, parameter, None, depth, options, control, waiting,
+            );
+        }
+    }
+
     /// Adds a branch, then what leaves it.
     fn take<F: MapFamily>(
         &mut self,
@@ -113,7 +200,7 @@ impl Diagram {
         depth: usize,
         options: &DiagramOptions,
         control: &Control<'_>,
-        waiting: &mut Vec<(f64, PeriodicOrbit, usize)>,
+        waiting: &mut Vec<Waiting>,
     ) {
         let branch = match followed {
             Ok(branch) => branch,
@@ -122,8 +209,11 @@ impl Diagram {
                 return;
             }
         };
-        if let Some(seed) = met(family, &branch) {
-            waiting.push((seed.0, seed.1, depth));
+        if let Some((parameter, orbit)) = met(family, &branch) {
+            waiting.push(Waiting {
+                depth,
+                ..Waiting::seed(&(parameter, orbit))
+            });
         }
         let flips: Vec<_> = branch
             .bifurcations
@@ -186,16 +276,24 @@ impl Diagram {
         orbit: &PeriodicOrbit,
         options: &ContinuationOptions,
     ) -> bool {
-        let mut solver = solver_for(family, orbit, options);
-        let points = orbit.flat();
-        let same_period = self
-            .branches
-            .iter()
-            .filter(|b| b.branch.period == orbit.period);
-        same_period
-            .flat_map(|b| b.branch.points.windows(2))
-            .any(|pair| lies_between(&mut solver, (&pair[0], &pair[1]), (&points, parameter)))
+        hold(&self.branches, family, parameter, orbit, options)
     }
+}
+
+fn hold<F: MapFamily>(
+    branches: &[DiagramBranch],
+    family: &F,
+    parameter: f64,
+    orbit: &PeriodicOrbit,
+    options: &ContinuationOptions,
+) -> bool {
+    let mut solver = solver_for(family, orbit, options);
+    let points = orbit.flat();
+    branches
+        .iter()
+        .filter(|b| b.branch.period == orbit.period)
+        .flat_map(|b| b.branch.points.windows(2))
+        .any(|pair| lies_between(&mut solver, (&pair[0], &pair[1]), (&points, parameter)))
 }
 
 /// The orbit of shorter period that a branch ran into, beside the meeting.

@@ -399,6 +399,53 @@ fn the_logistic_diagram_assembles_from_one_attractor() {
     }
 }
 
+/// Threads that have nothing to do follow seeds of other periods beforehand, also those that turn
+/// out to lie on a branch: a period-2 orbit on the first seed's doubled branch, a period-4 orbit
+/// on that of the second, and a period-3 orbit twice.
+#[test]
+fn a_diagram_is_the_same_on_any_number_of_threads() {
+    let family: Family<Logistic> = Family(Logistic);
+    let seed = |r: f64, period: usize| {
+        let mut map = family.at(r).unwrap();
+        let mut x = [0.4];
+        for _ in 0..10_000 {
+            x[0] *= r * (1.0 - x[0]);
+        }
+        let orbit = close_orbit(&mut map, &x, period, &ShootingOptions::default()).unwrap();
+        assert_eq!(orbit.period, period);
+        (r, orbit)
+    };
+    // Of the windows of the logistic map that of period 3 opens at 1 + √8, that of period 5 at
+    // 3.738 (May 1976).
+    let seeds = [
+        seed(2.5, 1),
+        seed(3.2, 2),
+        seed(3.83, 3),
+        seed(3.5, 4),
+        seed(3.8318, 3),
+        seed(3.7389, 5),
+    ];
+    let options = DiagramOptions {
+        continuation: ContinuationOptions::over(1.2, 3.9),
+        doublings: 1,
+        max_branches: 100,
+    };
+    let assembled = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        pool.install(|| assemble_diagram(&family, &seeds, &options, &Control::default()))
+    };
+    let alone = assembled(1);
+    let periods: Vec<usize> = alone.branches.iter().map(|b| b.branch.period).collect();
+    for (period, expected) in [(1, 2), (2, 1), (3, 2), (5, 2)] {
+        let found = periods.iter().filter(|p| **p == period).count();
+        assert_eq!(found, expected, "{period} of {periods:?}");
+    }
+    for threads in [2, 4] {
+        assert_eq!(format!("{:?}", assembled(threads)), format!("{alone:?}"));
+    }
+}
+
 /// The two fixed points ±√(r − 1) of the cubic map are mirror images with one multiplier 3 − 2r, and
 /// branches of their own; one that is given twice is followed once.
 #[test]

@@ -6,6 +6,7 @@ use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::approach::{ApproachOptions, ApproachReport, Way, approach};
 use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
+use nanotap::study::threads::install;
 
 /// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
 pub(crate) const STIFF: &str = "\
@@ -85,6 +86,25 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
     for p in &report.table {
         let amplitude = p.observables.as_ref().unwrap().first_harmonic;
         assert!(stable(p.gap, amplitude), "{:?} {}", p.way, p.gap);
+    }
+}
+
+/// Other threads make steps of the way back beforehand, in the hysteresis in vain.
+#[test]
+fn a_curve_is_the_same_on_any_number_of_threads() {
+    let lever = studied(STIFF, &[]);
+    let options = ApproachOptions {
+        points: 30,
+        ..ApproachOptions::default()
+    };
+    let on = |threads: usize| {
+        let report = install(Some(threads), || curve(&lever, &options)).unwrap();
+        assert!(report.hysteresis.iter().any(|h| h.near < h.far));
+        serde_json::to_string(&report).unwrap()
+    };
+    let alone = on(1);
+    for threads in [2, 3] {
+        assert!(on(threads) == alone, "{threads}");
     }
 }
 

@@ -23,6 +23,9 @@
 
 pub mod frequency_modulation;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
+
 use nanotap_dynamics::{
     Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, classify, grid_neighbours,
     orbits_shared,
@@ -280,25 +283,12 @@ pub fn approach(
     let free = FreeMotion::of(&case.model()?);
     let distances = distances(&free, options)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
-    let mut table = Vec::with_capacity(2 * distances.len());
-    let mut walk = Walk {
+    let walk = Walk {
         case,
         options,
         classify: budgets(options),
-        state: None,
     };
-    let there = distances.iter().map(|gap| (Way::Approach, *gap));
-    let back = distances.iter().rev().map(|gap| (Way::Retract, *gap));
-    let total = 2 * distances.len();
-    for (k, (way, gap)) in there.chain(back).enumerate() {
-        if control.is_cancelled() {
-            break;
-        }
-        table.push(walk.step(way, gap)?);
-        if let Some(report) = control.progress {
-            report(k + 1, total);
-        }
-    }
+    let table = walk.there_and_back(&distances, control)?;
     let quiet = Control {
         progress: None,
         ..*control
@@ -390,23 +380,96 @@ fn budgets(options: &ApproachOptions) -> ClassifyOptions {
     }
 }
 
-/// A motion that is followed.
+/// How a motion is followed.
 struct Walk<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
     classify: ClassifyOptions,
-    /// Where the last motion ended.
-    state: Option<Vec<f64>>,
+}
+
+/// A distance on the way.
+struct Step {
+    point: ApproachPoint,
+    /// Where the motion at the next distance starts; nowhere: from rest.
+    onwards: Option<Vec<f64>>,
+}
+
+impl Step {
+    /// Whether two steps at one distance come to the same orbit.
+    fn is_on_orbit_of(&self, other: &Self) -> bool {
+        let orbits = self.point.orbit.as_ref().zip(other.point.orbit.as_ref());
+        orbits.is_some_and(|(a, b)| a.is_same_as(b))
+    }
 }
 
 impl Walk<'_> {
-    fn step(&mut self, way: Way, gap: f64) -> Result<ApproachPoint, CaseError> {
+    /// The motions at all distances, there and back. Where the way back is on the orbit that the
+    /// way there has passed, it goes on as the way there did. So most of its steps are known to
+    /// begin while the way there is still going on, and other threads make them; where the ways
+    /// part they have been made in vain.
+    fn there_and_back(
+        &self,
+        distances: &[f64],
+        control: &Control<'_>,
+    ) -> Result<Vec<ApproachPoint>, CaseError> {
+        let count = distances.len();
+        let done = AtomicUsize::new(0);
+        let step = |way, k: usize, start: Option<&Vec<f64>>| {
+            let step = self.step(way, distances[k], start);
+            if let Some(report) = control.progress {
+                let steps = done.fetch_add(1, Ordering::Relaxed) + 1;
+                report(steps.min(2 * count), 2 * count);
+            }
+            step
+        };
+        // Steps of the way back, made before it is known whether it takes them.
+        let mut ahead: Vec<OnceLock<Result<Step, CaseError>>> = Vec::new();
+        ahead.resize_with(count, OnceLock::new);
+        let there = rayon::scope(|scope| {
+            let mut there: Vec<Arc<Step>> = Vec::with_capacity(count);
+            for k in 0..count {
+                if control.is_cancelled() {
+                    break;
+                }
+                let start = there.last().and_then(|step| step.onwards.as_ref());
+                let found = Arc::new(step(Way::Approach, k, start)?);
+                if k > 0 && found.point.orbit.is_some() && rayon::current_num_threads() > 1 {
+                    let (found, step, slot) = (Arc::clone(&found), &step, &ahead[k - 1]);
+                    scope.spawn(move |_| {
+                        if !control.is_cancelled() {
+                            slot.get_or_init(|| step(Way::Retract, k - 1, found.onwards.as_ref()));
+                        }
+                    });
+                }
+                there.push(found);
+            }
+            Ok::<_, CaseError>(there)
+        })?;
+        let mut way_back: Vec<Step> = Vec::with_capacity(count);
+        for k in (0..there.len()).rev() {
+            if control.is_cancelled() {
+                break;
+            }
+            let made = match way_back.last() {
+                None => step(Way::Retract, k, there[k].onwards.as_ref()),
+                Some(last) if last.is_on_orbit_of(&there[k + 1]) => ahead[k]
+                    .take()
+                    .unwrap_or_else(|| step(Way::Retract, k, there[k + 1].onwards.as_ref())),
+                Some(last) => step(Way::Retract, k, last.onwards.as_ref()),
+            };
+            way_back.push(made?);
+        }
+        let there = there.into_iter().map(|step| step.point.clone());
+        let back = way_back.into_iter().map(|step| step.point);
+        Ok(there.chain(back).collect())
+    }
+
+    /// The motion at a distance from `start`, or from rest.
+    fn step(&self, way: Way, gap: f64, start: Option<&Vec<f64>>) -> Result<Step, CaseError> {
         let case = self.case;
         let model = case.with(case.gap_key(), gap).model()?;
-        let start = self
-            .state
-            .take()
-            .unwrap_or_else(|| vec![0.0; model.dimension()]);
+        let rest = || vec![0.0; model.dimension()];
+        let start = start.cloned().unwrap_or_else(rest);
         let classified = classify(&mut Strobe::new(&model), &start, &self.classify);
         let named = Named::of(&classified.kind);
         let met = Met {
@@ -417,11 +480,12 @@ impl Walk<'_> {
         };
         // The next motion starts on this one's orbit, not where its decay was when Newton
         // saw the end of it. A motion that ran off is not followed: the next starts from rest.
-        self.state = match &met.orbit {
+        let onwards = match &met.orbit {
             Some(orbit) => Some(orbit.nearest(&met.state).0.to_vec()),
             None => (met.classification != Classification::Unbounded).then(|| met.state.clone()),
         };
-        Ok(self.observed(way, gap, &model, met))
+        let point = self.observed(way, gap, &model, met);
+        Ok(Step { point, onwards })
     }
 
     /// What neither way met at a distance, but the attractors of the distances beside it lead to.

@@ -145,13 +145,13 @@ impl Sweep {
         let stride = schema.variables[strobe].stride();
         let columns = schema.coordinate(super::dataset::STATE);
         let columns = columns.map_or(stride, |c| c.values.len());
-        let mut states = vec![Vec::new(); count];
-        for chunk in 0..store.chunks() {
+        let of_chunk = |chunk: usize| -> Result<Vec<(usize, OrbitState)>, StoreError> {
             let block = schema.grid.block(chunk);
             let periods = Motions::read(store, chunk)?.periods;
             let Values::Real(rows) = store.read_chunk(&block, strobe)? else {
-                continue;
+                return Ok(Vec::new());
             };
+            let mut found = Vec::new();
             for (flat, entry) in block.entries().enumerate() {
                 let period = usize::try_from(periods[flat]).unwrap_or(0);
                 let end = (flat + 1) * stride;
@@ -161,9 +161,15 @@ impl Sweep {
                     let first = entry[axis];
                     let second = if axis > 0 { entry[0] } else { 0 };
                     let width = self.options.over[0].count;
-                    states[second * width + first].push((period, state.to_vec()));
+                    found.push((second * width + first, (period, state.to_vec())));
                 }
             }
+            Ok(found)
+        };
+        let chunks = (0..store.chunks()).into_par_iter().map(of_chunk);
+        let mut states = vec![Vec::new(); count];
+        for (value, state) in chunks.collect::<Result<Vec<_>, _>>()?.into_iter().flatten() {
+            states[value].push(state);
         }
         Ok(states)
     }

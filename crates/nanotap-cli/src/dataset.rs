@@ -106,14 +106,13 @@ impl DatasetArguments {
         })?;
         match done {
             Ok(()) => Ok(store),
-            Err(WorkError::Store(error)) => Err(error.into()),
-            Err(WorkError::Threads(error)) => Err((*error).into()),
             Err(stopped @ (WorkError::Cancelled { .. } | WorkError::Neighbours)) => {
                 Err(Failure::numerics(format!(
                     "{stopped} in {}; run the same command again to go on",
                     path.display()
                 )))
             }
+            Err(error) => Err(error.into()),
         }
     }
 }

@@ -52,9 +52,13 @@ impl Regime {
     ) -> Result<Self, FlowError> {
         check(&matrix, &forcing, drive)?;
         let response = forced_response(index, &forcing, drive, &basis)?;
-        let lefts = basis.left.column_iter();
+        let (m, n) = basis.left.shape();
+        let mut packed_left = Vec::with_capacity(n * layout::vectors_for(m));
+        for left in basis.left.as_slice().chunks_exact(m.max(1)) {
+            layout::append(&mut packed_left, left);
+        }
         Ok(Self {
-            packed_left: lefts.flat_map(|l| layout::list(l.as_slice())).collect(),
+            packed_left,
             packed_right: LinearMap::of(&basis.stacked_right()),
             matrix,
             forcing,

@@ -36,9 +36,19 @@ pub(crate) fn set(list: &mut [ComplexVector], k: usize, z: Complex<f64>) {
 
 /// A list of complex numbers in vectors.
 pub(crate) fn list(numbers: &[Complex<f64>]) -> Vec<ComplexVector> {
-    let mut list = vec![[[0.0; WIDTH]; 2]; vectors_for(numbers.len())];
-    for (k, &z) in numbers.iter().enumerate() {
-        set(&mut list, k, z);
-    }
+    let mut list = Vec::new();
+    append(&mut list, numbers);
     list
+}
+
+/// Appends a list to others.
+pub(crate) fn append(lists: &mut Vec<ComplexVector>, numbers: &[Complex<f64>]) {
+    lists.extend(numbers.chunks(WIDTH).map(|numbers| {
+        let mut vector = ComplexVector::default();
+        for (lane, z) in numbers.iter().enumerate() {
+            vector[0][lane] = z.re;
+            vector[1][lane] = z.im;
+        }
+        vector
+    }));
 }

@@ -23,10 +23,13 @@ impl LinearMap {
     pub(crate) fn of(matrix: &DMatrix<f64>) -> Self {
         let (from, to) = (matrix.ncols() / 2, matrix.nrows().div_ceil(2));
         let mut rows = vec![ComplexVector::default(); layout::vectors_for(to) * 2 * from];
-        for (k, column) in matrix.column_iter().enumerate() {
-            for (i, &entry) in column.iter().enumerate() {
-                let (vector, lane) = layout::place(i % to);
-                rows[vector * 2 * from + k][i / to][lane] = entry;
+        let columns = matrix.as_slice().chunks_exact(matrix.nrows().max(1));
+        for (k, column) in columns.enumerate() {
+            let (real, imaginary) = column.split_at(to);
+            for (part, half) in [real, imaginary].into_iter().enumerate() {
+                for (vector, values) in half.chunks(WIDTH).enumerate() {
+                    rows[vector * 2 * from + k][part][..values.len()].copy_from_slice(values);
+                }
             }
         }
         Self { rows, from, to }

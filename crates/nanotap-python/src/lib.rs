@@ -24,6 +24,10 @@ mod watch;
 
 use pyo3::prelude::*;
 
+/// Faster than the system's at the small blocks that reports and models are made of.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The compiled part of nanotap.
 #[pymodule]
 fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -21,6 +21,10 @@ mod simulate;
 mod sweep;
 mod switch;
 
+/// The one that the programs have.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() {
     divan::main();
 }

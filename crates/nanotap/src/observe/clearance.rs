@@ -44,6 +44,10 @@ pub struct Clearance<D = f64> {
 const PLACES_PER_MODE: usize = 8;
 /// Width of the interval of places in which the beam is lowest.
 const PLACE: f64 = 1e-9;
+/// The place nearest to the clamp at which a slope is asked for.
+const CLAMP: f64 = 1e-6;
+/// Slopes of a beam that is level.
+const LEVEL: f64 = 1e-13;
 /// Newton's steps to the moment of a least height, …
 const MOST_STEPS: usize = 12;
 /// … the last of which is shorter than this part of a drive period.
@@ -63,46 +67,38 @@ struct RecordedBeam<'a> {
     model: &'a Model,
     beam: &'a BeamOutputs,
     recording: &'a Recording,
-    /// Least heights at the places of the grid, where they are known.
-    heights: Option<Vec<f64>>,
 }
 
 impl RecordedBeam<'_> {
-    /// The least height over all places, of which none is lower than its `bound`.
+    /// The least height over all places, from the least heights on the grid of places (infinite
+    /// where a place does not matter).
     ///
-    /// Places on a grid first; then, between the neighbours of the best, the place where the
-    /// beam is level at the moment when it is lowest there. For the least height over time
-    /// changes with the place as the height itself does at that moment.
-    fn lowest(&self, bound: impl Fn(f64) -> f64) -> Option<Clearance> {
-        let count = PLACES_PER_MODE * self.beam.modes.count();
-        let place = |i: usize| i as f64 / count as f64;
-        let mut best: Option<(usize, f64)> = None;
-        for i in (0..=count).rev() {
-            let known = best.map_or(f64::INFINITY, |(_, known)| known);
-            if bound(place(i)) >= known {
+    /// The beam is lowest in one of the valleys of the grid, not always in that with the lowest
+    /// place on the grid.
+    fn lowest(&self, heights: &[f64]) -> Option<Clearance> {
+        let mut best: Option<Clearance> = None;
+        for valley in valleys(heights) {
+            if best.is_some_and(|known| known.height <= valley.bound) {
                 continue;
             }
-            let here = match &self.heights {
-                Some(heights) => heights[i],
-                None => self.least_height(place(i))?.height,
-            };
-            if here < known {
-                best = Some((i, here));
+            let bottom = self.bottom(&valley)?;
+            if best.is_none_or(|known| bottom.height < known.height) {
+                best = Some(bottom);
             }
         }
-        let (i, _) = best?;
-        let best = self.least_height(place(i))?;
-        // At the clamp itself every beam is level.
-        let (low, high) = (
-            place(i.saturating_sub(1)).max(1e-6),
-            place((i + 1).min(count)),
-        );
+        best
+    }
+
+    /// The lowest point of a valley: the place where the beam is level at the moment when it is
+    /// lowest there. For the least height over time changes with the place as the height itself
+    /// does at that moment.
+    fn bottom(&self, valley: &Valley) -> Option<Clearance> {
+        let first = self.least_height(valley.place)?;
         // The moment of the least height is followed from place to place; at the end it is
         // searched for over the whole motion.
-        if let Some(near) = self.level(best, low, high, |xi, from| self.least_near(xi, from)) {
-            let known = near.xi == best.xi;
-            let certain = if known {
-                best
+        if let Some(near) = self.level(first, valley, |xi, from| self.least_near(xi, from)) {
+            let certain = if near.xi == first.xi {
+                first
             } else {
                 self.least_height(near.xi)?
             };
@@ -110,48 +106,64 @@ impl RecordedBeam<'_> {
                 return Some(certain);
             }
         }
-        self.level(best, low, high, |xi, _| self.least_height(xi))
+        self.level(first, valley, |xi, _| self.least_height(xi))
     }
 
-    /// Where between `low` and `high` the beam is level at the moment when it is lowest there;
-    /// `least` finds the least height of a place, given a moment near it. `best` where the
-    /// beam's slopes at both ends say that it is lowest at an end.
+    /// Where in a valley the beam is level at the moment when it is lowest there, downhill from
+    /// `first`; `least` finds the least height of a place, given a moment near it. The valley's
+    /// end where the beam falls all the way there.
     fn level(
         &self,
-        mut best: Clearance,
-        mut low: f64,
-        mut high: f64,
+        first: Clearance,
+        valley: &Valley,
         least: impl Fn(f64, f64) -> Option<Clearance>,
     ) -> Option<Clearance> {
-        // The slopes there point away from each other, or the beam is lowest at an end.
-        let mut falls = self.slope(&least(low, best.period)?)?;
-        let mut rises = self.slope(&least(high, best.period)?)?;
-        if falls >= 0.0 || rises <= 0.0 {
+        let mut best = first;
+        let mut near = (first.xi, self.slope(&first)?);
+        // At the clamp itself every beam is level.
+        let end = if near.1 < 0.0 {
+            valley.high
+        } else {
+            valley.low.max(CLAMP)
+        };
+        if end == near.0 {
             return Some(best);
         }
+        let mut far: Option<(f64, f64)> = None;
+        let mut far_xi = end;
         for step in 0..200 {
-            if high - low <= PLACE {
+            if near.1.abs() <= LEVEL || (far_xi - near.0).abs() <= PLACE {
                 break;
             }
-            let secant = low - falls * (high - low) / (rises - falls);
-            let inside = secant > low && secant < high;
-            let xi = if inside && step % 3 < 2 {
-                secant
-            } else {
-                0.5 * (low + high)
+            let middle = 0.5 * (near.0 + far_xi);
+            let xi = match far {
+                // The end comes first, then the middle until the beam rises beyond it.
+                None if step == 0 => end,
+                None => middle,
+                Some((far, rises)) => {
+                    let secant = near.0 - near.1 * (far - near.0) / (rises - near.1);
+                    let inside = (secant - near.0) * (secant - far) < 0.0;
+                    if inside && step % 3 < 2 {
+                        secant
+                    } else {
+                        middle
+                    }
+                }
             };
             let here = least(xi, best.period)?;
-            if here.height < best.height {
+            let slope = self.slope(&here)?;
+            let lower = here.height < best.height;
+            if lower {
                 best = here;
             }
-            let slope = self.slope(&here)?;
-            if slope.abs() <= 1e-13 {
-                break;
-            }
-            if slope < 0.0 {
-                (low, falls) = (xi, slope);
+            if slope * near.1 <= 0.0 {
+                far = Some((xi, slope));
+                far_xi = xi;
+            } else if lower || far.is_some() {
+                near = (xi, slope);
             } else {
-                (high, rises) = (xi, slope);
+                // Beyond a ridge.
+                far_xi = xi;
             }
         }
         Some(best)
@@ -209,6 +221,47 @@ impl RecordedBeam<'_> {
     }
 }
 
+/// A place on the grid that is no higher than its neighbours.
+struct Valley {
+    place: f64,
+    /// The neighbours.
+    low: f64,
+    high: f64,
+    /// The valley goes no deeper.
+    bound: f64,
+}
+
+/// The valleys of the least heights on the grid of places, the lowest first.
+///
+/// The least height over time is the lower envelope of smooth curves, so that it is smooth at its
+/// lowest points. The parabola through a place and its neighbours, a + c − 2b apart by second
+/// differences, goes at most (a + c − 2b)/8 below the place; here four times that is allowed.
+fn valleys(heights: &[f64]) -> Vec<Valley> {
+    let last = heights.len() - 1;
+    let place = |i: usize| i as f64 / last as f64;
+    let mut valleys: Vec<(f64, Valley)> = (0..=last)
+        .filter_map(|i| {
+            let (left, right) = (i.saturating_sub(1), (i + 1).min(last));
+            let (a, b, c) = (heights[left], heights[i], heights[right]);
+            (b.is_finite() && b <= a && b <= c).then(|| {
+                let bound = b - 0.5 * (a + c - 2.0 * b);
+                let (low, high) = (place(left), place(right));
+                (
+                    b,
+                    Valley {
+                        place: place(i).max(CLAMP),
+                        low,
+                        high,
+                        bound,
+                    },
+                )
+            })
+        })
+        .collect();
+    valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
+    valleys.into_iter().map(|(_, valley)| valley).collect()
+}
+
 /// Periods whose least height is found exactly, those with the lowest bounds first; the rest
 /// of the motions that need more is as the ones before it.
 const MOST_PERIODS: usize = 64;
@@ -254,10 +307,6 @@ struct Start {
 struct Candidate {
     /// No point of the beam was lower.
     bound: f64,
-    /// The least height of the beam's end.
-    end: f64,
-    /// The bound on what modes from the second on contribute.
-    higher: f64,
     period: usize,
     start: Start,
 }
@@ -341,8 +390,6 @@ impl ClearanceSearch {
         {
             self.candidates.push(Candidate {
                 bound,
-                end,
-                higher: self.higher,
                 period: self.periods,
                 start,
             });
@@ -394,14 +441,9 @@ impl ClearanceSearch {
                 model,
                 beam,
                 recording: &Recording::Exact(period),
-                heights: Some(least_heights(model, beam, &state)?),
             };
-            let first = beam.beam.modes.iter().next();
-            let bound = |xi: f64| {
-                let along = first.map_or(1.0, |mode| mode.shape(xi) / mode.tip());
-                (1.0 - along) * self.clamp + along * candidate.end - candidate.higher
-            };
-            let Some(here) = beam.lowest(bound) else {
+            let heights = least_heights(model, beam.beam, &state)?;
+            let Some(here) = beam.lowest(&heights) else {
                 continue;
             };
             if least.is_none_or(|known| here.height < known.height) {
@@ -513,17 +555,15 @@ impl SampledClearance {
             model,
             beam: model.beam.as_ref()?,
             recording: &recording,
-            heights: None,
         };
-        let bound = |xi: f64| {
-            let place = (xi * last as f64).round() as usize;
-            if lowest.places[place.min(last)] > near {
-                f64::INFINITY
-            } else {
-                f64::NEG_INFINITY
+        let exact = |(i, sampled): (usize, &f64)| {
+            if *sampled > near {
+                return Some(f64::INFINITY);
             }
+            Some(beam.least_height(i as f64 / last as f64)?.height)
         };
-        let found = beam.lowest(bound)?;
+        let heights: Option<Vec<f64>> = lowest.places.iter().enumerate().map(exact).collect();
+        let found = beam.lowest(&heights?)?;
         Some(Clearance {
             period: found.period + lowest.number as f64,
             ..found

@@ -2,65 +2,49 @@
 //! coefficients, and the work of one output on another.
 
 use crate::Complex;
+use crate::rate::Rate;
 use crate::signal::Signal;
 use crate::trajectory::PiecewiseSignal;
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// `amplitude · s^power · e^{rate s}`; a signal is the real part of a sum of these.
+/// `amplitude · s^power · e^{rate s}` over a length of time; a signal is the real part of a sum of
+/// these.
 #[derive(Clone, Copy)]
 struct Term {
     rate: Complex,
     power: u32,
     amplitude: Complex,
+    /// `e^{rate · length}`.
+    end: Complex,
 }
 
-fn terms(signal: &Signal) -> Vec<Term> {
-    let constant = Term {
-        rate: Complex::new(0.0, 0.0),
-        power: 0,
-        amplitude: Complex::new(signal.constant, 0.0),
-    };
-    let simple = signal.terms().map(|(rate, amplitude)| Term {
-        rate,
-        power: 0,
-        amplitude,
-    });
-    let powers = signal.powers.iter().map(|t| Term {
-        rate: t.rate,
-        power: t.power,
-        amplitude: t.amplitude,
-    });
+fn terms(signal: &Signal, length: f64) -> Vec<Term> {
+    let constant = (
+        Complex::new(0.0, 0.0),
+        0,
+        Complex::new(signal.constant, 0.0),
+    );
+    let simple = signal.terms().map(|(rate, amplitude)| (rate, 0, amplitude));
+    let powers = signal.powers.iter().map(|t| (t.rate, t.power, t.amplitude));
     std::iter::once(constant)
         .chain(simple)
         .chain(powers)
-        .filter(|t| t.amplitude.modulus() != 0.0)
+        .filter(|(_, _, amplitude)| *amplitude != Complex::new(0.0, 0.0))
+        .map(|(rate, power, amplitude)| Term {
+            rate,
+            power,
+            amplitude,
+            end: (rate * length).exponential(),
+        })
         .collect()
 }
 
-/// `(e^z − 1)/z`, accurate for every `z`.
-pub(crate) fn phi1(z: Complex) -> Complex {
-    if z.modulus() < 1e-5 {
-        return Complex::new(1.0, 0.0) + z * 0.5 + z * z / 6.0;
-    }
-    // e^{x+iy} − 1 = (e^x − 1) cos y − 2 sin²(y/2) + i e^x sin y
-    let half = nanotap_arithmetic::sin(0.5 * z.im);
-    let (sin, cos) = nanotap_arithmetic::sin_cos(z.im);
-    Complex::new(
-        nanotap_arithmetic::exp_m1(z.re) * cos - 2.0 * half * half,
-        nanotap_arithmetic::exp(z.re) * sin,
-    ) / z
-}
-
-/// `∫₀^length s^power e^{rate s} ds`.
-fn moment(rate: Complex, power: u32, length: f64) -> Complex {
+/// `∫₀^length s^power e^{rate s} ds` with `end = e^{rate · length}`.
+fn moment(rate: Complex, power: u32, length: f64, end: Complex) -> Complex {
     let z = rate * length;
-    if power == 0 {
-        return phi1(z) * length;
-    }
-    if z.modulus() > f64::from(power) + 1.0 {
+    if power == 0 || z.modulus() > f64::from(power) + 1.0 {
         // Integration by parts, stable upwards while |z| exceeds the power.
-        let mut integral = phi1(z) * length;
-        let end = z.exponential();
+        let mut integral = Rate::new(rate, length).integral(length, end);
         for p in 1..=power {
             integral = (end * length.powi(p as i32) - integral * f64::from(p)) / rate;
         }
@@ -77,46 +61,65 @@ fn moment(rate: Complex, power: u32, length: f64) -> Complex {
 
 /// `∫₀^length g ds`.
 pub fn integral(signal: &Signal, length: f64) -> f64 {
-    terms(signal)
+    terms(signal, length)
         .iter()
-        .map(|t| (t.amplitude * moment(t.rate, t.power, length)).re)
+        .map(|t| (t.amplitude * moment(t.rate, t.power, length, t.end)).re)
         .sum()
 }
 
 /// `∫₀^length g(s) e^{−iω(start + s)} ds`.
 pub fn fourier_integral(signal: &Signal, start: f64, length: f64, omega: f64) -> Complex {
-    fourier_of_terms(&terms(signal), start, length, omega, &mut Moments::new())
+    Turn::new(start, length, omega).integral(&terms(signal, length))
 }
 
-/// Moments of a rate and its conjugate, by rate and power; of one piece at one frequency.
-type Moments = Vec<(Complex, u32, [Complex; 2])>;
-
-fn fourier_of_terms(
-    terms: &[Term],
-    start: f64,
+/// `e^{−iωt}` over a piece, and the moments of what it was multiplied with.
+struct Turn {
+    /// `−iω`.
+    rate: Complex,
     length: f64,
-    omega: f64,
-    known: &mut Moments,
-) -> Complex {
-    let turn = Complex::new(0.0, -omega);
-    let sum: Complex = terms
-        .iter()
-        .map(|t| {
-            let of_term = |(rate, power, _): &&(Complex, u32, [Complex; 2])| {
-                *rate == t.rate && *power == t.power
-            };
-            let [direct, mirrored] = if let Some((_, _, moments)) = known.iter().find(of_term) {
-                *moments
-            } else {
-                let moments =
-                    [t.rate, t.rate.conj()].map(|rate| moment(rate + turn, t.power, length));
-                known.push((t.rate, t.power, moments));
-                moments
-            };
-            (t.amplitude * direct + t.amplitude.conj() * mirrored) * 0.5
-        })
-        .sum();
-    sum * (turn * start).exponential()
+    /// At the piece's start.
+    start: Complex,
+    /// `e^{−iω · length}`.
+    over: Complex,
+    /// Moments of a rate and its conjugate, turned, by rate and power.
+    known: Vec<(Complex, u32, [Complex; 2])>,
+}
+
+impl Turn {
+    fn new(start: f64, length: f64, omega: f64) -> Self {
+        let rate = Complex::new(0.0, -omega);
+        Self {
+            rate,
+            length,
+            start: (rate * start).exponential(),
+            over: (rate * length).exponential(),
+            known: Vec::new(),
+        }
+    }
+
+    /// The integral of its product with a sum of terms.
+    fn integral(&mut self, terms: &[Term]) -> Complex {
+        let sum: Complex = terms
+            .iter()
+            .map(|t| {
+                let [direct, mirrored] = self.moments(t);
+                (t.amplitude * direct + t.amplitude.conj() * mirrored) * 0.5
+            })
+            .sum();
+        sum * self.start
+    }
+
+    fn moments(&mut self, t: &Term) -> [Complex; 2] {
+        let mut known = self.known.iter();
+        let known = known.find(|(rate, power, _)| *rate == t.rate && *power == t.power);
+        if let Some((_, _, moments)) = known {
+            return *moments;
+        }
+        let moments = [(t.rate, t.end), (t.rate.conj(), t.end.conj())]
+            .map(|(rate, end)| moment(rate + self.rate, t.power, self.length, end * self.over));
+        self.known.push((t.rate, t.power, moments));
+        moments
+    }
 }
 
 /// The Fourier coefficients ([`PiecewiseSignal::fourier`]) of several outputs of one trajectory
@@ -125,21 +128,23 @@ pub fn fouriers(signals: &[&PiecewiseSignal], frequencies: &[f64]) -> Vec<Vec<Co
     let pieces = signals.first().map_or(0, |signal| signal.pieces.len());
     let terms: Vec<Vec<Vec<Term>>> = (0..pieces)
         .map(|k| {
-            let of_piece = signals.iter().map(|signal| terms(&signal.pieces[k].signal));
+            let of_piece = signals.iter().map(|signal| {
+                let piece = &signal.pieces[k];
+                terms(&piece.signal, piece.length)
+            });
             of_piece.collect()
         })
         .collect();
     let duration = signals.first().map_or(0.0, |signal| signal.duration());
-    let mut known = Moments::new();
     frequencies
         .iter()
         .map(|&omega| {
             let mut sums = vec![Complex::new(0.0, 0.0); signals.len()];
             for (k, terms) in terms.iter().enumerate() {
-                known.clear();
                 let piece = &signals[0].pieces[k];
+                let mut turn = Turn::new(piece.start, piece.length, omega);
                 for (sum, terms) in sums.iter_mut().zip(terms) {
-                    *sum += fourier_of_terms(terms, piece.start, piece.length, omega, &mut known);
+                    *sum += turn.integral(terms);
                 }
             }
             if duration > 0.0 {
@@ -154,15 +159,17 @@ pub fn fouriers(signals: &[&PiecewiseSignal], frequencies: &[f64]) -> Vec<Vec<Co
 
 /// `∫₀^length g h ds`.
 pub fn product_integral(g: &Signal, h: &Signal, length: f64) -> f64 {
-    let (g, h) = (terms(g), terms(h));
+    let (g, h) = (terms(g, length), terms(h, length));
     let mut sum = 0.0;
     for a in &g {
         for b in &h {
-            let power = a.power + b.power;
-            let direct = a.amplitude * b.amplitude * moment(a.rate + b.rate, power, length);
-            let crossed =
-                a.amplitude * b.amplitude.conj() * moment(a.rate + b.rate.conj(), power, length);
-            sum += 0.5 * (direct.re + crossed.re);
+            let product = |rate: Complex, amplitude: Complex, end: Complex| {
+                let moment = moment(a.rate + rate, a.power + b.power, length, a.end * end);
+                (a.amplitude * amplitude * moment).re
+            };
+            let direct = product(b.rate, b.amplitude, b.end);
+            let crossed = product(b.rate.conj(), b.amplitude.conj(), b.end.conj());
+            sum += 0.5 * (direct + crossed);
         }
     }
     sum

@@ -43,6 +43,7 @@ pub mod integral;
 pub mod jacobian;
 mod motion;
 mod observer;
+mod rate;
 pub mod regime;
 mod relaxation;
 pub mod search;

@@ -7,8 +7,8 @@
 //! where only `A` and `f` (times the period) change.
 
 use crate::harmonic::{HarmonicVector, Output};
-use crate::integral::phi1;
 use crate::observer::{Observer, SegmentView, SwitchView};
+use crate::rate::phi1;
 use crate::system::{Reset, System};
 use crate::{Complex, Drive, Flow, FlowError, Regime, SpectralBasis};
 use nalgebra::{DMatrix, DVector};

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::stretch::{Rate, Rates, pair_weights};
+use super::stretch::{Rates, pair_weights};
+use crate::rate::Rate;
 use crate::regime::{Kernel, KernelFrame, ModalOutput};
 use crate::search::table::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};

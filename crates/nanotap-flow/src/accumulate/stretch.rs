@@ -2,6 +2,7 @@
 //! `Re(w q e^{λs})` of an output, with `q` the same for all outputs, so that its integrals are
 //! worked out once and weighted for each.
 
+use crate::rate::Rate;
 use crate::{Complex, Drive};
 
 const ZERO: Complex = Complex::new(0.0, 0.0);
@@ -15,77 +16,6 @@ pub(super) struct Rates {
     /// asked for.
     pairs: Vec<[Rate; 2]>,
 }
-
-/// A rate `λ`, and how `∫ e^{λs} ds` is worked out.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rate {
-    value: Complex,
-    primitive: Primitive,
-}
-
-/// `(e^{λs} − 1)/λ` loses digits where `|λs|` is small, but what is lost is only `ε/|λ|`. Over
-/// a period `T` this is nothing, unless `|λ|T` itself is small.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Primitive {
-    /// `1/λ`.
-    Quotient(Complex),
-    /// The Taylor series.
-    Series,
-    /// `λ = 0`.
-    Length,
-}
-
-/// `|λ|T` up to which the Taylor series is taken.
-const SLOW: f64 = 0.02;
-
-impl Rate {
-    /// For stretches of up to `period`.
-    pub(super) fn new(value: Complex, period: f64) -> Self {
-        let square = value.re * value.re + value.im * value.im;
-        let primitive = if square == 0.0 {
-            Primitive::Length
-        } else if square * (period * period) < SLOW * SLOW {
-            Primitive::Series
-        } else {
-            Primitive::Quotient(value.conj() * (1.0 / square))
-        };
-        Self { value, primitive }
-    }
-
-    /// `∫₀^length e^{λs} ds` with `end = e^{λ · length}`.
-    #[inline(always)]
-    fn integral(&self, length: f64, end: Complex) -> Complex {
-        match self.primitive {
-            Primitive::Quotient(inverse) => (end - 1.0) * inverse,
-            Primitive::Length => Complex::new(length, 0.0),
-            Primitive::Series => {
-                // Σ zⁿ/(n + 1)!
-                let z = self.value * length;
-                let mut sum = Complex::new(INVERSE_FACTORIALS[ORDER], 0.0);
-                for coefficient in INVERSE_FACTORIALS[..ORDER].iter().rev() {
-                    sum = sum * z + coefficient;
-                }
-                sum * length
-            }
-        }
-    }
-}
-
-/// The series leaves out 0.02⁸/9! of one.
-const ORDER: usize = 7;
-
-/// `1/(n + 1)!`.
-const INVERSE_FACTORIALS: [f64; ORDER + 1] = {
-    let mut all = [1.0; ORDER + 1];
-    let mut factorial = 1.0;
-    let mut n = 1;
-    while n <= ORDER {
-        factorial *= (n + 1) as f64;
-        all[n] = 1.0 / factorial;
-        n += 1;
-    }
-    all
-};
 
 impl Rates {
     /// Of the modes' eigenvalues and the tones' frequencies.

@@ -38,7 +38,9 @@ def last_words(text: str) -> str:
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     wrong = [line for line in lines if "error" in line.lower()]
     # Where things lie on this machine is nobody else's concern.
-    return re.sub(r"(?<!\w)(/[\w.+-]+)+/", "", (wrong or lines or ["no output"])[0])[:160]
+    return re.sub(r"(?<!\w)(/[\w.+-]+)+/", "", (wrong or lines or ["no output"])[0])[
+        :160
+    ]
 
 
 def run(command: list[str], **more) -> str:

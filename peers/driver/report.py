@@ -170,12 +170,14 @@ def draw(rows: list[Row], path: Path) -> bool:
                 zorder=3,
             )
             continue
+        # Neither colour with marker nor colour with line comes twice.
+        turn = others // len(COLOURS)
         axes.plot(
             times,
             errors,
             color=COLOURS[others % len(COLOURS)],
-            marker=MARKERS[others % len(MARKERS)],
-            linestyle=STYLES[others // len(COLOURS)],
+            marker=MARKERS[(others + turn) % len(MARKERS)],
+            linestyle=STYLES[turn],
             markersize=4,
             linewidth=1,
             label=row.name,

@@ -54,18 +54,7 @@ impl Flow {
     /// # Errors
     /// When a value is not finite, the length is wrong, or no regime holds the state.
     pub fn start(&mut self, x: &[f64], phase: f64) -> Result<(), FlowError> {
-        let n = self.system.dimension();
-        if x.len() != n {
-            return Err(FlowError::Shape {
-                what: "the state",
-                found: x.len(),
-                expected: n,
-            });
-        }
-        if !x.iter().all(|v| v.is_finite()) || !phase.is_finite() {
-            return Err(FlowError::NotFinite { what: "the state" });
-        }
-        self.motion.start(&self.system, x, phase)
+        self.motion.start_checked(&self.system, x, phase)
     }
 
     /// Writes the state (length `n`) to `x`.

@@ -11,7 +11,7 @@
 //! - [`signal`]: what any linear output is inside a regime, a sum of decaying
 //!   complex exponentials; [`search`], [`extrema`] and [`integral`] work on it;
 //! - [`system`]: regimes and transitions together, with every switch a precomputed
-//!   change of basis; [`flow`] runs it, [`trajectory`] records it;
+//!   change of basis; [`flow`] runs it, [`Ensemble`] many motions side by side, [`trajectory`] records it;
 //! - [`accumulate`]: exact observables of a motion while it runs, at the price of the motion;
 //! - [`jacobian`] and [`sensitivity`]: derivatives with respect to the state and
 //!   to any parameter; [`variation`]: of what is read off the motion;
@@ -34,6 +34,7 @@
 pub mod accumulate;
 mod double_double;
 pub mod drive;
+mod ensemble;
 pub mod error;
 pub mod extrema;
 pub mod fixed_step;
@@ -59,6 +60,7 @@ pub mod variation;
 pub type Complex = nalgebra::Complex<f64>;
 
 pub use drive::Drive;
+pub use ensemble::{Ensemble, Stretches};
 pub use error::FlowError;
 pub use flow::{Flow, Observer};
 pub use harmonic::{HarmonicVector, Output};

@@ -17,13 +17,13 @@ pub(crate) struct Motion {
     pub(crate) regime: usize,
     pub(crate) phase: f64,
     /// Modal coordinates, then the tones' phasors, packed: `[re, im]`.
-    packed: Vec<ComplexVector>,
+    pub(crate) packed: Vec<ComplexVector>,
     /// The work space of a switch.
     next: Vec<ComplexVector>,
     /// `e^{λ_k s}` of the stretch that is passed.
     turns: Vec<ComplexVector>,
     /// The transition whose guard starts at zero, and how.
-    surface: Option<(usize, Start)>,
+    pub(crate) surface: Option<(usize, Start)>,
     signal: Signal,
     followed: Followed,
     /// For observers: modal coordinates and `e^{λ_k s}` as plain numbers.
@@ -39,7 +39,7 @@ pub(crate) struct Motion {
 const STALLED_SWITCHES: u32 = 1000;
 /// What counts as hardly any time, as a part of the fastest time scale: what switches again
 /// and again so soon does not come to rest in between.
-const BRIEF: f64 = 1e-6;
+pub(crate) const BRIEF: f64 = 1e-6;
 /// An impact sequence ends in sticking when its flights last less than this part
 /// of the fastest time scale: what is left of it is below rounding (second order).
 const CHATTER_RESOLUTION: f64 = 1e-8;
@@ -88,6 +88,27 @@ impl Motion {
         self.store_modal(system);
         self.set_phasors(system);
         Ok(())
+    }
+
+    /// The same of what may be no state.
+    pub(crate) fn start_checked(
+        &mut self,
+        system: &System,
+        x: &[f64],
+        phase: f64,
+    ) -> Result<(), FlowError> {
+        let n = system.dimension();
+        if x.len() != n {
+            return Err(FlowError::Shape {
+                what: "the state",
+                found: x.len(),
+                expected: n,
+            });
+        }
+        if !x.iter().all(|v| v.is_finite()) || !phase.is_finite() {
+            return Err(FlowError::NotFinite { what: "the state" });
+        }
+        self.start(system, x, phase)
     }
 
     /// Writes the state (length `n`) to `x`.
@@ -165,7 +186,7 @@ impl Motion {
         }
     }
 
-    fn set_phasors(&mut self, system: &System) {
+    pub(crate) fn set_phasors(&mut self, system: &System) {
         let modes = system.regimes()[self.regime].basis().len();
         for k in 0..system.drive().frequencies().len() {
             self.set_coordinate(modes + k, system.drive().phasor(k, self.phase));
@@ -186,39 +207,30 @@ impl Motion {
     fn run_over<S: Simd>(&mut self, system: &System, periods: usize) -> Result<(), FlowError> {
         let (mut left, mut stalled) = (periods, 0);
         while left > 0 {
-            let reach = self.reach_over::<S>(system, left);
-            let found = self.next_crossing::<S>(system, reach)?;
-            self.go_over::<S>(system, reach, found, &mut left, &mut stalled)?;
+            self.run_stretch::<S>(system, &mut left, &mut stalled)?;
         }
         Ok(())
     }
 
-    /// How far it may be looked for a switch at once with `left` periods, this one included,
-    /// still to run: never over more than one period's end.
+    /// Moves on to the next switch, or as far as it may be looked for one at once with `left`
+    /// periods, this one included, still to run: never over more than one period's end, which is
+    /// counted.
     #[inline(always)]
-    fn reach_over<S: Simd>(&self, system: &System, left: usize) -> f64 {
-        let period = system.drive().period();
-        if left > 1 {
-            self.reach::<S>(system, self.phase + period)
-        } else {
-            self.reach::<S>(system, period)
-        }
-    }
-
-    /// Moves on to the switch that was found within `reach`, or to where the search ended,
-    /// and counts the period that ends on the way.
-    #[inline(always)]
-    fn go_over<S: Simd>(
+    pub(crate) fn run_stretch<S: Simd>(
         &mut self,
         system: &System,
-        reach: f64,
-        found: Option<(usize, Crossing)>,
         left: &mut usize,
         stalled: &mut u32,
     ) -> Result<(), FlowError> {
         let period = system.drive().period();
-        let end = if *left > 1 { f64::INFINITY } else { period };
-        self.go_on::<S, ()>(system, end, reach, found, stalled, &mut ())?;
+        let ends = if *left > 1 {
+            [self.phase + period, f64::INFINITY]
+        } else {
+            [period; 2]
+        };
+        let reach = self.reach::<S>(system, ends[0]);
+        let found = self.next_crossing::<S>(system, reach)?;
+        self.go_on::<S, ()>(system, ends[1], reach, found, stalled, &mut ())?;
         if self.phase >= period {
             if *left > 1 {
                 self.phase -= period;

@@ -36,6 +36,9 @@ pub struct Signal {
     factors_at: Option<f64>,
 }
 
+/// What rounding makes of a value, in units of the terms' size.
+pub(crate) const NOISE: f64 = 4.0 * f64::EPSILON;
+
 /// `Re(amplitude · s^power · e^{rate s})` with `power ≥ 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerTerm {
@@ -321,17 +324,16 @@ impl Signal {
         }
     }
 
-    /// Sums of the terms' amplitudes, weighted in two ways.
+    /// Sums of the terms' amplitudes, weighted in four ways.
     #[inline(always)]
-    pub(crate) fn weighted_amplitudes<S: Simd>(&self, weights: &[ComplexVector]) -> [f64; 2] {
+    pub(crate) fn weighted_amplitudes<S: Simd>(&self, weights: &[[Vector; 4]]) -> [f64; 4] {
         let mut sums = [S::splat(0.0); 4];
         for (p, weights) in self.vectors.iter().zip(weights) {
             for (sum, weight) in sums.iter_mut().zip(weights) {
                 *sum = S::fma(S::load(&p.amplitude), S::load(weight), *sum);
             }
         }
-        let sums = simd::sums::<S>(sums);
-        [sums[0], sums[1]]
+        simd::sums::<S>(sums)
     }
 
     /// The sum of all terms' sizes.
@@ -490,7 +492,7 @@ impl Signal {
 
     /// The size of rounding errors in its value.
     pub fn noise(&self) -> f64 {
-        4.0 * f64::EPSILON * self.size
+        NOISE * self.size
     }
 
     /// Whether every term is finite.

@@ -28,15 +28,17 @@
 //! `walk` along the points of a `table`; what that cannot decide is left to certified steps
 //! (`steps`). `range` and [`sign_changes()`] look for extrema with the same means.
 
-mod interval;
+pub(crate) mod interval;
+pub(crate) mod near;
 pub(crate) mod on_table;
 pub(crate) mod range;
+pub(crate) mod side_by_side;
 mod sign_changes;
 mod steps;
 pub(crate) mod table;
 #[cfg(test)]
 mod tests;
-mod walk;
+pub(crate) mod walk;
 
 use crate::signal::Signal;
 use crate::simd::{self, LARGEST_ANGLE, Library, Work};

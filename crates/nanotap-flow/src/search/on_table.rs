@@ -1,13 +1,13 @@
 //! The first zero of a tabulated guard: whole flights are certified by its table, and where it
 //! falls through zero one evaluation of the guard is enough.
 
-use super::interval::{FallingZero, Interval};
-use super::steps::{RESOLUTION, quadratic_root};
+use super::interval::{Cubic, Interval};
+use super::near::Near;
 use super::table::{Followed, Table};
 use super::walk::Span;
 use super::{BySteps, Crossing, Start, Statistics};
-use crate::signal::{Jet, Signal};
-use crate::simd::{Simd, Work};
+use crate::signal::Signal;
+use crate::simd::{Simd, Single, Work};
 
 /// The first crossing of a signal whose exponentials are tabulated. Exponentials of the last evaluation are kept in the signal.
 #[inline(always)]
@@ -31,14 +31,16 @@ pub(crate) fn first_crossing<S: Simd>(
         .run::<S>();
     };
     followed.follow::<S>(table, signal);
-    let search = IntervalSearch {
+    let mut search = IntervalSearch {
         table,
+        signal,
         length,
         start,
+        statistics,
     };
-    let Some(mut coarse) = table.coarse::<S>(signal, whole) else {
+    let Some(mut coarse) = table.coarse::<S>(search.signal, whole) else {
         return search
-            .span::<S>(whole, signal, followed, statistics)
+            .span::<S>(whole, followed)
             .and_then(Decision::crossing);
     };
     let mut found = None;
@@ -46,11 +48,10 @@ pub(crate) fn first_crossing<S: Simd>(
         && let Some(interval) = coarse.next_open(followed.amplitudes())
     {
         followed.move_to::<S>(table, &interval);
-        let span = whole.within(&interval);
-        found = search.span::<S>(span, signal, followed, statistics);
+        found = search.span::<S>(whole.within(&interval), followed);
         followed.move_back();
     }
-    statistics.points += coarse.points;
+    search.statistics.points += coarse.points;
     found.and_then(Decision::crossing)
 }
 
@@ -89,120 +90,110 @@ impl Decision {
     }
 }
 
-/// The signal itself where an interval's quintic falls through zero, and its third derivative
-/// there; the exponentials are kept.
-#[inline(always)]
-fn evaluate_zero<S: Simd>(
-    zero: &FallingZero,
-    signal: &mut Signal,
-    statistics: &mut Statistics,
-) -> (Jet, f64) {
-    statistics.evaluations += 1;
-    signal.jet_keeping_factors::<S>(zero.at)
-}
-
-/// The crossing at a quintic's zero, if it is certain to be the only one in its interval and one
-/// step away.
-#[inline(always)]
-fn confirm_zero(
-    zero: &FallingZero,
-    (jet, jerk): (Jet, f64),
-    signal: &Signal,
-    length: f64,
-) -> Option<Decision> {
-    // Every zero in the interval is as near as this, and the rate keeps its sign up to there.
-    let near = (jet.value.abs() + 2.0 * zero.error) / zero.gentlest;
-    let unique = near * signal.fastest() < 0.1
-        && near * (jet.curvature.abs() + 1.2 * jet.third * near) < -jet.rate;
-    if !unique {
-        return None;
-    }
-    let crossing = last_cubic_step(&jet, jerk, zero.at, length, signal)?;
-    Some(if crossing.at <= length {
-        Decision::Crossing(crossing)
-    } else {
-        Decision::TooLate
-    })
-}
+/// Evaluations of the signal near a quintic's zero before it is left to certified steps.
+const MOST_EVALUATIONS: usize = 4;
 
 /// A search through the intervals of a table's fine grid.
 struct IntervalSearch<'a> {
     table: &'a Table,
+    signal: &'a mut Signal,
     length: f64,
     start: Start,
+    statistics: &'a mut Statistics,
 }
 
 impl IntervalSearch<'_> {
     /// The crossing in a span.
     #[inline(always)]
-    fn span<S: Simd>(
-        &self,
-        span: Span,
-        signal: &mut Signal,
-        followed: &Followed,
-        statistics: &mut Statistics,
-    ) -> Option<Decision> {
-        let mut fine = self.table.fine::<S>(signal, span);
+    fn span<S: Simd>(&mut self, span: Span, followed: &Followed) -> Option<Decision> {
+        let table = self.table;
+        let mut fine = table.fine::<S>(self.signal, span);
         let mut found = None;
         while found.is_none()
             && let Some(interval) = fine.next_open(followed.amplitudes())
         {
-            found = self.interval::<S>(&interval, signal, statistics);
+            let rate_error = fine.rate_error();
+            let from_zero = interval.point == 0 && span.surface.is_some();
+            // What starts at zero and rises all the way is certified as well.
+            if !(from_zero && interval.quintic().rates()[0] > rate_error) {
+                found = self.interval::<S>(&interval, rate_error);
+            }
         }
-        statistics.points += fine.points;
+        self.statistics.points += fine.points;
         found
     }
 
     /// The crossing in an interval that may hold one.
     #[inline(always)]
-    fn interval<S: Simd>(
-        &self,
-        interval: &Interval,
-        signal: &mut Signal,
-        statistics: &mut Statistics,
-    ) -> Option<Decision> {
-        if let Some(zero) = interval.falling_zero() {
-            let evaluated = evaluate_zero::<S>(&zero, signal, statistics);
-            let confirmed = confirm_zero(&zero, evaluated, signal, self.length);
-            if confirmed.is_some() {
-                return confirmed;
-            }
+    fn interval<S: Simd>(&mut self, interval: &Interval, rate_error: f64) -> Option<Decision> {
+        if interval.crosses()
+            && let Some(decision) = self.zero::<S>(interval, rate_error)
+        {
+            return Some(decision);
         }
         S::apart(BySteps {
-            signal,
+            signal: self.signal,
             length: self.length,
             from: interval.start,
             limit: interval.end.min(self.length),
             start: self.start,
-            statistics,
+            statistics: self.statistics,
         })
         .map(Decision::Crossing)
     }
-}
 
-/// The last step to a zero with the third derivative, `jerk`, known and not only bounded: the
-/// cubic's zero.
-#[inline(always)]
-fn last_cubic_step(
-    jet: &Jet,
-    jerk: f64,
-    at: f64,
-    length: f64,
-    signal: &Signal,
-) -> Option<Crossing> {
-    let slope = |h: f64| jet.rate + h * (jet.curvature + 0.5 * jerk * h);
-    let first = quadratic_root(jet);
-    let step = first - jerk * first.powi(3) / (6.0 * slope(first));
-    let rate = slope(step);
-    let cubic =
-        jet.value + step * (jet.rate + step * (0.5 * jet.curvature + step * jerk * (1.0 / 6.0)));
-    // |g(at + step)| ≤ B₄ step⁴ / 24 where the cubic vanishes, and B₄ ≤ B max|λ|.
-    let error = jet.third * signal.fastest() * step.powi(4) / 24.0;
-    let solved = cubic.abs() <= signal.noise();
-    (solved && error <= RESOLUTION * length * rate.abs()).then_some(Crossing {
-        at: at + step,
-        rate: rate.min(0.0),
-        grazing: false,
-        refined: false,
-    })
+    /// The signal's zero near that of an interval's quintic, by steps of Newton's method with two
+    /// more derivatives, if it is certain to be the only one. The exponentials of the last
+    /// evaluation are kept.
+    #[inline(always)]
+    fn zero<S: Simd>(&mut self, interval: &Interval, rate_error: f64) -> Option<Decision> {
+        let quintic = interval.quintic();
+        let gentlest = -quintic.rates()[1];
+        if gentlest <= 0.0 {
+            return None;
+        }
+        // The signal too falls all the way.
+        let falls = gentlest > rate_error;
+        let mut at = interval.start + quintic.zero() * interval.width;
+        for evaluated in 0..MOST_EVALUATIONS {
+            self.statistics.evaluations += 1;
+            let (jet, jerk) = self.signal.jet_keeping_factors::<S>(at);
+            let near = Near::<Single> {
+                cubic: Cubic {
+                    value: jet.value,
+                    rate: jet.rate,
+                    curvature: jet.curvature,
+                    jerk,
+                },
+                third: jet.third,
+                fastest: self.signal.fastest(),
+                noise: self.signal.noise(),
+                length: self.length,
+            };
+            if evaluated == 0 && !falls && near.not_unique(gentlest, interval.error) != 0 {
+                return None;
+            }
+            let step = near.cubic.step();
+            let rate = near.cubic.slope(step);
+            let crossing = Crossing {
+                at: at + step,
+                rate: rate.min(0.0),
+                grazing: false,
+                refined: false,
+            };
+            if near.goes_on(step, rate) == 0 {
+                return Some(if crossing.at <= self.length {
+                    Decision::Crossing(crossing)
+                } else {
+                    Decision::TooLate
+                });
+            }
+            at = crossing.at;
+            let inside = at >= interval.start && at <= interval.end;
+            if !inside {
+                return None;
+            }
+        }
+        None
+    }
 }

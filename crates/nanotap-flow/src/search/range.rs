@@ -180,7 +180,7 @@ impl<'a> RangeSearch<'a> {
         points: &mut Points,
         range: &Range,
     ) -> Self {
-        let [sixth, outside] = signal.weighted_amplitudes::<S>(&grid.weights);
+        let [sixth, outside, ..] = signal.weighted_amplitudes::<S>(&grid.weights);
         let floor = outside + ROUNDING * signal.size();
         let most = grid.table.len() / grid.terms;
         // Point 0 is the start; the last interval is the one that holds the end.

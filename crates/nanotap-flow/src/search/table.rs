@@ -7,7 +7,7 @@
 use super::interval::Interval;
 use crate::regime::Kernel;
 use crate::signal::{Amplitude, Signal};
-use crate::simd::{self, ComplexVector, Simd, WIDTH, layout};
+use crate::simd::{self, ComplexVector, Simd, Vector, WIDTH, layout};
 use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Angle through which the fastest followed term turns from point to point: a larger one
@@ -16,7 +16,7 @@ const ANGLE: f64 = 2.4;
 /// The least number of intervals in a period, on the fine grid and on the coarse one.
 const INTERVALS: [f64; 2] = [24.0, 8.0];
 /// The most terms that are followed, on the fine grid and on the coarse one.
-const FOLLOWED: [usize; 2] = [8, 3];
+const FOLLOWED: [usize; 2] = [4, 3];
 /// The most terms that are followed on the fine grid where extrema are looked for.
 const FOLLOWED_FOR_EXTREMA: usize = 32;
 /// How much faster the fine grid's fastest term must be than the coarse grid's.
@@ -29,6 +29,8 @@ const LARGEST: usize = 64;
 /// The most points of the fine grid: faster terms are not followed. With that many the tables of
 /// a regime stay below 16 MiB.
 const MOST_POINTS: f64 = 8192.0;
+/// How far a slow term of amplitude one may keep away from its chord over an interval.
+const SLOW: f64 = 0.5;
 /// What rounding, in table and sums, could take from a value, in units of the terms' size.
 pub(crate) const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
@@ -60,17 +62,23 @@ pub(crate) struct Grid {
     pub(crate) density: f64,
     /// How many terms it follows.
     pub(crate) terms: usize,
+    /// How many of them are slow: hardly bent over an interval.
+    pub(crate) slow: usize,
     /// Whether these are all.
     pub(crate) complete: bool,
     /// `[Re, Im]` of each followed term's exponential at four points, vector after vector.
     pub(crate) table: Vec<ComplexVector>,
-    /// For vectors of terms: the weight of their amplitudes in `M₆h⁶/7200`, and 1 where a
-    /// term is not followed.
-    pub(crate) weights: Vec<ComplexVector>,
+    /// For vectors of terms: what bounds take of their amplitudes.
+    pub(crate) weights: Vec<Weights>,
 }
 
+/// Of four terms the weights of their amplitudes in `M₆h⁶/7200`; 1 where a term is not followed;
+/// its `|λ|`, or what rounding takes of that where it is followed; and how far a term keeps away
+/// from its chord over an interval, or 1 where it is not slow.
+pub(crate) type Weights = [Vector; 4];
+
 /// A complex number as `[Re, Im]`.
-type Pair = [f64; 2];
+pub(crate) type Pair = [f64; 2];
 
 impl Table {
     /// The table for the guard `kernel` over stretches of up to `period`, if one makes sense.
@@ -151,6 +159,11 @@ impl Table {
         self.reach
     }
 
+    /// The terms that are followed, slowest first.
+    pub(crate) fn followed(&self) -> &[usize] {
+        &self.followed
+    }
+
     /// Whether every term is followed, on the fine grid at least.
     pub(crate) fn is_complete(&self) -> bool {
         self.fine.complete
@@ -185,11 +198,12 @@ impl Followed {
             return;
         };
         for (amplitude, column) in self.here.iter().zip(&coarse.powers) {
-            let power = column[interval.point].map(S::splat);
+            let [re, im] = column[interval.point];
+            let power = [S::splat(re), S::splat(im)];
             let mut moved = *amplitude;
             for z in &mut moved {
                 let product = simd::complex_mul::<S>([S::load(&z[0]), S::load(&z[1])], power);
-                *z = product.map(S::store);
+                *z = [S::store(product[0]), S::store(product[1])];
             }
             self.other.push(moved);
         }
@@ -204,6 +218,19 @@ impl Followed {
 }
 
 impl Grid {
+    /// How many points it has.
+    pub(crate) fn points(&self) -> usize {
+        self.table.len() / self.terms * WIDTH
+    }
+
+    /// The exponential of followed term `j` at a point, `[Re, Im]`.
+    #[inline(always)]
+    pub(crate) fn exponential(&self, j: usize, point: usize) -> Pair {
+        let (vector, lane) = layout::place(point);
+        let [re, im] = &self.table[vector * self.terms + j];
+        [re[lane], im[lane]]
+    }
+
     /// The grid that follows the terms `followed`, from a column of exponentials for each
     /// (of at least as many terms).
     fn new(kernel: &Kernel, followed: &[usize], step: f64, columns: &[Vec<Pair>]) -> Self {
@@ -218,25 +245,42 @@ impl Grid {
                 entry[1][lane] = im;
             }
         }
-        let mut weights = vec![ComplexVector::default(); kernel.vectors.len()];
+        let slow = |k: &&usize| chord(kernel.rate(**k).modulus(), step) <= SLOW;
+        let slow = followed.iter().take_while(slow).count();
+        let mut weights = vec![Weights::default(); kernel.vectors.len()];
         for k in 0..kernel.count {
             let (vector, lane) = layout::place(k);
             let entry = &mut weights[vector];
+            let size = kernel.rate(k).modulus();
             if followed.contains(&k) {
-                entry[0][lane] = (kernel.rate(k).modulus() * step).powi(6) / 7200.0;
+                entry[0][lane] = (size * step).powi(6) / 7200.0;
+                entry[2][lane] = ROUNDING * size;
             } else {
                 entry[1][lane] = 1.0;
+                entry[2][lane] = size;
             }
+            entry[3][lane] = if followed[..slow].contains(&k) {
+                chord(size, step)
+            } else {
+                1.0
+            };
         }
         Self {
             step,
             density: 1.0 / step,
             terms,
+            slow,
             complete: terms == kernel.count,
             table,
             weights,
         }
     }
+}
+
+/// How far a term of amplitude one keeps away from its chord over an interval of width `step`: at
+/// most an eighth of the width squared times its curvature.
+fn chord(rate: f64, step: f64) -> f64 {
+    (rate * step).powi(2) / 8.0
 }
 
 /// `e^{λ h p}` of a term for `p = 0 … count − 1`. Each is a product of at most as many

@@ -19,7 +19,10 @@
 use super::interval::{Interval, Point};
 use super::table::{Grid, ROUNDING, Table};
 use crate::signal::{Amplitude, Signal};
-use crate::simd::{Simd, WIDTH};
+use crate::simd::{Lanes, Simd, Single, WIDTH};
+
+/// `7200 √5/30000`: the bound of a quintic's rate error from that of its value.
+const RATE_OF_SIXTH: f64 = 0.536_656_314_599_949_5;
 
 /// A part of a regime that is to be searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,16 +35,65 @@ pub(crate) struct Span {
     pub(crate) surface: Option<f64>,
 }
 
+/// What bounds a signal on a grid, from the sums of its amplitudes with the grid's
+/// [`Weights`](super::table::Weights).
+#[derive(Clone, Copy)]
+pub(crate) struct Bounds<L: Lanes> {
+    /// What Bernstein coefficients must not fall below.
+    pub(crate) floor: L::Register,
+    /// The same for the sum of the middle two.
+    pub(crate) tension: L::Register,
+    /// Bound on the distance from the quintic to the signal within an interval.
+    pub(crate) error: L::Register,
+    /// The same for their rates.
+    pub(crate) rate_error: L::Register,
+}
+
+impl<L: Lanes> Bounds<L> {
+    /// From the sums, and the size of all terms.
+    #[inline(always)]
+    pub(crate) fn new(
+        [sixth, outside, outside_rate]: [L::Register; 3],
+        size: L::Register,
+        density: f64,
+    ) -> Self {
+        let rounding = L::mul(L::splat(ROUNDING), size);
+        let floor = L::add(outside, rounding);
+        // Of the quintic's rate |e'| ≤ √5/30000 M₆h⁵ (Birkhoff and Priver 1967).
+        let rate = L::fma(
+            L::splat(RATE_OF_SIXTH),
+            sixth,
+            L::mul(L::splat(10.0), rounding),
+        );
+        Self {
+            floor,
+            tension: L::fma(L::splat(2.0), floor, sixth),
+            error: L::fma(L::splat(1.0 / 6.4), sixth, floor),
+            rate_error: L::fma(rate, L::splat(density), outside_rate),
+        }
+    }
+}
+
+/// The inner Bernstein coefficients that a point gives to the interval on its right, b₁ and b₂, and
+/// to that on its left, b₄ and b₃.
+#[inline(always)]
+pub(crate) fn coefficients<L: Lanes>(
+    [g, v, c]: [L::Register; 3],
+    step: f64,
+) -> [[L::Register; 2]; 2] {
+    let bent = L::fma(c, L::splat(step * step / 20.0), g);
+    let (fifth, two_fifths) = (L::splat(0.2 * step), L::splat(0.4 * step));
+    [
+        [L::fma(v, fifth, g), L::fma(v, two_fifths, bent)],
+        [L::fnma(v, fifth, g), L::fnma(v, two_fifths, bent)],
+    ]
+}
+
 /// A walk along the intervals of one grid.
 pub(crate) struct Scan<'a, S: Simd> {
     grid: &'a Grid,
     constant: f64,
-    /// What Bernstein coefficients must not fall below.
-    floor: f64,
-    /// The same for the sum of the middle two.
-    tension: f64,
-    /// Bound on the distance from the quintic to the signal within an interval.
-    error: f64,
+    bounds: Bounds<Single>,
     span: Span,
     /// The next vector of points, and how many there are to look at.
     vector: usize,
@@ -59,16 +111,13 @@ pub(crate) struct Scan<'a, S: Simd> {
 impl<'a, S: Simd> Scan<'a, S> {
     #[inline(always)]
     fn new(grid: &'a Grid, signal: &Signal, span: Span) -> Self {
-        let [sixth, outside] = signal.weighted_amplitudes::<S>(&grid.weights);
-        let floor = outside + ROUNDING * signal.size();
+        let sums = signal.weighted_amplitudes::<S>(&grid.weights);
         let intervals = (span.end - span.start) * grid.density;
         let most = grid.table.len() / grid.terms;
         Self {
             grid,
             constant: signal.constant,
-            floor,
-            tension: sixth + 2.0 * floor,
-            error: sixth / 6.4 + floor,
+            bounds: Bounds::new([sums[0], sums[1], sums[2]], signal.size(), grid.density),
             span,
             vector: 0,
             vectors: most.min((intervals * (1.0 / WIDTH as f64)) as usize + 2),
@@ -77,6 +126,12 @@ impl<'a, S: Simd> Scan<'a, S> {
             lefts: [S::splat(f64::MAX); 2],
             points: 0,
         }
+    }
+
+    /// Bound on the distance from an interval's quintic's rate to the signal's.
+    #[inline(always)]
+    pub(crate) fn rate_error(&self) -> f64 {
+        self.bounds.rate_error
     }
 
     /// Where a point lies.
@@ -114,19 +169,15 @@ impl<'a, S: Simd> Scan<'a, S> {
             point,
             width: self.grid.step,
             ends: [before, Point::of::<S>(&self.ends[1], lane)],
-            error: self.error,
+            error: self.bounds.error,
         })
     }
 
     /// Certifies the intervals that end at the next vector's points, or finds which are open.
     #[inline(always)]
     fn look_at_next(&mut self, amplitudes: &[Amplitude]) {
-        let h = self.grid.step;
         let [g, v, c] = self.sums(amplitudes);
-        let bent = S::fma(c, S::splat(h * h / 20.0), g);
-        let (fifth, two_fifths) = (S::splat(0.2 * h), S::splat(0.4 * h));
-        let (b1, b2) = (S::fma(v, fifth, g), S::fma(v, two_fifths, bent));
-        let (b4, b3) = (S::fnma(v, fifth, g), S::fnma(v, two_fifths, bent));
+        let [[b1, b2], [b4, b3]] = coefficients::<S>([g, v, c], self.grid.step);
         let inner = S::min(b1, b2);
         let mut left = S::min(g, inner);
         if self.vector == 0 && self.span.surface.is_some() && self.grid.complete {
@@ -136,8 +187,8 @@ impl<'a, S: Simd> Scan<'a, S> {
         let right = S::min(g, S::min(b4, b3));
         let low = S::min(S::shifted_in(self.lefts[0], left), right);
         let middle = S::add(S::shifted_in(self.lefts[1], b2), b3);
-        let below = S::below(low, S::splat(self.floor));
-        self.open = below | S::below(middle, S::splat(self.tension));
+        let below = S::below(low, S::splat(self.bounds.floor));
+        self.open = below | S::below(middle, S::splat(self.bounds.tension));
         if self.vector == 0 {
             // There is no interval before the first point.
             self.open &= !1;

@@ -1,6 +1,6 @@
 //! Real-linear maps, with a constant, of complex numbers in vectors.
 
-use super::{ComplexVector, Simd, WIDTH, layout};
+use super::{ComplexOctet, ComplexVector, Simd, WIDTH, Wide, layout};
 
 /// `z ↦ Σ_k (a_k Re z_k + b_k Im z_k) + c` with complex vectors `a_k`, `b_k`, `c`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,6 +64,35 @@ impl AffineMap {
             }
             let [a, b] = sums;
             *out = [S::store(S::add(a[0], b[0])), S::store(S::add(a[1], b[1]))];
+        }
+    }
+
+    /// Writes the first `rows` numbers of the images of eight `z` side by side to `out`.
+    #[inline(always)]
+    pub(crate) fn apply_wide<W: Wide>(
+        &self,
+        z: &[ComplexOctet],
+        rows: usize,
+        out: &mut [ComplexOctet],
+    ) {
+        let vectors = self.vectors;
+        let (linear, constant) = self.columns.split_at(self.columns.len() - vectors);
+        let (real, imaginary) = linear.split_at(linear.len() / 2);
+        for (row, out) in out.iter_mut().enumerate().take(rows) {
+            let (vector, lane) = layout::place(row);
+            let [re, im] = &constant[vector];
+            let mut sums = [W::splat(re[lane]), W::splat(im[lane])];
+            let pairs = real
+                .chunks_exact(vectors)
+                .zip(imaginary.chunks_exact(vectors));
+            for ((real, imaginary), z) in pairs.zip(z) {
+                let [re, im] = W::load_complex(z);
+                for (part, sum) in sums.iter_mut().enumerate() {
+                    *sum = W::fma(W::splat(real[vector][part][lane]), re, *sum);
+                    *sum = W::fma(W::splat(imaginary[vector][part][lane]), im, *sum);
+                }
+            }
+            *out = W::store_complex(sums);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64 as x;
 
-use super::{Simd, Vector, Work};
+use super::{Lanes, Simd, Twice, Vector, WideWork, Work};
 
 /// AVX2 and FMA. Only [`dispatch`](super::dispatch) enters it, on machines that have both.
 #[derive(Clone, Copy)]
@@ -14,6 +14,12 @@ pub(super) fn run<W: Work>(work: W) -> W::Output {
     work.run::<Avx2>()
 }
 
+/// The same for eight motions side by side.
+#[target_feature(enable = "avx2,fma")]
+pub(super) fn run_wide<W: WideWork>(work: W) -> W::Output {
+    work.run::<Twice<Avx2>>()
+}
+
 /// The same, never inlined.
 #[target_feature(enable = "avx2,fma")]
 #[inline(never)]
@@ -23,25 +29,9 @@ fn run_apart<W: Work>(work: W) -> W::Output {
 
 // SAFETY of every block here: these instructions need AVX2 and FMA and nothing else;
 // `Avx2` is used only where the machine was found to have them.
-impl Simd for Avx2 {
+impl Lanes for Avx2 {
     type Register = x::__m256d;
 
-    #[inline(always)]
-    fn apart<W: Work>(work: W) -> W::Output {
-        // SAFETY: this arithmetic is in use only where the machine has its instructions.
-        unsafe { run_apart(work) }
-    }
-
-    #[inline(always)]
-    fn load(a: &Vector) -> Self::Register {
-        unsafe { x::_mm256_loadu_pd(a.as_ptr()) }
-    }
-    #[inline(always)]
-    fn store(a: Self::Register) -> Vector {
-        let mut out = [0.0; super::WIDTH];
-        unsafe { x::_mm256_storeu_pd(out.as_mut_ptr(), a) };
-        out
-    }
     #[inline(always)]
     fn splat(a: f64) -> Self::Register {
         unsafe { x::_mm256_set1_pd(a) }
@@ -59,20 +49,20 @@ impl Simd for Avx2 {
         unsafe { x::_mm256_mul_pd(a, b) }
     }
     #[inline(always)]
+    fn div(a: Self::Register, b: Self::Register) -> Self::Register {
+        unsafe { x::_mm256_div_pd(a, b) }
+    }
+    #[inline(always)]
+    fn map(a: Self::Register, function: fn(f64) -> f64) -> Self::Register {
+        Self::load(&Self::store(a).map(function))
+    }
+    #[inline(always)]
     fn fma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
         unsafe { x::_mm256_fmadd_pd(a, b, c) }
     }
     #[inline(always)]
     fn fnma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
         unsafe { x::_mm256_fnmadd_pd(a, b, c) }
-    }
-    #[inline(always)]
-    fn sums([a, b, c, d]: [Self::Register; 4]) -> Self::Register {
-        unsafe {
-            let (ab, cd) = (x::_mm256_hadd_pd(a, b), x::_mm256_hadd_pd(c, d));
-            let crossed = x::_mm256_permute2f128_pd::<0x21>(ab, cd);
-            x::_mm256_add_pd(crossed, x::_mm256_blend_pd::<0b1100>(ab, cd))
-        }
     }
     #[inline(always)]
     fn sqrt(a: Self::Register) -> Self::Register {
@@ -89,17 +79,6 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn below(a: Self::Register, b: Self::Register) -> u32 {
         unsafe { x::_mm256_movemask_pd(x::_mm256_cmp_pd::<{ x::_CMP_NGE_UQ }>(a, b)) as u32 }
-    }
-    #[inline(always)]
-    fn with_first(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_blend_pd::<0b0001>(a, b) }
-    }
-    #[inline(always)]
-    fn shifted_in(before: Self::Register, a: Self::Register) -> Self::Register {
-        unsafe {
-            let crossed = x::_mm256_permute2f128_pd::<0x21>(before, a);
-            x::_mm256_shuffle_pd::<0b0101>(crossed, a)
-        }
     }
     #[inline(always)]
     fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register {
@@ -136,6 +115,52 @@ impl Simd for Avx2 {
                 x::_mm256_xor_pd(x::_mm256_blendv_pd(sine, cosine, odd), sign(quadrant)),
                 x::_mm256_xor_pd(x::_mm256_blendv_pd(cosine, sine, odd), sign(next)),
             )
+        }
+    }
+}
+
+impl Simd for Avx2 {
+    #[inline(always)]
+    fn apart<W: Work>(work: W) -> W::Output {
+        // SAFETY: this arithmetic is in use only where the machine has its instructions.
+        unsafe { run_apart(work) }
+    }
+    #[inline(always)]
+    fn load(a: &Vector) -> Self::Register {
+        unsafe { x::_mm256_loadu_pd(a.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store(a: Self::Register) -> Vector {
+        let mut out = [0.0; super::WIDTH];
+        unsafe { x::_mm256_storeu_pd(out.as_mut_ptr(), a) };
+        out
+    }
+    #[inline(always)]
+    fn sums([a, b, c, d]: [Self::Register; 4]) -> Self::Register {
+        unsafe {
+            let (ab, cd) = (x::_mm256_hadd_pd(a, b), x::_mm256_hadd_pd(c, d));
+            let crossed = x::_mm256_permute2f128_pd::<0x21>(ab, cd);
+            x::_mm256_add_pd(crossed, x::_mm256_blend_pd::<0b1100>(ab, cd))
+        }
+    }
+    #[inline(always)]
+    fn with_first(a: Self::Register, b: Self::Register) -> Self::Register {
+        unsafe { x::_mm256_blend_pd::<0b0001>(a, b) }
+    }
+    #[inline(always)]
+    fn shifted_in(before: Self::Register, a: Self::Register) -> Self::Register {
+        unsafe {
+            let crossed = x::_mm256_permute2f128_pd::<0x21>(before, a);
+            x::_mm256_shuffle_pd::<0b0101>(crossed, a)
+        }
+    }
+    #[inline(always)]
+    fn select(mask: u32, a: Self::Register, b: Self::Register) -> Self::Register {
+        unsafe {
+            let lanes = x::_mm256_set_epi64x(8, 4, 2, 1);
+            let set = x::_mm256_and_si256(x::_mm256_set1_epi64x(i64::from(mask)), lanes);
+            let chosen = x::_mm256_castsi256_pd(x::_mm256_cmpeq_epi64(set, lanes));
+            x::_mm256_blendv_pd(b, a, chosen)
         }
     }
 }

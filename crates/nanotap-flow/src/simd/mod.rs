@@ -1,9 +1,13 @@
-//! Four numbers at a time: the arithmetic of the inner loop, and nothing of it elsewhere.
+//! Four numbers at a time, or eight: the arithmetic of the inner loop, and nothing of it elsewhere.
 //!
 //! The same source is compiled for any machine ([`Plain`]) and for vector registers with
 //! fused multiply-add (`Avx2`; [`dispatch`] picks at run time). Both do the same operations in
 //! the same order, each rounded once, and so give the same bits. `NANOTAP_ARITHMETIC=plain` in
 //! the environment picks the first: it is how tests run both.
+//!
+//! One motion has its terms in the lanes of a register ([`Simd`]). Eight motions side by side have
+//! a lane each ([`Wide`]): in one register of eight (`Avx512`, unless `NANOTAP_ARITHMETIC=avx2`), or
+//! in two of four ([`Twice`]).
 //!
 //! [`functions`] has the exponentials, [`layout`] how lists lie in vectors, [`affine`] the
 //! change of coordinates at a switch, [`linear`] the same of a whole matrix.
@@ -14,17 +18,23 @@ use std::sync::LazyLock;
 pub(crate) mod affine;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod functions;
 pub(crate) mod layout;
 pub(crate) mod linear;
 mod plain;
+mod single;
 #[cfg(test)]
 mod tests;
+mod twice;
 
 pub(crate) use functions::{
     LARGEST_ANGLE, SMALL_ANGLE, complex_mul, exp, exp_complex, exp_small, sin_cos, sum, sums,
 };
 pub(crate) use plain::{Library, Plain};
+pub(crate) use single::Single;
+use twice::Twice;
 
 /// Numbers in a vector.
 pub(crate) const WIDTH: usize = 4;
@@ -35,22 +45,27 @@ pub(crate) type Vector = [f64; WIDTH];
 /// Four complex numbers in memory: real parts, imaginary parts.
 pub(crate) type ComplexVector = [Vector; 2];
 
-/// An arithmetic of four numbers: how they are held and computed with.
-pub(crate) trait Simd: Copy {
+/// Motions side by side.
+pub(crate) const LANES: usize = 2 * WIDTH;
+
+/// Eight numbers in memory: one of each of eight motions.
+pub(crate) type Octet = [f64; LANES];
+
+/// Eight complex numbers in memory: real parts, imaginary parts.
+pub(crate) type ComplexOctet = [Octet; 2];
+
+/// An arithmetic of numbers side by side, each in its lane and none knowing of the others.
+pub(crate) trait Lanes: Copy {
     /// Whether functions are those of `nanotap-arithmetic`, one lane at a time.
     const LIBRARY: bool = false;
-    /// What holds four numbers.
+    /// What holds a number in each lane.
     type Register: Copy;
 
-    /// Does a piece of work in this arithmetic, compiled on its own and never inlined.
-    fn apart<W: Work>(work: W) -> W::Output;
-
-    fn load(a: &Vector) -> Self::Register;
-    fn store(a: Self::Register) -> Vector;
     fn splat(a: f64) -> Self::Register;
     fn add(a: Self::Register, b: Self::Register) -> Self::Register;
     fn sub(a: Self::Register, b: Self::Register) -> Self::Register;
     fn mul(a: Self::Register, b: Self::Register) -> Self::Register;
+    fn div(a: Self::Register, b: Self::Register) -> Self::Register;
     /// `a b + c`.
     fn fma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register;
     /// `c − a b`.
@@ -60,16 +75,10 @@ pub(crate) trait Simd: Copy {
     fn max(a: Self::Register, b: Self::Register) -> Self::Register;
     /// A bit a lane, set where not `a ≥ b` (so where one is not a number as well).
     fn below(a: Self::Register, b: Self::Register) -> u32;
-    /// `a` with the first lane of `b`.
-    fn with_first(a: Self::Register, b: Self::Register) -> Self::Register;
-    /// The lanes of `a` moved up by one, `before`'s last one first.
-    fn shifted_in(before: Self::Register, a: Self::Register) -> Self::Register;
     /// The lanes, none below `low` or above `high`.
     fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register;
     /// `2^n` from the sum of [`ROUND`](functions::ROUND) and an integer `n`.
     fn power_of_two(shifted: Self::Register) -> Self::Register;
-    /// The sum of each vector's lanes, side by side.
-    fn sums(a: [Self::Register; 4]) -> Self::Register;
     /// Sine and cosine of an angle from those of its rest beyond a multiple of π/2; the
     /// multiple is in the low bits of `shifted`.
     fn turn(
@@ -77,6 +86,53 @@ pub(crate) trait Simd: Copy {
         sine: Self::Register,
         cosine: Self::Register,
     ) -> (Self::Register, Self::Register);
+    /// `function` of each lane.
+    fn map(a: Self::Register, function: fn(f64) -> f64) -> Self::Register;
+
+    /// The size of each.
+    #[inline(always)]
+    fn abs(a: Self::Register) -> Self::Register {
+        Self::max(a, Self::sub(Self::splat(0.0), a))
+    }
+}
+
+/// An arithmetic of four numbers: how they are held and computed with.
+pub(crate) trait Simd: Lanes {
+    /// Does a piece of work in this arithmetic, compiled on its own and never inlined.
+    fn apart<W: Work>(work: W) -> W::Output;
+
+    fn load(a: &Vector) -> Self::Register;
+    fn store(a: Self::Register) -> Vector;
+    /// `a` with the first lane of `b`.
+    fn with_first(a: Self::Register, b: Self::Register) -> Self::Register;
+    /// The lanes of `a` moved up by one, `before`'s last one first.
+    fn shifted_in(before: Self::Register, a: Self::Register) -> Self::Register;
+    /// `a` in the lanes of the lowest bits of `mask`, `b` elsewhere.
+    fn select(mask: u32, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// The sum of each vector's lanes, side by side.
+    fn sums(a: [Self::Register; 4]) -> Self::Register;
+}
+
+/// An arithmetic of eight numbers, for eight motions side by side.
+pub(crate) trait Wide: Lanes {
+    /// What serves one of them alone.
+    type One: Simd;
+
+    fn load(a: &Octet) -> Self::Register;
+    fn store(a: Self::Register) -> Octet;
+    /// `a` in the lanes of `mask`, `b` elsewhere.
+    fn select(mask: u32, a: Self::Register, b: Self::Register) -> Self::Register;
+
+    /// Complex numbers, as real and imaginary parts. (Spelt out: what is mapped over an array is
+    /// compiled apart, without the instructions of a register.)
+    #[inline(always)]
+    fn load_complex(z: &ComplexOctet) -> [Self::Register; 2] {
+        [Self::load(&z[0]), Self::load(&z[1])]
+    }
+    #[inline(always)]
+    fn store_complex(z: [Self::Register; 2]) -> ComplexOctet {
+        [Self::store(z[0]), Self::store(z[1])]
+    }
 }
 
 /// Work that is compiled once for each arithmetic.
@@ -85,6 +141,14 @@ pub(crate) trait Work {
     type Output;
     /// Does it.
     fn run<S: Simd>(self) -> Self::Output;
+}
+
+/// The same for eight motions side by side.
+pub(crate) trait WideWork {
+    /// What comes of it.
+    type Output;
+    /// Does it.
+    fn run<W: Wide>(self) -> Self::Output;
 }
 
 /// Does the work in the arithmetic that this machine is fastest in.
@@ -98,16 +162,43 @@ pub(crate) fn dispatch<W: Work>(work: W) -> W::Output {
     work.run::<Plain>()
 }
 
+/// The same for eight motions side by side.
+pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    match (avx512_available(), avx2_available()) {
+        // SAFETY: the machine has these instructions.
+        (true, true) => return unsafe { avx512::run(work) },
+        // SAFETY: the machine has these instructions.
+        (false, true) => return unsafe { avx2::run_wide(work) },
+        (_, false) => {}
+    }
+    work.run::<Twice<Plain>>()
+}
+
+/// Whether `NANOTAP_ARITHMETIC` in the environment does not ask for less than this machine has.
+#[cfg(target_arch = "x86_64")]
+fn nobody_asks_for(paths: &[&str]) -> bool {
+    !std::env::var("NANOTAP_ARITHMETIC").is_ok_and(|path| paths.contains(&path.as_str()))
+}
+
 /// Whether this machine has fused multiply-add in vectors of four, and nobody asked for the plain
 /// path.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn avx2_available() -> bool {
     static WANTED: LazyLock<bool> = LazyLock::new(|| {
-        let plain = std::env::var_os("NANOTAP_ARITHMETIC").is_some_and(|path| path == "plain");
-        !plain
+        nobody_asks_for(&["plain"])
             && std::arch::is_x86_feature_detected!("avx2")
             && std::arch::is_x86_feature_detected!("fma")
+    });
+    *WANTED
+}
+
+/// Whether this machine has vectors of eight, and nobody asked for less.
+#[cfg(target_arch = "x86_64")]
+fn avx512_available() -> bool {
+    static WANTED: LazyLock<bool> = LazyLock::new(|| {
+        nobody_asks_for(&["plain", "avx2"]) && std::arch::is_x86_feature_detected!("avx512f")
     });
     *WANTED
 }

@@ -1,6 +1,6 @@
 //! Four numbers in an array, on any machine.
 
-use super::{Simd, Vector, WIDTH, Work};
+use super::{Lanes, Simd, Vector, WIDTH, Work};
 
 /// On any machine.
 #[derive(Clone, Copy)]
@@ -16,19 +16,6 @@ macro_rules! arrays {
     ($fma:expr) => {
         type Register = Vector;
 
-        #[inline(always)]
-        fn apart<W: Work>(work: W) -> W::Output {
-            run_apart::<Self, W>(work)
-        }
-
-        #[inline(always)]
-        fn load(a: &Vector) -> Vector {
-            *a
-        }
-        #[inline(always)]
-        fn store(a: Vector) -> Vector {
-            a
-        }
         #[inline(always)]
         fn splat(a: f64) -> Vector {
             [a; WIDTH]
@@ -54,8 +41,12 @@ macro_rules! arrays {
             std::array::from_fn(|i| $fma(-a[i], b[i], c[i]))
         }
         #[inline(always)]
-        fn sums(a: [Vector; 4]) -> Vector {
-            a.map(|a| (a[0] + a[1]) + (a[2] + a[3]))
+        fn div(a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| a[i] / b[i])
+        }
+        #[inline(always)]
+        fn map(a: Vector, function: fn(f64) -> f64) -> Vector {
+            a.map(function)
         }
         #[inline(always)]
         fn sqrt(a: Vector) -> Vector {
@@ -73,14 +64,6 @@ macro_rules! arrays {
         fn below(a: Vector, b: Vector) -> u32 {
             let at_least = |i: usize| a[i] >= b[i];
             (0..WIDTH).fold(0, |bits, i| bits | (u32::from(!at_least(i)) << i))
-        }
-        #[inline(always)]
-        fn with_first(a: Vector, b: Vector) -> Vector {
-            [b[0], a[1], a[2], a[3]]
-        }
-        #[inline(always)]
-        fn shifted_in(before: Vector, a: Vector) -> Vector {
-            [before[3], a[0], a[1], a[2]]
         }
         #[inline(always)]
         fn clamp(a: Vector, low: f64, high: f64) -> Vector {
@@ -105,17 +88,59 @@ macro_rules! arrays {
     };
 }
 
+/// What only four numbers side by side can do.
+macro_rules! four {
+    () => {
+        #[inline(always)]
+        fn apart<W: Work>(work: W) -> W::Output {
+            run_apart::<Self, W>(work)
+        }
+        #[inline(always)]
+        fn load(a: &Vector) -> Vector {
+            *a
+        }
+        #[inline(always)]
+        fn store(a: Vector) -> Vector {
+            a
+        }
+        #[inline(always)]
+        fn sums(a: [Vector; 4]) -> Vector {
+            a.map(|a| (a[0] + a[1]) + (a[2] + a[3]))
+        }
+        #[inline(always)]
+        fn select(mask: u32, a: Vector, b: Vector) -> Vector {
+            std::array::from_fn(|i| if mask & (1 << i) == 0 { b[i] } else { a[i] })
+        }
+        #[inline(always)]
+        fn with_first(a: Vector, b: Vector) -> Vector {
+            [b[0], a[1], a[2], a[3]]
+        }
+        #[inline(always)]
+        fn shifted_in(before: Vector, a: Vector) -> Vector {
+            [before[3], a[0], a[1], a[2]]
+        }
+    };
+}
+
 #[inline(never)]
 fn run_apart<S: Simd, W: Work>(work: W) -> W::Output {
     work.run::<S>()
 }
 
-impl Simd for Plain {
+impl Lanes for Plain {
     // Rounded once, as vector registers do it: by the processor, or in software.
     arrays!(f64::mul_add);
 }
 
-impl Simd for Library {
+impl Simd for Plain {
+    four!();
+}
+
+impl Lanes for Library {
     const LIBRARY: bool = true;
     arrays!(|a: f64, b: f64, c: f64| a * b + c);
+}
+
+impl Simd for Library {
+    four!();
 }

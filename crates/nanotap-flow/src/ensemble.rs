@@ -1,0 +1,618 @@
+//! Many motions of one system, eight at a time: each has a lane of a vector register.
+//!
+//! Motions do not keep step: one flies while another presses, and no two switch at the same time.
+//! They need not. Those in the same regime are searched for their next switches together, whatever
+//! the drive phase, for time is counted from the last switch; then each goes its own way. What one
+//! motion alone waits for (divisions, the exponentials of a time that has just been found) is
+//! thereby done for eight.
+//!
+//! What eight share is the common case: a stretch that a table certifies, ended by a switch that a
+//! few evaluations settle. A lane in which it is not so (a grazing touch, a shallow dip, an end within
+//! the interval of a switch) goes on alone for this stretch, as [`Flow`](crate::Flow) does. What comes
+//! of a motion does not depend on those beside it.
+
+use crate::FlowError;
+use crate::motion::{BRIEF, Motion};
+use crate::regime::Kernel;
+use crate::search::Start;
+use crate::search::interval::{Cubic, Quintic};
+use crate::search::near::Near;
+use crate::search::side_by_side::{self, Intervals, Signals};
+use crate::search::table::Table;
+use crate::search::walk::Bounds;
+use crate::signal::NOISE;
+use crate::simd::{
+    self, ComplexOctet, ComplexVector, LANES, LARGEST_ANGLE, Octet, SMALL_ANGLE, Simd, Wide,
+    WideWork, layout,
+};
+use crate::system::{PreparedTransition, System};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Evaluations of the guard near a switch before it is left to one motion alone.
+const MOST_EVALUATIONS: usize = 3;
+
+/// The work space of many motions of a [`System`]. Cloning shares the system.
+#[derive(Clone, Debug)]
+pub struct Ensemble {
+    system: Arc<System>,
+    /// Whether its motions can go side by side.
+    fits: bool,
+    /// For what a lane cannot do, and for starts and ends.
+    alone: Motion,
+    members: Vec<Member>,
+    /// Members that wait in each regime.
+    waiting: Vec<VecDeque<usize>>,
+    pack: Pack,
+    stretches: Stretches,
+}
+
+/// How many stretches from switch to switch were passed side by side, and how many alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stretches {
+    /// Eight at a time.
+    pub together: u64,
+    /// One at a time, as a [`Flow`](crate::Flow) does it.
+    pub alone: u64,
+}
+
+/// One motion, as [`Motion`] has it.
+#[derive(Clone, Debug)]
+struct Member {
+    regime: usize,
+    phase: f64,
+    packed: Vec<ComplexVector>,
+    surface: Option<(usize, Start)>,
+    /// Periods still to run, this one included.
+    left: usize,
+    stalled: u32,
+    failure: Option<FlowError>,
+}
+
+/// The work space of eight motions in one regime, a lane each.
+#[derive(Clone, Debug, Default)]
+struct Pack {
+    /// Modal coordinates and phasors, and those after the switch.
+    coordinates: Vec<ComplexOctet>,
+    switched: Vec<ComplexOctet>,
+    /// Amplitudes of all terms of the guard.
+    amplitudes: Vec<ComplexOctet>,
+    /// `e^{λ_k s}` at the times that were evaluated last.
+    factors: Vec<ComplexOctet>,
+}
+
+/// Sums over the amplitudes of the guard in each lane.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// Of sizes.
+    size: Octet,
+    /// Bound of the third derivative.
+    third: Octet,
+    /// The rate at the start.
+    rate: Octet,
+    /// With the weights of the table.
+    weighted: [Octet; 4],
+}
+
+/// What is known of each lane's next switch.
+struct Switches {
+    /// Lanes that come to one.
+    found: u32,
+    /// Lanes in which it is not certain.
+    uncertain: u32,
+    /// When, or where the search ended.
+    at: Octet,
+    /// The time beyond that at which factors were evaluated.
+    rest: Octet,
+}
+
+impl Ensemble {
+    /// An ensemble of motions of `system`.
+    pub fn new(system: Arc<System>) -> Self {
+        Self {
+            fits: fits(&system),
+            alone: Motion::new(&system),
+            members: Vec::new(),
+            waiting: vec![VecDeque::new(); system.regimes().len()],
+            pack: Pack::default(),
+            stretches: Stretches::default(),
+            system,
+        }
+    }
+
+    /// The system.
+    pub fn system(&self) -> &Arc<System> {
+        &self.system
+    }
+
+    /// How motions have gone so far, those of systems that fit.
+    pub fn stretches(&self) -> Stretches {
+        self.stretches
+    }
+
+    /// Replaces each of the states (of length `n`, one after the other), which are at phase 0, by
+    /// that so many drive periods later. Of a motion that cannot be followed the state is left as it
+    /// was and the reason returned. `periods` says how many states there are.
+    ///
+    /// # Panics
+    /// If there are not as many states as `periods`.
+    pub fn advance(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Result<(), FlowError>> {
+        let n = self.system.dimension();
+        assert_eq!(states.len(), n * periods.len(), "a state for each motion");
+        let each = states.chunks_exact_mut(n).zip(periods);
+        if !self.fits {
+            return each
+                .map(|(x, &periods)| self.advance_alone(x, periods))
+                .collect();
+        }
+        let system = Arc::clone(&self.system);
+        self.members.clear();
+        for (x, &left) in each {
+            let failure = self.alone.start_checked(&system, x, 0.0).err();
+            let member = Member {
+                regime: self.alone.regime,
+                phase: 0.0,
+                packed: self.alone.packed.clone(),
+                surface: self.alone.surface,
+                left: if failure.is_some() { 0 } else { left },
+                stalled: 0,
+                failure,
+            };
+            if member.left > 0 {
+                self.waiting[member.regime].push_back(self.members.len());
+            }
+            self.members.push(member);
+        }
+        simd::dispatch_wide(RunAll(self));
+        let Self { members, alone, .. } = self;
+        let each = states.chunks_exact_mut(n).zip(members.drain(..));
+        each.map(|(x, member)| match member.failure {
+            Some(failure) => Err(failure),
+            None => {
+                member.hand_to(&system, alone);
+                alone.write_state(&system, x);
+                Ok(())
+            }
+        })
+        .collect()
+    }
+
+    fn advance_alone(&mut self, x: &mut [f64], periods: usize) -> Result<(), FlowError> {
+        self.alone.start_checked(&self.system, x, 0.0)?;
+        self.alone.run_periods(&self.system, periods)?;
+        self.alone.write_state(&self.system, x);
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn run_all<W: Wide>(&mut self) {
+        let fullest = |waiting: &[VecDeque<usize>]| {
+            let lengths = waiting.iter().map(VecDeque::len).enumerate();
+            lengths.max_by_key(|(_, length)| *length)
+        };
+        while let Some((regime, 1..)) = fullest(&self.waiting) {
+            let waiting = &mut self.waiting[regime];
+            let count = waiting.len().min(LANES);
+            // Lanes that are left over do what the first does.
+            let first = waiting[0];
+            let mut members = [first; LANES];
+            for member in &mut members[..count] {
+                *member = waiting.pop_front().unwrap_or(first);
+            }
+            self.run_together::<W>(regime, &members, count);
+            for &member in &members[..count] {
+                let Member { regime, left, .. } = self.members[member];
+                if left > 0 {
+                    self.waiting[regime].push_back(member);
+                }
+            }
+        }
+    }
+
+    /// Runs members of one regime to their next switches, or as far as it may be looked for one.
+    #[inline(always)]
+    fn run_together<W: Wide>(&mut self, regime: usize, members: &[usize; LANES], count: usize) {
+        let system = Arc::clone(&self.system);
+        let prepared = &system.prepared(regime)[0];
+        let Some(table) = &prepared.table else {
+            return;
+        };
+        let kernel = &prepared.kernel;
+        self.pack
+            .gather::<W>(&system, kernel.count, &self.members, members);
+        let sums = self.pack.amplitudes::<W>(kernel, table);
+        let mut signals = Signals {
+            kernel,
+            table,
+            amplitudes: &self.pack.amplitudes,
+            sums: sums.weighted,
+            size: sums.size,
+            reach: [0.0; LANES],
+            on_surface: 0,
+            rate: sums.rate,
+            idle: 0,
+        };
+        let longest = side_by_side::reach(table);
+        for (lane, &member) in members.iter().enumerate() {
+            let member = &self.members[member];
+            let bit = 1 << lane;
+            signals.reach[lane] = member.reach(&system).min(longest);
+            match member.surface {
+                None | Some((_, Start::Inside)) => {}
+                Some((_, Start::Surface { rate })) => {
+                    signals.on_surface |= bit;
+                    signals.rate[lane] = rate.unwrap_or(sums.rate[lane]);
+                }
+                // Only one motion alone can leave.
+                Some((_, Start::Release | Start::Flat { .. })) => signals.idle |= bit,
+            }
+            if !sums.size[lane].is_finite() {
+                signals.idle |= bit;
+            }
+        }
+        let (reach, idle) = (signals.reach, signals.idle);
+        let (intervals, bounds) = signals.first_open::<W>();
+        let switches = self.pack.switches::<W>(
+            &system,
+            prepared,
+            &sums,
+            &intervals,
+            &bounds,
+            table.fine.step,
+            reach,
+        );
+        self.pack.pass::<W>(kernel, switches.rest);
+        if switches.found != 0 {
+            let rows = system.regimes()[prepared.switch.to].basis().len();
+            self.pack.switch::<W>(prepared, rows);
+        }
+        let brief = BRIEF / system.fastest();
+        for (lane, &number) in members.iter().enumerate().take(count) {
+            let bit = 1 << lane;
+            let length = switches.at[lane];
+            let switched = switches.found & bit != 0;
+            let known = (switches.uncertain | idle) & bit == 0 && (!switched || length > brief);
+            let member = &mut self.members[number];
+            if known {
+                self.stretches.together += 1;
+                member.go_on(&system, &self.pack, prepared, lane, length, switched);
+            } else {
+                self.stretches.alone += 1;
+                member.go_on_alone::<W::One>(&system, &mut self.alone);
+            }
+        }
+    }
+}
+
+/// Whether motions of a system can go side by side: one guard leads out of each regime, tabulated,
+/// and nothing is known of it but that it starts at zero.
+fn fits(system: &System) -> bool {
+    let simple = |regime: usize| {
+        let ([prepared], [transition]) = (
+            system.prepared(regime),
+            system.transitions()[regime].as_slice(),
+        ) else {
+            return false;
+        };
+        prepared.table.as_ref().is_some_and(side_by_side::fits)
+            && prepared.sticking.is_none()
+            && !transition.release
+            && transition.onset.is_none()
+    };
+    system.largest_angle() <= LARGEST_ANGLE && (0..system.regimes().len()).all(simple)
+}
+
+impl Member {
+    /// How far it may be looked for a switch at once, as for one motion.
+    #[inline(always)]
+    fn reach(&self, system: &System) -> f64 {
+        let period = system.drive().period();
+        let left = if self.left > 1 {
+            period
+        } else {
+            period - self.phase
+        };
+        left.min(system.table_reach(self.regime))
+    }
+
+    /// Takes what was computed in a lane: `length` of time passed, and a switch at its end or none.
+    #[inline(always)]
+    fn go_on(
+        &mut self,
+        system: &System,
+        pack: &Pack,
+        prepared: &PreparedTransition,
+        lane: usize,
+        length: f64,
+        switched: bool,
+    ) {
+        let period = system.drive().period();
+        let to_the_end = !switched && self.left == 1 && length >= period - self.phase;
+        self.phase = if to_the_end {
+            period
+        } else {
+            self.phase + length
+        };
+        self.stalled = 0;
+        if switched {
+            self.regime = prepared.switch.to;
+            let rate = None;
+            self.surface = prepared.reverse.map(|k| (k, Start::Surface { rate }));
+        } else if length > 0.0 {
+            self.surface = None;
+        }
+        let coordinates = if switched {
+            &pack.switched
+        } else {
+            &pack.coordinates
+        };
+        let modes = coordinates.len() - system.drive().frequencies().len();
+        self.packed.resize(
+            layout::vectors_for(coordinates.len()),
+            ComplexVector::default(),
+        );
+        for (k, [re, im]) in coordinates.iter().enumerate().take(modes) {
+            let (vector, place) = layout::place(k);
+            self.packed[vector][0][place] = re[lane];
+            self.packed[vector][1][place] = im[lane];
+        }
+        if self.phase >= period {
+            self.phase = if self.left > 1 {
+                self.phase - period
+            } else {
+                0.0
+            };
+            self.left -= 1;
+        }
+    }
+
+    /// Goes on to the next switch as a motion does that has nobody beside it.
+    #[inline(always)]
+    fn go_on_alone<S: Simd>(&mut self, system: &System, alone: &mut Motion) {
+        self.hand_to(system, alone);
+        match alone.run_stretch::<S>(system, &mut self.left, &mut self.stalled) {
+            Ok(()) => {
+                self.regime = alone.regime;
+                self.phase = alone.phase;
+                self.packed.clone_from(&alone.packed);
+                self.surface = alone.surface;
+            }
+            Err(failure) => {
+                self.failure = Some(failure);
+                self.left = 0;
+            }
+        }
+    }
+
+    /// Makes `motion` this one. Phasors follow from the phase.
+    fn hand_to(&self, system: &System, motion: &mut Motion) {
+        motion.regime = self.regime;
+        motion.phase = self.phase;
+        motion.packed.clone_from(&self.packed);
+        motion.surface = self.surface;
+        motion.set_phasors(system);
+    }
+}
+
+impl Pack {
+    /// Gives each member a lane.
+    #[inline(always)]
+    fn gather<W: Wide>(
+        &mut self,
+        system: &System,
+        count: usize,
+        all: &[Member],
+        members: &[usize; LANES],
+    ) {
+        self.coordinates.resize(count, ComplexOctet::default());
+        let tones = system.drive().frequencies();
+        let (modal, phasors) = self.coordinates.split_at_mut(count - tones.len());
+        let mut phase = Octet::default();
+        for (lane, &member) in members.iter().enumerate() {
+            let Member {
+                packed, phase: own, ..
+            } = &all[member];
+            phase[lane] = *own;
+            for (k, [re, im]) in modal.iter_mut().enumerate() {
+                let (vector, place) = layout::place(k);
+                re[lane] = packed[vector][0][place];
+                im[lane] = packed[vector][1][place];
+            }
+        }
+        let phase = W::load(&phase);
+        for (phasor, frequency) in phasors.iter_mut().zip(tones) {
+            let (sine, cosine) = simd::sin_cos::<W>(W::mul(W::splat(*frequency), phase));
+            *phasor = W::store_complex([cosine, sine]);
+        }
+    }
+
+    /// Works out the amplitudes of the guard's terms.
+    #[inline(always)]
+    fn amplitudes<W: Wide>(&mut self, kernel: &Kernel, table: &Table) -> Sums {
+        let zero = W::splat(0.0);
+        let (mut size, mut third) = (W::splat(kernel.constant.abs()), zero);
+        let (mut first, mut weighted) = (zero, [zero; 4]);
+        self.amplitudes
+            .resize(kernel.count, ComplexOctet::default());
+        let terms = self.amplitudes.iter_mut().zip(&self.coordinates);
+        for (k, (amplitude, q)) in terms.enumerate() {
+            let (vector, place) = layout::place(k);
+            let terms = &kernel.vectors[vector];
+            let weight = [
+                W::splat(terms.weight[0][place]),
+                W::splat(terms.weight[1][place]),
+            ];
+            let a = simd::complex_mul::<W>(weight, W::load_complex(q));
+            let norm = W::sqrt(W::fma(a[0], a[0], W::mul(a[1], a[1])));
+            size = W::add(size, norm);
+            third = W::fma(norm, W::splat(terms.cube[place]), third);
+            first = W::fma(W::splat(terms.decay[place]), a[0], first);
+            first = W::fnma(W::splat(terms.frequency[place]), a[1], first);
+            for (sum, weight) in weighted.iter_mut().zip(&table.fine.weights[vector]) {
+                *sum = W::fma(norm, W::splat(weight[place]), *sum);
+            }
+            *amplitude = W::store_complex(a);
+        }
+        Sums {
+            size: W::store(size),
+            third: W::store(third),
+            rate: W::store(first),
+            weighted: [
+                W::store(weighted[0]),
+                W::store(weighted[1]),
+                W::store(weighted[2]),
+                W::store(weighted[3]),
+            ],
+        }
+    }
+
+    /// The switches within the intervals: by Newton's method with two more derivatives from where
+    /// the interval's quintic falls through zero. Where a lane has none, factors are those of the
+    /// search's end.
+    #[inline(always)]
+    fn switches<W: Wide>(
+        &mut self,
+        system: &System,
+        prepared: &PreparedTransition,
+        sums: &Sums,
+        intervals: &Intervals<W>,
+        bounds: &Bounds<W>,
+        width: f64,
+        reach: Octet,
+    ) -> Switches {
+        let (kernel, found) = (&prepared.kernel, intervals.found);
+        let quintic = Quintic::<W> {
+            width: W::splat(width),
+            ends: intervals.ends,
+        };
+        let zero = W::splat(0.0);
+        let gentlest = W::sub(zero, quintic.rates()[1]);
+        let [above, under] = [quintic.ends[0][0], W::sub(zero, quintic.ends[1][0])];
+        // Above zero at one end, below at the other, and falling all the way.
+        let mut uncertain = W::below(above, bounds.error)
+            | W::below(under, bounds.error)
+            | W::below(gentlest, W::splat(f64::MIN_POSITIVE));
+        let falls = !W::below(gentlest, bounds.rate_error);
+        let (start, length) = (intervals.start, W::load(&reach));
+        let end = W::add(start, W::splat(width));
+        let mut open = found & !uncertain;
+        let mut at = W::store(W::fma(quintic.zero(), quintic.width, start));
+        for lane in 0..LANES {
+            if open & (1 << lane) == 0 {
+                at[lane] = reach[lane];
+            }
+        }
+        let mut rest = [0.0; LANES];
+        for evaluation in 0..MOST_EVALUATIONS {
+            let from = W::load(&at);
+            let near = Near::<W> {
+                cubic: self.evaluate::<W>(kernel, from),
+                third: W::load(&sums.third),
+                fastest: W::splat(kernel.fastest),
+                noise: W::mul(W::splat(NOISE), W::load(&sums.size)),
+                length,
+            };
+            if evaluation == 0 {
+                uncertain |= !falls & near.not_unique(gentlest, bounds.error);
+                open &= !uncertain;
+            }
+            let step = near.cubic.step();
+            let turn = W::mul(W::abs(step), W::splat(system.fastest()));
+            let last = !near.goes_on(step, near.cubic.slope(step))
+                & !W::below(W::splat(SMALL_ANGLE), turn);
+            let next = W::add(from, step);
+            // A switch lies before the end of the stretch, and Newton's method stays in the interval.
+            let lost = W::below(next, zero)
+                | (last & W::below(length, next))
+                | (!last & (W::below(next, start) | W::below(end, next)));
+            uncertain |= open & lost;
+            let (step, next) = (W::store(step), W::store(next));
+            let going_on = open & !lost & !last;
+            for lane in 0..LANES {
+                let bit = 1 << lane;
+                if open & last & !lost & bit != 0 {
+                    rest[lane] = step[lane];
+                } else if going_on & bit != 0 {
+                    at[lane] = next[lane];
+                }
+            }
+            open = going_on;
+            if open == 0 {
+                break;
+            }
+        }
+        uncertain |= open;
+        Switches {
+            found,
+            uncertain: found & uncertain,
+            at: W::store(W::add(W::load(&at), W::load(&rest))),
+            rest,
+        }
+    }
+
+    /// The guard and its first three derivatives at time `at`, whose exponentials are kept.
+    #[inline(always)]
+    fn evaluate<W: Wide>(&mut self, kernel: &Kernel, at: W::Register) -> Cubic<W> {
+        let zero = W::splat(0.0);
+        let mut sums = [W::splat(kernel.constant), zero, zero, zero];
+        self.factors.resize(kernel.count, ComplexOctet::default());
+        for (k, (factor, a)) in self.factors.iter_mut().zip(&self.amplitudes).enumerate() {
+            let rate = kernel.rate(k);
+            let powers = [rate, rate * rate, rate * rate * rate];
+            let (decay, frequency) = (W::splat(rate.re), W::splat(rate.im));
+            let turned = simd::exp_complex::<W>(decay, frequency, at);
+            let [re, im] = simd::complex_mul::<W>(W::load_complex(a), turned);
+            sums[0] = W::add(sums[0], re);
+            for (sum, power) in sums[1..].iter_mut().zip(powers) {
+                *sum = W::fma(W::splat(power.re), re, *sum);
+                *sum = W::fnma(W::splat(power.im), im, *sum);
+            }
+            *factor = W::store_complex(turned);
+        }
+        let [value, rate, curvature, jerk] = sums;
+        Cubic {
+            value,
+            rate,
+            curvature,
+            jerk,
+        }
+    }
+
+    /// Moves on by the times that were evaluated and what is left beyond them.
+    #[inline(always)]
+    fn pass<W: Wide>(&mut self, kernel: &Kernel, rest: Octet) {
+        let rest = W::load(&rest);
+        for (k, (q, factor)) in self.coordinates.iter_mut().zip(&self.factors).enumerate() {
+            let rate = kernel.rate(k);
+            let z = [
+                W::mul(W::splat(rate.re), rest),
+                W::mul(W::splat(rate.im), rest),
+            ];
+            let turn = simd::complex_mul::<W>(W::load_complex(factor), simd::exp_small::<W>(z));
+            *q = W::store_complex(simd::complex_mul::<W>(W::load_complex(q), turn));
+        }
+    }
+
+    /// Changes the basis as at a switch, to `rows` modal coordinates.
+    #[inline(always)]
+    fn switch<W: Wide>(&mut self, prepared: &PreparedTransition, rows: usize) {
+        let tones = self.coordinates.len() - prepared.guard.modal.len();
+        self.switched.resize(rows + tones, ComplexOctet::default());
+        let map = &prepared.switch.packed;
+        map.apply_wide::<W>(&self.coordinates, rows, &mut self.switched);
+        let phasors = &self.coordinates[self.coordinates.len() - tones..];
+        self.switched[rows..].copy_from_slice(phasors);
+    }
+}
+
+/// [`Ensemble::run_all`].
+struct RunAll<'a>(&'a mut Ensemble);
+
+impl WideWork for RunAll<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        self.0.run_all::<W>();
+    }
+}

@@ -34,16 +34,21 @@ pub(crate) fn advance<M: StroboscopicMap>(
     finite(state)
 }
 
-/// As [`advance`], over several periods without looking in between.
-#[inline]
-pub(crate) fn advance_by<M: StroboscopicMap>(
+/// As [`advance`], of many states, each over periods of its own without looking in between.
+pub(crate) fn advance_each<M: StroboscopicMap>(
     map: &mut M,
-    state: &mut [f64],
-    periods: usize,
-) -> Result<(), MapFailure> {
-    map.advance_by(state, periods)
-        .map_err(MapFailure::refused)?;
-    finite(state)
+    states: &mut [f64],
+    periods: &[usize],
+) -> Vec<Result<(), MapFailure>> {
+    let advanced = map.advance_each(states, periods).into_iter();
+    let states = states.chunks_exact(map.dimension());
+    advanced
+        .zip(states)
+        .map(|(result, state)| {
+            result.map_err(MapFailure::refused)?;
+            finite(state)
+        })
+        .collect()
 }
 
 /// As [`advance`], with the Jacobian.

@@ -59,6 +59,21 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         (0..periods).try_for_each(|_| self.advance(state))
     }
 
+    /// Replaces each of `states` (of length `dimension`, one after the other) by `Pᵏ` of it, with `k`
+    /// from `periods`, which says how many there are. A flow that takes several at a time may be faster
+    /// than [`advance_by`](Self::advance_by) of each; what comes of one does not depend on the
+    /// others, and differs from that by rounding only. A
+    /// state that cannot be followed is of no use afterwards.
+    fn advance_each(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+    ) -> Vec<Result<(), Self::Error>> {
+        let each = states.chunks_exact_mut(self.dimension()).zip(periods);
+        each.map(|(state, &periods)| self.advance_by(state, periods))
+            .collect()
+    }
+
     /// Replaces `state` by `P(state)` and `jacobian` (`dimension × dimension`)
     /// by `DP(state)`.
     ///

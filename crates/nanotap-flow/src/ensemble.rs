@@ -139,15 +139,22 @@ impl Ensemble {
     pub fn advance(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Result<(), FlowError>> {
         let n = self.system.dimension();
         assert_eq!(states.len(), n * periods.len(), "a state for each motion");
-        let each = states.chunks_exact_mut(n).zip(periods);
         if !self.fits {
+            let each = states.chunks_exact_mut(n).zip(periods);
             return each
                 .map(|(x, &periods)| self.advance_alone(x, periods))
                 .collect();
         }
+        self.begin(states, periods);
+        simd::dispatch_wide(RunAll(self));
+        self.end(states, periods)
+    }
+
+    /// Makes members of states.
+    fn begin(&mut self, states: &[f64], periods: &[usize]) {
         let system = Arc::clone(&self.system);
         self.members.clear();
-        for (x, &left) in each {
+        for (x, &left) in states.chunks_exact(system.dimension()).zip(periods) {
             let failure = self.alone.start_checked(&system, x, 0.0).err();
             let member = Member {
                 regime: self.alone.regime,
@@ -163,11 +170,19 @@ impl Ensemble {
             }
             self.members.push(member);
         }
-        simd::dispatch_wide(RunAll(self));
+    }
+
+    /// Writes where members have come to.
+    fn end(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Result<(), FlowError>> {
+        let system = Arc::clone(&self.system);
         let Self { members, alone, .. } = self;
-        let each = states.chunks_exact_mut(n).zip(members.drain(..));
-        each.map(|(x, member)| match member.failure {
+        let each = states
+            .chunks_exact_mut(system.dimension())
+            .zip(members.drain(..))
+            .zip(periods);
+        each.map(|((x, member), periods)| match member.failure {
             Some(failure) => Err(failure),
+            None if *periods == 0 => Ok(()),
             None => {
                 member.hand_to(&system, alone);
                 alone.write_state(&system, x);
@@ -614,5 +629,49 @@ impl WideWork for RunAll<'_> {
     #[inline(always)]
     fn run<W: Wide>(self) {
         self.0.run_all::<W>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Plain, Twice};
+    use crate::{Drive, HarmonicVector, Output, Regime, Transition};
+    use nalgebra::{DMatrix, DVector, RowDVector};
+
+    /// A mass on a spring that taps another.
+    fn system() -> Arc<System> {
+        let drive = Drive::single(2.6).unwrap();
+        let regime = |index: usize, stiffness: f64| {
+            let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -9.0 - stiffness, -0.3]);
+            let push = DVector::from_vec(vec![0.0, 1.0]);
+            let forcing = HarmonicVector::zeros(2, 1).with_tone(0, &push, &(0.2 * &push));
+            Regime::new(index, matrix, forcing, &drive).unwrap()
+        };
+        let gap = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
+        let transitions = vec![
+            vec![Transition::new(gap.clone(), 1)],
+            vec![Transition::new(gap.scaled(-1.0), 0)],
+        ];
+        let regimes = vec![regime(0, 0.0), regime(1, 40.0)];
+        Arc::new(System::new(drive.clone(), regimes, transitions).unwrap())
+    }
+
+    fn states() -> Vec<f64> {
+        (0..40).map(|k| 0.1 * f64::from(k % 7) - 0.3).collect()
+    }
+
+    /// Numbers side by side in registers, in two or one, are those of any machine.
+    #[test]
+    fn every_arithmetic_gives_the_same_bits() {
+        let mut ensemble = Ensemble::new(system());
+        let (mut plain, mut fastest) = (states(), states());
+        ensemble.begin(&plain, &[9; 20]);
+        RunAll(&mut ensemble).run::<Twice<Plain>>();
+        let results = ensemble.end(&mut plain, &[9; 20]);
+        assert!(results.iter().all(Result::is_ok));
+        ensemble.advance(&mut fastest, &[9; 20]);
+        assert_eq!(plain, fastest);
+        assert_ne!(plain, states());
     }
 }

@@ -12,7 +12,7 @@
 //! the label of a start within rounding of a basin boundary is a matter of chance.
 
 use crate::census::{Attractor, AttractorKind};
-use crate::failure::{MapFailure, advance, advance_by};
+use crate::failure::{MapFailure, advance, advance_each};
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::vector::norm;
@@ -151,6 +151,8 @@ impl Default for BasinOptions {
 
 /// Last states of an unsettled start that must lie in an attractor's box.
 const LAST: usize = 64;
+/// Starts that are followed together: a flow may advance several at a time.
+const TOGETHER: usize = 64;
 /// Strobe points that the box of an attractor that is no orbit is drawn around.
 const CLOUD: usize = 4096;
 
@@ -222,69 +224,133 @@ impl Basins {
         map: &mut M,
         range: std::ops::Range<usize>,
     ) -> Vec<Label> {
-        let d = map.dimension();
-        let mut state = vec![0.0; d];
-        let mut scratch = vec![0.0; d];
-        (range.start..range.end.min(self.len()))
-            .map(|index| {
-                self.slice.state(index, &mut state);
-                self.label(map, &mut state, &mut scratch)
-                    .unwrap_or_else(|failure| match failure {
-                        MapFailure::NotFinite => Label::Unbounded,
-                        MapFailure::Refused(_) => Label::Failed,
-                    })
-            })
-            .collect()
+        let points: Vec<usize> = (range.start..range.end.min(self.len())).collect();
+        let mut labels = vec![Label::Unsettled; points.len()];
+        for (points, labels) in points.chunks(TOGETHER).zip(labels.chunks_mut(TOGETHER)) {
+            self.label(map, points, labels);
+        }
+        labels
     }
 
-    fn label<M: StroboscopicMap>(
+    /// Labels some points, whose motions are followed together.
+    fn label<M: StroboscopicMap>(&self, map: &mut M, points: &[usize], labels: &mut [Label]) {
+        let d = map.dimension();
+        let mut scratch = vec![0.0; d];
+        let mut states = vec![0.0; d * points.len()];
+        for (state, &point) in states.chunks_exact_mut(d).zip(points) {
+            self.slice.state(point, state);
+        }
+        let mut runs: Vec<Run<'_>> = (0..points.len())
+            .map(|number| Run::new(number, self))
+            .collect();
+        let mut periods = Vec::with_capacity(points.len());
+        while !runs.is_empty() {
+            let (mut going_on, mut left) = (Vec::with_capacity(states.len()), Vec::new());
+            periods.clear();
+            for (mut run, state) in runs.into_iter().zip(states.chunks_exact(d)) {
+                match self.look(map, &mut run, state, &mut scratch) {
+                    Ok(Look::Again(after)) => {
+                        going_on.extend_from_slice(state);
+                        periods.push(after);
+                        run.period += after;
+                        left.push(run);
+                    }
+                    Ok(Look::Settled(label)) => labels[run.number] = label,
+                    Err(failure) => labels[run.number] = label_of(&failure),
+                }
+            }
+            let advanced = advance_each(map, &mut going_on, &periods);
+            (runs, states) = (Vec::with_capacity(left.len()), Vec::new());
+            let each = left.into_iter().zip(going_on.chunks_exact(d));
+            for ((run, state), result) in each.zip(advanced) {
+                match result {
+                    Ok(()) => {
+                        states.extend_from_slice(state);
+                        runs.push(run);
+                    }
+                    Err(failure) => labels[run.number] = label_of(&failure),
+                }
+            }
+        }
+    }
+
+    /// Looks where a run is: its label, or in how many periods to look again.
+    fn look<M: StroboscopicMap>(
         &self,
         map: &mut M,
-        state: &mut [f64],
+        run: &mut Run<'_>,
+        state: &[f64],
         scratch: &mut [f64],
-    ) -> Result<Label, MapFailure> {
-        let max_periods = self.options.max_periods;
-        // Boxes that have held every one of the last states, as bits.
-        let mut inside = vec![true; self.boxes.len()];
-        let mut wait = Wait::new(&self.balls);
-        let mut period = 0;
-        loop {
-            let size = norm(state);
-            if size > self.options.bound {
-                return Ok(Label::Unbounded);
-            }
-            for (label, ball) in &self.balls {
-                if ball.contains(state) && ball.holds(map, state, scratch)? {
-                    return Ok(Label::Attractor(*label));
-                }
-            }
-            if period + LAST > max_periods {
-                for (flag, (_, low, high)) in inside.iter_mut().zip(&self.boxes) {
-                    *flag &= state
-                        .iter()
-                        .zip(low.iter().zip(high))
-                        .all(|(x, (l, h))| l <= x && x <= h);
-                }
-            }
-            if period == max_periods {
-                break;
-            }
-            // The last states are all looked at, and those of a motion that may run off.
-            let unwatched = (max_periods + 1).saturating_sub(period + LAST);
-            let periods = if size > SMALL * self.options.bound {
-                1
-            } else {
-                wait.after(state).min(unwatched).max(1)
-            };
-            advance_by(map, state, periods)?;
-            period += periods;
+    ) -> Result<Look, MapFailure> {
+        let (max_periods, period) = (self.options.max_periods, run.period);
+        let size = norm(state);
+        if size > self.options.bound {
+            return Ok(Look::Settled(Label::Unbounded));
         }
-        let mut held = self.boxes.iter().zip(&inside).filter(|(_, f)| **f);
-        Ok(match (held.next(), held.next()) {
-            (Some(((label, ..), _)), None) => Label::Attractor(*label),
-            _ => Label::Unsettled,
-        })
+        for (label, ball) in &self.balls {
+            if ball.contains(state) && ball.holds(map, state, scratch)? {
+                return Ok(Look::Settled(Label::Attractor(*label)));
+            }
+        }
+        if period + LAST > max_periods {
+            for (flag, (_, low, high)) in run.inside.iter_mut().zip(&self.boxes) {
+                *flag &= state
+                    .iter()
+                    .zip(low.iter().zip(high))
+                    .all(|(x, (l, h))| l <= x && x <= h);
+            }
+        }
+        if period == max_periods {
+            let mut held = self.boxes.iter().zip(&run.inside).filter(|(_, f)| **f);
+            return Ok(Look::Settled(match (held.next(), held.next()) {
+                (Some(((label, ..), _)), None) => Label::Attractor(*label),
+                _ => Label::Unsettled,
+            }));
+        }
+        // The last states are all looked at, and those of a motion that may run off.
+        let unwatched = (max_periods + 1).saturating_sub(period + LAST);
+        Ok(Look::Again(if size > SMALL * self.options.bound {
+            1
+        } else {
+            run.wait.after(state).min(unwatched).max(1)
+        }))
     }
+}
+
+fn label_of(failure: &MapFailure) -> Label {
+    match failure {
+        MapFailure::NotFinite => Label::Unbounded,
+        MapFailure::Refused(_) => Label::Failed,
+    }
+}
+
+/// A start that is being followed.
+struct Run<'a> {
+    /// Whose label it is.
+    number: usize,
+    /// Periods so far.
+    period: usize,
+    /// Boxes that have held every one of the last states.
+    inside: Vec<bool>,
+    wait: Wait<'a>,
+}
+
+impl<'a> Run<'a> {
+    fn new(number: usize, basins: &'a Basins) -> Self {
+        Self {
+            number,
+            period: 0,
+            inside: vec![true; basins.boxes.len()],
+            wait: Wait::new(&basins.balls),
+        }
+    }
+}
+
+/// What comes of a look at a run.
+enum Look {
+    Settled(Label),
+    /// It is to be looked at again after so many periods.
+    Again(usize),
 }
 
 /// How long a start need not be looked at: half of what it would take to the nearest ball at

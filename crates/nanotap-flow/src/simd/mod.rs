@@ -34,7 +34,7 @@ pub(crate) use functions::{
 };
 pub(crate) use plain::{Library, Plain};
 pub(crate) use single::Single;
-use twice::Twice;
+pub(crate) use twice::Twice;
 
 /// Numbers in a vector.
 pub(crate) const WIDTH: usize = 4;

@@ -46,7 +46,84 @@ fn each_operation(a: Vector) -> Vec<[u64; 6]> {
     results
 }
 
+/// What eight lanes give for `x`, `y` and what follows from them, in every operation.
+fn in_eight<W: Wide>(x: &Octet, y: &Octet) -> Vec<u64> {
+    let (x, y) = (W::load(x), W::load(y));
+    let half = W::mul(x, W::splat(1e-3));
+    let small = [W::mul(x, W::splat(1e-9)), W::mul(y, W::splat(1e-9))];
+    let (sine, cosine) = sin_cos::<W>(y);
+    let [re, im] = exp_small::<W>(small);
+    let numbers = [
+        exp::<W>(half),
+        sine,
+        cosine,
+        re,
+        im,
+        W::fma(x, y, x),
+        W::fnma(x, y, x),
+        W::div(x, y),
+        W::sqrt(W::abs(x)),
+        W::add(W::min(x, y), W::max(x, y)),
+        W::sub(W::clamp(x, -2.0, 3.0), y),
+        W::select(0b1011_0010, x, y),
+    ];
+    let mut bits: Vec<u64> = numbers
+        .into_iter()
+        .flat_map(|register| W::store(register).map(f64::to_bits))
+        .collect();
+    bits.push(u64::from(W::below(x, y)));
+    bits
+}
+
 proptest! {
+    /// Eight lanes in one register, in two and in plain numbers give the same bits, and
+    /// each lane what a number alone would.
+    #[test]
+    fn eight_lanes_agree_in_every_bit(
+        x in proptest::array::uniform8(-1e3..1e3_f64),
+        y in proptest::array::uniform8(-1e3..1e3_f64),
+    ) {
+        let expected = in_eight::<Twice<Plain>>(&x, &y);
+        #[cfg(target_arch = "x86_64")]
+        if avx2_available() {
+            prop_assert_eq!(&expected, &in_eight::<Twice<Avx2>>(&x, &y));
+        }
+        #[cfg(target_arch = "x86_64")]
+        if avx512_available() {
+            prop_assert_eq!(&expected, &in_eight::<avx512::Avx512>(&x, &y));
+        }
+        let (_, rows) = expected.split_last().unwrap();
+        for lane in 0..LANES {
+            let (sine, cosine) = sin_cos::<Plain>(Plain::splat(y[lane]));
+            prop_assert_eq!(rows[LANES + lane], sine[0].to_bits());
+            prop_assert_eq!(rows[2 * LANES + lane], cosine[0].to_bits());
+            prop_assert_eq!(rows[7 * LANES + lane], (x[lane] / y[lane]).to_bits());
+            let chosen = if 0b1011_0010 & (1 << lane) == 0 { y } else { x };
+            prop_assert_eq!(rows[11 * LANES + lane], chosen[lane].to_bits());
+            prop_assert_eq!(expected[12 * LANES] >> lane & 1, u64::from(x[lane] < y[lane]));
+        }
+    }
+
+    /// `e^z` of small arguments against the library's, to rounding.
+    #[test]
+    fn small_exponentials_are_accurate(re in -0.003..0.003_f64, im in -0.003..0.003_f64) {
+        let [a, b] = exp_small::<Single>([re, im]);
+        prop_assert!((a - re.exp() * im.cos()).abs() < 4e-16, "{a}");
+        prop_assert!((b - re.exp() * im.sin()).abs() < 3e-17, "{b}");
+    }
+
+    /// A number alone is turned, and its exponential made, as any other.
+    #[test]
+    fn a_number_alone_has_the_same_functions(x in -700.0..700.0_f64, y in -1e4..1e4_f64) {
+        let (sine, cosine) = sin_cos::<Single>(y);
+        prop_assert!((sine - y.sin()).abs() < 1e-12 && (cosine - y.cos()).abs() < 1e-12);
+        prop_assert!((exp::<Single>(x) / x.exp() - 1.0).abs() < 1e-12);
+        prop_assert_eq!(Single::below(x, y), u32::from(x < y));
+        prop_assert_eq!(Single::below(f64::NAN, y), 1);
+        prop_assert_eq!(Single::map(x, f64::abs), Single::abs(x));
+        prop_assert_eq!(Single::clamp(x, -1.0, 2.0), x.clamp(-1.0, 2.0));
+    }
+
     /// Against the standard library's functions, to three units in the last place: one and a
     /// half of ours, one of the library's and the quotient's rounding.
     #[test]

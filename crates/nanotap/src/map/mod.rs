@@ -52,6 +52,8 @@ pub const MOST_NUMBERS: usize = 200_000_000;
 
 /// Drive periods between two looks at whether the work is to stop.
 const UNINTERRUPTED: usize = 1024;
+/// States that are advanced together.
+const TOGETHER: usize = 64;
 
 /// Why the map could not be made or applied.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -183,7 +185,8 @@ impl Map {
     }
 
     /// Replaces every one of `states` (row by row, `rows × n`) by `Pᵏ` of it, `k = periods`,
-    /// on the threads of the present pool; the same bits whatever their number.
+    /// on the threads of the present pool; the same bits whatever their number. Many states are
+    /// advanced side by side, and come out as one alone to rounding.
     ///
     /// # Errors
     /// When the rows are no states, a motion cannot be followed, or the work was stopped.
@@ -195,17 +198,20 @@ impl Map {
     ) -> Result<(), MapError> {
         let n = self.dimension();
         let rows = self.rows(states)?;
-        let one = |strobe: &mut Strobe, (index, state): (usize, &mut [f64])| {
-            advance(strobe, state, periods, control).map_err(|error| error.after(index))
-        };
-        let few = rows.saturating_mul(periods) <= UNINTERRUPTED;
-        if rows == 1 || few {
-            let mut strobe = self.strobe();
-            let mut states = states.chunks_mut(n).enumerate();
-            return states.try_for_each(|state| one(&mut strobe, state));
+        if rows == 1 {
+            return advance(&mut self.strobe(), states, periods, control);
         }
-        let states = states.par_chunks_mut(n).enumerate();
-        states.try_for_each_init(|| self.strobe(), one)
+        let some = |strobe: &mut Strobe, (number, states): (usize, &mut [f64])| {
+            advance_all(strobe, states, periods, control)
+                .map_err(|error| error.after(number * TOGETHER))
+        };
+        if rows.saturating_mul(periods) <= UNINTERRUPTED {
+            let mut strobe = self.strobe();
+            let mut parts = states.chunks_mut(TOGETHER * n).enumerate();
+            return parts.try_for_each(|part| some(&mut strobe, part));
+        }
+        let parts = states.par_chunks_mut(TOGETHER * n).enumerate();
+        parts.try_for_each_init(|| self.strobe(), some)
     }
 
     /// The states `z, Pᵉ(z), P²ᵉ(z), …` for `e = every`, `count` of them, row by row
@@ -369,6 +375,26 @@ fn advance(
         }
         let now = (periods - done).min(UNINTERRUPTED);
         strobe.advance_by(state, now).map_err(of_state(0))?;
+    }
+    Ok(())
+}
+
+/// The same of many states, one after the other.
+fn advance_all(
+    strobe: &mut Strobe,
+    states: &mut [f64],
+    periods: usize,
+    control: &Control<'_>,
+) -> Result<(), MapError> {
+    let rows = states.len() / strobe.dimension().max(1);
+    for done in (0..periods).step_by(UNINTERRUPTED) {
+        if control.is_cancelled() {
+            return Err(MapError::Stopped);
+        }
+        let now = (periods - done).min(UNINTERRUPTED);
+        let advanced = strobe.advance_each(states, &vec![now; rows]);
+        let mut failures = advanced.into_iter().enumerate();
+        failures.try_for_each(|(index, result)| result.map_err(of_state(index)))?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use nanotap_flow::search::sign_changes;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::signal::Signal;
 use nanotap_flow::system::{Switch, Transition};
-use nanotap_flow::{Flow, FlowError, Output, System};
+use nanotap_flow::{Ensemble, Flow, FlowError, Output, System};
 
 use crate::model::nonlinear::NonlinearStrobe;
 use crate::model::{Model, MotionError, Tangent, TangentKind};
@@ -128,6 +128,25 @@ impl StroboscopicMap for Strobe {
         }
     }
 
+    /// Eight at a time where the model is piecewise linear with one contact.
+    fn advance_each(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+    ) -> Vec<Result<(), MotionError>> {
+        match &mut self.0 {
+            Engine::Exact(map) => {
+                let advanced = map.ensemble().advance(states, periods).into_iter();
+                advanced.map(|result| Ok(result?)).collect()
+            }
+            Engine::Nonlinear(map) => {
+                let each = states.chunks_exact_mut(map.dimension()).zip(periods);
+                each.map(|(state, &periods)| (0..periods).try_for_each(|_| map.advance(state)))
+                    .collect()
+            }
+        }
+    }
+
     fn advance_with_jacobian(
         &mut self,
         state: &mut [f64],
@@ -189,6 +208,8 @@ impl StroboscopicMap for Strobe {
 #[derive(Clone, Debug)]
 struct ExactStrobe {
     flow: Flow,
+    /// Many motions at a time, once that is asked for.
+    ensemble: Option<Box<Ensemble>>,
     /// The state that the flow was last left in: whoever goes on from it need not start anew.
     last: Vec<f64>,
     /// Work space of a Jacobian.
@@ -204,12 +225,19 @@ impl ExactStrobe {
     fn new(model: &Model, tangents: Vec<SystemTangent>) -> Self {
         Self {
             flow: Flow::new(Arc::clone(&model.system)),
+            ensemble: None,
             last: Vec::new(),
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
             parts_at_rest: model.forgetting.is_some(),
             tangents: tangents.into(),
         }
+    }
+
+    fn ensemble(&mut self) -> &mut Ensemble {
+        let system = self.flow.system();
+        self.ensemble
+            .get_or_insert_with(|| Box::new(Ensemble::new(Arc::clone(system))))
     }
 
     fn advance_with_derivatives(

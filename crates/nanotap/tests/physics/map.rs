@@ -38,9 +38,15 @@ fn many_states_go_as_each_alone_and_stop_when_told() {
     let mut left = states.clone();
     let refused = map.apply_all(&mut left, 1500, &stopped);
     assert!(matches!(refused, Err(MapError::Stopped)));
+    let mut in_halves = states.clone();
     map.apply_all(&mut states, 1500, &Control::default())
         .unwrap();
-    assert_eq!(states, alone);
+    assert!(largest(&states, &alone) < 1e-12);
+    // Who is beside a state changes nothing.
+    for half in in_halves.chunks_mut(10 * 6) {
+        map.apply_all(half, 1500, &Control::default()).unwrap();
+    }
+    assert_eq!(states, in_halves);
 }
 
 #[test]

@@ -143,15 +143,13 @@ pub(super) fn at_value(
         ]);
     };
     let mut runner = Runner::new(&case, &model, &sweep.options);
-    let mut outcomes = Vec::with_capacity(starts.len());
-    for start in starts {
-        if cancelled() {
-            return None;
-        }
-        let state = sweep.options.starts.state(start, &model);
-        outcomes.push(runner.run(&state).0);
+    let states = starts.map(|start| sweep.options.starts.state(start, &model));
+    if let Some(transient) = sweep.options.transient {
+        return runner.all_after(&states.collect::<Vec<_>>(), transient, cancelled);
     }
-    Some(outcomes)
+    states
+        .map(|state| (!cancelled()).then(|| runner.classified(&state).0))
+        .collect()
 }
 
 /// The runs along a line of the first parameter, each from the last state of the one
@@ -210,6 +208,9 @@ impl SweepOptions {
     }
 }
 
+/// Periods of all starts of a value between two looks whether the work is to stop.
+const UNINTERRUPTED: usize = 1024;
+
 /// Runs one model again and again.
 struct Runner<'a> {
     options: &'a SweepOptions,
@@ -261,21 +262,65 @@ impl<'a> Runner<'a> {
         }
     }
 
+    /// The motions from all these starts after a number of periods, which are passed together; `None`
+    /// when it was stopped.
+    fn all_after(
+        &mut self,
+        starts: &[Vec<f64>],
+        transient: usize,
+        cancelled: &impl Fn() -> bool,
+    ) -> Option<Vec<Outcome>> {
+        let dimension = self.map.dimension();
+        let mut states = starts.concat();
+        let mut failures = vec![None; starts.len()];
+        for done in (0..transient).step_by(UNINTERRUPTED) {
+            if cancelled() {
+                return None;
+            }
+            // A motion that has failed is not followed any further.
+            let now = (transient - done).min(UNINTERRUPTED);
+            let periods: Vec<usize> = failures
+                .iter()
+                .map(|failure| if failure.is_none() { now } else { 0 })
+                .collect();
+            let advanced = self.map.advance_each(&mut states, &periods);
+            for (failure, result) in failures.iter_mut().zip(advanced) {
+                *failure = failure.or(result.err().as_ref().map(class_of));
+            }
+        }
+        let each = states.chunks_exact(dimension).zip(failures);
+        each.map(|(state, failure)| {
+            if cancelled() {
+                return None;
+            }
+            Some(match failure {
+                Some(class) => Outcome::unknown(class, transient),
+                None => self.settled(state, transient).0,
+            })
+        })
+        .collect()
+    }
+
     /// The motion after a number of periods.
     fn after(&mut self, start: &[f64], transient: usize) -> (Outcome, Option<Vec<f64>>) {
         let mut state = start.to_vec();
-        if let Err(error) = self.map.advance_by(&mut state, transient) {
-            return (Outcome::unknown(class_of(&error), transient), None);
+        match self.map.advance_by(&mut state, transient) {
+            Ok(()) => self.settled(&state, transient),
+            Err(error) => (Outcome::unknown(class_of(&error), transient), None),
         }
-        let named = self.kind_of(&state);
+    }
+
+    /// The motion that has come to `state` after a number of periods.
+    fn settled(&mut self, state: &[f64], transient: usize) -> (Outcome, Option<Vec<f64>>) {
+        let named = self.kind_of(state);
         let outcome = Outcome::named(&named, transient);
         match &named.orbit {
             // What repeats is recorded once.
-            Some(orbit) if is_on(orbit, &state) => {
-                let from = orbit.nearest(&state).0;
+            Some(orbit) if is_on(orbit, state) => {
+                let from = orbit.nearest(state).0;
                 self.recorded(outcome, from, Some(orbit.period))
             }
-            _ => self.recorded(outcome, &state, None),
+            _ => self.recorded(outcome, state, None),
         }
     }
 

@@ -1,0 +1,251 @@
+//! Motions side by side are those that go alone.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_flow::{Drive, Ensemble, Flow, FlowError, HarmonicVector, Output, Regime};
+use nanotap_flow::{System, Transition};
+use proptest::prelude::*;
+
+/// Masses on springs of their own, (frequency, damping, weight) each, that one tip is the weighted
+/// sum of; the tip's gap to a surface moves with the drive, and the surface is a spring and a
+/// damper.
+#[derive(Clone, Debug)]
+struct Tip {
+    masses: Vec<(f64, f64, f64)>,
+    stiffness: f64,
+    damping: f64,
+    drive: f64,
+    frequency: f64,
+    gap: f64,
+}
+
+impl Tip {
+    fn system(&self) -> Arc<System> {
+        let n = self.masses.len();
+        let drive = Drive::single(self.frequency).unwrap();
+        let tip = RowDVector::from_fn(2 * n, |_, j| if j < n { self.masses[j].2 } else { 0.0 });
+        let gap = Output::linear(tip, 1)
+            .with_tone(0, self.drive, 0.0)
+            .with_constant(self.gap);
+        let regime = |index: usize, stiffness: f64, damping: f64| {
+            let mut matrix = DMatrix::zeros(2 * n, 2 * n);
+            let mut push = DVector::zeros(2 * n);
+            for (i, &(frequency, own, weight)) in self.masses.iter().enumerate() {
+                matrix[(i, n + i)] = 1.0;
+                matrix[(n + i, i)] = -frequency * frequency;
+                matrix[(n + i, n + i)] = -2.0 * own * frequency;
+                for (j, &(_, _, other)) in self.masses.iter().enumerate() {
+                    matrix[(n + i, j)] -= stiffness * weight * other;
+                    matrix[(n + i, n + j)] -= damping * weight * other;
+                }
+                push[n + i] = -weight;
+            }
+            let forcing = HarmonicVector::zeros(2 * n, 1)
+                .with_tone(
+                    0,
+                    &(&push * (stiffness * self.drive)),
+                    &(&push * (damping * self.drive * self.frequency)),
+                )
+                .with_constant(&(&push * (stiffness * self.gap)));
+            Regime::new(index, matrix, forcing, &drive).unwrap()
+        };
+        let regimes = vec![regime(0, 0.0, 0.0), regime(1, self.stiffness, self.damping)];
+        let transitions = vec![
+            vec![Transition::new(gap.clone(), 1)],
+            vec![Transition::new(gap.scaled(-1.0), 0)],
+        ];
+        Arc::new(System::new(drive, regimes, transitions).unwrap())
+    }
+
+    /// Three masses that hammer: some two contacts a period, as the paper's lever at Ω = 2.6.
+    fn lever() -> Self {
+        Self {
+            masses: vec![(3.0, 0.02, 1.8), (19.4, 0.003, -1.9), (56.0, 0.001, 2.0)],
+            stiffness: 20.0,
+            damping: 0.2,
+            drive: 0.3,
+            frequency: 2.6,
+            gap: 0.0,
+        }
+    }
+}
+
+/// States of `2n` numbers each, of the size that motions have.
+fn states(n: usize, count: usize) -> Vec<f64> {
+    let number = |k: usize| 0.15 * ((k * k) as f64 * 0.37 + k as f64 * 1.3).sin();
+    (0..2 * n * count).map(number).collect()
+}
+
+fn alone(system: &Arc<System>, states: &[f64], periods: &[usize]) -> Vec<f64> {
+    let mut flow = Flow::new(Arc::clone(system));
+    let mut all = states.to_vec();
+    for (x, &periods) in all.chunks_exact_mut(system.dimension()).zip(periods) {
+        flow.start(x, 0.0).unwrap();
+        flow.run_periods(periods).unwrap();
+        flow.state(x);
+    }
+    all
+}
+
+fn together(system: &Arc<System>, states: &[f64], periods: &[usize]) -> Vec<f64> {
+    let mut all = states.to_vec();
+    let results = Ensemble::new(Arc::clone(system)).advance(&mut all, periods);
+    assert!(results.iter().all(Result::is_ok), "{results:?}");
+    all
+}
+
+fn tips() -> impl Strategy<Value = Tip> {
+    let mass = (
+        (0.0..4.0_f64).prop_map(f64::exp),
+        0.001..0.1_f64,
+        prop_oneof![-2.0..-0.5_f64, 0.5..2.0_f64],
+    );
+    (
+        proptest::collection::vec(mass, 1..7),
+        1.0..100.0_f64,
+        0.0..0.5_f64,
+        0.05..0.5_f64,
+        0.5..10.0_f64,
+        -0.2..0.3_f64,
+    )
+        .prop_map(|(masses, stiffness, damping, drive, frequency, gap)| Tip {
+            masses,
+            stiffness,
+            damping,
+            drive,
+            frequency,
+            gap,
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// A few periods of random systems: longer, and chaos would part what rounding parts.
+    #[test]
+    fn motions_side_by_side_are_those_that_go_alone(
+        tip in tips(),
+        periods in proptest::collection::vec(0..4_usize, 1..20),
+    ) {
+        let system = tip.system();
+        let states = states(tip.masses.len(), periods.len());
+        let expected = alone(&system, &states, &periods);
+        let found = together(&system, &states, &periods);
+        let size = expected.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
+        for (a, b) in found.iter().zip(&expected) {
+            prop_assert!((a - b).abs() < 1e-9 * size, "{a} {b}");
+        }
+    }
+
+    /// What comes of a motion depends on no other: not on who is beside it, not on the order.
+    #[test]
+    fn neighbours_do_not_matter(tip in tips(), count in 1..20_usize) {
+        let system = tip.system();
+        let n = system.dimension();
+        let states = states(tip.masses.len(), count);
+        let periods: Vec<usize> = (0..count).map(|k| 1 + k % 5).collect();
+        let all = together(&system, &states, &periods);
+        let each = states.chunks_exact(n).zip(&periods).zip(all.chunks_exact(n));
+        for ((state, periods), expected) in each {
+            prop_assert_eq!(together(&system, state, &[*periods]), expected);
+        }
+        let reversed: Vec<f64> = states.rchunks_exact(n).flatten().copied().collect();
+        let order: Vec<usize> = periods.iter().rev().copied().collect();
+        let back = together(&system, &reversed, &order);
+        let expected: Vec<f64> = all.rchunks_exact(n).flatten().copied().collect();
+        prop_assert_eq!(back, expected);
+    }
+}
+
+/// Where the gap falls to zero but once a flight, hardly a stretch need be passed alone.
+#[test]
+fn nearly_all_stretches_are_passed_together() {
+    let tip = Tip {
+        masses: vec![(3.0, 0.02, 1.8), (19.4, 0.01, -1.0), (56.0, 0.01, 0.5)],
+        ..Tip::lever()
+    };
+    let mut ensemble = Ensemble::new(tip.system());
+    let mut states = states(3, 40);
+    let results = ensemble.advance(&mut states, &[100; 40]);
+    assert!(results.iter().all(Result::is_ok));
+    let stretches = ensemble.stretches();
+    assert!(stretches.together > 40 * 150, "{stretches:?}");
+    assert!(stretches.alone * 25 < stretches.together, "{stretches:?}");
+}
+
+/// More motions than lanes, and periods from none to many: each stops at its own end.
+#[test]
+fn each_motion_has_periods_of_its_own() {
+    // Its motions come to rest on an orbit, so that a hundred periods leave rounding small.
+    let tip = Tip {
+        drive: 0.1,
+        gap: 0.25,
+        ..Tip::lever()
+    };
+    let system = tip.system();
+    let states = states(3, 11);
+    let periods: Vec<usize> = (0..11).map(|k| 10 * k).collect();
+    let expected = alone(&system, &states, &periods);
+    let found = together(&system, &states, &periods);
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a - b).abs() < 1e-10, "{a} {b}");
+    }
+    assert_eq!(found[..6], states[..6], "no period changes nothing");
+}
+
+/// What is no state is refused, and its neighbours go on.
+#[test]
+fn one_bad_state_harms_no_other() {
+    let system = Tip::lever().system();
+    let mut states = states(3, 3);
+    let good = states.clone();
+    states[7] = f64::NAN;
+    let results = Ensemble::new(Arc::clone(&system)).advance(&mut states, &[2; 3]);
+    assert!(matches!(results[1], Err(FlowError::NotFinite { .. })));
+    assert!(results[0].is_ok() && results[2].is_ok());
+    let expected = together(&system, &good, &[2; 3]);
+    assert_eq!(states[..6], expected[..6]);
+    assert_eq!(states[12..], expected[12..]);
+}
+
+/// Regimes with two ways out are passed one motion at a time, and right.
+#[test]
+fn systems_that_do_not_fit_go_alone() {
+    let drive = Drive::single(1.3).unwrap();
+    let regime = |index: usize, stiffness: f64, at: f64| {
+        let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0 - stiffness, -0.1]);
+        let force = |v: f64| DVector::from_vec(vec![0.0, v]);
+        let forcing = HarmonicVector::zeros(2, 1)
+            .with_tone(0, &force(0.8), &force(0.0))
+            .with_constant(&force(stiffness * at));
+        Regime::new(index, matrix, forcing, &drive).unwrap()
+    };
+    let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
+    let (right, left) = (x.scaled(-1.0).with_constant(0.4), x.with_constant(0.4));
+    let transitions = vec![
+        vec![
+            Transition::new(right.clone(), 1),
+            Transition::new(left.clone(), 2),
+        ],
+        vec![Transition::new(right.scaled(-1.0), 0)],
+        vec![Transition::new(left.scaled(-1.0), 0)],
+    ];
+    let regimes = vec![
+        regime(0, 0.0, 0.0),
+        regime(1, 30.0, 0.4),
+        regime(2, 30.0, -0.4),
+    ];
+    let system = Arc::new(System::new(drive.clone(), regimes, transitions).unwrap());
+    let states = states(1, 5);
+    let periods = [3; 5];
+    assert_eq!(
+        together(&system, &states, &periods),
+        alone(&system, &states, &periods)
+    );
+}

@@ -18,7 +18,7 @@ use std::time::Instant;
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap_flow::{Flow, System};
+use nanotap_flow::{Ensemble, Flow, System};
 
 /// Modes, and the dimension of a state.
 const MODES: usize = 3;
@@ -169,16 +169,18 @@ fn basin(options: &Options) -> Result<(), Failure> {
     let count = BASIN_SIDE * BASIN_SIDE;
     let along = |k: usize| k as f64 / (BASIN_SIDE - 1) as f64;
     let packets = as_many_as_fit(options, count / PACKET, |packet| {
-        let mut flow = motion(&model);
-        for number in packet * PACKET..(packet + 1) * PACKET {
-            let point = number * 24721 % count;
-            let mut start = [0.0; DIMENSION];
+        let mut ensemble = Ensemble::new(Arc::clone(&model.system));
+        let mut starts = [0.0; PACKET * DIMENSION];
+        for (k, start) in starts.chunks_mut(DIMENSION).enumerate() {
+            let point = (packet * PACKET + k) * 24721 % count;
             start[0] = -1.0 + 2.0 * along(point / BASIN_SIDE);
             start[MODES] = -4.0 + 8.0 * along(point % BASIN_SIDE);
-            flow.start(&start, 0.0)?;
-            flow.run_periods(BASIN_PERIODS)?;
-            black_box(state(&flow));
         }
+        let results = ensemble.advance(&mut starts, &[BASIN_PERIODS; PACKET]);
+        for result in results {
+            result?;
+        }
+        black_box(starts);
         Ok(())
     })?;
     println!(

@@ -4,7 +4,8 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::observe::{Set, measure};
-use nanotap_flow::Flow;
+use nanotap_flow::{Ensemble, Flow};
+use std::sync::Arc;
 
 use crate::cases::{self, DAMPINGS, MODES};
 
@@ -45,6 +46,28 @@ fn in_one_go(bencher: Bencher<'_, '_>, modes: usize) {
         .counter(ItemsCount::new(PERIODS))
         .with_inputs(|| flow.clone())
         .bench_local_refs(|flow| flow.run_periods(PERIODS).expect("a bounded motion"));
+}
+
+/// 64 motions of it side by side, each over as many periods. Items are periods.
+#[divan::bench(args = MODES)]
+fn side_by_side(bencher: Bencher<'_, '_>, modes: usize) {
+    const MOTIONS: usize = 64;
+    let case = cases::paper(modes);
+    let model = cases::model(&case);
+    let mut ensemble = Ensemble::new(Arc::clone(&model.system));
+    let mut states = vec![0.0; MOTIONS * model.dimension()];
+    for (k, state) in states.chunks_mut(model.dimension()).enumerate() {
+        state[0] = 0.01 * k as f64;
+    }
+    let run = |ensemble: &mut Ensemble, states: &mut [f64], periods| {
+        let results = ensemble.advance(states, &[periods; MOTIONS]);
+        assert!(results.iter().all(Result::is_ok), "bounded motions");
+    };
+    run(&mut ensemble, &mut states, 400);
+    bencher
+        .counter(ItemsCount::new(MOTIONS * PERIODS))
+        .with_inputs(|| states.clone())
+        .bench_local_refs(|states| run(&mut ensemble, states, PERIODS));
 }
 
 /// The same with what sweeps record of every motion measured.

@@ -128,9 +128,12 @@ impl Signals<'_> {
                 let value = W::sub(value, other);
                 *open = (W::below(W::min(before, value), floor) & !ended) as u8;
                 before = value;
-                // Below zero for certain, or at the end of the stretch.
+                // Below zero for certain, or at the end of the stretch. What is below zero from the
+                // start has its first interval open.
                 let at = W::splat(points as f64 * grid.step);
-                ended |= !W::below(gone, value) | !W::below(at, reach);
+                if points > 0 {
+                    ended |= !W::below(gone, value) | !W::below(at, reach);
+                }
                 points += 1;
             }
             if ended & ALL == ALL {

@@ -235,7 +235,9 @@ proptest! {
             } else if !on_surface && first.value > 0.0 {
                 Some(Start::Inside)
             } else {
-                signals.idle |= 1 << lane;
+                // Of what does not rise from the surface nothing is asked. What is below zero is looked
+                // at, and not certified.
+                signals.idle |= u32::from(on_surface) << lane;
                 None
             };
         }
@@ -243,7 +245,11 @@ proptest! {
         prop_assert_eq!(found.found & signals.idle, 0);
         let begins = <Twice<Plain> as Wide>::store(found.start);
         for (lane, start) in starts.iter().enumerate() {
-            let Some(start) = start else { continue };
+            let Some(start) = start else {
+                let open = found.found & (1 << lane) != 0;
+                prop_assert!(on_surface || (open && begins[lane] == 0.0), "{lane}");
+                continue;
+            };
             let signal = lane_of(&kernel, &amplitudes, lane, reach);
             let mut statistics = Statistics::default();
             let crossing = first_crossing(&signal, reach, *start, &mut statistics);

@@ -59,7 +59,9 @@ def test_arrays_are_as_their_states_alone(map_, orbit):
     together = map_(z, periods=300)
     assert together.shape == z.shape
     alone = np.array([[map_(one, periods=300) for one in row] for row in z])
-    assert np.array_equal(together, alone)
+    # Many states go side by side, and a state alone as one: the same to rounding.
+    assert np.abs(together - alone).max() < 1e-13
+    assert np.array_equal(together[2:4], map_(z[2:4], periods=300))
     assert np.array_equal(together, map_(z, periods=300, threads=1))
     assert np.array_equal(map_(z, periods=0), z)
     assert map_(np.empty((0, 6))).shape == (0, 6)
@@ -144,7 +146,10 @@ def test_maps_and_motions_can_be_pickled_and_shared(map_, orbit):
     starts = orbit.state * np.linspace(0.9, 1.1, 16)[:, None]
     with ThreadPoolExecutor(4) as threads:
         found = list(threads.map(lambda z: map_(z, periods=400), starts))
-    assert np.array_equal(np.array(found), map_(starts, periods=400))
+    assert np.abs(np.array(found) - map_(starts, periods=400)).max() < 1e-13
+    with ThreadPoolExecutor(4) as threads:
+        halves = threads.map(lambda z: map_(z, periods=400), [starts[:8], starts[8:]])
+    assert np.array_equal(np.concatenate(list(halves)), map_(starts, periods=400))
 
 
 def test_what_makes_no_sense_is_refused(map_):

@@ -12,7 +12,7 @@
 //! of a motion does not depend on those beside it.
 
 use crate::FlowError;
-use crate::motion::{BRIEF, Motion};
+use crate::motion::{BRIEF, Motion, count_period};
 use crate::regime::Kernel;
 use crate::search::Start;
 use crate::search::interval::{Cubic, Quintic};
@@ -120,11 +120,6 @@ impl Ensemble {
         }
     }
 
-    /// The system.
-    pub fn system(&self) -> &Arc<System> {
-        &self.system
-    }
-
     /// How motions have gone so far, those of systems that fit.
     pub fn stretches(&self) -> Stretches {
         self.stretches
@@ -145,17 +140,18 @@ impl Ensemble {
                 .map(|(x, &periods)| self.advance_alone(x, periods))
                 .collect();
         }
-        self.begin(states, periods);
-        simd::dispatch_wide(RunAll(self));
-        self.end(states, periods)
+        // Lent to the inner loop: threads that share it need not count references to it.
+        let system = Arc::clone(&self.system);
+        self.begin(&system, states, periods);
+        simd::dispatch_wide(RunAll(self, &system));
+        self.end(&system, states, periods)
     }
 
     /// Makes members of states.
-    fn begin(&mut self, states: &[f64], periods: &[usize]) {
-        let system = Arc::clone(&self.system);
+    fn begin(&mut self, system: &System, states: &[f64], periods: &[usize]) {
         self.members.clear();
         for (x, &left) in states.chunks_exact(system.dimension()).zip(periods) {
-            let failure = self.alone.start_checked(&system, x, 0.0).err();
+            let failure = self.alone.start_checked(system, x, 0.0).err();
             let member = Member {
                 regime: self.alone.regime,
                 phase: 0.0,
@@ -173,8 +169,12 @@ impl Ensemble {
     }
 
     /// Writes where members have come to.
-    fn end(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Result<(), FlowError>> {
-        let system = Arc::clone(&self.system);
+    fn end(
+        &mut self,
+        system: &System,
+        states: &mut [f64],
+        periods: &[usize],
+    ) -> Vec<Result<(), FlowError>> {
         let Self { members, alone, .. } = self;
         let each = states
             .chunks_exact_mut(system.dimension())
@@ -184,8 +184,8 @@ impl Ensemble {
             Some(failure) => Err(failure),
             None if *periods == 0 => Ok(()),
             None => {
-                member.hand_to(&system, alone);
-                alone.write_state(&system, x);
+                member.hand_to(system, alone);
+                alone.write_state(system, x);
                 Ok(())
             }
         })
@@ -200,7 +200,7 @@ impl Ensemble {
     }
 
     #[inline(always)]
-    fn run_all<W: Wide>(&mut self) {
+    fn run_all<W: Wide>(&mut self, system: &System) {
         let fullest = |waiting: &[VecDeque<usize>]| {
             let lengths = waiting.iter().map(VecDeque::len).enumerate();
             lengths.max_by_key(|(_, length)| *length)
@@ -214,7 +214,7 @@ impl Ensemble {
             for member in &mut members[..count] {
                 *member = waiting.pop_front().unwrap_or(first);
             }
-            self.run_together::<W>(regime, &members, count);
+            self.run_together::<W>(system, regime, &members, count);
             for &member in &members[..count] {
                 let Member { regime, left, .. } = self.members[member];
                 if left > 0 {
@@ -226,15 +226,20 @@ impl Ensemble {
 
     /// Runs members of one regime to their next switches, or as far as it may be looked for one.
     #[inline(always)]
-    fn run_together<W: Wide>(&mut self, regime: usize, members: &[usize; LANES], count: usize) {
-        let system = Arc::clone(&self.system);
+    fn run_together<W: Wide>(
+        &mut self,
+        system: &System,
+        regime: usize,
+        members: &[usize; LANES],
+        count: usize,
+    ) {
         let prepared = &system.prepared(regime)[0];
         let Some(table) = &prepared.table else {
             return;
         };
         let kernel = &prepared.kernel;
         self.pack
-            .gather::<W>(&system, kernel.count, &self.members, members);
+            .gather::<W>(system, kernel.count, &self.members, members);
         let sums = self.pack.amplitudes::<W>(kernel, table);
         let mut signals = Signals {
             kernel,
@@ -251,7 +256,7 @@ impl Ensemble {
         for (lane, &member) in members.iter().enumerate() {
             let member = &self.members[member];
             let bit = 1 << lane;
-            signals.reach[lane] = member.reach(&system).min(longest);
+            signals.reach[lane] = member.reach(system).min(longest);
             match member.surface {
                 None | Some((_, Start::Inside)) => {}
                 Some((_, Start::Surface { rate })) => {
@@ -268,7 +273,7 @@ impl Ensemble {
         let (reach, idle) = (signals.reach, signals.idle);
         let (intervals, bounds) = signals.first_open::<W>();
         let switches = self.pack.switches::<W>(
-            &system,
+            system,
             prepared,
             &sums,
             &intervals,
@@ -290,10 +295,10 @@ impl Ensemble {
             let member = &mut self.members[number];
             if known {
                 self.stretches.together += 1;
-                member.go_on(&system, &self.pack, prepared, lane, length, switched);
+                member.go_on(system, &self.pack, prepared, lane, length, switched);
             } else {
                 self.stretches.alone += 1;
-                member.go_on_alone::<W::One>(&system, &mut self.alone);
+                member.go_on_alone::<W::One>(system, &mut self.alone);
             }
         }
     }
@@ -371,14 +376,7 @@ impl Member {
             self.packed[vector][0][place] = re[lane];
             self.packed[vector][1][place] = im[lane];
         }
-        if self.phase >= period {
-            self.phase = if self.left > 1 {
-                self.phase - period
-            } else {
-                0.0
-            };
-            self.left -= 1;
-        }
+        count_period(&mut self.phase, &mut self.left, period);
     }
 
     /// Goes on to the next switch as a motion does that has nobody beside it.
@@ -621,14 +619,14 @@ impl Pack {
 }
 
 /// [`Ensemble::run_all`].
-struct RunAll<'a>(&'a mut Ensemble);
+struct RunAll<'a>(&'a mut Ensemble, &'a System);
 
 impl WideWork for RunAll<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        self.0.run_all::<W>();
+        self.0.run_all::<W>(self.1);
     }
 }
 
@@ -664,11 +662,12 @@ mod tests {
     /// Numbers side by side in registers, in two or one, are those of any machine.
     #[test]
     fn every_arithmetic_gives_the_same_bits() {
-        let mut ensemble = Ensemble::new(system());
+        let system = system();
+        let mut ensemble = Ensemble::new(Arc::clone(&system));
         let (mut plain, mut fastest) = (states(), states());
-        ensemble.begin(&plain, &[9; 20]);
-        RunAll(&mut ensemble).run::<Twice<Plain>>();
-        let results = ensemble.end(&mut plain, &[9; 20]);
+        ensemble.begin(&system, &plain, &[9; 20]);
+        RunAll(&mut ensemble, &system).run::<Twice<Plain>>();
+        let results = ensemble.end(&system, &mut plain, &[9; 20]);
         assert!(results.iter().all(Result::is_ok));
         ensemble.advance(&mut fastest, &[9; 20]);
         assert_eq!(plain, fastest);

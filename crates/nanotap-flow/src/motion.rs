@@ -231,14 +231,8 @@ impl Motion {
         let reach = self.reach::<S>(system, ends[0]);
         let found = self.next_crossing::<S>(system, reach)?;
         self.go_on::<S, ()>(system, ends[1], reach, found, stalled, &mut ())?;
-        if self.phase >= period {
-            if *left > 1 {
-                self.phase -= period;
-                self.set_phasors(system);
-            } else {
-                self.begin_period(system);
-            }
-            *left -= 1;
+        if count_period(&mut self.phase, left, period) {
+            self.set_phasors(system);
         }
         Ok(())
     }
@@ -561,6 +555,18 @@ impl Motion {
         switch.packed.apply::<S>(&self.packed, &mut self.next);
         std::mem::swap(&mut self.packed, &mut self.next);
     }
+}
+
+/// Whether a drive period has ended at `phase`; it is counted then, and the phase that of the next
+/// one. After the last it is zero.
+#[inline(always)]
+pub(crate) fn count_period(phase: &mut f64, left: &mut usize, period: f64) -> bool {
+    let ended = *phase >= period;
+    if ended {
+        *phase = if *left > 1 { *phase - period } else { 0.0 };
+        *left -= 1;
+    }
+    ended
 }
 
 /// Does the work in the arithmetic that serves the system: the library's functions where angles

@@ -213,39 +213,3 @@ fn one_bad_state_harms_no_other() {
     assert_eq!(states[..6], expected[..6]);
     assert_eq!(states[12..], expected[12..]);
 }
-
-/// Regimes with two ways out are passed one motion at a time, and right.
-#[test]
-fn systems_that_do_not_fit_go_alone() {
-    let drive = Drive::single(1.3).unwrap();
-    let regime = |index: usize, stiffness: f64, at: f64| {
-        let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0 - stiffness, -0.1]);
-        let force = |v: f64| DVector::from_vec(vec![0.0, v]);
-        let forcing = HarmonicVector::zeros(2, 1)
-            .with_tone(0, &force(0.8), &force(0.0))
-            .with_constant(&force(stiffness * at));
-        Regime::new(index, matrix, forcing, &drive).unwrap()
-    };
-    let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
-    let (right, left) = (x.scaled(-1.0).with_constant(0.4), x.with_constant(0.4));
-    let transitions = vec![
-        vec![
-            Transition::new(right.clone(), 1),
-            Transition::new(left.clone(), 2),
-        ],
-        vec![Transition::new(right.scaled(-1.0), 0)],
-        vec![Transition::new(left.scaled(-1.0), 0)],
-    ];
-    let regimes = vec![
-        regime(0, 0.0, 0.0),
-        regime(1, 30.0, 0.4),
-        regime(2, 30.0, -0.4),
-    ];
-    let system = Arc::new(System::new(drive.clone(), regimes, transitions).unwrap());
-    let states = states(1, 5);
-    let periods = [3; 5];
-    assert_eq!(
-        together(&system, &states, &periods),
-        alone(&system, &states, &periods)
-    );
-}

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System, Transition};
+use nanotap_flow::{Drive, Ensemble, Flow, HarmonicVector, Output, Regime, System, Transition};
 
 /// Two coupled masses, one of which hits springy stops on both sides: regimes with two transitions
 /// and with one.
@@ -93,4 +93,22 @@ fn periods_may_be_run_in_one_go() {
         assert_eq!(one_go.switches(), stopping.switches());
         assert_eq!(one_go.phase(), 0.0);
     }
+}
+
+/// Where two ways lead out of a regime, many motions go one after the other, and are the same to the
+/// last bit.
+#[test]
+fn what_does_not_fit_side_by_side_goes_alone() {
+    let system = system();
+    let starts: Vec<f64> = (0..6).flat_map(start).collect();
+    let (mut together, mut alone) = (starts.clone(), starts);
+    let results = Ensemble::new(system.clone()).advance(&mut together, &[3; 6]);
+    assert!(results.iter().all(Result::is_ok), "{results:?}");
+    for x in alone.chunks_exact_mut(4) {
+        let mut flow = Flow::new(system.clone());
+        flow.start(x, 0.0).unwrap();
+        flow.run_periods(3).unwrap();
+        flow.state(x);
+    }
+    assert_eq!(together, alone);
 }

@@ -455,7 +455,7 @@ fn last_step(jet: &Jet, at: f64, length: f64, noise: f64) -> Option<Crossing> {
 }
 
 /// The zero of `g + vh + ½ch²` nearest to `h = 0` (a Newton step where there is none).
-pub(super) fn quadratic_root(jet: &Jet) -> f64 {
+fn quadratic_root(jet: &Jet) -> f64 {
     let (g, v, c) = (jet.value, jet.rate, jet.curvature);
     let discriminant = v * v - 2.0 * g * c;
     if discriminant >= 0.0 {

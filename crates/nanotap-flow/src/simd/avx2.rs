@@ -32,62 +32,28 @@ fn run_apart<W: Work>(work: W) -> W::Output {
 impl Lanes for Avx2 {
     type Register = x::__m256d;
 
+    instructions! {
+        add(a, b) = _mm256_add_pd;
+        sub(a, b) = _mm256_sub_pd;
+        mul(a, b) = _mm256_mul_pd;
+        div(a, b) = _mm256_div_pd;
+        fma(a, b, c) = _mm256_fmadd_pd;
+        fnma(a, b, c) = _mm256_fnmadd_pd;
+        sqrt(a) = _mm256_sqrt_pd;
+        min(a, b) = _mm256_min_pd;
+        max(a, b) = _mm256_max_pd;
+    }
     #[inline(always)]
     fn splat(a: f64) -> Self::Register {
         unsafe { x::_mm256_set1_pd(a) }
-    }
-    #[inline(always)]
-    fn add(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_add_pd(a, b) }
-    }
-    #[inline(always)]
-    fn sub(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_sub_pd(a, b) }
-    }
-    #[inline(always)]
-    fn mul(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_mul_pd(a, b) }
-    }
-    #[inline(always)]
-    fn div(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_div_pd(a, b) }
     }
     #[inline(always)]
     fn map(a: Self::Register, function: fn(f64) -> f64) -> Self::Register {
         Self::load(&Self::store(a).map(function))
     }
     #[inline(always)]
-    fn fma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_fmadd_pd(a, b, c) }
-    }
-    #[inline(always)]
-    fn fnma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_fnmadd_pd(a, b, c) }
-    }
-    #[inline(always)]
-    fn sqrt(a: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_sqrt_pd(a) }
-    }
-    #[inline(always)]
-    fn min(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_min_pd(a, b) }
-    }
-    #[inline(always)]
-    fn max(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm256_max_pd(a, b) }
-    }
-    #[inline(always)]
     fn below(a: Self::Register, b: Self::Register) -> u32 {
         unsafe { x::_mm256_movemask_pd(x::_mm256_cmp_pd::<{ x::_CMP_NGE_UQ }>(a, b)) as u32 }
-    }
-    #[inline(always)]
-    fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register {
-        unsafe {
-            x::_mm256_min_pd(
-                x::_mm256_max_pd(a, x::_mm256_set1_pd(low)),
-                x::_mm256_set1_pd(high),
-            )
-        }
     }
     #[inline(always)]
     fn power_of_two(shifted: Self::Register) -> Self::Register {

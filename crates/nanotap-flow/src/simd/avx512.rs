@@ -21,53 +21,24 @@ pub(super) fn run<W: WideWork>(work: W) -> W::Output {
 impl Lanes for Avx512 {
     type Register = x::__m512d;
 
+    instructions! {
+        add(a, b) = _mm512_add_pd;
+        sub(a, b) = _mm512_sub_pd;
+        mul(a, b) = _mm512_mul_pd;
+        div(a, b) = _mm512_div_pd;
+        fma(a, b, c) = _mm512_fmadd_pd;
+        fnma(a, b, c) = _mm512_fnmadd_pd;
+        sqrt(a) = _mm512_sqrt_pd;
+        min(a, b) = _mm512_min_pd;
+        max(a, b) = _mm512_max_pd;
+    }
     #[inline(always)]
     fn splat(a: f64) -> Self::Register {
         unsafe { x::_mm512_set1_pd(a) }
     }
     #[inline(always)]
-    fn add(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_add_pd(a, b) }
-    }
-    #[inline(always)]
-    fn sub(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_sub_pd(a, b) }
-    }
-    #[inline(always)]
-    fn mul(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_mul_pd(a, b) }
-    }
-    #[inline(always)]
-    fn div(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_div_pd(a, b) }
-    }
-    #[inline(always)]
-    fn fma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_fmadd_pd(a, b, c) }
-    }
-    #[inline(always)]
-    fn fnma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_fnmadd_pd(a, b, c) }
-    }
-    #[inline(always)]
-    fn sqrt(a: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_sqrt_pd(a) }
-    }
-    #[inline(always)]
-    fn min(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_min_pd(a, b) }
-    }
-    #[inline(always)]
-    fn max(a: Self::Register, b: Self::Register) -> Self::Register {
-        unsafe { x::_mm512_max_pd(a, b) }
-    }
-    #[inline(always)]
     fn below(a: Self::Register, b: Self::Register) -> u32 {
         u32::from(unsafe { x::_mm512_cmp_pd_mask::<{ x::_CMP_NGE_UQ }>(a, b) })
-    }
-    #[inline(always)]
-    fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register {
-        Self::min(Self::max(a, Self::splat(low)), Self::splat(high))
     }
     #[inline(always)]
     fn power_of_two(shifted: Self::Register) -> Self::Register {

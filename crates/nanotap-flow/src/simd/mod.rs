@@ -15,6 +15,19 @@
 #[cfg(target_arch = "x86_64")]
 use std::sync::LazyLock;
 
+/// Operations of which each is one instruction of the processor, `x` being its module.
+#[cfg(target_arch = "x86_64")]
+macro_rules! instructions {
+    ($($operation:ident($($operand:ident),+) = $instruction:ident;)+) => {
+        $(
+            #[inline(always)]
+            fn $operation($($operand: Self::Register),+) -> Self::Register {
+                unsafe { x::$instruction($($operand),+) }
+            }
+        )+
+    };
+}
+
 pub(crate) mod affine;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -75,8 +88,6 @@ pub(crate) trait Lanes: Copy {
     fn max(a: Self::Register, b: Self::Register) -> Self::Register;
     /// A bit a lane, set where not `a ≥ b` (so where one is not a number as well).
     fn below(a: Self::Register, b: Self::Register) -> u32;
-    /// The lanes, none below `low` or above `high`.
-    fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register;
     /// `2^n` from the sum of [`ROUND`](functions::ROUND) and an integer `n`.
     fn power_of_two(shifted: Self::Register) -> Self::Register;
     /// Sine and cosine of an angle from those of its rest beyond a multiple of π/2; the
@@ -88,6 +99,12 @@ pub(crate) trait Lanes: Copy {
     ) -> (Self::Register, Self::Register);
     /// `function` of each lane.
     fn map(a: Self::Register, function: fn(f64) -> f64) -> Self::Register;
+
+    /// The lanes, none below `low` or above `high`.
+    #[inline(always)]
+    fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register {
+        Self::min(Self::max(a, Self::splat(low)), Self::splat(high))
+    }
 
     /// The size of each.
     #[inline(always)]

@@ -66,10 +66,6 @@ macro_rules! arrays {
             (0..WIDTH).fold(0, |bits, i| bits | (u32::from(!at_least(i)) << i))
         }
         #[inline(always)]
-        fn clamp(a: Vector, low: f64, high: f64) -> Vector {
-            a.map(|a| a.max(low).min(high))
-        }
-        #[inline(always)]
         fn power_of_two(shifted: Vector) -> Vector {
             shifted.map(|s| f64::from_bits((s.to_bits() << 52).wrapping_add(1.0_f64.to_bits())))
         }

@@ -55,10 +55,6 @@ impl Lanes for Single {
         u32::from(!at_least)
     }
     #[inline(always)]
-    fn clamp(a: f64, low: f64, high: f64) -> f64 {
-        Self::min(Self::max(a, low), high)
-    }
-    #[inline(always)]
     fn power_of_two(shifted: f64) -> f64 {
         f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
     }

@@ -56,10 +56,6 @@ impl<S: Simd> Lanes for Twice<S> {
         S::below(a[0], b[0]) | (S::below(a[1], b[1]) << WIDTH)
     }
     #[inline(always)]
-    fn clamp(a: Self::Register, low: f64, high: f64) -> Self::Register {
-        [S::clamp(a[0], low, high), S::clamp(a[1], low, high)]
-    }
-    #[inline(always)]
     fn power_of_two(shifted: Self::Register) -> Self::Register {
         [S::power_of_two(shifted[0]), S::power_of_two(shifted[1])]
     }

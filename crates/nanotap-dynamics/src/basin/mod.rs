@@ -225,6 +225,11 @@ impl Basins {
         range: std::ops::Range<usize>,
     ) -> Vec<Label> {
         let points: Vec<usize> = (range.start..range.end.min(self.len())).collect();
+        self.labels(map, &points)
+    }
+
+    /// The same of any points. Many at a time may be faster than each alone, and come to the same.
+    pub fn labels<M: StroboscopicMap>(&self, map: &mut M, points: &[usize]) -> Vec<Label> {
         let mut labels = vec![Label::Unsettled; points.len()];
         for (points, labels) in points.chunks(TOGETHER).zip(labels.chunks_mut(TOGETHER)) {
             self.label(map, points, labels);

@@ -44,16 +44,14 @@ use rayon::prelude::*;
 pub use motion::{Motion, Point};
 
 use crate::case::{Case, CaseError, Key};
-use crate::model::strobe::Strobe;
+use crate::model::strobe::{Strobe, together};
 use crate::model::{Model, MotionError, Tangent};
 
 /// Most numbers that [`Map::iterate`] returns.
 pub const MOST_NUMBERS: usize = 200_000_000;
 
 /// Drive periods between two looks at whether the work is to stop.
-const UNINTERRUPTED: usize = 1024;
-/// States that are advanced together.
-const TOGETHER: usize = 64;
+pub(crate) const UNINTERRUPTED: usize = 1024;
 
 /// Why the map could not be made or applied.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -201,16 +199,17 @@ impl Map {
         if rows == 1 {
             return advance(&mut self.strobe(), states, periods, control);
         }
+        let together = together(&self.strobe, rows);
         let some = |strobe: &mut Strobe, (number, states): (usize, &mut [f64])| {
             advance_all(strobe, states, periods, control)
-                .map_err(|error| error.after(number * TOGETHER))
+                .map_err(|error| error.after(number * together))
         };
         if rows.saturating_mul(periods) <= UNINTERRUPTED {
             let mut strobe = self.strobe();
-            let mut parts = states.chunks_mut(TOGETHER * n).enumerate();
+            let mut parts = states.chunks_mut(together * n).enumerate();
             return parts.try_for_each(|part| some(&mut strobe, part));
         }
-        let parts = states.par_chunks_mut(TOGETHER * n).enumerate();
+        let parts = states.par_chunks_mut(together * n).enumerate();
         parts.try_for_each_init(|| self.strobe(), some)
     }
 
@@ -369,14 +368,9 @@ fn advance(
     periods: usize,
     control: &Control<'_>,
 ) -> Result<(), MapError> {
-    for done in (0..periods).step_by(UNINTERRUPTED) {
-        if control.is_cancelled() {
-            return Err(MapError::Stopped);
-        }
-        let now = (periods - done).min(UNINTERRUPTED);
-        strobe.advance_by(state, now).map_err(of_state(0))?;
-    }
-    Ok(())
+    in_parts(periods, control, |now| {
+        strobe.advance_by(state, now).map_err(of_state(0))
+    })
 }
 
 /// The same of many states, one after the other.
@@ -387,14 +381,24 @@ fn advance_all(
     control: &Control<'_>,
 ) -> Result<(), MapError> {
     let rows = states.len() / strobe.dimension().max(1);
+    in_parts(periods, control, |now| {
+        let advanced = strobe.advance_each(states, &vec![now; rows]);
+        let mut results = advanced.into_iter().enumerate();
+        results.try_for_each(|(index, result)| result.map_err(of_state(index)))
+    })
+}
+
+/// Goes over `periods` in parts, between which it is looked whether the work is to stop.
+fn in_parts(
+    periods: usize,
+    control: &Control<'_>,
+    mut part: impl FnMut(usize) -> Result<(), MapError>,
+) -> Result<(), MapError> {
     for done in (0..periods).step_by(UNINTERRUPTED) {
         if control.is_cancelled() {
             return Err(MapError::Stopped);
         }
-        let now = (periods - done).min(UNINTERRUPTED);
-        let advanced = strobe.advance_each(states, &vec![now; rows]);
-        let mut failures = advanced.into_iter().enumerate();
-        failures.try_for_each(|(index, result)| result.map_err(of_state(index)))?;
+        part((periods - done).min(UNINTERRUPTED))?;
     }
     Ok(())
 }

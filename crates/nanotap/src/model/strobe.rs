@@ -124,7 +124,7 @@ impl StroboscopicMap for Strobe {
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance_by(state, periods)?),
-            Engine::Nonlinear(map) => (0..periods).try_for_each(|_| map.advance(state)),
+            Engine::Nonlinear(map) => map.advance_by(state, periods),
         }
     }
 
@@ -141,7 +141,7 @@ impl StroboscopicMap for Strobe {
             }
             Engine::Nonlinear(map) => {
                 let each = states.chunks_exact_mut(map.dimension()).zip(periods);
-                each.map(|(state, &periods)| (0..periods).try_for_each(|_| map.advance(state)))
+                each.map(|(state, &periods)| map.advance_by(state, periods))
                     .collect()
             }
         }
@@ -202,6 +202,21 @@ impl StroboscopicMap for Strobe {
             }
         }
     }
+}
+
+/// The most states that are advanced together.
+const TOGETHER: usize = 64;
+
+/// How many of `count` states a thread of the present pool is best given at a time.
+pub(crate) fn together(map: &Strobe, count: usize) -> usize {
+    count
+        .div_ceil(rayon::current_num_threads())
+        .clamp(1, most_together(map))
+}
+
+/// The most states that are worth advancing together on one thread.
+pub(crate) fn most_together(map: &Strobe) -> usize {
+    if map.is_costly() { 1 } else { TOGETHER }
 }
 
 /// The exact map of a piecewise-linear model.

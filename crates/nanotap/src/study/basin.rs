@@ -26,7 +26,7 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
-use crate::model::strobe::Strobe;
+use crate::model::strobe::{Strobe, together};
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
 use crate::study::kind::DatasetStudy;
@@ -472,17 +472,14 @@ fn strangers(map: &Strobe, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
     let points: Vec<usize> = some(y.count)
         .flat_map(|row| some(x.count).map(move |column| row * x.count + column))
         .collect();
-    let lost: Vec<bool> = points
-        .par_iter()
-        .map_init(
-            || map.clone(),
-            |map, &index| basins.chunk(map, index..index + 1) == [Label::Unsettled],
-        )
+    let labels: Vec<Vec<Label>> = points
+        .par_chunks(together(map, points.len()))
+        .map_init(|| map.clone(), |map, points| basins.labels(map, points))
         .collect();
     points
         .into_iter()
-        .zip(lost)
-        .filter(|(_, lost)| *lost)
+        .zip(labels.into_iter().flatten())
+        .filter(|(_, label)| *label == Label::Unsettled)
         .take(STRANGERS)
         .map(|(index, _)| {
             let mut state = vec![0.0; map.dimension()];

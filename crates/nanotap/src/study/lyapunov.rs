@@ -14,6 +14,7 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
+use crate::map::UNINTERRUPTED;
 use crate::model::recording::each_period;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
@@ -125,9 +126,6 @@ enum Unfinished {
     #[error(transparent)]
     Flow(#[from] MotionError),
 }
-
-/// Drive periods between two looks at whether the work is to stop.
-const UNINTERRUPTED: usize = 1024;
 
 impl Stoppable<'_> {
     fn goes_on(&self) -> Result<(), Unfinished> {

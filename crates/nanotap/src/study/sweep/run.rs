@@ -9,7 +9,8 @@ use super::{Sweep, SweepOptions};
 use crate::case::Case;
 use crate::case::physical::Scales;
 use crate::dataset::Block;
-use crate::model::strobe::Strobe;
+use crate::map::UNINTERRUPTED;
+use crate::model::strobe::{Strobe, most_together};
 use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
 use crate::observe::{Kept, Observables, Set, Watched, Watcher};
@@ -208,9 +209,6 @@ impl SweepOptions {
     }
 }
 
-/// Periods of all starts of a value between two looks whether the work is to stop.
-const UNINTERRUPTED: usize = 1024;
-
 /// Runs one model again and again.
 struct Runner<'a> {
     options: &'a SweepOptions,
@@ -270,35 +268,37 @@ impl<'a> Runner<'a> {
         transient: usize,
         cancelled: &impl Fn() -> bool,
     ) -> Option<Vec<Outcome>> {
-        let dimension = self.map.dimension();
-        let mut states = starts.concat();
-        let mut failures = vec![None; starts.len()];
-        for done in (0..transient).step_by(UNINTERRUPTED) {
-            if cancelled() {
-                return None;
+        let mut outcomes = Vec::with_capacity(starts.len());
+        for starts in starts.chunks(most_together(&self.map)) {
+            let mut states = starts.concat();
+            let mut failures = vec![None; starts.len()];
+            for done in (0..transient).step_by(UNINTERRUPTED) {
+                if cancelled() {
+                    return None;
+                }
+                // A motion that has failed is not followed any further.
+                let now = (transient - done).min(UNINTERRUPTED);
+                let periods: Vec<usize> = failures
+                    .iter()
+                    .map(|failure| if failure.is_none() { now } else { 0 })
+                    .collect();
+                let advanced = self.map.advance_each(&mut states, &periods);
+                for (failure, result) in failures.iter_mut().zip(advanced) {
+                    *failure = failure.or(result.err().as_ref().map(class_of));
+                }
             }
-            // A motion that has failed is not followed any further.
-            let now = (transient - done).min(UNINTERRUPTED);
-            let periods: Vec<usize> = failures
-                .iter()
-                .map(|failure| if failure.is_none() { now } else { 0 })
-                .collect();
-            let advanced = self.map.advance_each(&mut states, &periods);
-            for (failure, result) in failures.iter_mut().zip(advanced) {
-                *failure = failure.or(result.err().as_ref().map(class_of));
+            let each = states.chunks_exact(self.map.dimension()).zip(failures);
+            for (state, failure) in each {
+                if cancelled() {
+                    return None;
+                }
+                outcomes.push(match failure {
+                    Some(class) => Outcome::unknown(class, transient),
+                    None => self.settled(state, transient).0,
+                });
             }
         }
-        let each = states.chunks_exact(dimension).zip(failures);
-        each.map(|(state, failure)| {
-            if cancelled() {
-                return None;
-            }
-            Some(match failure {
-                Some(class) => Outcome::unknown(class, transient),
-                None => self.settled(state, transient).0,
-            })
-        })
-        .collect()
+        Some(outcomes)
     }
 
     /// The motion after a number of periods.

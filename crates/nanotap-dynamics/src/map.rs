@@ -44,6 +44,12 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         false
     }
 
+    /// How many motions at a time are best given to [`advance_each`](Self::advance_each): one where
+    /// they go one after the other.
+    fn side_by_side(&self) -> usize {
+        1
+    }
+
     /// Replaces `state` (length `dimension`) by `P(state)`.
     ///
     /// # Errors
@@ -69,9 +75,18 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         states: &mut [f64],
         periods: &[usize],
     ) -> Vec<Result<(), Self::Error>> {
-        let each = states.chunks_exact_mut(self.dimension()).zip(periods);
-        each.map(|(state, &periods)| self.advance_by(state, periods))
-            .collect()
+        one_after_another(self, states, periods)
+    }
+
+    /// As [`advance_each`](Self::advance_each), and puts the states at the ends of all periods, those
+    /// of one state one after the other, into its place in `passed`, as far as it can be followed.
+    fn advance_each_through(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+        passed: &mut [Vec<f64>],
+    ) -> Vec<Result<(), Self::Error>> {
+        one_after_another_through(self, states, periods, passed)
     }
 
     /// Replaces `state` by `P(state)` and `jacobian` (`dimension × dimension`)
@@ -122,6 +137,37 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         let _ = tangencies;
         self.advance(state)
     }
+}
+
+/// [`StroboscopicMap::advance_each`] of a map that takes one at a time.
+pub fn one_after_another<M: StroboscopicMap>(
+    map: &mut M,
+    states: &mut [f64],
+    periods: &[usize],
+) -> Vec<Result<(), M::Error>> {
+    let each = states.chunks_exact_mut(map.dimension()).zip(periods);
+    each.map(|(state, &periods)| map.advance_by(state, periods))
+        .collect()
+}
+
+/// [`StroboscopicMap::advance_each_through`] of a map that takes one at a time.
+pub fn one_after_another_through<M: StroboscopicMap>(
+    map: &mut M,
+    states: &mut [f64],
+    periods: &[usize],
+    passed: &mut [Vec<f64>],
+) -> Vec<Result<(), M::Error>> {
+    let each = states.chunks_exact_mut(map.dimension()).zip(periods);
+    each.zip(passed)
+        .map(|((state, &periods), passed)| {
+            passed.clear();
+            (0..periods).try_for_each(|_| {
+                map.advance(state)?;
+                passed.extend_from_slice(state);
+                Ok(())
+            })
+        })
+        .collect()
 }
 
 /// A one-parameter family of stroboscopic maps, for continuation.

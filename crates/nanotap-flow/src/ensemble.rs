@@ -11,7 +11,6 @@
 //! the interval of a switch) goes on alone for this stretch, as [`Flow`](crate::Flow) does. What comes
 //! of a motion does not depend on those beside it.
 
-use crate::FlowError;
 use crate::motion::{BRIEF, Motion, count_period};
 use crate::regime::Kernel;
 use crate::search::Start;
@@ -26,6 +25,7 @@ use crate::simd::{
     WideWork, layout,
 };
 use crate::system::{PreparedTransition, System};
+use crate::{FlowError, Regime};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -45,6 +45,19 @@ pub struct Ensemble {
     waiting: Vec<VecDeque<usize>>,
     pack: Pack,
     stretches: Stretches,
+    /// States at the ends of periods, if they are asked for.
+    strobe: Option<Strobe>,
+}
+
+/// The states of all members at the ends of their periods.
+#[derive(Clone, Debug)]
+struct Strobe {
+    /// Of each member those that came, one after the other.
+    passed: Vec<Vec<f64>>,
+    /// Of each regime its forced response at phase 0.
+    responses: Vec<Vec<f64>>,
+    /// States at the end of the period in which the present stretch begins, a lane each.
+    now: Vec<Octet>,
 }
 
 /// How many stretches from switch to switch were passed side by side, and how many alone.
@@ -110,14 +123,33 @@ impl Ensemble {
     /// An ensemble of motions of `system`.
     pub fn new(system: Arc<System>) -> Self {
         Self {
-            fits: fits(&system),
+            fits: Self::fits(&system),
             alone: Motion::new(&system),
             members: Vec::new(),
             waiting: vec![VecDeque::new(); system.regimes().len()],
             pack: Pack::default(),
             stretches: Stretches::default(),
+            strobe: None,
             system,
         }
+    }
+
+    /// Whether motions of `system` can go side by side: one guard leads out of each regime, tabulated,
+    /// and nothing is known of it but that it starts at zero. Others go one after the other.
+    pub fn fits(system: &System) -> bool {
+        let simple = |regime: usize| {
+            let ([prepared], [transition]) = (
+                system.prepared(regime),
+                system.transitions()[regime].as_slice(),
+            ) else {
+                return false;
+            };
+            prepared.table.as_ref().is_some_and(side_by_side::fits)
+                && prepared.sticking.is_none()
+                && !transition.release
+                && transition.onset.is_none()
+        };
+        system.largest_angle() <= LARGEST_ANGLE && (0..system.regimes().len()).all(simple)
     }
 
     /// How motions have gone so far, those of systems that fit.
@@ -145,6 +177,47 @@ impl Ensemble {
         self.begin(&system, states, periods);
         simd::dispatch_wide(RunAll(self, &system));
         self.end(&system, states, periods)
+    }
+
+    /// As [`Ensemble::advance`], and puts the states at the ends of all periods of each motion, one
+    /// after the other, into its place in `passed`; the last of them is where it came to, unless it
+    /// could not be followed to the end.
+    ///
+    /// # Panics
+    /// If there are not as many states, and places in `passed`, as `periods`.
+    pub fn advance_through(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+        passed: &mut [Vec<f64>],
+    ) -> Vec<Result<(), FlowError>> {
+        assert_eq!(passed.len(), periods.len(), "a place for each motion");
+        if !self.fits {
+            let n = self.system.dimension();
+            let each = states.chunks_exact_mut(n).zip(periods).zip(passed);
+            let through = each.map(|((x, &periods), passed)| {
+                passed.clear();
+                (0..periods).try_for_each(|_| {
+                    self.advance_alone(x, 1)?;
+                    passed.extend_from_slice(x);
+                    Ok(())
+                })
+            });
+            return through.collect();
+        }
+        self.strobe = Some(Strobe::new(&self.system, passed));
+        let results = self.advance(states, periods);
+        if let Some(strobe) = self.strobe.take() {
+            let each = passed.iter_mut().zip(strobe.passed).zip(&results);
+            let states = states.chunks_exact(self.system.dimension());
+            for (((to, mut from), result), (state, periods)) in each.zip(states.zip(periods)) {
+                if result.is_ok() && *periods > 0 {
+                    from.extend_from_slice(state);
+                }
+                *to = from;
+            }
+        }
+        results
     }
 
     /// Makes members of states.
@@ -193,6 +266,9 @@ impl Ensemble {
     }
 
     fn advance_alone(&mut self, x: &mut [f64], periods: usize) -> Result<(), FlowError> {
+        if periods == 0 {
+            return Ok(());
+        }
         self.alone.start_checked(&self.system, x, 0.0)?;
         self.alone.run_periods(&self.system, periods)?;
         self.alone.write_state(&self.system, x);
@@ -281,45 +357,94 @@ impl Ensemble {
             table.fine.step,
             reach,
         );
+        let brief = BRIEF / system.fastest();
+        let mut known = !(switches.uncertain | idle);
+        for (lane, length) in switches.at.iter().enumerate() {
+            let bit = 1 << lane;
+            if switches.found & bit != 0 && *length <= brief {
+                known &= !bit;
+            }
+        }
+        if self.strobe.is_some() {
+            let mut ends = [f64::INFINITY; LANES];
+            for (lane, length) in switches.at.iter().enumerate() {
+                // Of a stretch that is passed alone nobody knows where it ends.
+                if known & (1 << lane) != 0 {
+                    ends[lane] = *length;
+                }
+            }
+            self.strobe_within::<W>(system, regime, members, ends);
+        }
         self.pack.pass::<W>(kernel, switches.rest);
         if switches.found != 0 {
             let rows = system.regimes()[prepared.switch.to].basis().len();
             self.pack.switch::<W>(prepared, rows);
         }
-        let brief = BRIEF / system.fastest();
         for (lane, &number) in members.iter().enumerate().take(count) {
             let bit = 1 << lane;
             let length = switches.at[lane];
             let switched = switches.found & bit != 0;
-            let known = (switches.uncertain | idle) & bit == 0 && (!switched || length > brief);
             let member = &mut self.members[number];
-            if known {
+            let left = member.left;
+            if known & bit != 0 {
                 self.stretches.together += 1;
                 member.go_on(system, &self.pack, prepared, lane, length, switched);
             } else {
                 self.stretches.alone += 1;
                 member.go_on_alone::<W::One>(system, &mut self.alone);
             }
+            if let Some(strobe) = &mut self.strobe
+                && 0 < member.left
+                && member.left < left
+            {
+                let state = strobe.now.iter().map(|values| values[lane]);
+                strobe.passed[number].extend(state);
+            }
+        }
+    }
+
+    /// Works out the states at the ends of periods within stretches that end after so much time.
+    #[inline(always)]
+    fn strobe_within<W: Wide>(
+        &mut self,
+        system: &System,
+        regime: usize,
+        members: &[usize; LANES],
+        ends: Octet,
+    ) {
+        let Some(strobe) = &mut self.strobe else {
+            return;
+        };
+        let period = system.drive().period();
+        let (mut ahead, mut some) = (Octet::default(), false);
+        for (lane, &member) in members.iter().enumerate() {
+            let phase = self.members[member].phase;
+            if phase + ends[lane] >= period {
+                (ahead[lane], some) = (period - phase, true);
+            }
+        }
+        if some {
+            let regime = (&system.regimes()[regime], &strobe.responses[regime]);
+            self.pack.states_after::<W>(regime, ahead, &mut strobe.now);
         }
     }
 }
 
-/// Whether motions of a system can go side by side: one guard leads out of each regime, tabulated,
-/// and nothing is known of it but that it starts at zero.
-fn fits(system: &System) -> bool {
-    let simple = |regime: usize| {
-        let ([prepared], [transition]) = (
-            system.prepared(regime),
-            system.transitions()[regime].as_slice(),
-        ) else {
-            return false;
+impl Strobe {
+    /// For members of `system` whose states go where `passed` has room for them.
+    fn new(system: &System, passed: &mut [Vec<f64>]) -> Self {
+        let emptied = |passed: &mut Vec<f64>| {
+            passed.clear();
+            std::mem::take(passed)
         };
-        prepared.table.as_ref().is_some_and(side_by_side::fits)
-            && prepared.sticking.is_none()
-            && !transition.release
-            && transition.onset.is_none()
-    };
-    system.largest_angle() <= LARGEST_ANGLE && (0..system.regimes().len()).all(simple)
+        let at_phase_0 = |regime: &Regime| regime.response().at(system.drive(), 0.0);
+        let responses = system.regimes().iter().map(at_phase_0);
+        Self {
+            passed: passed.iter_mut().map(emptied).collect(),
+            responses: responses.map(|x| x.as_slice().to_vec()).collect(),
+            now: vec![Octet::default(); system.dimension()],
+        }
+    }
 }
 
 impl Member {
@@ -603,6 +728,32 @@ impl Pack {
             ];
             let turn = simd::complex_mul::<W>(W::load_complex(factor), simd::exp_small::<W>(z));
             *q = W::store_complex(simd::complex_mul::<W>(W::load_complex(q), turn));
+        }
+    }
+
+    /// The states a time `ahead`, at phase 0 of the drive, in a regime whose forced response is known
+    /// there.
+    #[inline(always)]
+    fn states_after<W: Wide>(
+        &self,
+        (regime, response): (&Regime, &Vec<f64>),
+        ahead: Octet,
+        states: &mut [Octet],
+    ) {
+        let (basis, ahead) = (regime.basis(), W::load(&ahead));
+        for (state, response) in states.iter_mut().zip(response) {
+            *state = [*response; LANES];
+        }
+        let columns = basis.right.as_slice().chunks_exact(states.len());
+        let terms = basis.eigenvalues.iter().zip(columns);
+        for ((rate, column), q) in terms.zip(&self.coordinates) {
+            let (decay, frequency) = (W::splat(rate.re), W::splat(rate.im));
+            let turn = simd::exp_complex::<W>(decay, frequency, ahead);
+            let [re, im] = simd::complex_mul::<W>(W::load_complex(q), turn);
+            for (state, r) in states.iter_mut().zip(column) {
+                let sum = W::fma(W::splat(r.re), re, W::load(state));
+                *state = W::store(W::fnma(W::splat(r.im), im, sum));
+            }
         }
     }
 

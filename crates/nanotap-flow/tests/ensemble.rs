@@ -100,6 +100,17 @@ fn together(system: &Arc<System>, states: &[f64], periods: &[usize]) -> Vec<f64>
     all
 }
 
+/// By how much states may differ that are the same but for rounding: a billionth of their size, or
+/// more where chaos parts neighbours.
+fn rounding(system: &Arc<System>, states: &[f64], periods: &[usize]) -> f64 {
+    let ends = alone(system, states, periods);
+    let beside: Vec<f64> = states.iter().map(|x| x * (1.0 + 1e-14)).collect();
+    let parted = alone(system, &beside, periods);
+    let apart = ends.iter().zip(&parted).map(|(a, b)| (a - b).abs());
+    let size = ends.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
+    1e-9 * size + 1e3 * apart.fold(0.0, f64::max)
+}
+
 fn tips() -> impl Strategy<Value = Tip> {
     let mass = (
         (0.0..4.0_f64).prop_map(f64::exp),
@@ -127,7 +138,7 @@ fn tips() -> impl Strategy<Value = Tip> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// A few periods of random systems: longer, and chaos would part what rounding parts.
+    /// A few periods of random systems.
     #[test]
     fn motions_side_by_side_are_those_that_go_alone(
         tip in tips(),
@@ -137,9 +148,35 @@ proptest! {
         let states = states(tip.masses.len(), periods.len());
         let expected = alone(&system, &states, &periods);
         let found = together(&system, &states, &periods);
-        let size = expected.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
+        let rounding = rounding(&system, &states, &periods);
         for (a, b) in found.iter().zip(&expected) {
-            prop_assert!((a - b).abs() < 1e-9 * size, "{a} {b}");
+            prop_assert!((a - b).abs() < rounding, "{a} {b}");
+        }
+    }
+
+    /// The states at the ends of all periods are those that a motion alone comes to after so many, and
+    /// the last one is where the motion ends.
+    #[test]
+    fn motions_pass_through_the_states_of_every_period(tip in tips(), count in 1..20_usize) {
+        let system = tip.system();
+        let n = system.dimension();
+        let starts = states(tip.masses.len(), count);
+        let periods: Vec<usize> = (0..count).map(|k| k % 4).collect();
+        let (mut ends, mut passed) = (starts.clone(), vec![vec![7.0]; count]);
+        let mut ensemble = Ensemble::new(Arc::clone(&system));
+        let results = ensemble.advance_through(&mut ends, &periods, &mut passed);
+        prop_assert!(results.iter().all(Result::is_ok), "{:?}", results);
+        for k in 0..count {
+            let (start, end) = (&starts[k * n..][..n], &ends[k * n..][..n]);
+            prop_assert_eq!(passed[k].len(), n * periods[k]);
+            prop_assert!(periods[k] == 0 || &passed[k][n * (periods[k] - 1)..] == end);
+            for (period, state) in passed[k].chunks_exact(n).enumerate() {
+                let expected = alone(&system, start, &[period + 1]);
+                let rounding = rounding(&system, start, &[period + 1]);
+                for (a, b) in state.iter().zip(&expected) {
+                    prop_assert!((a - b).abs() < rounding, "{} {}", a, b);
+                }
+            }
         }
     }
 
@@ -212,4 +249,9 @@ fn one_bad_state_harms_no_other() {
     let expected = together(&system, &good, &[2; 3]);
     assert_eq!(states[..6], expected[..6]);
     assert_eq!(states[12..], expected[12..]);
+    let (mut states, mut passed) = (good, [const { Vec::new() }; 3]);
+    states[7] = f64::NAN;
+    let results = Ensemble::new(system).advance_through(&mut states, &[2; 3], &mut passed);
+    assert!(results[0].is_ok() && results[1].is_err() && results[2].is_ok());
+    assert_eq!(passed.map(|passed| passed.len()), [12, 0, 12]);
 }

@@ -4,13 +4,15 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::observe::{Set, measure};
-use nanotap_flow::{Ensemble, Flow};
+use nanotap_flow::{Ensemble, Flow, FlowError};
 use std::sync::Arc;
 
 use crate::cases::{self, DAMPINGS, MODES};
 
 /// Periods a run: chaotic motion differs from period to period.
 const PERIODS: usize = 100;
+/// Motions side by side.
+const MOTIONS: usize = 64;
 
 /// Times [`PERIODS`] periods from where `flow` is.
 fn periods(bencher: Bencher<'_, '_>, flow: &Flow) {
@@ -51,7 +53,23 @@ fn in_one_go(bencher: Bencher<'_, '_>, modes: usize) {
 /// 64 motions of it side by side, each over as many periods. Items are periods.
 #[divan::bench(args = MODES)]
 fn side_by_side(bencher: Bencher<'_, '_>, modes: usize) {
-    const MOTIONS: usize = 64;
+    together(bencher, modes, |ensemble, states, periods, _| {
+        ensemble.advance(states, periods)
+    });
+}
+
+/// The same with the states at the ends of all periods.
+#[divan::bench(args = MODES)]
+fn side_by_side_strobed(bencher: Bencher<'_, '_>, modes: usize) {
+    together(bencher, modes, Ensemble::advance_through);
+}
+
+/// Times `advance` of [`MOTIONS`] motions on the attractor.
+fn together(
+    bencher: Bencher<'_, '_>,
+    modes: usize,
+    advance: impl Fn(&mut Ensemble, &mut [f64], &[usize], &mut [Vec<f64>]) -> Vec<Result<(), FlowError>>,
+) {
     let case = cases::paper(modes);
     let model = cases::model(&case);
     let mut ensemble = Ensemble::new(Arc::clone(&model.system));
@@ -59,15 +77,16 @@ fn side_by_side(bencher: Bencher<'_, '_>, modes: usize) {
     for (k, state) in states.chunks_mut(model.dimension()).enumerate() {
         state[0] = 0.01 * k as f64;
     }
-    let run = |ensemble: &mut Ensemble, states: &mut [f64], periods| {
-        let results = ensemble.advance(states, &[periods; MOTIONS]);
+    let mut passed = vec![Vec::new(); MOTIONS];
+    let mut run = |states: &mut [f64], periods| {
+        let results = advance(&mut ensemble, states, &[periods; MOTIONS], &mut passed);
         assert!(results.iter().all(Result::is_ok), "bounded motions");
     };
-    run(&mut ensemble, &mut states, 400);
+    run(&mut states, 400);
     bencher
         .counter(ItemsCount::new(MOTIONS * PERIODS))
         .with_inputs(|| states.clone())
-        .bench_local_refs(|states| run(&mut ensemble, states, PERIODS));
+        .bench_local_refs(|states| run(states, PERIODS));
 }
 
 /// The same with what sweeps record of every motion measured.

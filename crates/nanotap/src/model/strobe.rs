@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
+use nanotap_dynamics::map::{one_after_another, one_after_another_through};
 use nanotap_dynamics::{StroboscopicMap, Tangency};
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
 use nanotap_flow::jacobian::Jacobian;
@@ -55,6 +56,14 @@ impl Strobe {
                 Engine::Nonlinear(Box::new(map))
             }
         })
+    }
+
+    /// What takes many motions of it at a time; `None` where they go one after the other.
+    fn ensemble(&mut self) -> Option<&mut Ensemble> {
+        match &mut self.0 {
+            Engine::Exact(map) => map.ensemble(),
+            Engine::Nonlinear(_) => None,
+        }
     }
 
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
@@ -114,6 +123,15 @@ impl StroboscopicMap for Strobe {
         matches!(self.0, Engine::Nonlinear(_))
     }
 
+    /// Many where the model is piecewise linear with one contact: eight at a time, and others to
+    /// fill the places of those that have come to a switch.
+    fn side_by_side(&self) -> usize {
+        match &self.0 {
+            Engine::Exact(map) if Ensemble::fits(map.flow.system()) => TOGETHER,
+            _ => 1,
+        }
+    }
+
     fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance(state)?),
@@ -128,23 +146,29 @@ impl StroboscopicMap for Strobe {
         }
     }
 
-    /// Eight at a time where the model is piecewise linear with one contact.
     fn advance_each(
         &mut self,
         states: &mut [f64],
         periods: &[usize],
     ) -> Vec<Result<(), MotionError>> {
-        match &mut self.0 {
-            Engine::Exact(map) => {
-                let advanced = map.ensemble().advance(states, periods).into_iter();
-                advanced.map(|result| Ok(result?)).collect()
-            }
-            Engine::Nonlinear(map) => {
-                let each = states.chunks_exact_mut(map.dimension()).zip(periods);
-                each.map(|(state, &periods)| map.advance_by(state, periods))
-                    .collect()
-            }
-        }
+        let Some(ensemble) = self.ensemble() else {
+            return one_after_another(self, states, periods);
+        };
+        let advanced = ensemble.advance(states, periods).into_iter();
+        advanced.map(|result| Ok(result?)).collect()
+    }
+
+    fn advance_each_through(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+        passed: &mut [Vec<f64>],
+    ) -> Vec<Result<(), MotionError>> {
+        let Some(ensemble) = self.ensemble() else {
+            return one_after_another_through(self, states, periods, passed);
+        };
+        let advanced = ensemble.advance_through(states, periods, passed);
+        advanced.into_iter().map(|result| Ok(result?)).collect()
     }
 
     fn advance_with_jacobian(
@@ -211,12 +235,7 @@ const TOGETHER: usize = 64;
 pub(crate) fn together(map: &Strobe, count: usize) -> usize {
     count
         .div_ceil(rayon::current_num_threads())
-        .clamp(1, most_together(map))
-}
-
-/// The most states that are worth advancing together on one thread.
-pub(crate) fn most_together(map: &Strobe) -> usize {
-    if map.is_costly() { 1 } else { TOGETHER }
+        .clamp(1, map.side_by_side())
 }
 
 /// The exact map of a piecewise-linear model.
@@ -249,10 +268,12 @@ impl ExactStrobe {
         }
     }
 
-    fn ensemble(&mut self) -> &mut Ensemble {
+    fn ensemble(&mut self) -> Option<&mut Ensemble> {
         let system = self.flow.system();
-        self.ensemble
-            .get_or_insert_with(|| Box::new(Ensemble::new(Arc::clone(system))))
+        if self.ensemble.is_none() && Ensemble::fits(system) {
+            self.ensemble = Some(Box::new(Ensemble::new(Arc::clone(system))));
+        }
+        self.ensemble.as_deref_mut()
     }
 
     fn advance_with_derivatives(

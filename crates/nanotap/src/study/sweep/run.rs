@@ -10,7 +10,7 @@ use crate::case::Case;
 use crate::case::physical::Scales;
 use crate::dataset::Block;
 use crate::map::UNINTERRUPTED;
-use crate::model::strobe::{Strobe, most_together};
+use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
 use crate::observe::{Kept, Observables, Set, Watched, Watcher};
@@ -269,7 +269,7 @@ impl<'a> Runner<'a> {
         cancelled: &impl Fn() -> bool,
     ) -> Option<Vec<Outcome>> {
         let mut outcomes = Vec::with_capacity(starts.len());
-        for starts in starts.chunks(most_together(&self.map)) {
+        for starts in starts.chunks(self.map.side_by_side()) {
             let mut states = starts.concat();
             let mut failures = vec![None; starts.len()];
             for done in (0..transient).step_by(UNINTERRUPTED) {

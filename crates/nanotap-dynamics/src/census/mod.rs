@@ -43,7 +43,7 @@ use rayon::prelude::*;
 use crate::census::escapes::Escapes;
 use crate::classify::{
     Chaos, Classified, ClassifyOptions, Known, MotionKind, RECOGNISABLE, RunEnd, Torus,
-    UndecidedReason, follow_start, watch,
+    UndecidedReason, follow_start, follow_starts, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -61,6 +61,8 @@ pub use unseen::Unseen;
 const FIRST_PILOTS: usize = 4;
 /// Starts of one batch after the pilots.
 const BATCH: usize = 128;
+/// Starts that are worth following side by side.
+const LEAST_TOGETHER: usize = 8;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
 const LEAST_PATIENCE: usize = 64;
@@ -395,22 +397,35 @@ impl<M: StroboscopicMap> Work<'_, M> {
             chaos: &self.chaos,
             patience: self.patience,
         };
+        // Of few starts most places side by side would be empty.
+        let side_by_side = self.map.side_by_side() > 1 && indices.len() >= LEAST_TOGETHER;
+        let together = if side_by_side {
+            let share = indices.len().div_ceil(rayon::current_num_threads());
+            share.clamp(LEAST_TOGETHER, self.map.side_by_side())
+        } else {
+            1
+        };
+        let options = &self.options.classify;
+        let follow = |map: &mut M, indices: &[usize]| -> Vec<Option<RunEnd>> {
+            let cancelled = || self.control.is_cancelled();
+            let start = |&k: &usize| self.starts.start(k).unwrap_or_default();
+            let arrivals = if side_by_side {
+                let starts: Vec<Vec<f64>> = indices.iter().map(start).collect();
+                follow_starts(map, &starts, known, options, cancelled)
+            } else {
+                let alone =
+                    |k| (!cancelled()).then(|| follow_start(map, &start(k), known, options));
+                indices.iter().map(alone).collect()
+            };
+            for _ in arrivals.iter().filter(|arrival| count && arrival.is_some()) {
+                self.control.report(&self.done, self.last);
+            }
+            arrivals
+        };
         indices
-            .par_iter()
-            .map_init(
-                || self.map.clone(),
-                |map, &k| {
-                    if self.control.is_cancelled() {
-                        return None;
-                    }
-                    let start = self.starts.start(k)?;
-                    let arrival = follow_start(map, &start, known, &self.options.classify);
-                    if count {
-                        self.control.report(&self.done, self.last);
-                    }
-                    Some(arrival)
-                },
-            )
+            .par_chunks(together)
+            .map_init(|| self.map.clone(), follow)
+            .flatten_iter()
             .collect()
     }
 

@@ -28,6 +28,7 @@
 mod approach;
 mod birkhoff;
 mod candidates;
+mod pack;
 mod run;
 mod undecided;
 
@@ -37,6 +38,7 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
+pub(crate) use pack::follow_starts;
 pub(crate) use run::{Known, RECOGNISABLE, RunEnd, follow_start, watch};
 pub use undecided::UndecidedReason;
 

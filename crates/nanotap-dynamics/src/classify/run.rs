@@ -4,7 +4,7 @@ use crate::classify::approach::approaches;
 use crate::classify::birkhoff::birkhoff_digits;
 use crate::classify::candidates::candidate_periods;
 use crate::classify::{Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason};
-use crate::failure::{MapFailure, advance};
+use crate::failure::{MapFailure, advance, finite};
 use crate::lyapunov::{LyapunovRun, LyapunovSpectrum, StrobeMeans};
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
@@ -38,7 +38,7 @@ const NEIGHBOUR: f64 = 1e-9;
 /// How many times its distance grows on chaos.
 const PARTING: f64 = 1e5;
 /// Periods in which it does.
-const LONGEST_PARTING: usize = 512;
+pub(super) const LONGEST_PARTING: usize = 512;
 
 /// What is known already when a start sets out.
 #[derive(Clone, Copy, Debug, Default)]
@@ -69,28 +69,30 @@ pub(crate) fn follow_start<M: StroboscopicMap>(
     known: Known<'_>,
     options: &ClassifyOptions,
 ) -> RunEnd {
-    let d = map.dimension();
-    let bad = if start.len() != d || d == 0 {
-        Some(format!("{} numbers given, {d} needed", start.len()))
-    } else {
-        start
-            .iter()
-            .find(|v| !v.is_finite())
-            .map(|v| format!("{v} is not finite"))
-    };
-    if let Some(reason) = bad {
-        return RunEnd::Classified(Box::new(Classified {
-            kind: undecided(UndecidedReason::BadStart(reason), None),
-            periods: 0,
-            state: start.to_vec(),
-            met: Vec::new(),
-        }));
+    if let Some(end) = refused(start, map.dimension()) {
+        return end;
     }
     let mut run = Run::new(start, known, options);
     match run.follow(map) {
         Ok(kind) => run.classified(kind),
         Err(stop) => run.stopped(stop),
     }
+}
+
+/// The end of a start that is no state of dimension `d`.
+pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
+    let reason = if start.len() != d || d == 0 {
+        format!("{} numbers given, {d} needed", start.len())
+    } else {
+        let bad = start.iter().find(|v| !v.is_finite())?;
+        format!("{bad} is not finite")
+    };
+    Some(RunEnd::Classified(Box::new(Classified {
+        kind: undecided(UndecidedReason::BadStart(reason), None),
+        periods: 0,
+        state: start.to_vec(),
+        met: Vec::new(),
+    })))
 }
 
 /// Follows a motion for so many periods more: its state then, or where it went instead.
@@ -127,7 +129,7 @@ fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Mot
 }
 
 /// Why following a start ended early.
-enum Stop {
+pub(super) enum Stop {
     Entered(usize),
     Unbounded,
     Failed(MapFailure),
@@ -139,23 +141,64 @@ impl From<MapFailure> for Stop {
     }
 }
 
-struct Run<'a> {
+pub(super) struct Run<'a> {
     d: usize,
-    state: Vec<f64>,
+    pub(super) state: Vec<f64>,
     scratch: Vec<f64>,
-    periods: usize,
+    pub(super) periods: usize,
     /// The latest strobe states, oldest first, at least the last twice the longest
     /// period.
     recent: Vec<f64>,
     keep: usize,
+    /// Periods after which it is looked at, if no budget ends before.
+    target: usize,
     known: Known<'a>,
     options: &'a ClassifyOptions,
     closing: ShootingOptions,
     met: Vec<PeriodicOrbit>,
 }
 
+/// What follows from a look at a run.
+pub(super) enum AfterLook {
+    /// It is this motion.
+    Known(MotionKind),
+    /// It may be on known chaos, which a neighbour decides.
+    Perhaps(Resembled),
+    /// It goes on to the next look.
+    GoOn,
+    /// It does not close: its exponents are measured.
+    Measure,
+}
+
+/// Chaos whose means a run has.
+pub(super) struct Resembled {
+    pub(super) spectrum: LyapunovSpectrum,
+    /// Standard deviations of the run's states.
+    deviations: Vec<f64>,
+}
+
+impl Resembled {
+    /// A neighbour of a state.
+    pub(super) fn neighbour(&self, state: &[f64]) -> Vec<f64> {
+        let apart = self.deviations.iter().map(|s| NEIGHBOUR * s);
+        state
+            .iter()
+            .zip(apart)
+            .map(|(x, apart)| x + apart)
+            .collect()
+    }
+
+    /// Whether a neighbour has come to be [`PARTING`] times as far away as it was, more than any
+    /// linear transient explains.
+    pub(super) fn has_parted(&self, state: &[f64], neighbour: &[f64]) -> bool {
+        let distances = neighbour.iter().zip(state).zip(&self.deviations);
+        let apart = distances.fold(0.0f64, |far, ((a, b), s)| far.max((a - b).abs() / s));
+        apart > PARTING * NEIGHBOUR
+    }
+}
+
 impl<'a> Run<'a> {
-    fn new(start: &[f64], known: Known<'a>, options: &'a ClassifyOptions) -> Self {
+    pub(super) fn new(start: &[f64], known: Known<'a>, options: &'a ClassifyOptions) -> Self {
         let keep = (2 * longest(options)).max(FIRST_LOOK) * start.len();
         Self {
             d: start.len(),
@@ -164,6 +207,7 @@ impl<'a> Run<'a> {
             periods: 0,
             recent: start.to_vec(),
             keep,
+            target: FIRST_LOOK.max(known.patience),
             known,
             options,
             closing: ShootingOptions {
@@ -177,7 +221,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn classified(self, kind: MotionKind) -> RunEnd {
+    pub(super) fn classified(self, kind: MotionKind) -> RunEnd {
         RunEnd::Classified(Box::new(Classified {
             kind,
             periods: self.periods,
@@ -186,7 +230,7 @@ impl<'a> Run<'a> {
         }))
     }
 
-    fn stopped(self, stop: Stop) -> RunEnd {
+    pub(super) fn stopped(self, stop: Stop) -> RunEnd {
         let periods = self.periods;
         match stop {
             Stop::Entered(index) => RunEnd::Entered { index, periods },
@@ -199,25 +243,50 @@ impl<'a> Run<'a> {
     }
 
     fn follow<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
-        let mut target = FIRST_LOOK.max(self.known.patience);
         loop {
-            let target_now = target.min(self.options.max_transient);
-            while self.periods < target_now {
+            while self.periods < self.next_look() {
                 self.step(map)?;
             }
-            if let Some(kind) = self.look(map)? {
-                return Ok(kind);
+            let mut after = self.at_look(map)?;
+            if let AfterLook::Perhaps(chaos) = after {
+                if self.parts_from_neighbour(map, &chaos)? {
+                    return Ok(self.chaotic(chaos.spectrum));
+                }
+                after = self.go_on();
             }
-            if self.periods >= RECOGNISABLE.min(self.options.max_transient)
-                && let Some(kind) = self.known_chaos(map)?
-            {
-                return Ok(kind);
+            match after {
+                AfterLook::Known(kind) => return Ok(kind),
+                AfterLook::Measure => return self.measure(map),
+                AfterLook::GoOn | AfterLook::Perhaps(_) => {}
             }
-            if target >= self.options.max_transient {
-                return self.measure(map);
-            }
-            target *= 2;
         }
+    }
+
+    /// Periods after which it is looked at next.
+    pub(super) fn next_look(&self) -> usize {
+        self.target.min(self.options.max_transient)
+    }
+
+    /// Looks where it goes.
+    pub(super) fn at_look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<AfterLook, Stop> {
+        if let Some(kind) = self.look(map)? {
+            return Ok(AfterLook::Known(kind));
+        }
+        if self.periods >= RECOGNISABLE.min(self.options.max_transient)
+            && let Some(chaos) = self.resembles()
+        {
+            return Ok(AfterLook::Perhaps(chaos));
+        }
+        Ok(self.go_on())
+    }
+
+    /// What comes after a look that named nothing.
+    pub(super) fn go_on(&mut self) -> AfterLook {
+        if self.target >= self.options.max_transient {
+            return AfterLook::Measure;
+        }
+        self.target *= 2;
+        AfterLook::GoOn
     }
 
     fn step<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
@@ -226,6 +295,17 @@ impl<'a> Run<'a> {
             Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
             other => other?,
         }
+        self.after_period(map)
+    }
+
+    /// As [`Run::step`], to a state that is known already.
+    pub(super) fn step_to<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        state: &[f64],
+    ) -> Result<(), Stop> {
+        self.state.copy_from_slice(state);
+        finite(state).map_err(|_| Stop::Unbounded)?;
         self.after_period(map)
     }
 
@@ -338,13 +418,11 @@ impl<'a> Run<'a> {
             .fold(0.0, |m: f64, row| m.max(distance(row, &self.state)))
     }
 
-    /// The chaotic motion that is known already, if the run is on it: neighbours part, and the
-    /// strobe states after the first quarter have the means of the known one.
-    fn known_chaos<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Option<MotionKind>, Stop> {
+    /// The chaotic motion that is known already, if the strobe states after the first quarter have
+    /// the means of it.
+    fn resembles(&self) -> Option<Resembled> {
         let mut known = self.known.chaos.iter().filter(|k| is_chaotic(k)).peekable();
-        if known.peek().is_none() {
-            return Ok(None);
-        }
+        known.peek()?;
         let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
         let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
         let deviations = means.deviations();
@@ -353,44 +431,33 @@ impl<'a> Run<'a> {
             .zip(&means.errors)
             .all(|(deviation, error)| *error <= TELLING * deviation);
         let found = known.find(|k| telling && k.strobe.agree_with(&means));
-        let Some(spectrum) = found else {
-            return Ok(None);
-        };
-        if !self.parts_from_neighbour(map, &deviations)? {
-            return Ok(None);
-        }
-        Ok(Some(self.chaotic(spectrum.clone())))
+        found.map(|spectrum| Resembled {
+            spectrum: spectrum.clone(),
+            deviations,
+        })
     }
 
-    /// Whether a neighbour of the state comes to be [`PARTING`] times as far away, more than any
-    /// linear transient explains. The run goes on meanwhile.
+    /// Whether a neighbour of the state parts from it within [`LONGEST_PARTING`] periods. The run
+    /// goes on meanwhile.
     fn parts_from_neighbour<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
-        deviations: &[f64],
+        chaos: &Resembled,
     ) -> Result<bool, Stop> {
-        let mut neighbour = self.state.clone();
-        for (x, deviation) in neighbour.iter_mut().zip(deviations) {
-            *x += NEIGHBOUR * deviation;
-        }
+        let mut neighbour = chaos.neighbour(&self.state);
         for _ in 0..LONGEST_PARTING {
             self.step(map)?;
             if advance(map, &mut neighbour).is_err() {
                 return Ok(false);
             }
-            let apart = neighbour
-                .iter()
-                .zip(&self.state)
-                .zip(deviations)
-                .fold(0.0f64, |far, ((a, b), s)| far.max((a - b).abs() / s));
-            if apart > PARTING * NEIGHBOUR {
+            if chaos.has_parted(&self.state, &neighbour) {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    fn chaotic(&self, spectrum: LyapunovSpectrum) -> MotionKind {
+    pub(super) fn chaotic(&self, spectrum: LyapunovSpectrum) -> MotionKind {
         let mut chaos = Chaos {
             spectrum,
             observed: 0,
@@ -402,7 +469,7 @@ impl<'a> Run<'a> {
     }
 
     /// Exponents of what does not close, looking for an escape after every doubling.
-    fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
+    pub(super) fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
         let mut exponents = LyapunovRun::new(self.d);
         for _ in 0..budget.alignment {
@@ -561,12 +628,12 @@ fn is_chaotic(spectrum: &LyapunovSpectrum) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
     #[derive(Clone)]
-    struct Logistic(f64);
+    pub(in crate::classify) struct Logistic(pub(in crate::classify) f64);
 
     impl StroboscopicMap for Logistic {
         type Error = std::convert::Infallible;

@@ -1,0 +1,359 @@
+//! Many starts followed side by side until their motions are known.
+//!
+//! Each run comes to what [`follow_start`](super::follow_start) makes of its start, but for rounding:
+//! the map passes some periods of all of them together, and each run then takes in the states that
+//! it came through, one by one. Where it ends before the last of them, the others are not looked at.
+//! What comes of a start depends on no other.
+
+use crate::classify::run::{AfterLook, LONGEST_PARTING, Resembled, Run, Stop, refused};
+use crate::classify::{ClassifyOptions, Known, MotionKind, RunEnd};
+use crate::failure::{MapFailure, finite};
+use crate::map::StroboscopicMap;
+
+/// Periods that are passed before a run is asked where it has come to.
+const UNSEEN: usize = 32;
+
+/// One start under way.
+struct Member<'a> {
+    number: usize,
+    run: Run<'a>,
+    /// The neighbour that shows whether it is on the chaos that it resembles.
+    beside: Option<Beside>,
+}
+
+/// A neighbour of a run.
+struct Beside {
+    chaos: Resembled,
+    neighbour: Vec<f64>,
+    /// Periods passed.
+    periods: usize,
+}
+
+/// The states at the ends of the periods that were passed, and why there are no more.
+#[derive(Default)]
+struct Passed {
+    states: Vec<f64>,
+    failure: Option<MapFailure>,
+}
+
+/// Follows all `starts`; `None` for those that were under way when the work was `cancelled`.
+pub(crate) fn follow_starts<M: StroboscopicMap>(
+    map: &mut M,
+    starts: &[Vec<f64>],
+    known: Known<'_>,
+    options: &ClassifyOptions,
+    cancelled: impl Fn() -> bool,
+) -> Vec<Option<RunEnd>> {
+    let d = map.dimension();
+    let mut ends: Vec<Option<RunEnd>> = starts.iter().map(|start| refused(start, d)).collect();
+    let mut members: Vec<Member<'_>> = (0..starts.len())
+        .filter(|&number| ends[number].is_none())
+        .map(|number| Member {
+            number,
+            run: Run::new(&starts[number], known, options),
+            beside: None,
+        })
+        .collect();
+    while !members.is_empty() {
+        let mut passed = pass(map, &members).into_iter();
+        let mut left = Vec::with_capacity(members.len());
+        for mut member in members {
+            if cancelled() {
+                return ends;
+            }
+            let own = passed.next().unwrap_or_default();
+            let neighbour = member.beside.as_ref().and_then(|_| passed.next());
+            match member.go_on(map, own, &neighbour.unwrap_or_default()) {
+                Ok(None) => left.push(member),
+                Ok(Some(kind)) => ends[member.number] = Some(member.run.classified(kind)),
+                Err(stop) => ends[member.number] = Some(member.run.stopped(stop)),
+            }
+        }
+        members = left;
+    }
+    ends
+}
+
+/// Passes some periods of every run, and of its neighbour after it where it has one.
+fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> {
+    let (mut states, mut periods) = (Vec::new(), Vec::new());
+    for Member { run, beside, .. } in members {
+        states.extend_from_slice(&run.state);
+        if let Some(beside) = beside {
+            states.extend_from_slice(&beside.neighbour);
+            periods.extend([UNSEEN.min(LONGEST_PARTING - beside.periods); 2]);
+        } else {
+            periods.push(UNSEEN.min(run.next_look() - run.periods));
+        }
+    }
+    let mut passed = vec![Vec::new(); periods.len()];
+    let results = map.advance_each_through(&mut states, &periods, &mut passed);
+    let each = passed.into_iter().zip(results);
+    each.map(|(states, result)| Passed {
+        states,
+        failure: result.err().map(MapFailure::refused),
+    })
+    .collect()
+}
+
+impl Member<'_> {
+    /// Takes in what was passed, and looks where the run goes when it is time to: what its motion is,
+    /// once that is known.
+    fn go_on<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        own: Passed,
+        neighbour: &Passed,
+    ) -> Result<Option<MotionKind>, Stop> {
+        let mut after = match self.beside.take() {
+            None => {
+                for state in own.states.chunks_exact(map.dimension()) {
+                    self.run.step_to(map, state)?;
+                }
+                own.failure.map_or(Ok(()), Err)?;
+                AfterLook::GoOn
+            }
+            Some(beside) => match self.go_on_beside(map, beside, own, neighbour)? {
+                Some(after) => after,
+                None => return Ok(None),
+            },
+        };
+        loop {
+            after = match after {
+                AfterLook::Known(kind) => return Ok(Some(kind)),
+                AfterLook::Measure => return self.run.measure(map).map(Some),
+                AfterLook::Perhaps(chaos) => {
+                    self.beside = Some(Beside {
+                        neighbour: chaos.neighbour(&self.run.state),
+                        chaos,
+                        periods: 0,
+                    });
+                    return Ok(None);
+                }
+                AfterLook::GoOn if self.run.periods < self.run.next_look() => return Ok(None),
+                AfterLook::GoOn => self.run.at_look(map)?,
+            }
+        }
+    }
+
+    /// The same beside a neighbour; nothing follows as long as it may still part.
+    fn go_on_beside<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        mut beside: Beside,
+        own: Passed,
+        neighbour: &Passed,
+    ) -> Result<Option<AfterLook>, Stop> {
+        let d = map.dimension();
+        let mut neighbours = neighbour.states.chunks_exact(d);
+        for state in own.states.chunks_exact(d) {
+            self.run.step_to(map, state)?;
+            let Some(neighbour) = neighbours.next().filter(|x| finite(x).is_ok()) else {
+                return Ok(Some(self.run.go_on()));
+            };
+            if beside.chaos.has_parted(state, neighbour) {
+                let kind = self.run.chaotic(beside.chaos.spectrum);
+                return Ok(Some(AfterLook::Known(kind)));
+            }
+            beside.periods += 1;
+            beside.neighbour.copy_from_slice(neighbour);
+        }
+        own.failure.map_or(Ok(()), Err)?;
+        if beside.periods >= LONGEST_PARTING {
+            return Ok(Some(self.run.go_on()));
+        }
+        self.beside = Some(beside);
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::classify::run::tests::Logistic;
+    use crate::classify::{Classified, classify, follow_start};
+    use crate::lyapunov::LyapunovSpectrum;
+    use crate::neighbourhood::Neighbourhood;
+
+    const STARTS: [&[f64]; 8] = [
+        &[0.3],
+        &[0.123],
+        &[],
+        &[f64::NAN],
+        &[0.77],
+        &[0.0],
+        &[1.5],
+        &[0.5],
+    ];
+
+    fn starts() -> Vec<Vec<f64>> {
+        STARTS.iter().map(|start| start.to_vec()).collect()
+    }
+
+    fn written(end: &RunEnd) -> String {
+        format!("{end:?}")
+    }
+
+    /// One after the other, `map` gives the same bits.
+    fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: Known<'_>) -> Vec<RunEnd> {
+        let options = ClassifyOptions::default();
+        let together = follow_starts(&mut map.clone(), &starts(), known, &options, || false);
+        let together: Vec<RunEnd> = together.into_iter().map(Option::unwrap).collect();
+        for (start, end) in starts().iter().zip(&together) {
+            let alone = follow_start(&mut map.clone(), start, known, &options);
+            assert_eq!(written(end), written(&alone), "{start:?}");
+        }
+        together
+    }
+
+    fn chaos(r: f64) -> LyapunovSpectrum {
+        match classify(&mut Logistic(r), &[0.3], &ClassifyOptions::default()).kind {
+            MotionKind::Chaotic(chaos) => chaos.spectrum,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Of r x (1 − x): an orbit of period 2 at 3.2, one that is reached slowly at 3.449, an orbit of
+    /// period 3 after a chaotic while at 3.8285, chaos at 3.9, and nothing that stays at 4.5.
+    #[test]
+    fn starts_side_by_side_come_to_what_each_comes_to_alone() {
+        for r in [3.2, 3.449, 3.8285, 3.9, 4.5] {
+            assert_same_as_alone(&Logistic(r), Known::default());
+        }
+    }
+
+    /// Patience as a census has it, and neighbourhoods on the way.
+    #[test]
+    fn neighbourhoods_are_entered_after_as_many_periods() {
+        let mut map = Logistic(3.2);
+        let found = classify(&mut map, &[0.3], &ClassifyOptions::default());
+        let MotionKind::Periodic(orbit) = found.kind else {
+            panic!("3.2 x (1 − x) has an orbit of period 2")
+        };
+        let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let known = Known {
+            balls: &[ball],
+            chaos: &[],
+            patience: 100,
+        };
+        let ends = assert_same_as_alone(&map, known);
+        assert!(matches!(
+            ends[0],
+            RunEnd::Entered {
+                index: 0,
+                periods: 1..100
+            }
+        ));
+    }
+
+    /// A start that resembles chaos is on it if a neighbour parts. On an orbit of period 3 none does,
+    /// though its means are said to be those of chaos.
+    #[test]
+    fn known_chaos_is_recognised_beside_a_neighbour() {
+        let own = [chaos(3.9)];
+        let known = Known {
+            chaos: &own,
+            patience: 300,
+            ..Known::default()
+        };
+        let ends = assert_same_as_alone(&Logistic(3.9), known);
+        let RunEnd::Classified(end) = &ends[0] else {
+            panic!("there is no neighbourhood")
+        };
+        let Classified {
+            kind: MotionKind::Chaotic(found),
+            periods,
+            ..
+        } = &**end
+        else {
+            panic!("{end:?}")
+        };
+        assert_eq!(found.spectrum, own[0]);
+        assert!(
+            (300..400).contains(periods),
+            "no exponents were measured: {periods}"
+        );
+        let mut other = chaos(3.9);
+        other.strobe.errors.fill(1.0);
+        let others = [other];
+        let known = Known {
+            chaos: &others,
+            ..known
+        };
+        assert_same_as_alone(&Logistic(3.8285), known);
+    }
+
+    /// A map that fails above 0.97.
+    #[derive(Clone)]
+    struct Fails(Logistic);
+
+    impl StroboscopicMap for Fails {
+        type Error = std::fmt::Error;
+
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {
+            let mut next = [state[0]];
+            self.0.advance(&mut next).unwrap();
+            if next[0] > 0.97 {
+                return Err(std::fmt::Error);
+            }
+            state.copy_from_slice(&next);
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Self::Error> {
+            self.0.advance_with_jacobian(state, jacobian).unwrap();
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_failure_comes_after_as_many_periods() {
+        assert_same_as_alone(&Fails(Logistic(3.9)), Known::default());
+        let own = [chaos(3.9)];
+        let known = Known {
+            chaos: &own,
+            patience: 300,
+            ..Known::default()
+        };
+        assert_same_as_alone(&Fails(Logistic(3.9)), known);
+    }
+
+    /// What had ended by then is told.
+    #[test]
+    fn work_that_is_stopped_tells_what_it_knows() {
+        let options = ClassifyOptions::default();
+        let asked = Cell::new(0);
+        let cancelled = || {
+            asked.set(asked.get() + 1);
+            asked.get() > 20
+        };
+        let ends = follow_starts(
+            &mut Logistic(3.9),
+            &starts(),
+            Known::default(),
+            &options,
+            cancelled,
+        );
+        assert!(
+            ends[2].is_some() && ends[6].is_some(),
+            "no states, and what runs off"
+        );
+        assert!(ends[0].is_none());
+    }
+}

@@ -5,9 +5,10 @@
 //! finer grid. [`walk`](super::walk) says what is concluded from the points.
 
 use super::interval::Interval;
+use crate::Complex;
 use crate::regime::Kernel;
 use crate::signal::{Amplitude, Signal};
-use crate::simd::{self, ComplexVector, Simd, Vector, WIDTH, layout};
+use crate::simd::{self, ComplexVector, Simd, Vector, WIDTH, Work, layout};
 use nanotap_arithmetic::ComplexFunctions as _;
 
 /// Angle through which the fastest followed term turns from point to point: a larger one
@@ -51,7 +52,7 @@ pub(crate) struct Table {
 pub(crate) struct Coarse {
     pub(crate) grid: Grid,
     /// Of every followed term, the exponential at each point.
-    powers: Vec<Vec<Pair>>,
+    powers: Vec<Column>,
 }
 
 /// Equidistant points with the exponentials of the slowest terms.
@@ -124,9 +125,12 @@ impl Table {
         let cost = period / fine_step / WIDTH as f64 * (6 * terms[0] + 20) as f64;
         let single = cost < CHEAP || coarse_step < COARSER * fine_step;
         order.truncate(terms[0]);
-        let columns = |step: f64, vectors: usize| -> Vec<Vec<Pair>> {
-            let column = |&k: &usize| exponentials(kernel, k, step, vectors * WIDTH);
-            order.iter().map(column).collect()
+        let columns = |step: f64, vectors: usize| {
+            simd::dispatch(Columns {
+                rates: order.iter().map(|&k| kernel.rate(k)).collect(),
+                step,
+                vectors,
+            })
         };
         if single {
             let vectors = vectors(period, fine_step);
@@ -198,8 +202,8 @@ impl Followed {
             return;
         };
         for (amplitude, column) in self.here.iter().zip(&coarse.powers) {
-            let [re, im] = column[interval.point];
-            let power = [S::splat(re), S::splat(im)];
+            let power = layout::get(column, interval.point);
+            let power = [S::splat(power.re), S::splat(power.im)];
             let mut moved = *amplitude;
             for z in &mut moved {
                 let product = simd::complex_mul::<S>([S::load(&z[0]), S::load(&z[1])], power);
@@ -233,17 +237,12 @@ impl Grid {
 
     /// The grid that follows the terms `followed`, from a column of exponentials for each
     /// (of at least as many terms).
-    fn new(kernel: &Kernel, followed: &[usize], step: f64, columns: &[Vec<Pair>]) -> Self {
+    fn new(kernel: &Kernel, followed: &[usize], step: f64, columns: &[Column]) -> Self {
         let terms = followed.len();
-        let points = columns.first().map_or(0, Vec::len);
-        let mut table = vec![ComplexVector::default(); points / WIDTH * terms];
-        for (j, column) in columns.iter().take(terms).enumerate() {
-            for (p, &[re, im]) in column.iter().enumerate() {
-                let (vector, lane) = layout::place(p);
-                let entry = &mut table[vector * terms + j];
-                entry[0][lane] = re;
-                entry[1][lane] = im;
-            }
+        let vectors = columns.first().map_or(0, Vec::len);
+        let mut table = Vec::with_capacity(vectors * terms);
+        for vector in 0..vectors {
+            table.extend(columns.iter().take(terms).map(|column| column[vector]));
         }
         let slow = |k: &&usize| chord(kernel.rate(**k).modulus(), step) <= SLOW;
         let slow = followed.iter().take_while(slow).count();
@@ -283,27 +282,52 @@ fn chord(rate: f64, step: f64) -> f64 {
     (rate * step).powi(2) / 8.0
 }
 
-/// `e^{λ h p}` of a term for `p = 0 … count − 1`. Each is a product of at most as many
-/// factors as `p` has binary digits, so that rounding does not pile up along the table.
-fn exponentials(kernel: &Kernel, k: usize, step: f64, count: usize) -> Vec<Pair> {
-    let rate = kernel.rate(k);
-    let mut powers = Vec::with_capacity(count);
-    powers.push([1.0, 0.0]);
-    let mut highest = 1;
-    while powers.len() < count {
-        let s = step * highest as f64;
-        let (sin, cos) = nanotap_arithmetic::sin_cos(rate.im * s);
-        let grown = nanotap_arithmetic::exp(rate.re * s);
-        for p in 0..highest.min(count - highest) {
-            powers.push(product(powers[p], [grown * cos, grown * sin]));
-        }
-        highest *= 2;
-    }
-    powers
+/// `e^{λ h p}` of a term for `p = 0, 1, …`, four points to a vector.
+type Column = Vec<ComplexVector>;
+
+/// Works out a column of so many vectors for each rate `λ`, with `step` as `h`.
+struct Columns {
+    rates: Vec<Complex>,
+    step: f64,
+    vectors: usize,
 }
 
-/// `a b` of complex numbers.
+impl Work for Columns {
+    type Output = Vec<Column>;
+
+    /// The first vector is evaluated, and so are the powers by which 1, 2, 4, … vectors are moved on to
+    /// the next as many: each number is a product of few factors, and rounding does not pile up along
+    /// the table.
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Vec<Column> {
+        let mut columns = Vec::with_capacity(self.rates.len());
+        for rate in &self.rates {
+            let mut column = Vec::with_capacity(self.vectors);
+            column.push(exponentials::<S>(*rate, [0.0, 1.0, 2.0, 3.0], self.step));
+            let mut jump = WIDTH as f64;
+            while column.len() < self.vectors {
+                let jumps = [1.0, 2.0, 4.0, 8.0].map(|times| times * jump);
+                let [re, im] = exponentials::<S>(*rate, jumps, self.step);
+                for (re, im) in re.into_iter().zip(im) {
+                    let power = [S::splat(re), S::splat(im)];
+                    for p in 0..column.len().min(self.vectors - column.len()) {
+                        let [re, im] = &column[p];
+                        let moved = simd::complex_mul::<S>([S::load(re), S::load(im)], power);
+                        column.push([S::store(moved[0]), S::store(moved[1])]);
+                    }
+                }
+                jump *= 16.0;
+            }
+            columns.push(column);
+        }
+        columns
+    }
+}
+
+/// `e^{λ h p}` of four `p`.
 #[inline(always)]
-fn product([ar, ai]: Pair, [br, bi]: Pair) -> Pair {
-    [ar * br - ai * bi, ar * bi + ai * br]
+fn exponentials<S: Simd>(rate: Complex, points: Vector, step: f64) -> ComplexVector {
+    let times = S::mul(S::load(&points), S::splat(step));
+    let [re, im] = simd::exp_complex::<S>(S::splat(rate.re), S::splat(rate.im), times);
+    [S::store(re), S::store(im)]
 }

@@ -30,14 +30,18 @@ impl Jacobian {
     /// Becomes the identity, for a flow that is in `regime`.
     pub fn begin(&mut self, regime: &Regime) {
         self.columns.clear();
-        self.columns.extend_from_slice(regime.packed_left());
+        self.columns
+            .extend_from_slice(regime.prepared().packed_left());
     }
 
     /// `∂x/∂x₀` (`n × n`) of a flow that is in `regime` now.
     pub fn to_state(&mut self, regime: &Regime, jacobian: &mut DMatrix<f64>) {
-        regime.packed_right().apply(&self.columns, &mut self.next);
+        regime
+            .prepared()
+            .packed_right()
+            .apply(&self.columns, &mut self.next);
         let n = jacobian.nrows();
-        let vectors = regime.packed_right().vectors();
+        let vectors = regime.prepared().packed_right().vectors();
         let columns = jacobian.as_mut_slice().chunks_exact_mut(n);
         for (column, packed) in columns.zip(self.next.chunks_exact(vectors)) {
             let (first, second) = column.split_at_mut(n.div_ceil(2));
@@ -62,7 +66,8 @@ impl Jacobian {
             &x,
             view.phase,
         );
-        let tangent = &view.switch.to_modal * (saltation * &view.switch.from_modal);
+        let (from, to) = (regime, &view.system.regimes()[view.switch.to]);
+        let tangent = to.prepared().stacked_left() * (saltation * from.prepared().stacked_right());
         LinearMap::of(&tangent).apply(&self.columns, &mut self.next);
     }
 }

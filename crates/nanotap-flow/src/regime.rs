@@ -1,11 +1,12 @@
 //! One linear regime, `ẋ = A x + f(t)` with harmonic `f`, solved in closed form.
 
+use crate::prepared_basis::PreparedBasis;
 use crate::relaxation::relaxation_masks;
-use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, Vector, layout};
 use crate::{Complex, Drive, FlowError, HarmonicVector, Output, SpectralBasis};
 use nalgebra::DMatrix;
 use nanotap_arithmetic::ComplexFunctions as _;
+use std::sync::Arc;
 
 /// A linear regime with its spectral basis and its forced response `x_p(t)`; the
 /// solution is `x(t) = x_p(t) + Re(R e^{Λ(t − t₀)} q)`, `q = L (x(t₀) − x_p(t₀))`.
@@ -13,12 +14,8 @@ use nanotap_arithmetic::ComplexFunctions as _;
 pub struct Regime {
     matrix: DMatrix<f64>,
     forcing: HarmonicVector,
-    basis: SpectralBasis,
+    prepared: Arc<PreparedBasis>,
     response: HarmonicVector,
-    /// The columns of `L`, packed.
-    packed_left: Vec<ComplexVector>,
-    /// `[Re R, −Im R]`, from modal coordinates to the state.
-    packed_right: LinearMap,
 }
 
 impl Regime {
@@ -36,10 +33,10 @@ impl Regime {
     ) -> Result<Self, FlowError> {
         check(&matrix, &forcing, drive)?;
         let basis = SpectralBasis::of(&matrix, drive.period(), index)?;
-        Self::with_basis(index, matrix, forcing, drive, basis)
+        Self::with_basis(index, matrix, forcing, drive, Arc::new(basis.into()))
     }
 
-    /// The same with a basis that the caller knows.
+    /// The same with a basis that the caller knows, and may share with other regimes.
     ///
     /// # Errors
     /// As [`Regime::new`].
@@ -48,21 +45,14 @@ impl Regime {
         matrix: DMatrix<f64>,
         forcing: HarmonicVector,
         drive: &Drive,
-        basis: SpectralBasis,
+        prepared: Arc<PreparedBasis>,
     ) -> Result<Self, FlowError> {
         check(&matrix, &forcing, drive)?;
-        let response = forced_response(index, &forcing, drive, &basis)?;
-        let (m, n) = basis.left.shape();
-        let mut packed_left = Vec::with_capacity(n * layout::vectors_for(m));
-        for left in basis.left.as_slice().chunks_exact(m.max(1)) {
-            layout::append(&mut packed_left, left);
-        }
+        let response = forced_response(index, &forcing, drive, prepared.basis())?;
         Ok(Self {
-            packed_left,
-            packed_right: LinearMap::of(&basis.stacked_right()),
             matrix,
             forcing,
-            basis,
+            prepared,
             response,
         })
     }
@@ -79,22 +69,17 @@ impl Regime {
 
     /// The spectral basis.
     pub fn basis(&self) -> &SpectralBasis {
-        &self.basis
+        self.prepared.basis()
+    }
+
+    /// The spectral basis as the inner loop takes it.
+    pub(crate) fn prepared(&self) -> &PreparedBasis {
+        &self.prepared
     }
 
     /// The forced response `x_p`.
     pub fn response(&self) -> &HarmonicVector {
         &self.response
-    }
-
-    /// The columns of `L`, one after the other.
-    pub(crate) fn packed_left(&self) -> &[ComplexVector] {
-        &self.packed_left
-    }
-
-    /// From modal coordinates to what they add to the forced response.
-    pub(crate) fn packed_right(&self) -> &LinearMap {
-        &self.packed_right
     }
 
     /// Modal coordinates of state `x` at time `t`, written to `q`; `rest` is work space, as
@@ -109,7 +94,7 @@ impl Regime {
     ) {
         self.response.write(drive, t, rest);
         q.fill(Complex::new(0.0, 0.0));
-        let columns = self.basis.left.as_slice().chunks_exact(q.len().max(1));
+        let columns = self.basis().left.as_slice().chunks_exact(q.len().max(1));
         for ((x, p), left) in x.iter().zip(rest).zip(columns) {
             let own = x - *p;
             for (q, l) in q.iter_mut().zip(left) {
@@ -127,7 +112,7 @@ impl Regime {
         x: &mut [f64],
     ) {
         self.response.write(drive, t, x);
-        let columns = self.basis.right.as_slice().chunks_exact(x.len().max(1));
+        let columns = self.basis().right.as_slice().chunks_exact(x.len().max(1));
         for (q, column) in q.into_iter().zip(columns) {
             for (x, r) in x.iter_mut().zip(column) {
                 *x += r.re * q.re - r.im * q.im;
@@ -141,8 +126,8 @@ impl Regime {
             output.row.iter().zip(column).map(|(r, z)| z * *r).sum()
         };
         ModalOutput {
-            modal: (0..self.basis.len())
-                .map(|k| dot(self.basis.right.column(k).as_slice()))
+            modal: (0..self.basis().len())
+                .map(|k| dot(self.basis().right.column(k).as_slice()))
                 .collect(),
             tones: output
                 .tones
@@ -204,7 +189,7 @@ impl KernelFrame {
         let tones = drive.frequencies().iter();
         let tones = tones.map(|&w| Complex::new(0.0, w));
         let rates: Vec<Complex> = regime
-            .basis
+            .basis()
             .eigenvalues
             .iter()
             .copied()

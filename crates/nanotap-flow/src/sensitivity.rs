@@ -10,7 +10,7 @@ use crate::harmonic::{HarmonicVector, Output};
 use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::rate::phi1;
 use crate::system::{Reset, System};
-use crate::{Complex, Drive, Flow, FlowError, Regime, SpectralBasis};
+use crate::{Complex, Drive, Flow, FlowError, PreparedBasis, Regime};
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 
@@ -129,7 +129,7 @@ impl Source {
         let forcing = tangent.forcing.plus(log_period, regime.forcing());
         let left = &regime.basis().left;
         let half = Complex::new(0.5, 0.0);
-        let [direct, mirrored] = driven(regime.basis(), &matrix);
+        let [direct, mirrored] = driven(regime.prepared(), &matrix);
         // Along the forced response, ∂A x_p + ∂f.
         let harmonic = regime.response().mapped(&matrix).plus(1.0, &forcing);
         Self {
@@ -148,11 +148,11 @@ impl Source {
 }
 
 /// `½ L ∂A R` and `½ L ∂A R̄`, from products of real matrices.
-fn driven(basis: &SpectralBasis, matrix: &DMatrix<f64>) -> [DMatrix<Complex>; 2] {
-    let m = basis.len();
+fn driven(prepared: &PreparedBasis, matrix: &DMatrix<f64>) -> [DMatrix<Complex>; 2] {
+    let m = prepared.basis().len();
     // [Re R, −Im R], and [Re L; Im L] ∂A of it.
-    let moved = matrix * basis.stacked_right();
-    let products = basis.stacked_left() * moved;
+    let moved = matrix * prepared.stacked_right();
+    let products = prepared.stacked_left() * moved;
     let entry = |sign: f64| {
         DMatrix::from_fn(m, m, |k, j| {
             let (a, b) = (products[(k, j)], products[(k, m + j)]);
@@ -401,7 +401,8 @@ impl Observer for Sensitivity<'_> {
             ) {
                 after += &change.matrix * &x + change.offset.at(system.drive(), view.phase);
             }
-            let stacked = &view.switch.to_modal * after;
+            let to = &view.system.regimes()[view.switch.to];
+            let stacked = to.prepared().stacked_left() * after;
             let m = stacked.len() / 2;
             self.modal[p] = (0..m)
                 .map(|k| Complex::new(stacked[k], stacked[m + k]))

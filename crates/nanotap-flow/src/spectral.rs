@@ -143,33 +143,6 @@ impl SpectralBasis {
         self.eigenvalues.is_empty()
     }
 
-    /// `[Re R, −Im R]` (`n × 2m`): the state of `[Re q; Im q]`, since `x = Re(R q)`.
-    pub(crate) fn stacked_right(&self) -> DMatrix<f64> {
-        let (n, m) = self.right.shape();
-        let mut stacked = DMatrix::zeros(n, 2 * m);
-        let (real, imaginary) = stacked.as_mut_slice().split_at_mut(n * m);
-        for ((re, im), z) in real.iter_mut().zip(imaginary).zip(self.right.as_slice()) {
-            *re = z.re;
-            *im = -z.im;
-        }
-        stacked
-    }
-
-    /// `[Re L; Im L]` (`2m × n`): `[Re q; Im q]` of the state.
-    pub(crate) fn stacked_left(&self) -> DMatrix<f64> {
-        let (m, n) = self.left.shape();
-        let mut stacked = DMatrix::zeros(2 * m, n);
-        let columns = stacked.as_mut_slice().chunks_exact_mut((2 * m).max(1));
-        for (column, left) in columns.zip(self.left.as_slice().chunks_exact(m.max(1))) {
-            let (real, imaginary) = column.split_at_mut(m);
-            for ((re, im), z) in real.iter_mut().zip(imaginary).zip(left) {
-                *re = z.re;
-                *im = z.im;
-            }
-        }
-        stacked
-    }
-
     /// Advances `q` by a time `s`, and leaves `e^{λ_k s}` in `factors`.
     pub(crate) fn advance(&self, q: &mut [Complex], s: f64, factors: &mut [Complex]) {
         for (factor, lambda) in factors.iter_mut().zip(&self.eigenvalues) {

@@ -179,10 +179,6 @@ pub struct Switch {
     /// Where the state is continuous: the guard's rate after the switch from that before it,
     /// `factor · rate + constant`, where it follows from it alone.
     pub(crate) rate_after: Option<RateAfter>,
-    /// State from `[Re q⁻; Im q⁻]`, `n × 2m⁻`.
-    pub(crate) from_modal: DMatrix<f64>,
-    /// `[Re q⁺; Im q⁺]` from the state, `2m⁺ × n`.
-    pub(crate) to_modal: DMatrix<f64>,
 }
 
 /// `factor · rate + constant`.
@@ -671,23 +667,24 @@ impl System {
 
     fn switch(&self, from: usize, to: usize, reset: Option<&Reset>, guard: &Output) -> Switch {
         let (a, b) = (&self.regimes[from], &self.regimes[to]);
-        let from_modal = a.basis().stacked_right();
-        let to_modal = b.basis().stacked_left();
+        // The state of [Re q⁻; Im q⁻], and [Re q⁺; Im q⁺] of the state.
+        let from_modal = a.prepared().stacked_right();
+        let to_modal = b.prepared().stacked_left();
         let (matrix, shift) = match reset {
-            None => (&to_modal * &from_modal, a.response().clone()),
+            None => (to_modal * from_modal, a.response().clone()),
             Some(reset) => (
-                &to_modal * &reset.matrix * &from_modal,
+                to_modal * &reset.matrix * from_modal,
                 a.response().mapped(&reset.matrix).plus(1.0, &reset.offset),
             ),
         };
         let shift = shift.plus(-1.0, b.response());
-        let packed = packed_switch(&matrix, &to_modal, &shift);
+        let packed = packed_switch(&matrix, to_modal, &shift);
         let saltation = self.constant_saltation(from, to, reset, guard);
         // With J the jump, L (J + u hᵀ) R = L J R + (L u)(hᵀ R).
         let tangent = saltation.as_ref().map(|u| {
             let mut tangent = matrix.clone();
-            let row = (&guard.row * &from_modal).transpose();
-            tangent.ger(1.0, &(&to_modal * u), &row, 1.0);
+            let row = (&guard.row * from_modal).transpose();
+            tangent.ger(1.0, &(to_modal * u), &row, 1.0);
             LinearMap::of(&tangent)
         });
         Switch {
@@ -701,8 +698,6 @@ impl System {
                 None => self.rate_after(from, to, guard),
                 Some(_) => None,
             },
-            from_modal,
-            to_modal,
         }
     }
 

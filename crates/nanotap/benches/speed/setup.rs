@@ -6,11 +6,21 @@ use nanotap::model::Model;
 
 use crate::cases::{self, MODES};
 
-/// From case to a model that is ready to run.
+/// From case to a model that is ready to run, as along a sweep over the drive.
 #[divan::bench(args = MODES)]
 fn model(bencher: Bencher<'_, '_>, modes: usize) {
     let case = cases::paper(modes);
     bencher.bench_local(|| Model::cantilever(black_box(&case)).expect("a valid case"));
+}
+
+/// The same of a case whose eigenbases are not known from one before.
+#[divan::bench(args = MODES)]
+fn another_stiffness(bencher: Bencher<'_, '_>, modes: usize) {
+    let mut case = cases::paper(modes);
+    bencher.bench_local(|| {
+        case.alpha4 += 1e-3;
+        Model::cantilever(black_box(&case)).expect("a valid case")
+    });
 }
 
 /// The derivative of the system with respect to Ω.

@@ -19,7 +19,7 @@ use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Forcing, Galerkin, Gap, Regime};
 use crate::model::measured_modes::Correction;
 use crate::model::parameter::Parameter;
-use crate::model::spectrum::Spectrum;
+use crate::model::spectrum::{TipLoad, eigenbasis};
 use crate::model::{BeamOutputs, Forgetting, Powers, Product};
 
 /// The free beam in the state (a, ȧ, s), ready for a sample.
@@ -240,17 +240,23 @@ impl<'a> Beam<'a> {
         if !known || !self.galerkin.corrections.is_empty() {
             return nanotap_flow::Regime::new(r, matrix, forcing, self.drive);
         }
-        let basis = if let Ok(s) = Spectrum::new(self.galerkin, regime) {
-            SpectralBasis::from_simple_eigenpairs(s.eigenvalues, s.right_state, s.left_state)?
+        let case = &self.galerkin.case;
+        let load = TipLoad::of(case, regime);
+        let known = eigenbasis(&self.galerkin.modes, case.alpha3, load);
+        let basis = if let Ok(basis) = known {
+            basis
         } else {
             // (Nearly) critical damping has no basis of eigenvectors; the general
             // decomposition groups what belongs together.
             let n = 2 * self.layout.modes;
             let beam = matrix.view((0, 0), (n, n)).into_owned();
-            SpectralBasis::of(&beam, self.drive.period(), r)?
+            Arc::new(SpectralBasis::of(&beam, self.drive.period(), r)?.into())
         };
         let basis = match self.memory_unit() {
-            Some(_) => with_fading_memory(basis, answer.memory_rate.memory.value),
+            Some(_) => {
+                let fading = answer.memory_rate.memory.value;
+                Arc::new(with_fading_memory(basis.basis().clone(), fading).into())
+            }
             None => basis,
         };
         nanotap_flow::Regime::with_basis(r, matrix, forcing, self.drive, basis)

@@ -7,11 +7,13 @@
 //! for all pairs and loses no digits at any N. (A tip mass far above the beam's costs the
 //! lowest frequency's digits in proportion: relative errors are about ε(1 + 4α1).)
 
+mod recent;
 mod secular;
 
 use nalgebra::{Complex, DMatrix};
 use nanotap_arithmetic::ComplexFunctions as _;
 
+pub(crate) use recent::eigenbasis;
 pub use secular::TipLoad;
 use secular::{Factor, Roots, Secular};
 
@@ -90,15 +92,6 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// The eigenbasis of `galerkin` in `regime`.
-    ///
-    /// # Errors
-    /// [`SpectrumError`] where there is none, or too bad a one to work with.
-    pub fn new(galerkin: &Galerkin, regime: Regime) -> Result<Self, SpectrumError> {
-        let case = &galerkin.case;
-        Self::of_beam(&galerkin.modes, case.alpha3, TipLoad::of(case, regime))
-    }
-
     /// The eigenbasis of a beam with damping α3 and a load at its tip.
     ///
     /// # Errors
@@ -552,7 +545,8 @@ mod tests {
             let galerkin = Galerkin::new(&case).unwrap();
             for regime in Regime::ALL {
                 let r = regime.index();
-                let spectrum = Spectrum::new(&galerkin, regime).unwrap();
+                let load = TipLoad::of(&case, regime);
+                let spectrum = Spectrum::of_beam(&galerkin.modes, case.alpha3, load).unwrap();
                 let matrices = [
                     galerkin.mass.clone(),
                     galerkin.damping[r].clone(),

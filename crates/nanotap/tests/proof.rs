@@ -290,7 +290,8 @@ fn long_unstable_orbits_are_proved() {
     }
 }
 
-/// The table of docs/proof.md: switches exactly, widths within a factor of two.
+/// The table of docs/proof.md: switches exactly and widths within a factor of two, or what is said to be
+/// some number within a tenth and within a factor of ten.
 #[test]
 fn enclosures_are_as_narrow_as_the_page_says() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/proof.md");
@@ -298,7 +299,10 @@ fn enclosures_are_as_narrow_as_the_page_says() {
     let mut rows = 0;
     for row in page.lines().filter(|line| line.starts_with("| Ω = ")) {
         let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
-        let number = |text: &str| -> f64 { text.parse().unwrap() };
+        let number = |text: &str| -> (f64, bool) {
+            let some = text.strip_prefix("some ");
+            (some.unwrap_or(text).parse().unwrap(), some.is_some())
+        };
         let orbit: Vec<&str> = cells[0].split(", ").collect();
         let after = |part: &str, word: &str| part.strip_prefix(word).unwrap().to_owned();
         let case = case(&[
@@ -311,7 +315,12 @@ fn enclosures_are_as_narrow_as_the_page_says() {
         };
         let theorem = found(&case, &options).1.theorem.unwrap();
         assert_eq!(theorem.stability, orbit[3], "{row}");
-        assert_eq!(theorem.switches.len() as f64, number(cells[1]), "{row}");
+        let (switches, some) = number(cells[1]);
+        let off = (theorem.switches.len() as f64 - switches).abs();
+        assert!(
+            off <= if some { 0.1 * switches } else { 0.0 },
+            "{row}: {off}"
+        );
         let half = |[low, high]: &[f64; 2]| 0.5 * (high - low);
         let state = theorem.state.iter().map(half).fold(0.0, f64::max);
         let multipliers = theorem.multipliers.iter().map(|d| d.radius);
@@ -319,8 +328,12 @@ fn enclosures_are_as_narrow_as_the_page_says() {
             (state, cells[2]),
             (multipliers.fold(0.0, f64::max), cells[3]),
         ] {
-            let ratio = known / number(said);
-            assert!((0.5..2.0).contains(&ratio), "{row}: {known:e}");
+            let (said, some) = number(said);
+            let factor = if some { 10.0 } else { 2.0 };
+            assert!(
+                (said / factor..said * factor).contains(&known),
+                "{row}: {known:e}"
+            );
         }
         rows += 1;
     }

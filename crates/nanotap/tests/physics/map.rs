@@ -4,7 +4,11 @@
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::map::{Map, MapError};
+use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::model::strobe::Strobe;
+use nanotap_dynamics::StroboscopicMap;
 
 fn regular() -> Map {
     let case = Cantilever {
@@ -47,6 +51,61 @@ fn many_states_go_as_each_alone_and_stop_when_told() {
         map.apply_all(half, 1500, &Control::default()).unwrap();
     }
     assert_eq!(states, in_halves);
+}
+
+/// With one contact, with a stop that resets the state, and under a nonlinear law: whether many are
+/// advanced side by side or one after the other, each passes the states that it passes alone.
+#[test]
+fn many_states_pass_through_those_that_each_passes_alone() {
+    let stop = Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.1,
+        forcing: 1.0,
+        omega: 2.5,
+        gap: 0.2,
+        stop: Stop::Rigid { restitution: 0.8 },
+    };
+    let hertz = [
+        "modes=1",
+        "cantilever.k=0.9 N/m",
+        "cantilever.f0=100 kHz",
+        "cantilever.Q=200",
+        "tip.radius=5 nm",
+        "drive.actuation=tip",
+        "drive.frequency=100 kHz",
+        "drive.free_amplitude=20 nm",
+        "gap.tip=18 nm",
+        "sample.law=hertz",
+        "sample.modulus=1 GPa",
+        "sample.poisson=0.3",
+    ];
+    let hertz = Case::parse(None, &hertz.map(str::to_owned)).unwrap();
+    let models = [
+        (Model::cantilever(&Cantilever::paper()).unwrap(), true),
+        (stop.model().unwrap(), false),
+        (hertz.model().unwrap(), false),
+    ];
+    for (model, side_by_side) in models {
+        let mut map = Strobe::new(&model);
+        assert_eq!(map.side_by_side() > 1, side_by_side);
+        let d = map.dimension();
+        let numbers = 0..u32::try_from(10 * d).unwrap();
+        let starts: Vec<f64> = numbers.map(|k| 0.05 * (f64::from(k) * 1.7).sin()).collect();
+        let periods: Vec<usize> = (0..10).map(|k| k % 4).collect();
+        let (mut ends, mut passed) = (starts.clone(), vec![vec![1.0]; 10]);
+        let results = map.advance_each_through(&mut ends, &periods, &mut passed);
+        assert!(results.iter().all(Result::is_ok), "{results:?}");
+        for (k, start) in starts.chunks_exact(d).enumerate() {
+            let mut state = start.to_vec();
+            assert_eq!(passed[k].len(), d * periods[k]);
+            for passed in passed[k].chunks_exact(d) {
+                map.advance(&mut state).unwrap();
+                assert!(largest(passed, &state) < 1e-11);
+            }
+            assert!(largest(&ends[k * d..][..d], &state) < 1e-11);
+        }
+    }
 }
 
 #[test]

@@ -362,8 +362,10 @@ impl<M: StroboscopicMap> Work<'_, M> {
     /// Finds neighbourhoods of the orbits that are new, checks all by the starts that were
     /// `classified` without them, and says how long a start is left to itself from now on.
     fn know_neighbourhoods(&mut self, classified: &[usize]) {
-        self.find_neighbourhoods();
-        self.check_neighbourhoods(classified);
+        // A run beside the same neighbourhoods as before would end as it did.
+        if self.find_neighbourhoods() {
+            self.check_neighbourhoods(classified);
+        }
         let sides = self.sides();
         self.patience = self
             .neighbourhoods
@@ -400,7 +402,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         // Of few starts most places side by side would be empty.
         let side_by_side = self.map.side_by_side() > 1 && indices.len() >= LEAST_TOGETHER;
         let together = if side_by_side {
-            let share = indices.len().div_ceil(rayon::current_num_threads());
+            let share = indices.len().div_ceil(4 * rayon::current_num_threads());
             share.clamp(LEAST_TOGETHER, self.map.side_by_side())
         } else {
             1
@@ -483,8 +485,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
         }
     }
 
-    /// Looks for the contracting neighbourhoods of the orbits that are new.
-    fn find_neighbourhoods(&mut self) {
+    /// Looks for the contracting neighbourhoods of the orbits that are new, and says whether there are
+    /// any.
+    fn find_neighbourhoods(&mut self) -> bool {
         let new: Vec<(usize, Neighbourhood)> = self.orbits[self.motions..]
             .par_iter()
             .enumerate()
@@ -500,7 +503,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .flatten()
             .collect();
         self.motions = self.orbits.len();
+        let found = !new.is_empty();
         self.neighbourhoods.extend(new);
+        found
     }
 
     /// How long the starts that were `classified` really took, now that their goal is

@@ -307,11 +307,12 @@ impl ExactStrobe {
         observer: &mut O,
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), FlowError> {
-        let system = Arc::clone(self.flow.system());
-        self.carried.begin(&system.regimes()[self.flow.regime()]);
-        self.flow.run_period(&mut (&mut self.carried, observer))?;
-        self.carried
-            .to_state(&system.regimes()[self.flow.regime()], jacobian);
+        // Threads that share the system count no references to it every period.
+        let flow = &mut self.flow;
+        self.carried.begin(&flow.system().regimes()[flow.regime()]);
+        flow.run_period(&mut (&mut self.carried, observer))?;
+        let regime = &flow.system().regimes()[flow.regime()];
+        self.carried.to_state(regime, jacobian);
         Ok(())
     }
 

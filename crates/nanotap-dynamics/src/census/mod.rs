@@ -63,6 +63,9 @@ const FIRST_PILOTS: usize = 4;
 const BATCH: usize = 128;
 /// Starts that are worth following side by side.
 const LEAST_TOGETHER: usize = 8;
+/// Packs of them that a thread is given of a batch: with fewer, others wait for the one that has the
+/// most left to do.
+const PACKS: usize = 4;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
 const LEAST_PATIENCE: usize = 64;
@@ -402,7 +405,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         // Of few starts most places side by side would be empty.
         let side_by_side = self.map.side_by_side() > 1 && indices.len() >= LEAST_TOGETHER;
         let together = if side_by_side {
-            let share = indices.len().div_ceil(4 * rayon::current_num_threads());
+            let share = indices.len().div_ceil(PACKS * rayon::current_num_threads());
             share.clamp(LEAST_TOGETHER, self.map.side_by_side())
         } else {
             1

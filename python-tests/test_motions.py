@@ -117,7 +117,9 @@ def test_an_orbit_has_the_terminals_numbers(regular, tmp_path):
     assert orbit.multipliers.tolist() == [
         complex(*pair) for pair in said["multipliers"]
     ]
-    assert orbit.stable and orbit.spectral_radius == abs(orbit.multipliers[0])
+    # numpy's size of a complex number may differ in the last digit.
+    assert orbit.stable
+    assert orbit.spectral_radius == pytest.approx(abs(orbit.multipliers[0]), rel=1e-15)
     assert abs(orbit.energy_balance.residual) < 1e-11
     assert orbit.thd == orbit["thd"] == said["thd"]
     assert orbit.harmonics[0].tip == said["harmonics"][0]["tip"]

@@ -207,15 +207,8 @@ impl Ensemble {
         }
         self.strobe = Some(Strobe::new(&self.system, passed));
         let results = self.advance(states, periods);
-        if let Some(strobe) = self.strobe.take() {
-            let each = passed.iter_mut().zip(strobe.passed).zip(&results);
-            let states = states.chunks_exact(self.system.dimension());
-            for (((to, mut from), result), (state, periods)) in each.zip(states.zip(periods)) {
-                if result.is_ok() && *periods > 0 {
-                    from.extend_from_slice(state);
-                }
-                *to = from;
-            }
+        if let Some(mut strobe) = self.strobe.take() {
+            passed.swap_with_slice(&mut strobe.passed);
         }
         results
     }
@@ -248,17 +241,26 @@ impl Ensemble {
         states: &mut [f64],
         periods: &[usize],
     ) -> Vec<Result<(), FlowError>> {
-        let Self { members, alone, .. } = self;
+        let Self {
+            members,
+            alone,
+            strobe,
+            ..
+        } = self;
         let each = states
             .chunks_exact_mut(system.dimension())
             .zip(members.drain(..))
             .zip(periods);
-        each.map(|((x, member), periods)| match member.failure {
+        let each = each.enumerate();
+        each.map(|(number, ((x, member), periods))| match member.failure {
             Some(failure) => Err(failure),
             None if *periods == 0 => Ok(()),
             None => {
                 member.hand_to(system, alone);
                 alone.write_state(system, x);
+                if let Some(strobe) = strobe {
+                    strobe.passed[number].extend_from_slice(x);
+                }
                 Ok(())
             }
         })
@@ -365,16 +367,7 @@ impl Ensemble {
                 known &= !bit;
             }
         }
-        if self.strobe.is_some() {
-            let mut ends = [f64::INFINITY; LANES];
-            for (lane, length) in switches.at.iter().enumerate() {
-                // Of a stretch that is passed alone nobody knows where it ends.
-                if known & (1 << lane) != 0 {
-                    ends[lane] = *length;
-                }
-            }
-            self.strobe_within::<W>(system, regime, members, ends);
-        }
+        self.strobe_within::<W>(system, regime, members, known, &switches.at);
         self.pack.pass::<W>(kernel, switches.rest);
         if switches.found != 0 {
             let rows = system.regimes()[prepared.switch.to].basis().len();
@@ -403,14 +396,16 @@ impl Ensemble {
         }
     }
 
-    /// Works out the states at the ends of periods within stretches that end after so much time.
+    /// Works out the states at the ends of periods within stretches of which the `known` ones end at
+    /// these times, where somebody wants them.
     #[inline(always)]
     fn strobe_within<W: Wide>(
         &mut self,
         system: &System,
         regime: usize,
         members: &[usize; LANES],
-        ends: Octet,
+        known: u32,
+        ends: &Octet,
     ) {
         let Some(strobe) = &mut self.strobe else {
             return;
@@ -419,7 +414,8 @@ impl Ensemble {
         let (mut ahead, mut some) = (Octet::default(), false);
         for (lane, &member) in members.iter().enumerate() {
             let phase = self.members[member].phase;
-            if phase + ends[lane] >= period {
+            // Of a stretch that is passed alone nobody knows where it ends.
+            if known & (1 << lane) == 0 || phase + ends[lane] >= period {
                 (ahead[lane], some) = (period - phase, true);
             }
         }

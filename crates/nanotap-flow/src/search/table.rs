@@ -78,9 +78,6 @@ pub(crate) struct Grid {
 /// from its chord over an interval, or 1 where it is not slow.
 pub(crate) type Weights = [Vector; 4];
 
-/// A complex number as `[Re, Im]`.
-pub(crate) type Pair = [f64; 2];
-
 impl Table {
     /// The table for the guard `kernel` over stretches of up to `period`, if one makes sense.
     pub(crate) fn new(kernel: &Kernel, period: f64) -> Option<Self> {
@@ -229,7 +226,7 @@ impl Grid {
 
     /// The exponential of followed term `j` at a point, `[Re, Im]`.
     #[inline(always)]
-    pub(crate) fn exponential(&self, j: usize, point: usize) -> Pair {
+    pub(crate) fn exponential(&self, j: usize, point: usize) -> [f64; 2] {
         let (vector, lane) = layout::place(point);
         let [re, im] = &self.table[vector * self.terms + j];
         [re[lane], im[lane]]

@@ -242,8 +242,8 @@ impl<'a> Beam<'a> {
         }
         let case = &self.galerkin.case;
         let load = TipLoad::of(case, regime);
-        let known = eigenbasis(&self.galerkin.modes, case.alpha3, load);
-        let basis = if let Ok(basis) = known {
+        let simple = eigenbasis(&self.galerkin.modes, case.alpha3, load);
+        let basis = if let Some(basis) = simple {
             basis
         } else {
             // (Nearly) critical damping has no basis of eigenvectors; the general

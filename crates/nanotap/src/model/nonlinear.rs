@@ -531,14 +531,6 @@ impl NonlinearStrobe {
         Ok(())
     }
 
-    pub(crate) fn advance_by(
-        &mut self,
-        state: &mut [f64],
-        periods: usize,
-    ) -> Result<(), MotionError> {
-        (0..periods).try_for_each(|_| self.advance(state))
-    }
-
     pub(crate) fn advance_with_derivatives(
         &mut self,
         state: &mut [f64],

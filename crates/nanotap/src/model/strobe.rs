@@ -142,7 +142,7 @@ impl StroboscopicMap for Strobe {
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance_by(state, periods)?),
-            Engine::Nonlinear(map) => map.advance_by(state, periods),
+            Engine::Nonlinear(map) => (0..periods).try_for_each(|_| map.advance(state)),
         }
     }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use nanotap_flow::{PreparedBasis, SpectralBasis};
 
-use super::{Spectrum, SpectrumError, TipLoad};
+use super::{Spectrum, TipLoad};
 use crate::model::beam::Modes;
 
 /// How many are remembered: those of a lever in flight and on two samples.
@@ -24,15 +24,13 @@ thread_local! {
     static RECENT: RefCell<Vec<(Beam, Arc<PreparedBasis>)>> = const { RefCell::new(Vec::new()) };
 }
 
-/// The eigenbasis of a beam with damping α3 and a load at its tip, as [`Spectrum::of_beam`] has it.
-///
-/// # Errors
-/// As [`Spectrum::of_beam`].
+/// The eigenbasis of a beam with damping α3 and a load at its tip, as [`Spectrum::of_beam`] has it;
+/// `None` where that has none.
 pub(crate) fn eigenbasis(
     modes: &Arc<Modes>,
     damping: f64,
     load: TipLoad,
-) -> Result<Arc<PreparedBasis>, SpectrumError> {
+) -> Option<Arc<PreparedBasis>> {
     let numbers = [damping, load.mass, load.damping, load.stiffness].map(f64::to_bits);
     let known = RECENT.with_borrow(|recent| {
         let mut recent = recent.iter();
@@ -40,23 +38,23 @@ pub(crate) fn eigenbasis(
         let found = recent.find(|(beam, _)| is(beam));
         found.map(|(_, basis)| Arc::clone(basis))
     });
-    if let Some(basis) = known {
-        return Ok(basis);
+    if known.is_some() {
+        return known;
     }
-    let spectrum = Spectrum::of_beam(modes, damping, load)?;
-    let basis = Arc::new(PreparedBasis::from(SpectralBasis {
-        eigenvalues: spectrum.eigenvalues,
-        right: spectrum.right_state,
-        left: spectrum.left_state,
-        clusters: Vec::new(),
-    }));
+    let spectrum = Spectrum::of_beam(modes, damping, load).ok()?;
+    let basis = SpectralBasis::from_simple_eigenpairs(
+        spectrum.eigenvalues,
+        spectrum.right_state,
+        spectrum.left_state,
+    );
+    let basis = Arc::new(PreparedBasis::from(basis.ok()?));
     RECENT.with_borrow_mut(|recent| {
         if recent.len() == MOST {
             recent.remove(0);
         }
         recent.push(((Arc::clone(modes), numbers), Arc::clone(&basis)));
     });
-    Ok(basis)
+    Some(basis)
 }
 
 #[cfg(test)]
@@ -104,6 +102,6 @@ mod tests {
                 &eigenbasis(&modes, 0.1, load(20.0)).unwrap()
             ));
         }
-        assert!(eigenbasis(&modes, f64::NAN, load(0.0)).is_err());
+        assert!(eigenbasis(&modes, f64::NAN, load(0.0)).is_none());
     }
 }

@@ -1,6 +1,6 @@
 //! What the motion from one start is.
 //!
-//! The run is looked at after 16, 32, 64, … periods. Each time the best candidate
+//! The run is looked at after 16, 32, 64, … periods ([`ClassifyOptions::first_look`]). Each time the best candidate
 //! periods go to Newton; a closed orbit counts only if its multipliers are stable
 //! *and* the run is seen to approach it at the rate those multipliers say, in the
 //! norm in which every linear motion near the orbit contracts at each return. So the
@@ -28,6 +28,7 @@
 mod approach;
 mod birkhoff;
 mod candidates;
+mod outlook;
 mod pack;
 mod run;
 mod undecided;
@@ -38,6 +39,7 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
+pub use outlook::{Outlook, outlook};
 pub(crate) use pack::follow_starts;
 pub(crate) use run::{Known, RECOGNISABLE, RunEnd, follow_start, watch};
 pub use undecided::UndecidedReason;
@@ -50,6 +52,9 @@ pub struct ClassifyOptions {
     /// Longest period tried where none of these closed the motion, before it is called
     /// anything but periodic.
     pub long_period: usize,
+    /// Periods after which it is looked for the first time where the motion goes. Fewer do where
+    /// it starts near its end, as on a neighbour's orbit.
+    pub first_look: usize,
     /// Periods after which exponents start to be measured (looking for periodic
     /// orbits goes on).
     pub max_transient: usize,
@@ -71,6 +76,7 @@ impl Default for ClassifyOptions {
         Self {
             max_period: 64,
             long_period: 512,
+            first_look: 16,
             max_transient: 1024,
             bound: 1e8,
             shooting: ShootingOptions {
@@ -170,7 +176,7 @@ pub fn classify<M: StroboscopicMap>(
     start: &[f64],
     options: &ClassifyOptions,
 ) -> Classified {
-    classify_beside(map, start, &[], options)
+    outlook(map, start, options).verified(map)
 }
 
 /// As [`classify`], where chaotic motions of the map are known: a run from which neighbours part,

@@ -13,8 +13,6 @@ use crate::vector::{distance, norm};
 
 /// Standard errors by which a positive exponent must clear zero.
 const CLEAR: f64 = 5.0;
-/// Periods after which a run is looked at first.
-const FIRST_LOOK: usize = 16;
 /// Newton steps of a guess: near an orbit half as many are needed, and far from one
 /// Newton would only wander to some orbit that the run does not go to.
 const CLOSING_STEPS: usize = 10;
@@ -115,7 +113,8 @@ pub(crate) fn watch<M: StroboscopicMap>(
     }
     // It may have gone to an orbit that no other start found.
     if !run.guesses(longest(options), LONG_WORTH_TRYING).is_empty() {
-        match run.look(map) {
+        let guesses = run.guesses_at_look();
+        match run.close(map, guesses) {
             Ok(Some(kind)) => return Err(run.classified(kind)),
             Ok(None) => {}
             Err(stop) => return Err(run.stopped(stop)),
@@ -156,6 +155,29 @@ pub(super) struct Run<'a> {
     options: &'a ClassifyOptions,
     closing: ShootingOptions,
     met: Vec<PeriodicOrbit>,
+}
+
+/// From where Newton is still to close orbits, and those that are none of the run's.
+pub(super) struct Guesses {
+    left: std::vec::IntoIter<(usize, Vec<f64>)>,
+    tried: Vec<PeriodicOrbit>,
+}
+
+impl Guesses {
+    fn new(guesses: Vec<(usize, Vec<f64>)>) -> Self {
+        Self {
+            left: guesses.into_iter(),
+            tried: Vec::new(),
+        }
+    }
+}
+
+/// An orbit that Newton closed beside a run.
+pub(super) enum Closed {
+    /// Its multipliers say that it attracts.
+    Attracting(PeriodicOrbit),
+    /// It does not, but the run is on it.
+    Occupied(PeriodicOrbit),
 }
 
 /// What follows from a look at a run.
@@ -199,7 +221,7 @@ impl Resembled {
 
 impl<'a> Run<'a> {
     pub(super) fn new(start: &[f64], known: Known<'a>, options: &'a ClassifyOptions) -> Self {
-        let keep = (2 * longest(options)).max(FIRST_LOOK) * start.len();
+        let keep = (2 * longest(options)).max(options.first_look) * start.len();
         Self {
             d: start.len(),
             state: start.to_vec(),
@@ -207,7 +229,7 @@ impl<'a> Run<'a> {
             periods: 0,
             recent: start.to_vec(),
             keep,
-            target: FIRST_LOOK.max(known.patience),
+            target: options.first_look.max(known.patience).max(1),
             known,
             options,
             closing: ShootingOptions {
@@ -242,23 +264,57 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// Follows it from an orbit that Newton closed, with the guesses that are left.
+    pub(super) fn follow_from<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        closed: Closed,
+        mut guesses: Guesses,
+    ) -> Result<MotionKind, Stop> {
+        if let Some(kind) = self.verdict(map, closed, &mut guesses)? {
+            return Ok(kind);
+        }
+        let after = self.looked(map, guesses)?;
+        match self.after_look(map, after)? {
+            Some(kind) => Ok(kind),
+            None => self.follow(map),
+        }
+    }
+
     fn follow<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         loop {
-            while self.periods < self.next_look() {
-                self.step(map)?;
+            self.run_to_look(map)?;
+            let after = self.at_look(map)?;
+            if let Some(kind) = self.after_look(map, after)? {
+                return Ok(kind);
             }
-            let mut after = self.at_look(map)?;
-            if let AfterLook::Perhaps(chaos) = after {
-                if self.parts_from_neighbour(map, &chaos)? {
-                    return Ok(self.chaotic(chaos.spectrum));
-                }
-                after = self.go_on();
+        }
+    }
+
+    /// Runs until it is time to look where it goes.
+    pub(super) fn run_to_look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
+        while self.periods < self.next_look() {
+            self.step(map)?;
+        }
+        Ok(())
+    }
+
+    /// What a look comes to, once all that it asks for is done.
+    fn after_look<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        mut after: AfterLook,
+    ) -> Result<Option<MotionKind>, Stop> {
+        if let AfterLook::Perhaps(chaos) = after {
+            if self.parts_from_neighbour(map, &chaos)? {
+                return Ok(Some(self.chaotic(chaos.spectrum)));
             }
-            match after {
-                AfterLook::Known(kind) => return Ok(kind),
-                AfterLook::Measure => return self.measure(map),
-                AfterLook::GoOn | AfterLook::Perhaps(_) => {}
-            }
+            after = self.go_on();
+        }
+        match after {
+            AfterLook::Known(kind) => Ok(Some(kind)),
+            AfterLook::Measure => self.measure(map).map(Some),
+            AfterLook::GoOn | AfterLook::Perhaps(_) => Ok(None),
         }
     }
 
@@ -269,7 +325,17 @@ impl<'a> Run<'a> {
 
     /// Looks where it goes.
     pub(super) fn at_look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<AfterLook, Stop> {
-        if let Some(kind) = self.look(map)? {
+        let guesses = self.guesses_at_look();
+        self.looked(map, guesses)
+    }
+
+    /// What becomes of a look with these guesses.
+    fn looked<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        guesses: Guesses,
+    ) -> Result<AfterLook, Stop> {
+        if let Some(kind) = self.close(map, guesses)? {
             return Ok(AfterLook::Known(kind));
         }
         if self.periods >= RECOGNISABLE.min(self.options.max_transient)
@@ -330,9 +396,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Tries to close the motion; its kind if it goes to a stable orbit or sits on
-    /// another.
-    fn look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<Option<MotionKind>, Stop> {
+    /// From where Newton is to close the motion.
+    pub(super) fn guesses_at_look(&self) -> Guesses {
         let long = longest(self.options);
         let mut guesses = self.guesses(self.options.max_period, WORTH_TRYING);
         if self.periods >= 2 * long {
@@ -347,7 +412,7 @@ impl<'a> Run<'a> {
         }
         // A slow spiral around a fixed point has its centre at the mean.
         guesses.push((1, self.recent_mean()));
-        self.close(map, guesses)
+        Guesses::new(guesses)
     }
 
     /// The latest states of the periods after which they most nearly repeat.
@@ -364,35 +429,65 @@ impl<'a> Run<'a> {
             .collect()
     }
 
-    fn close<M: StroboscopicMap>(
-        &mut self,
+    /// The next orbit that Newton closes: one that attracts, or one that the run sits on.
+    pub(super) fn next_orbit<M: StroboscopicMap>(
+        &self,
         map: &mut M,
-        guesses: Vec<(usize, Vec<f64>)>,
-    ) -> Result<Option<MotionKind>, Stop> {
-        let mut tried: Vec<PeriodicOrbit> = Vec::new();
-        for (period, points) in guesses {
+        guesses: &mut Guesses,
+    ) -> Option<Closed> {
+        for (period, points) in guesses.left.by_ref() {
             let Ok(orbit) = close_orbit_from_points(map, &points, period, &self.closing) else {
                 continue;
             };
-            if tried.iter().any(|t| t.is_same_as(&orbit)) {
+            if guesses.tried.iter().any(|t| t.is_same_as(&orbit)) {
                 continue;
             }
             if orbit.is_stable() {
-                if approaches(map, &self.state, &orbit)? {
-                    return Ok(Some(MotionKind::Periodic(orbit)));
-                }
-                if !self.met.iter().any(|m| m.is_same_as(&orbit)) {
-                    self.met.push(orbit.clone());
-                }
-            } else if orbit
-                .states
-                .iter()
-                .any(|x| distance(x, &self.state) <= 10.0 * orbit.error)
-            {
+                return Some(Closed::Attracting(orbit));
+            }
+            let mut states = orbit.states.iter();
+            if states.any(|x| distance(x, &self.state) <= 10.0 * orbit.error) {
+                return Some(Closed::Occupied(orbit));
+            }
+            guesses.tried.push(orbit);
+        }
+        None
+    }
+
+    /// What a closed orbit makes of the motion; nothing if the run does not go to it.
+    fn verdict<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        closed: Closed,
+        guesses: &mut Guesses,
+    ) -> Result<Option<MotionKind>, Stop> {
+        let orbit = match closed {
+            Closed::Attracting(orbit) => orbit,
+            Closed::Occupied(orbit) => {
                 let reason = UndecidedReason::OnOrbitThatDoesNotAttract(Box::new(orbit));
                 return Ok(Some(undecided(reason, None)));
             }
-            tried.push(orbit);
+        };
+        if approaches(map, &self.state, &orbit)? {
+            return Ok(Some(MotionKind::Periodic(orbit)));
+        }
+        if !self.met.iter().any(|m| m.is_same_as(&orbit)) {
+            self.met.push(orbit.clone());
+        }
+        guesses.tried.push(orbit);
+        Ok(None)
+    }
+
+    /// Tries to close the motion; its kind if it goes to a stable orbit or sits on another.
+    fn close<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        mut guesses: Guesses,
+    ) -> Result<Option<MotionKind>, Stop> {
+        while let Some(closed) = self.next_orbit(map, &mut guesses) {
+            if let Some(kind) = self.verdict(map, closed, &mut guesses)? {
+                return Ok(Some(kind));
+            }
         }
         Ok(None)
     }
@@ -482,7 +577,8 @@ impl<'a> Run<'a> {
                 self.step_with(map, &mut exponents)?;
                 exponents.record(&self.state);
             }
-            if let Some(kind) = self.look(map)? {
+            let guesses = self.guesses_at_look();
+            if let Some(kind) = self.close(map, guesses)? {
                 return Ok(match (kind, before.filter(is_chaotic)) {
                     (MotionKind::Periodic(orbit), Some(spectrum)) => MotionKind::TransientChaos {
                         orbit,
@@ -533,7 +629,7 @@ impl<'a> Run<'a> {
             self.step(map)?;
         }
         let last_guesses = self.guesses(longest_period, LAST_WORTH_TRYING);
-        if let Some(kind) = self.close(map, last_guesses)? {
+        if let Some(kind) = self.close(map, Guesses::new(last_guesses))? {
             return Ok(kind);
         }
         // The average of a bounded logarithm is off by its bound over the length.

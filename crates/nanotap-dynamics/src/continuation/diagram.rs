@@ -59,28 +59,7 @@ pub fn assemble_diagram<F: MapFamily>(
     control: &Control<'_>,
 ) -> Diagram {
     let mut diagram = Diagram::default();
-    let mut waiting: Vec<Waiting> = seeds.iter().rev().map(Waiting::seed).collect();
-    while let Some(next) = waiting.pop() {
-        if control.is_cancelled() || diagram.branches.len() >= options.max_branches {
-            break;
-        }
-        let others = likely_next(&next, &waiting);
-        let starts: Vec<_> = others.iter().map(|k| waiting[*k].start()).collect();
-        let ((), ways) = rayon::join(
-            || diagram.add(family, next, options, control, &mut waiting),
-            || {
-                let follow = |start: &_| both_ways(family, start, options, control);
-                starts.par_iter().map(follow).collect::<Vec<_>>()
-            },
-        );
-        for (k, ways) in others.into_iter().zip(ways) {
-            waiting[k].followed = Some(ways);
-        }
-        waiting = waiting
-            .into_par_iter()
-            .filter_map(|orbit| diagram.lacks(family, orbit, &options.continuation))
-            .collect();
-    }
+    diagram.extend(family, seeds, options, control);
     diagram
 }
 
@@ -155,6 +134,41 @@ fn both_ways<F: MapFamily>(
 }
 
 impl Diagram {
+    /// Adds the branches of further seeds, as if they had been the last to be given.
+    pub fn extend<F: MapFamily>(
+        &mut self,
+        family: &F,
+        seeds: &[(f64, PeriodicOrbit)],
+        options: &DiagramOptions,
+        control: &Control<'_>,
+    ) {
+        let mut waiting: Vec<Waiting> = seeds.iter().rev().map(Waiting::seed).collect();
+        loop {
+            waiting = waiting
+                .into_par_iter()
+                .filter_map(|orbit| self.lacks(family, orbit, &options.continuation))
+                .collect();
+            let Some(next) = waiting.pop() else {
+                break;
+            };
+            if control.is_cancelled() || self.branches.len() >= options.max_branches {
+                break;
+            }
+            let others = likely_next(&next, &waiting);
+            let starts: Vec<_> = others.iter().map(|k| waiting[*k].start()).collect();
+            let ((), ways) = rayon::join(
+                || self.add(family, next, options, control, &mut waiting),
+                || {
+                    let follow = |start: &_| both_ways(family, start, options, control);
+                    starts.par_iter().map(follow).collect::<Vec<_>>()
+                },
+            );
+            for (k, ways) in others.into_iter().zip(ways) {
+                waiting[k].followed = Some(ways);
+            }
+        }
+    }
+
     /// An orbit that waits, if it lies on no branch.
     fn lacks<F: MapFamily>(
         &self,
@@ -164,7 +178,7 @@ impl Diagram {
     ) -> Option<Waiting> {
         let new = &self.branches[waiting.seen..];
         waiting.seen = self.branches.len();
-        let held = hold(new, family, waiting.parameter, &waiting.orbit, options);
+        let held = !new.is_empty() && hold(new, family, waiting.parameter, &waiting.orbit, options);
         (!held).then_some(waiting)
     }
 

@@ -359,6 +359,50 @@ pub const fn kind_name(kind: BifurcationKind) -> &'static str {
     }
 }
 
+/// Branches on which given orbits lie, as these come: see [`branches_through`].
+pub(in crate::study) struct BranchesThrough<'a> {
+    case: &'a Case,
+    options: &'a BranchOptions,
+    diagram: Diagram,
+}
+
+impl<'a> BranchesThrough<'a> {
+    /// No branches yet.
+    ///
+    /// # Errors
+    /// As [`branch`].
+    pub(in crate::study) fn new(
+        case: &'a Case,
+        options: &'a BranchOptions,
+    ) -> Result<Self, BranchError> {
+        check(case, options)?;
+        Ok(Self {
+            case,
+            options,
+            diagram: Diagram::default(),
+        })
+    }
+
+    /// Adds those through orbits, each with its value of the parameter.
+    pub(in crate::study) fn follow(
+        &mut self,
+        orbits: &[(f64, PeriodicOrbit)],
+        control: &Control<'_>,
+    ) {
+        let family = self.case.family(self.options.key);
+        let how = self.options.diagram();
+        self.diagram.extend(&family, orbits, &how, control);
+    }
+
+    /// What was found.
+    pub(in crate::study) fn report(self, control: &Control<'_>) -> BranchReport {
+        BranchReport {
+            cancelled: control.is_cancelled(),
+            ..described(self.case, self.options, &self.diagram)
+        }
+    }
+}
+
 /// Follows the branches on which given orbits lie, each with its value of the parameter,
 /// both ways over the whole range; `period`, `state` and `census` of the options do not
 /// matter.
@@ -371,12 +415,9 @@ pub fn branches_through(
     options: &BranchOptions,
     control: &Control<'_>,
 ) -> Result<BranchReport, BranchError> {
-    check(case, options)?;
-    let family = case.family(options.key);
-    let diagram = assemble_diagram(&family, seeds, &options.diagram(), control);
-    let mut report = described(case, options, &diagram);
-    report.cancelled = control.is_cancelled();
-    Ok(report)
+    let mut branches = BranchesThrough::new(case, options)?;
+    branches.follow(seeds, control);
+    Ok(branches.report(control))
 }
 
 /// Follows branches of `case`.

@@ -22,12 +22,10 @@
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
 
 pub mod frequency_modulation;
-
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
+mod walk;
 
 use nanotap_dynamics::{
-    Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, classify, grid_neighbours,
+    Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, grid_neighbours,
     orbits_shared,
 };
 use schemars::JsonSchema;
@@ -39,15 +37,16 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
-use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
+use crate::study::branch::{BranchError, BranchOptions, BranchReport, BranchesThrough};
 use crate::study::kind::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
-use crate::study::simulate::{Classification, Named};
+use crate::study::simulate::Classification;
 use crate::study::sweep::SweepOptions;
 use crate::study::value::Amount;
 use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
 };
+use walk::Walk;
 
 /// How to approach. Distances are in the model's unit of length.
 #[derive(Clone, Debug, PartialEq)]
@@ -283,23 +282,46 @@ pub fn approach(
     let free = FreeMotion::of(&case.model()?);
     let distances = distances(&free, options)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
-    let walk = Walk {
+    let curve = Curve {
         case,
         options,
         classify: budgets(options),
     };
-    let table = walk.there_and_back(&distances, control)?;
+    let walk = Walk {
+        case,
+        classify: &ClassifyOptions {
+            first_look: walk::FIRST_LOOK,
+            ..curve.classify.clone()
+        },
+        distances: &distances,
+        observed: &|way, gap, model, met| curve.observed(way, gap, model, met),
+    };
+    let table = walk.there_and_back(control)?;
     let quiet = Control {
         progress: None,
         ..*control
     };
-    let coexisting = walk.coexisting(&distances, &table, &quiet)?;
-    let branches = if options.branches && !control.is_cancelled() {
-        let met = table.iter().chain(&coexisting);
-        branches(case, key, met, (from, to), options, &quiet)?
-    } else {
-        None
-    };
+    // The branches of what both ways met are followed while it is asked what else attracts.
+    let how = branching(key, (from, to), options);
+    let branches = options.branches.then(|| BranchesThrough::new(case, &how));
+    let mut branches = branches.transpose()?;
+    let met = seeds(&table);
+    let (coexisting, ()) = rayon::join(
+        || curve.coexisting(&distances, &table, &quiet),
+        || {
+            if let Some(branches) = &mut branches {
+                branches.follow(&met, &quiet);
+            }
+        },
+    );
+    let coexisting = coexisting?;
+    let others = seeds(&coexisting);
+    let any = !(met.is_empty() && others.is_empty());
+    let branches = branches.filter(|_| any && !control.is_cancelled());
+    let branches = branches.map(|mut branches| {
+        branches.follow(&others, &quiet);
+        branches.report(&quiet)
+    });
     Ok(ApproachReport {
         parameter: key.path(),
         from,
@@ -380,114 +402,14 @@ fn budgets(options: &ApproachOptions) -> ClassifyOptions {
     }
 }
 
-/// How a motion is followed.
-struct Walk<'a> {
+/// How a curve is taken.
+struct Curve<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
     classify: ClassifyOptions,
 }
 
-/// A distance on the way.
-struct Step {
-    point: ApproachPoint,
-    /// Where the motion at the next distance starts; nowhere: from rest.
-    onwards: Option<Vec<f64>>,
-}
-
-impl Step {
-    /// Whether two steps at one distance come to the same orbit.
-    fn is_on_orbit_of(&self, other: &Self) -> bool {
-        let orbits = self.point.orbit.as_ref().zip(other.point.orbit.as_ref());
-        orbits.is_some_and(|(a, b)| a.is_same_as(b))
-    }
-}
-
-impl Walk<'_> {
-    /// The motions at all distances, there and back. Where the way back is on the orbit that the
-    /// way there has passed, it goes on as the way there did. So most of its steps are known to
-    /// begin while the way there is still going on, and other threads make them; where the ways
-    /// part they have been made in vain.
-    fn there_and_back(
-        &self,
-        distances: &[f64],
-        control: &Control<'_>,
-    ) -> Result<Vec<ApproachPoint>, CaseError> {
-        let count = distances.len();
-        let done = AtomicUsize::new(0);
-        let step = |way, k: usize, start: Option<&Vec<f64>>| {
-            let step = self.step(way, distances[k], start);
-            if let Some(report) = control.progress {
-                let steps = done.fetch_add(1, Ordering::Relaxed) + 1;
-                report(steps.min(2 * count), 2 * count);
-            }
-            step
-        };
-        // Steps of the way back, made before it is known whether it takes them.
-        let mut ahead: Vec<OnceLock<Result<Step, CaseError>>> = Vec::new();
-        ahead.resize_with(count, OnceLock::new);
-        let there = rayon::scope(|scope| {
-            let mut there: Vec<Arc<Step>> = Vec::with_capacity(count);
-            for k in 0..count {
-                if control.is_cancelled() {
-                    break;
-                }
-                let start = there.last().and_then(|step| step.onwards.as_ref());
-                let found = Arc::new(step(Way::Approach, k, start)?);
-                if k > 0 && found.point.orbit.is_some() && rayon::current_num_threads() > 1 {
-                    let (found, step, slot) = (Arc::clone(&found), &step, &ahead[k - 1]);
-                    scope.spawn(move |_| {
-                        if !control.is_cancelled() {
-                            slot.get_or_init(|| step(Way::Retract, k - 1, found.onwards.as_ref()));
-                        }
-                    });
-                }
-                there.push(found);
-            }
-            Ok::<_, CaseError>(there)
-        })?;
-        let mut way_back: Vec<Step> = Vec::with_capacity(count);
-        for k in (0..there.len()).rev() {
-            if control.is_cancelled() {
-                break;
-            }
-            let made = match way_back.last() {
-                None => step(Way::Retract, k, there[k].onwards.as_ref()),
-                Some(last) if last.is_on_orbit_of(&there[k + 1]) => ahead[k]
-                    .take()
-                    .unwrap_or_else(|| step(Way::Retract, k, there[k + 1].onwards.as_ref())),
-                Some(last) => step(Way::Retract, k, last.onwards.as_ref()),
-            };
-            way_back.push(made?);
-        }
-        let there = there.into_iter().map(|step| step.point.clone());
-        let back = way_back.into_iter().map(|step| step.point);
-        Ok(there.chain(back).collect())
-    }
-
-    /// The motion at a distance from `start`, or from rest.
-    fn step(&self, way: Way, gap: f64, start: Option<&Vec<f64>>) -> Result<Step, CaseError> {
-        let case = self.case;
-        let model = case.with(case.gap_key(), gap).model()?;
-        let rest = || vec![0.0; model.dimension()];
-        let start = start.cloned().unwrap_or_else(rest);
-        let classified = classify(&mut Strobe::new(&model), &start, &self.classify);
-        let named = Named::of(&classified.kind);
-        let met = Met {
-            classification: named.classification,
-            evidence: named.evidence,
-            orbit: named.orbit,
-            state: classified.state,
-        };
-        // The next motion starts on this one's orbit, not where its decay was when Newton
-        // saw the end of it. A motion that ran off is not followed: the next starts from rest.
-        let onwards = match &met.orbit {
-            Some(orbit) => Some(orbit.nearest(&met.state).0.to_vec()),
-            None => (met.classification != Classification::Unbounded).then(|| met.state.clone()),
-        };
-        let point = self.observed(way, gap, &model, met);
-        Ok(Step { point, onwards })
-    }
-
+impl Curve<'_> {
     /// What neither way met at a distance, but the attractors of the distances beside it lead to.
     fn coexisting(
         &self,
@@ -588,27 +510,20 @@ struct Met {
     state: Vec<f64>,
 }
 
-/// Branches through all periodic motions.
-fn branches<'a>(
-    case: &Case,
-    key: Key,
-    met: impl Iterator<Item = &'a ApproachPoint>,
-    (from, to): (f64, f64),
-    options: &ApproachOptions,
-    control: &Control<'_>,
-) -> Result<Option<BranchReport>, BranchError> {
-    let seeds: Vec<(f64, PeriodicOrbit)> = met
+/// The periodic motions among those met, each with its distance.
+fn seeds(met: &[ApproachPoint]) -> Vec<(f64, PeriodicOrbit)> {
+    met.iter()
         .filter_map(|point| Some((point.gap, point.orbit.clone()?)))
-        .collect();
-    if seeds.is_empty() {
-        return Ok(None);
-    }
-    let how = BranchOptions {
+        .collect()
+}
+
+/// How their branches are followed.
+fn branching(key: Key, (from, to): (f64, f64), options: &ApproachOptions) -> BranchOptions {
+    BranchOptions {
         doublings: options.doublings,
         max_multiplier: STRONGEST,
         ..BranchOptions::over(key, from, to)
-    };
-    branches_through(case, &seeds, &how, control).map(Some)
+    }
 }
 
 /// Growth of disturbances over a period beyond which an orbit is no part of what is met: near the

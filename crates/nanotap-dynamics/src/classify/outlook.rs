@@ -1,0 +1,107 @@
+//! Where a motion seems to go, before it is known that it does.
+//!
+//! Seeing a run approach an orbit, or measuring the exponents of one that does not close, takes
+//! most of the time that naming a motion takes. Where the next motion only wants a start from this
+//! one, it can set out from what Newton closed while another thread does the rest.
+
+use crate::classify::run::{AfterLook, Closed, Guesses, Known, Run, Stop, refused};
+use crate::classify::{Classified, ClassifyOptions, MotionKind, ended};
+use crate::map::StroboscopicMap;
+use crate::orbit::PeriodicOrbit;
+
+/// A motion followed until it seems to be known.
+pub struct Outlook<'a> {
+    stage: Stage<'a>,
+}
+
+/// How far a motion was followed.
+enum Stage<'a> {
+    /// To an orbit that Newton closed, with the guesses that are left if it is not the end.
+    Closed(Box<(Run<'a>, Closed, Guesses)>),
+    /// Through its transient, without an orbit.
+    Unclosed(Box<Run<'a>>),
+    /// To its end.
+    Known(Box<Classified>),
+}
+
+/// Follows the motion from `start` until Newton closes an orbit that it may go to, or its
+/// transient is over. [`Outlook::verified`] names it, as [`classify`](super::classify()) would.
+pub fn outlook<'a, M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    options: &'a ClassifyOptions,
+) -> Outlook<'a> {
+    let stage = match refused(start, map.dimension()) {
+        Some(end) => Stage::Known(Box::new(ended(end, start))),
+        None => followed(map, Run::new(start, Known::default(), options)),
+    };
+    Outlook { stage }
+}
+
+fn followed<'a, M: StroboscopicMap>(map: &mut M, mut run: Run<'a>) -> Stage<'a> {
+    loop {
+        if let Err(stop) = run.run_to_look(map) {
+            return Stage::Known(Box::new(named(run, Err(stop))));
+        }
+        let mut guesses = run.guesses_at_look();
+        if let Some(closed) = run.next_orbit(map, &mut guesses) {
+            return Stage::Closed(Box::new((run, closed, guesses)));
+        }
+        if let AfterLook::Measure = run.go_on() {
+            return Stage::Unclosed(Box::new(run));
+        }
+    }
+}
+
+/// What a run that knows nothing beforehand ended with.
+fn named(run: Run<'_>, how: Result<MotionKind, Stop>) -> Classified {
+    let state = run.state.clone();
+    let end = match how {
+        Ok(kind) => run.classified(kind),
+        Err(stop) => run.stopped(stop),
+    };
+    ended(end, &state)
+}
+
+impl Outlook<'_> {
+    /// The stable orbit that it seems to go to.
+    pub fn orbit(&self) -> Option<&PeriodicOrbit> {
+        match &self.stage {
+            Stage::Closed(beside) => match &beside.1 {
+                Closed::Attracting(orbit) => Some(orbit),
+                Closed::Occupied(_) => None,
+            },
+            Stage::Unclosed(_) | Stage::Known(_) => None,
+        }
+    }
+
+    /// The state that it has come to.
+    pub fn state(&self) -> &[f64] {
+        match &self.stage {
+            Stage::Closed(beside) => &beside.0.state,
+            Stage::Unclosed(run) => &run.state,
+            Stage::Known(end) => &end.state,
+        }
+    }
+
+    /// Whether it ran off.
+    pub fn is_unbounded(&self) -> bool {
+        matches!(&self.stage, Stage::Known(end) if matches!(end.kind, MotionKind::Unbounded))
+    }
+
+    /// Follows it on, by the same map, until it can be named.
+    pub fn verified<M: StroboscopicMap>(self, map: &mut M) -> Classified {
+        match self.stage {
+            Stage::Known(end) => *end,
+            Stage::Unclosed(mut run) => {
+                let how = run.measure(map);
+                named(*run, how)
+            }
+            Stage::Closed(beside) => {
+                let (mut run, closed, guesses) = *beside;
+                let how = run.follow_from(map, closed, guesses);
+                named(run, how)
+            }
+        }
+    }
+}

@@ -13,20 +13,24 @@ use crate::vector::distance;
 const LONGEST_STRETCH: f64 = 512.0;
 /// Part of its first distance, and of the orbit's size, at which a run has come to the orbit.
 const ARRIVED: f64 = 0.01;
+/// Part of the orbit's size at which the rest of the way is looked at.
+const BESIDE: f64 = 0.1;
 /// Decay times that this takes, and more where the run comes from so many sizes away.
 const LONGEST_WATCH: f64 = 5.0;
 const FARTHEST: f64 = 1e9;
 /// Places of the rest of the way at which the map is tried.
 const PLACES: usize = 16;
+/// Phases of the slowest turns at which it is tried, at every halving of the distance.
+const PHASES: usize = 8;
 
 /// True if the run from `state` approaches the stable `orbit` as its multipliers say: nearer by a
-/// factor 100 in the adapted norm, and to a hundredth of the orbit's size; or for one decay time,
-/// with the peaks of four stretches falling one after the other, at half the linear rate at least,
-/// and with a free way ahead. Peaks, because beside a flip or a Neimark–Sacker point the distance
-/// falls only on average over the turns. The way ahead is the linear decay from there, at whose
-/// places the map must contract: what turns fast has shown in the stretches, and what turns slowly
-/// shows at the places. Where it is not free, as where a beat will bring the tip to a sample that it
-/// does not touch yet, or the distance falls by less, the run is watched for decay times more.
+/// factor 100 in the adapted norm, and to a hundredth of the orbit's size; or beside it, a tenth of
+/// its size away, for one decay time with the peaks of four stretches falling one after the other, at
+/// half the linear rate at least, and with a free way ahead. Peaks, because beside a flip or a
+/// Neimark–Sacker point the distance falls only on average over the turns. The way ahead is the
+/// linear decay from there and all phases of its slowest turns, where the map must contract. Where it
+/// is not free, as where a beat will bring the tip to a sample that it does not touch yet, or the
+/// distance falls by less, the run is watched for decay times more.
 ///
 /// Four stretches are one decay time long, or 2048 returns; a torus around the orbit that beats
 /// more slowly than that, and happens to shrink meanwhile, would be mistaken.
@@ -42,7 +46,7 @@ pub(crate) fn approaches<M: StroboscopicMap>(
         match approach.one_decay_time(map)? {
             Progress::Arrived => return Ok(true),
             Progress::Gone => return Ok(false),
-            Progress::Falls if approach.has_free_way(map)? => return Ok(true),
+            Progress::Falls if approach.has_free_way(map) => return Ok(true),
             Progress::Falls | Progress::Nearer => {}
         }
     }
@@ -53,9 +57,9 @@ pub(crate) fn approaches<M: StroboscopicMap>(
 enum Progress {
     /// It is as small as it need be.
     Arrived,
-    /// It falls as the multipliers say.
+    /// It falls as the multipliers say, beside the orbit.
     Falls,
-    /// It falls by less.
+    /// It falls by less, or far away.
     Nearer,
     /// It does not fall.
     Gone,
@@ -76,6 +80,8 @@ struct Approach<'a> {
     first: f64,
     /// Distance at which it has arrived.
     near: f64,
+    /// Distance beside the orbit, where what is far from it no longer counts.
+    beside: f64,
     now: f64,
     /// Decay times that this takes.
     longest_watch: usize,
@@ -125,6 +131,7 @@ impl<'a> Approach<'a> {
             x,
             first,
             near: floor.max(ARRIVED * first / far),
+            beside: if size > floor { BESIDE * size } else { first },
             now: first,
             longest_watch: (LONGEST_WATCH + nanotap_arithmetic::ln(far)).ceil() as usize,
         }))
@@ -163,9 +170,9 @@ impl<'a> Approach<'a> {
         let wanted = 1.5 * self.stretch() as f64 * self.rate;
         let falls = highest.windows(2).all(|w| w[1] < w[0])
             && nanotap_arithmetic::ln(highest[3] / highest[0]) <= wanted;
-        Ok(if falls {
+        Ok(if falls && self.now <= self.beside {
             Progress::Falls
-        } else if highest[3] < highest[0] {
+        } else if falls || highest[3] < highest[0] {
             Progress::Nearer
         } else {
             Progress::Gone
@@ -179,32 +186,68 @@ impl<'a> Approach<'a> {
     }
 
     /// Whether the map contracts all along the linear decay from where the run is to where it has
-    /// arrived.
-    fn has_free_way<M: StroboscopicMap>(&self, map: &mut M) -> Result<bool, MapFailure> {
+    /// arrived, and at all phases of the slowest turns that it makes on the way.
+    fn has_free_way<M: StroboscopicMap>(&self, map: &mut M) -> bool {
         let returns = nanotap_arithmetic::ln(self.near / self.now) / self.rate;
         let between = (returns / PLACES as f64).ceil().max(1.0) as u32;
         let decay = self.monodromy.pow(between);
-        let slowest = 0.5 * (1.0 + self.adapted.rate());
         let mut away = DVector::from_iterator(
             self.x.len(),
             self.x.iter().zip(self.center).map(|(x, c)| x - c),
         );
-        let mut place = self.x.clone();
         for _ in 0..PLACES {
             away = &decay * away;
-            for ((place, center), away) in place.iter_mut().zip(self.center).zip(&away) {
-                *place = center + away;
-            }
-            let before = self.adapted.distance(&place, self.center);
-            for _ in 0..self.period {
-                advance(map, &mut place)?;
-            }
-            let after = self.adapted.distance(&place, self.center);
-            if after > slowest * before + self.floor {
-                return Ok(false);
+            if !self.contracts(map, &away) {
+                return false;
             }
         }
-        Ok(true)
+        let slowest = self.slowest_turns(away);
+        let halvings = std::iter::successors(Some(self.now), |radius| Some(0.5 * radius));
+        halvings
+            .take_while(|radius| *radius > self.near)
+            .all(|radius| {
+                slowest
+                    .iter()
+                    .all(|unit| self.contracts(map, &(unit * radius)))
+            })
+    }
+
+    /// Whether a return from so far `away` comes nearer; not where none can be made.
+    fn contracts<M: StroboscopicMap>(&self, map: &mut M, away: &DVector<f64>) -> bool {
+        let mut place: Vec<f64> = self.center.iter().zip(away).map(|(c, a)| c + a).collect();
+        let before = self.adapted.distance(&place, self.center);
+        if (0..self.period).any(|_| advance(map, &mut place).is_err()) {
+            return false;
+        }
+        let after = self.adapted.distance(&place, self.center);
+        let slowest = 0.5 * (1.0 + self.adapted.rate());
+        after <= slowest * before + self.floor
+    }
+
+    /// Directions all around, of length 1 in the adapted norm, in the plane in which what is left
+    /// of a decay turns; both ways along a line where it does not.
+    fn slowest_turns(&self, left: DVector<f64>) -> Vec<DVector<f64>> {
+        let later = self.adapted.coordinates(&(&self.monodromy * &left));
+        let first = self.adapted.coordinates(&left).normalize();
+        let across = &later - &first * first.dot(&later);
+        let turns = across.norm() > 1e-6 * later.norm();
+        let (across, phases) = if turns {
+            (across.normalize(), PHASES)
+        } else {
+            (across, 2)
+        };
+        (0..phases)
+            .map(|k| {
+                let turn = 2.0 * k as f64 / phases as f64;
+                let (sin, cos) = nanotap_arithmetic::sin_cos(std::f64::consts::PI * turn);
+                let part = if turns { sin } else { 0.0 };
+                let direction = &first * cos + &across * part;
+                let mut out = vec![0.0; direction.len()];
+                self.adapted.unit_vector(direction.as_slice(), &mut out);
+                DVector::from_vec(out)
+            })
+            .filter(|unit| unit.iter().all(|v| v.is_finite()))
+            .collect()
     }
 }
 

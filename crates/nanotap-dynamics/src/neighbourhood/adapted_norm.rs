@@ -9,8 +9,8 @@
 //! Fails (returns `None`) if the spectral radius is not below 1, or so near it that
 //! H is not positive definite in rounding.
 
-use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
+use nalgebra::{DMatrix, DVector};
 
 /// A few units in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -116,6 +116,11 @@ impl AdaptedNorm {
         for (o, row) in out.iter_mut().zip(self.inverse.row_iter()) {
             *o = row.iter().zip(direction).map(|(a, b)| a * b).sum();
         }
+    }
+
+    /// Lᵀ `away`, whose Euclidean length is the norm of `away`.
+    pub(crate) fn coordinates(&self, away: &DVector<f64>) -> DVector<f64> {
+        &self.upper_matrix * away
     }
 
     /// True if a matrix has an operator norm of at most `rate` in this norm: the

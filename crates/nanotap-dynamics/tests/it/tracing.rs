@@ -4,9 +4,9 @@ use std::convert::Infallible;
 
 use nanotap_dynamics::{
     Bifurcation, BifurcationCurve, BifurcationKind, CensusOptions, ContinuationOptions, Control,
-    CurveEnd, CurveOptions, DMatrix, DiagramOptions, Direction, MapFamily, ShootingOptions,
-    StartBox, TwoParameterFamily, assemble_diagram, census, close_orbit, continue_orbit,
-    trace_curve,
+    CurveEnd, CurveOptions, DMatrix, Diagram, DiagramOptions, Direction, MapFamily,
+    ShootingOptions, StartBox, TwoParameterFamily, assemble_diagram, census, close_orbit,
+    continue_orbit, trace_curve,
 };
 
 use crate::systems::{Cubic, Family, Formula, Grazing, Henon, Logistic, System};
@@ -444,6 +444,12 @@ fn a_diagram_is_the_same_on_any_number_of_threads() {
     for threads in [2, 4] {
         assert_eq!(format!("{:?}", assembled(threads)), format!("{alone:?}"));
     }
+    // Seeds that come later are as if they had been the last to be given.
+    let mut later = Diagram::default();
+    for part in [&seeds[..2], &seeds[2..]] {
+        later.extend(&family, part, &options, &Control::default());
+    }
+    assert_eq!(format!("{later:?}"), format!("{alone:?}"));
 }
 
 /// The two fixed points ±√(r − 1) of the cubic map are mirror images with one multiplier 3 − 2r, and

@@ -4,9 +4,11 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::strobe::Strobe;
 use nanotap::study::approach::{ApproachOptions, ApproachReport, Way, approach};
 use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 use nanotap::study::threads::install;
+use nanotap_dynamics::StroboscopicMap as _;
 
 /// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
 pub(crate) const STIFF: &str = "\
@@ -89,22 +91,79 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
     }
 }
 
-/// Other threads make steps of the way back beforehand, in the hysteresis in vain.
+/// A distance is left before its motion is named: in vain where the motion jumps, as at the ends of
+/// the hysteresis, and where nothing closes, as at Ω = 6.
 #[test]
 fn a_curve_is_the_same_on_any_number_of_threads() {
-    let lever = studied(STIFF, &[]);
-    let options = ApproachOptions {
-        points: 30,
-        ..ApproachOptions::default()
+    let unclosed = Case::from(Cantilever {
+        omega: 6.0,
+        ..Cantilever::paper()
+    });
+    let same = |case: &Case, points: usize| {
+        let options = ApproachOptions {
+            points,
+            ..ApproachOptions::default()
+        };
+        let on = |threads: usize| install(Some(threads), || curve(case, &options)).unwrap();
+        let alone = on(1);
+        let written = serde_json::to_string(&alone).unwrap();
+        for threads in [2, 3] {
+            let together = serde_json::to_string(&on(threads)).unwrap();
+            assert!(together == written, "{threads} threads, {points} points");
+        }
+        alone
     };
-    let on = |threads: usize| {
-        let report = install(Some(threads), || curve(&lever, &options)).unwrap();
-        assert!(report.hysteresis.iter().any(|h| h.near < h.far));
-        serde_json::to_string(&report).unwrap()
-    };
-    let alone = on(1);
-    for threads in [2, 3] {
-        assert!(on(threads) == alone, "{threads}");
+    let report = same(&studied(STIFF, &[]), 30);
+    assert!(report.hysteresis.iter().any(|h| h.near < h.far));
+    let report = same(&unclosed, 12);
+    let count = report.table.iter().filter(|p| p.period.is_none()).count();
+    assert!((2..24).contains(&count), "{count}");
+}
+
+/// What a coarse curve says is where long runs go, each from the end of the one before: it is not
+/// misled by a beat that nears the free motion at first, nor by a neck that holds the tip of a sticky
+/// sample while the distance to the tapping motion falls.
+#[test]
+fn a_coarse_curve_follows_the_motion_that_long_runs_come_to() {
+    let sticky = include_str!("../../../../docs/cases/jkr-soft.toml");
+    for (case, points, long) in [
+        (studied(STIFF, &[]), 12, 10_000),
+        (studied(STIFF, &[]), 9, 10_000),
+        (studied(sticky, &[]), 9, 3000),
+    ] {
+        let options = ApproachOptions {
+            points,
+            branches: false,
+            ..ApproachOptions::default()
+        };
+        let mut state: Option<Vec<f64>> = None;
+        for p in &curve(&case, &options).table {
+            let model = case.with(case.gap_key(), p.gap).model().unwrap();
+            let mut map = Strobe::new(&model);
+            let mut here = state.unwrap_or_else(|| vec![0.0; model.dimension()]);
+            for _ in 0..long {
+                map.advance(&mut here).unwrap();
+            }
+            let run = SimulateOptions {
+                state: Some(here.clone()),
+                transient: Some(0),
+                periods: 1,
+                ..SimulateOptions::default()
+            };
+            let comes_to = simulate(&model, &run).unwrap().observables;
+            let said = p.observables.as_ref().unwrap();
+            let same = |a: f64, b: f64| (a - b).abs() < 1e-4 * b.abs() + 1e-9;
+            assert!(
+                same(said.first_harmonic, comes_to.first_harmonic)
+                    && same(said.contact_fraction, comes_to.contact_fraction),
+                "{:?} at {}: {} and {}",
+                p.way,
+                p.gap,
+                said.first_harmonic,
+                comes_to.first_harmonic
+            );
+            state = Some(here);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Which motions there are, and where they change: the analysis joined to the model.
 
+use nanotap::case::file::Source;
 use nanotap::case::{Case, Key, PlaneFamily};
 use nanotap::control::Control;
 use nanotap::model::Model;
@@ -7,14 +8,17 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
+use nanotap::model::strobe::Strobe;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::lyapunov::{LyapunovOptions, Section, lyapunov, section};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::simulate::{Classification, SimulateError, SimulateOptions, simulate};
 use nanotap::study::start_box::default_box;
-use nanotap_dynamics::TwoParameterFamily as _;
-use nanotap_dynamics::{DMatrix, StroboscopicMap as _};
+use nanotap_dynamics::{
+    AttractorKind, CensusOptions, DMatrix, StartOutcome, StroboscopicMap as _,
+    TwoParameterFamily as _, census,
+};
 
 fn at(omega: f64) -> Cantilever {
     Cantilever::paper().with(Parameter::Omega, omega)
@@ -133,6 +137,46 @@ fn the_census_at_high_frequency_is_complete() {
                 (side.lower..=side.upper).contains(value),
                 "{side:?} {value}"
             );
+        }
+    }
+}
+
+/// Every start of a census goes where a long run from it goes: with a period 1 and a period 4 beside
+/// each other, and with the two states in attraction and repulsion, whose attractive one a tip
+/// nears from afar before it touches.
+#[test]
+fn every_start_goes_where_a_long_run_from_it_does() {
+    let bistable = include_str!("../../../../docs/cases/bistable-lever.toml");
+    let source = Source {
+        name: "bistable-lever.toml".into(),
+        text: bistable.into(),
+    };
+    let paper = Model::cantilever(&at(20.0).with(Parameter::Alpha1, 0.0)).unwrap();
+    let lever = Case::parse(Some(source), &[]).unwrap().model().unwrap();
+    for (model, count, long) in [(paper, 128, 1500), (lever, 32, 3000)] {
+        let starts = default_box(&model).unwrap().starts(1, count);
+        let map = Strobe::new(&model);
+        let found = census(
+            &map,
+            &starts,
+            &CensusOptions::default(),
+            &Control::default(),
+        );
+        assert_eq!(found.attractors.len(), 2);
+        for (k, (start, outcome)) in starts.iter().zip(&found.outcomes_by_start).enumerate() {
+            let mut state = start.clone();
+            let mut map = map.clone();
+            for _ in 0..long {
+                map.advance(&mut state).unwrap();
+            }
+            let goes_to = found.attractors.iter().position(|a| match &a.kind {
+                AttractorKind::Periodic(orbit) => orbit.nearest(&state).1 < 1e-6 * orbit.scale(),
+                _ => false,
+            });
+            let StartOutcome::Attractor { index, .. } = outcome else {
+                panic!("start {k}: {outcome:?}");
+            };
+            assert_eq!(Some(*index), goes_to, "start {k}");
         }
     }
 }

@@ -201,7 +201,7 @@ impl<'a> Approach<'a> {
                 return false;
             }
         }
-        let slowest = self.slowest_turns(away);
+        let slowest = self.slowest_turns(&away);
         let halvings = std::iter::successors(Some(self.now), |radius| Some(0.5 * radius));
         halvings
             .take_while(|radius| *radius > self.near)
@@ -226,9 +226,9 @@ impl<'a> Approach<'a> {
 
     /// Directions all around, of length 1 in the adapted norm, in the plane in which what is left
     /// of a decay turns; both ways along a line where it does not.
-    fn slowest_turns(&self, left: DVector<f64>) -> Vec<DVector<f64>> {
-        let later = self.adapted.coordinates(&(&self.monodromy * &left));
-        let first = self.adapted.coordinates(&left).normalize();
+    fn slowest_turns(&self, left: &DVector<f64>) -> Vec<DVector<f64>> {
+        let later = self.adapted.coordinates(&(&self.monodromy * left));
+        let first = self.adapted.coordinates(left).normalize();
         let across = &later - &first * first.dot(&later);
         let turns = across.norm() > 1e-6 * later.norm();
         let (across, phases) = if turns {

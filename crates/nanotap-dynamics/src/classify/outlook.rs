@@ -105,3 +105,33 @@ impl Outlook<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::classify::run::tests::Logistic;
+
+    /// r x (1 − x) at 3.2 goes to a period 2, at 3.9 nowhere that closes, at 4.1 away.
+    #[test]
+    fn what_is_seen_is_what_is_named() {
+        let options = ClassifyOptions::default();
+        let mut map = Logistic(3.2);
+        let seen = outlook(&mut map, &[0.3], &options);
+        let closed = seen.orbit().unwrap().clone();
+        assert_eq!((closed.period, seen.is_unbounded()), (2, false));
+        let named = seen.verified(&mut map);
+        assert!(matches!(&named.kind, MotionKind::Periodic(orbit) if orbit.is_same_as(&closed)));
+
+        let mut map = Logistic(3.9);
+        let seen = outlook(&mut map, &[0.3], &options);
+        assert!(seen.orbit().is_none() && !seen.is_unbounded());
+        let named = seen.verified(&mut map);
+        assert!(matches!(named.kind, MotionKind::Chaotic(_)), "{named:?}");
+
+        let mut map = Logistic(4.1);
+        let seen = outlook(&mut map, &[0.3], &options);
+        assert!(seen.is_unbounded());
+        let named = seen.verified(&mut map);
+        assert!(matches!(named.kind, MotionKind::Unbounded));
+    }
+}

@@ -3,7 +3,7 @@
 //! shows. Through every periodic motion found, branches are continued in the distance, stable
 //! and unstable, with their folds, flips and grazings located.
 //!
-//! A motion counts only if [`classify()`] could name it: a periodic one is the orbit itself,
+//! A motion counts only if [`classify()`](nanotap_dynamics::classify()) could name it: a periodic one is the orbit itself,
 //! closed by Newton and seen to be approached; a chaotic or quasi-periodic one is described
 //! by a recording; of what is undecided no numbers are given. Attractors met at one distance
 //! are then tried at the distances beside it, until none gains one: what coexists with both

@@ -3,11 +3,11 @@
 //! shows. Through every periodic motion found, branches are continued in the distance, stable
 //! and unstable, with their folds, flips and grazings located.
 //!
-//! A motion counts only if [`classify()`](nanotap_dynamics::classify()) could name it: a periodic one is the orbit itself,
-//! closed by Newton and seen to be approached; a chaotic or quasi-periodic one is described
-//! by a recording; of what is undecided no numbers are given. Attractors met at one distance
-//! are then tried at the distances beside it, until none gains one: what coexists with both
-//! ways is part of the report.
+//! A motion counts only if [`classify()`](nanotap_dynamics::classify()) could name it: a periodic
+//! one is the orbit itself, closed by Newton and seen to be approached; a chaotic or
+//! quasi-periodic one is described by a recording; of what is undecided no numbers are given.
+//! Attractors met at one distance are then tried at the distances beside it, until none gains
+//! one: what coexists with both ways is part of the report.
 //!
 //! The distance is the gap between tip and sample at rest, `alpha5` of the cantilever (zc of
 //! AFM people, with which the piezo moves) and `gap` of an oscillator. The model's unit of

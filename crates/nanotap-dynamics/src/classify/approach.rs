@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::failure::{MapFailure, advance, advance_with_jacobian};
+use crate::failure::{MapFailure, advance};
 use crate::map::StroboscopicMap;
-use crate::neighbourhood::AdaptedNorm;
+use crate::neighbourhood::{AdaptedNorm, Return};
 use crate::orbit::PeriodicOrbit;
 use crate::vector::distance;
 
@@ -95,13 +95,9 @@ impl<'a> Approach<'a> {
         orbit: &'a PeriodicOrbit,
     ) -> Result<Option<Self>, MapFailure> {
         let (d, n) = (state.len(), orbit.period);
-        let mut monodromy = DMatrix::identity(d, d);
-        let mut factor = DMatrix::zeros(d, d);
-        let mut point = orbit.states[0].clone();
-        for _ in 0..n {
-            advance_with_jacobian(map, &mut point, &mut factor)?;
-            monodromy = &factor * monodromy;
-        }
+        let center = &orbit.states[0];
+        let mut work = Return::new(d);
+        let monodromy = work.jacobian(map, center, n)?.clone();
         let Some(adapted) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
             return Ok(None);
         };
@@ -114,11 +110,9 @@ impl<'a> Approach<'a> {
         for _ in 0..(n - nearest) % n {
             advance(map, &mut x)?;
         }
-        let center = &orbit.states[0];
         let first = adapted.distance(&x, center);
-        let floor = adapted.floor(center, &point);
-        let widest = adapted.extents().into_iter().fold(0.0, f64::max);
-        let size = orbit.scale() / widest;
+        let floor = adapted.floor(center, &work.state);
+        let size = adapted.radius(orbit.scale());
         // A motion at rest has no size.
         let far = if size > floor { first / size } else { 1.0 }.clamp(1.0, FARTHEST);
         Ok(Some(Self {
@@ -220,8 +214,7 @@ impl<'a> Approach<'a> {
             return false;
         }
         let after = self.adapted.distance(&place, self.center);
-        let slowest = 0.5 * (1.0 + self.adapted.rate());
-        after <= slowest * before + self.floor
+        after <= self.adapted.rate_of_return() * before + self.floor
     }
 
     /// Directions all around, of length 1 in the adapted norm, in the plane in which what is left
@@ -229,23 +222,24 @@ impl<'a> Approach<'a> {
     fn slowest_turns(&self, left: &DVector<f64>) -> Vec<DVector<f64>> {
         let later = self.adapted.coordinates(&(&self.monodromy * left));
         let first = self.adapted.coordinates(left).normalize();
-        let across = &later - &first * first.dot(&later);
-        let turns = across.norm() > 1e-6 * later.norm();
-        let (across, phases) = if turns {
-            (across.normalize(), PHASES)
+        let mut across = &later - &first * first.dot(&later);
+        let phases = if across.norm() > 1e-6 * later.norm() {
+            across.normalize_mut();
+            PHASES
         } else {
-            (across, 2)
+            across.fill(0.0);
+            2
         };
         (0..phases)
             .map(|k| {
                 let turn = 2.0 * k as f64 / phases as f64;
                 let (sin, cos) = nanotap_arithmetic::sin_cos(std::f64::consts::PI * turn);
-                let part = if turns { sin } else { 0.0 };
-                let direction = &first * cos + &across * part;
+                let direction = &first * cos + &across * sin;
                 let mut out = vec![0.0; direction.len()];
                 self.adapted.unit_vector(direction.as_slice(), &mut out);
                 DVector::from_vec(out)
             })
+            // Where nothing is left of the decay there is no turn.
             .filter(|unit| unit.iter().all(|v| v.is_finite()))
             .collect()
     }

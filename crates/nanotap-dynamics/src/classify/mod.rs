@@ -1,9 +1,10 @@
 //! What the motion from one start is.
 //!
-//! The run is looked at after 16, 32, 64, … periods ([`ClassifyOptions::first_look`]). Each time the best candidate
-//! periods go to Newton; a closed orbit counts only if its multipliers are stable
-//! *and* the run is seen to approach it at the rate those multipliers say, in the
-//! norm in which every linear motion near the orbit contracts at each return. So the
+//! The run is looked at after 16, 32, 64, … periods ([`ClassifyOptions::first_look`]).
+//! Each time the best candidate periods go to Newton; a closed orbit counts only if its
+//! multipliers are stable *and* the run is seen to come to it, or to approach it at the
+//! rate those multipliers say with a free way ahead, in the norm in which every linear
+//! motion near the orbit contracts at each return. So the
 //! transient is as long as the motion needs, a slow decay towards a weakly stable
 //! orbit is recognised for what it is (Newton jumps to its end), and no tolerance on
 //! how nearly the run repeats ever decides.

@@ -24,7 +24,7 @@ pub(crate) struct AdaptedNorm {
     upper_matrix: DMatrix<f64>,
     /// L⁻ᵀ.
     inverse: DMatrix<f64>,
-    /// Factor by which the linear map contracts this norm at least.
+    /// Factor by which the linearised return map contracts this norm at least.
     rate: f64,
 }
 
@@ -68,9 +68,10 @@ impl AdaptedNorm {
         })
     }
 
-    /// Factor by which the linearised return map contracts this norm at least.
-    pub(crate) fn rate(&self) -> f64 {
-        self.rate
+    /// Factor by which a return that is not linear is asked to contract it: half way from that of
+    /// the linearised one to 1.
+    pub(crate) fn rate_of_return(&self) -> f64 {
+        0.5 * (1.0 + self.rate)
     }
 
     /// ‖a − b‖_H.
@@ -110,6 +111,11 @@ impl AdaptedNorm {
         self.inverse.row_iter().map(|r| r.norm()).collect()
     }
 
+    /// Radius of the ball whose widest half width is `scale`.
+    pub(crate) fn radius(&self, scale: f64) -> f64 {
+        scale / self.extents().into_iter().fold(0.0, f64::max)
+    }
+
     /// The vector of the unit ball that `direction` (on the Euclidean unit sphere)
     /// stands for: L⁻ᵀ direction.
     pub(crate) fn unit_vector(&self, direction: &[f64], out: &mut [f64]) {
@@ -146,7 +152,7 @@ mod tests {
     fn the_linear_map_contracts_by_the_rate() {
         let m = DMatrix::from_row_slice(2, 2, &[0.9, 700.0, 0.0, 0.85]);
         let norm = AdaptedNorm::new(&m, 0.9).unwrap();
-        assert!((norm.rate() - 0.95).abs() < 1e-15);
+        assert!((norm.rate - 0.95).abs() < 1e-15);
         assert!(norm.is_contracted_by(&m, 0.95 + 1e-9));
         // No norm of a matrix is below its spectral radius.
         assert!(!norm.is_contracted_by(&m, 0.89));

@@ -67,12 +67,11 @@ impl Neighbourhood {
         let Some(norm) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
             return Ok(None);
         };
-        let rate = 0.5 * (1.0 + norm.rate());
+        let rate = norm.rate_of_return();
         let unit_extents = norm.extents();
-        let widest = unit_extents.iter().copied().fold(0.0, f64::max);
         let floor = 10.0 * norm.floor(&center, &work.state);
         let scale = orbit.scale().max(1e3 * orbit.error);
-        let mut radius = scale / widest;
+        let mut radius = norm.radius(scale);
         for _ in 0..TRIALS {
             if radius < 8.0 * floor {
                 break;
@@ -189,15 +188,16 @@ impl Neighbourhood {
 }
 
 /// Work space for the return map.
-struct Return {
-    state: Vec<f64>,
+pub(crate) struct Return {
+    /// Where the return ended.
+    pub(crate) state: Vec<f64>,
     factor: DMatrix<f64>,
     product: DMatrix<f64>,
     next: DMatrix<f64>,
 }
 
 impl Return {
-    fn new(d: usize) -> Self {
+    pub(crate) fn new(d: usize) -> Self {
         Self {
             state: vec![0.0; d],
             factor: DMatrix::zeros(d, d),
@@ -207,7 +207,7 @@ impl Return {
     }
 
     /// DPⁿ at `from`; `self.state` becomes Pⁿ(from).
-    fn jacobian<M: StroboscopicMap>(
+    pub(crate) fn jacobian<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
         from: &[f64],

@@ -23,3 +23,15 @@ mod references;
 mod short_contacts;
 mod standard_linear_solid;
 mod taylor;
+
+use nanotap::case::Case;
+use nanotap::case::file::Source;
+
+/// The case that a file with this text states.
+fn stated(text: &str) -> Case {
+    let source = Source {
+        name: "case.toml".into(),
+        text: text.into(),
+    };
+    Case::parse(Some(source), &[]).unwrap()
+}

@@ -1,6 +1,5 @@
 //! Which motions there are, and where they change: the analysis joined to the model.
 
-use nanotap::case::file::Source;
 use nanotap::case::{Case, Key, PlaneFamily};
 use nanotap::control::Control;
 use nanotap::model::Model;
@@ -19,6 +18,8 @@ use nanotap_dynamics::{
     AttractorKind, CensusOptions, DMatrix, StartOutcome, StroboscopicMap as _,
     TwoParameterFamily as _, census,
 };
+
+use crate::stated;
 
 fn at(omega: f64) -> Cantilever {
     Cantilever::paper().with(Parameter::Omega, omega)
@@ -146,13 +147,9 @@ fn the_census_at_high_frequency_is_complete() {
 /// nears from afar before it touches.
 #[test]
 fn every_start_goes_where_a_long_run_from_it_does() {
-    let bistable = include_str!("../../../../docs/cases/bistable-lever.toml");
-    let source = Source {
-        name: "bistable-lever.toml".into(),
-        text: bistable.into(),
-    };
+    let bistable = stated(include_str!("../../../../docs/cases/bistable-lever.toml"));
     let paper = Model::cantilever(&at(20.0).with(Parameter::Alpha1, 0.0)).unwrap();
-    let lever = Case::parse(Some(source), &[]).unwrap().model().unwrap();
+    let lever = bistable.model().unwrap();
     for (model, count, long) in [(paper, 128, 1500), (lever, 32, 3000)] {
         let starts = default_box(&model).unwrap().starts(1, count);
         let map = Strobe::new(&model);

@@ -3,7 +3,6 @@
 
 use nalgebra::{DMatrix, DVector};
 use nanotap::case::document::equilibria;
-use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
@@ -18,7 +17,7 @@ use nanotap_dynamics::{Control, StroboscopicMap};
 use proptest::prelude::*;
 
 use crate::derivatives::{advance, worst, worst_over};
-use crate::taylor;
+use crate::{stated, taylor};
 
 /// A lever on a moving surface, driven as in the paper.
 fn lever(modes: usize, omega: f64, surface: MovingSurface) -> Cantilever {
@@ -444,11 +443,7 @@ fn grazing_is_of_the_square_root_type() {
 /// ends where the tip reaches the surface, as far as its free swing reaches.
 #[test]
 fn branches_end_where_their_orbits_graze() {
-    let source = Source {
-        name: "moving-surface.toml".into(),
-        text: include_str!("../../../../docs/cases/moving-surface.toml").into(),
-    };
-    let case = Case::parse(Some(source), &[]).unwrap();
+    let case = stated(include_str!("../../../../docs/cases/moving-surface.toml"));
     let key = case.key("gap.tip").unwrap();
     let followed = |from: f64, to: f64| {
         let options = BranchOptions::over(key, from, to);

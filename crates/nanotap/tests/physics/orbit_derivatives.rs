@@ -1,7 +1,6 @@
 //! Derivatives of orbits and of everything observed of them, by the implicit function theorem,
 //! against central differences of fourth order.
 
-use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
@@ -12,6 +11,8 @@ use nanotap::model::strobe::Strobe;
 use nanotap::observe::{Derivative, Observable, Observables, Set, Value, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{ShootingOptions, close_orbit};
+
+use crate::stated;
 
 /// The numbers of an observable.
 fn numbers(value: Value) -> Vec<f64> {
@@ -220,11 +221,7 @@ fn by_physical_quantities_in_si() {
                 [sample]\nstiffness = \"20 N/m\"\ndamping = \"1e-7 N s/m\"\n\
                 [drive]\nfrequency = \"75 kHz\"\nfree_amplitude = \"20 nm\"\n\
                 [gap]\ntip = \"15 nm\"\n";
-    let source = Source {
-        name: "lever.toml".into(),
-        text: text.into(),
-    };
-    let case = Case::parse(Some(source), &[]).unwrap();
+    let case = stated(text);
     let keys = [
         "sample.stiffness",
         "sample.damping",

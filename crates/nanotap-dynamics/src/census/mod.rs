@@ -493,6 +493,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
     fn find_neighbourhoods(&mut self) -> bool {
         let new: Vec<(usize, Neighbourhood)> = self.orbits[self.motions..]
             .par_iter()
+            .with_max_len(1)
             .enumerate()
             .map_init(
                 || self.map.clone(),
@@ -583,6 +584,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         let balls = self.balls();
         let ends: Vec<Result<Vec<f64>, RunEnd>> = watched
             .par_iter()
+            .with_max_len(1)
             .map_init(
                 || self.map.clone(),
                 |map, &k| match &self.outcomes[k] {

@@ -146,6 +146,7 @@ impl Diagram {
         loop {
             waiting = waiting
                 .into_par_iter()
+                .with_max_len(1)
                 .filter_map(|orbit| self.lacks(family, orbit, &options.continuation))
                 .collect();
             let Some(next) = waiting.pop() else {

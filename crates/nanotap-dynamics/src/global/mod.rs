@@ -122,6 +122,7 @@ fn over_graph<M: StroboscopicMap>(
     let done = std::sync::atomic::AtomicUsize::new(0);
     let values: Vec<GlobalValue> = (0..count)
         .into_par_iter()
+        .with_max_len(1)
         .map(|k| {
             let value = match at(k) {
                 Ok(map) => from_census(census_of(&map, &starts(k, &map), &options.census, &quiet)),
@@ -187,6 +188,7 @@ fn shared<M: StroboscopicMap>(
             .collect();
         let trials: Vec<Option<Trial>> = tasks
             .par_iter()
+            .with_max_len(1)
             .map(|&(from, k)| {
                 if control.is_cancelled() {
                     return None;

@@ -364,6 +364,8 @@ pub(in crate::study) struct BranchesThrough<'a> {
     case: &'a Case,
     options: &'a BranchOptions,
     diagram: Diagram,
+    /// Those asked for so far.
+    given: Vec<(f64, PeriodicOrbit)>,
 }
 
 impl<'a> BranchesThrough<'a> {
@@ -380,18 +382,33 @@ impl<'a> BranchesThrough<'a> {
             case,
             options,
             diagram: Diagram::default(),
+            given: Vec::new(),
         })
     }
 
     /// Adds those through orbits, each with its value of the parameter.
     pub(in crate::study) fn follow(
         &mut self,
-        orbits: &[(f64, PeriodicOrbit)],
+        orbits: impl IntoIterator<Item = (f64, PeriodicOrbit)>,
         control: &Control<'_>,
     ) {
+        let known = self.given.len();
+        for (value, orbit) in orbits {
+            let same =
+                |(at, other): &(f64, PeriodicOrbit)| *at == value && other.is_same_as(&orbit);
+            if !self.given.iter().any(same) {
+                self.given.push((value, orbit));
+            }
+        }
         let family = self.case.family(self.options.key);
         let how = self.options.diagram();
-        self.diagram.extend(&family, orbits, &how, control);
+        let new = &self.given[known..];
+        self.diagram.extend(&family, new, &how, control);
+    }
+
+    /// Whether no orbit was given.
+    pub(in crate::study) const fn is_empty(&self) -> bool {
+        self.given.is_empty()
     }
 
     /// What was found.
@@ -416,7 +433,7 @@ pub fn branches_through(
     control: &Control<'_>,
 ) -> Result<BranchReport, BranchError> {
     let mut branches = BranchesThrough::new(case, options)?;
-    branches.follow(seeds, control);
+    branches.follow(seeds.iter().cloned(), control);
     Ok(branches.report(control))
 }
 
@@ -638,6 +655,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
             reason: format!("the {what} is left out, its motion cannot be measured: {error}"),
         };
         let points: Vec<_> = (branch.points.par_iter())
+            .with_max_len(1)
             .map(|p| {
                 point(case, options, index, p)
                     .map_err(|error| unmeasured(p.parameter, "point", &error))
@@ -650,6 +668,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
             }
         }
         let bifurcations: Vec<_> = (branch.bifurcations.par_iter())
+            .with_max_len(1)
             .map(|b| {
                 bifurcation(case, options, index, b)
                     .map_err(|error| unmeasured(b.parameter, kind_name(b.kind), &error))

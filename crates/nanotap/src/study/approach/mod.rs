@@ -22,7 +22,10 @@
 //! its branch was followed); of branches that no motion on the way lies on nothing is known.
 
 pub mod frequency_modulation;
+mod meanwhile;
 mod walk;
+
+use std::sync::mpsc::Sender;
 
 use nanotap_dynamics::{
     Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, grid_neighbours,
@@ -46,6 +49,7 @@ use crate::study::value::Amount;
 use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
 };
+use meanwhile::{Seed, following};
 use walk::Walk;
 
 /// How to approach. Distances are in the model's unit of length.
@@ -287,40 +291,44 @@ pub fn approach(
         options,
         classify: budgets(options),
     };
-    let walk = Walk {
-        case,
-        classify: &ClassifyOptions {
-            first_look: walk::FIRST_LOOK,
-            ..curve.classify.clone()
-        },
-        distances: &distances,
-        observed: &|way, gap, model, met| curve.observed(way, gap, model, met),
-    };
-    let table = walk.there_and_back(control)?;
     let quiet = Control {
         progress: None,
         ..*control
     };
-    // The branches of what both ways met are followed while it is asked what else attracts.
+    let curve = &curve;
+    // What both ways meet, each as soon as it is known, then what coexists with it.
+    let motions = |met: Option<Sender<Seed>>| {
+        let walk = Walk {
+            case,
+            classify: &ClassifyOptions {
+                first_look: walk::FIRST_LOOK,
+                ..curve.classify.clone()
+            },
+            distances: &distances,
+            observed: &|way, gap, model, met| curve.observed(way, gap, model, met),
+            told: &|point| {
+                if let Some((met, seed)) = met.as_ref().zip(point.seed()) {
+                    // Who no longer listens has no more branches to follow.
+                    let _ = met.send(seed);
+                }
+            },
+        };
+        let table = walk.there_and_back(control)?;
+        drop(met);
+        let coexisting = curve.coexisting(&distances, &table, &quiet)?;
+        Ok::<_, CaseError>((table, coexisting))
+    };
     let how = branching(key, (from, to), options);
     let branches = options.branches.then(|| BranchesThrough::new(case, &how));
     let mut branches = branches.transpose()?;
-    let met = seeds(&table);
-    let (coexisting, ()) = rayon::join(
-        || curve.coexisting(&distances, &table, &quiet),
-        || {
-            if let Some(branches) = &mut branches {
-                branches.follow(&met, &quiet);
-            }
-        },
-    );
-    let coexisting = coexisting?;
-    let others = seeds(&coexisting);
-    let any = !(met.is_empty() && others.is_empty());
-    let branches = branches.filter(|_| any && !control.is_cancelled());
-    let branches = branches.map(|mut branches| {
-        branches.follow(&others, &quiet);
-        branches.report(&quiet)
+    let (table, coexisting) = match &mut branches {
+        Some(branches) => following(branches, |met| motions(Some(met)), &quiet),
+        None => motions(None),
+    }?;
+    let branches = branches.and_then(|mut branches| {
+        branches.follow(coexisting.iter().filter_map(ApproachPoint::seed), &quiet);
+        let any = !branches.is_empty() && !control.is_cancelled();
+        any.then(|| branches.report(&quiet))
     });
     Ok(ApproachReport {
         parameter: key.path(),
@@ -510,14 +518,14 @@ struct Met {
     state: Vec<f64>,
 }
 
-/// The periodic motions among those met, each with its distance.
-fn seeds(met: &[ApproachPoint]) -> Vec<(f64, PeriodicOrbit)> {
-    met.iter()
-        .filter_map(|point| Some((point.gap, point.orbit.clone()?)))
-        .collect()
+impl ApproachPoint {
+    /// The orbit whose branch is followed, where the motion is one.
+    fn seed(&self) -> Option<Seed> {
+        Some((self.gap, self.orbit.clone()?))
+    }
 }
 
-/// How their branches are followed.
+/// How branches are followed.
 fn branching(key: Key, (from, to): (f64, f64), options: &ApproachOptions) -> BranchOptions {
     BranchOptions {
         doublings: options.doublings,

@@ -6,8 +6,8 @@
 //! the motion. Where it turns out to be another than it seemed, what was made of the distances
 //! after it is thrown away; so the table is the same on any number of threads.
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use nanotap_dynamics::{ClassifyOptions, Control, Outlook, PeriodicOrbit, outlook};
 
@@ -33,6 +33,8 @@ pub(super) struct Walk<'a> {
     pub(super) distances: &'a [f64],
     /// What a motion is at a distance, as a line of the table.
     pub(super) observed: &'a (dyn Fn(Way, f64, &Model, Met) -> ApproachPoint + Sync),
+    /// Who is told of each line, in the order of the table, as soon as it stands.
+    pub(super) told: &'a (dyn Fn(&ApproachPoint) + Sync),
 }
 
 /// What a distance hands on.
@@ -142,6 +144,16 @@ impl<'a> Walk<'a> {
         let known: Vec<OnceLock<_>> = (first..self.steps()).map(|_| OnceLock::new()).collect();
         let end = AtomicUsize::new(self.steps());
         let unnamed = AtomicUsize::new(0);
+        let told = Mutex::new(0);
+        let tell = || {
+            let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+            while first + *told < end.load(Ordering::Relaxed)
+                && let Some(Ok(Known { point, .. })) = known[*told].get()
+            {
+                (self.told)(point);
+                *told += 1;
+            }
+        };
         let needless = |step: usize| control.is_cancelled() || step >= end.load(Ordering::Relaxed);
         rayon::scope_fifo(|scope| {
             while !needless(passed.len()) {
@@ -149,7 +161,7 @@ impl<'a> Walk<'a> {
                 let (ahead, seems) = self.look_ahead(passed)?;
                 passed.push(seems.clone());
                 unnamed.fetch_add(1, Ordering::Relaxed);
-                let (known, end, unnamed) = (&known, &end, &unnamed);
+                let (known, end, unnamed, tell) = (&known, &end, &unnamed, &tell);
                 scope.spawn_fifo(move |_| {
                     unnamed.fetch_sub(1, Ordering::Relaxed);
                     if needless(step) {
@@ -163,6 +175,7 @@ impl<'a> Walk<'a> {
                         end.fetch_min(step + 1, Ordering::Relaxed);
                     }
                     known[step - first].get_or_init(|| named);
+                    tell();
                     if let Some(report) = control.progress {
                         report(step + 1, self.steps());
                     }

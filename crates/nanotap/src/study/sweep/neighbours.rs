@@ -88,6 +88,7 @@ impl Sweep {
         let states = self.orbit_states(store, strobe, count)?;
         let known: Vec<Vec<PeriodicOrbit>> = states
             .par_iter()
+            .with_max_len(1)
             .enumerate()
             .map(|(k, states)| map_at(k).map_or_else(|_| Vec::new(), |map| closed(map, states)))
             .collect();

@@ -87,8 +87,8 @@ mod tests {
         (omega, orbit.unwrap())
     }
 
-    /// Branches as text, from several walks at once on so many threads: more than there are, so
-    /// that threads which wait for others come to follow for walks that wait for them.
+    /// Branches as text, from several walks at once on so many threads. With more walks than
+    /// threads, one that waits for a walk to go on may keep another walk from it.
     fn branches_of(walks: usize, threads: usize) -> Vec<String> {
         let case = Case::from(Cantilever::paper());
         let options = BranchOptions::over(Key::Omega, 3.0, 3.02);

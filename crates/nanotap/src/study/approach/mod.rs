@@ -308,7 +308,7 @@ pub fn approach(
             observed: &|way, gap, model, met| curve.observed(way, gap, model, met),
             told: &|point| {
                 if let Some((met, seed)) = met.as_ref().zip(point.seed()) {
-                    // Who no longer listens has no more branches to follow.
+                    // It cannot fail: whoever follows listens until the walk is over.
                     let _ = met.send(seed);
                 }
             },

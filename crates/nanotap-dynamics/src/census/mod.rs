@@ -5,7 +5,7 @@
 //! 2. Around each stable orbit a contracting neighbourhood is found
 //!    ([`crate::neighbourhood`]). A neighbourhood that a start with another
 //!    destination enters is discarded.
-//! 3. The other starts follow in batches. Each is run until it enters a neighbourhood,
+//! 3. The other starts follow in batches (`batch.rs`). Each is run until it enters a neighbourhood,
 //!    or is classified like a pilot; what a batch finds is known to the next. A start on
 //!    chaos that is known is recognised, without exponents of its own, by parting from a
 //!    neighbour and by the means of its strobe states and their squares.
@@ -30,6 +30,7 @@
 //! [`Census::transient_chaos`].
 
 mod assemble;
+mod batch;
 mod confidence;
 mod escapes;
 mod start_box;
@@ -40,10 +41,11 @@ use std::sync::atomic::AtomicUsize;
 
 use rayon::prelude::*;
 
+use crate::census::batch::Batch;
 use crate::census::escapes::Escapes;
 use crate::classify::{
     Chaos, Classified, ClassifyOptions, Known, MotionKind, RECOGNISABLE, RunEnd, Torus,
-    UndecidedReason, follow_start, follow_starts, watch,
+    UndecidedReason, first_entry, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -59,13 +61,8 @@ pub use unseen::Unseen;
 
 /// Pilots that are followed before anything is known at all.
 const FIRST_PILOTS: usize = 4;
-/// Starts of one batch after the pilots.
+/// Starts of the first batch after the pilots, of which all others are multiples.
 const BATCH: usize = 128;
-/// Starts that are worth following side by side.
-const LEAST_TOGETHER: usize = 8;
-/// Packs of them that a thread is given of a batch: with fewer, others wait for the one that has the
-/// most left to do.
-const PACKS: usize = 4;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
 const LEAST_PATIENCE: usize = 64;
@@ -278,7 +275,7 @@ pub fn census_of<M: StroboscopicMap>(
     pilots.extend(work.follow(options.pilots.saturating_sub(FIRST_PILOTS)));
     work.know_neighbourhoods(&pilots);
     while work.outcomes.len() < last && !work.is_enough() {
-        let classified = work.follow(BATCH);
+        let classified = work.follow(work.next_batch());
         work.know_neighbourhoods(&classified);
     }
     let mut after = Escapes::after(work.relaxation());
@@ -318,7 +315,7 @@ struct Work<'a, M> {
     patience: usize,
     /// Periods run so far.
     periods: usize,
-    /// Drawn starts decided since the last new motion.
+    /// Starts decided since the last new motion, of those that count in the fractions.
     row: usize,
 }
 
@@ -328,33 +325,53 @@ impl<M: StroboscopicMap> Work<'_, M> {
         if self.control.is_cancelled() || self.starts.len().is_some() {
             return self.control.is_cancelled();
         }
-        let found = self.orbits.len() + self.chaos.len();
-        Unseen::new(found, self.row).share <= self.options.unseen
+        Unseen::new(self.found(), self.row).share <= self.options.unseen
             || self.outcomes.len() > self.starts.given_count()
                 && self.periods >= self.options.max_periods
+    }
+
+    /// Motions found so far.
+    fn found(&self) -> usize {
+        self.orbits.len() + self.chaos.len()
+    }
+
+    /// Starts of the next batch: as many as found nothing new in a row, since threads wait for each
+    /// other at the end of a batch. Of those that are drawn, no more than bound and budget ask for if
+    /// nothing new comes.
+    fn next_batch(&self) -> usize {
+        let mut size = self.row;
+        if self.starts.len().is_none() {
+            let bound = Unseen::row_for(self.found(), self.options.unseen).saturating_sub(self.row);
+            let periods = self.options.max_periods.saturating_sub(self.periods) as f64;
+            let budget = periods * self.outcomes.len() as f64 / self.periods.max(1) as f64;
+            size = size.min(bound).min(budget.ceil() as usize);
+        }
+        size.div_ceil(BATCH).max(1) * BATCH
     }
 
     /// Follows the next `size` starts; returns those that were classified.
     fn follow(&mut self, size: usize) -> Vec<usize> {
         let first = self.outcomes.len();
-        let range: Vec<usize> = (first..self.last.min(first + size)).collect();
-        for start in range.iter().filter_map(|k| self.starts.start(*k)) {
-            extend(&mut self.ends, &start);
+        let range = first..self.last.min(first + size);
+        let starts: Vec<Vec<f64>> = range.clone().map_while(|k| self.starts.start(k)).collect();
+        for start in &starts {
+            extend(&mut self.ends, start);
         }
-        let arrivals = self.run(&range, true);
+        let arrivals = self.run(&starts);
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         let mut classified = Vec::new();
-        for (k, arrival) in range.into_iter().zip(arrivals) {
-            let before = self.orbits.len() + self.chaos.len();
+        for (k, arrival) in range.zip(arrivals) {
+            let before = self.found();
             if matches!(arrival, Some(RunEnd::Classified(_))) {
                 classified.push(k);
             }
             let outcome = self.outcome(arrival, &known);
             self.periods += assemble::periods_of(&outcome);
-            let drawn = matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
-            if self.orbits.len() + self.chaos.len() > before {
+            let counts = self.starts.len().is_some()
+                || matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
+            if self.found() > before {
                 self.row = 0;
-            } else if drawn && !matches!(outcome, Outcome::Undecided(_)) {
+            } else if counts && !matches!(outcome, Outcome::Undecided(_)) {
                 self.row += 1;
             }
             self.outcomes.push(outcome);
@@ -395,43 +412,21 @@ impl<M: StroboscopicMap> Work<'_, M> {
         balls.map(|(_, ball)| ball.clone()).collect()
     }
 
-    fn run(&self, indices: &[usize], count: bool) -> Vec<Option<RunEnd>> {
+    fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<RunEnd>> {
         let balls = self.balls();
-        let known = Known {
-            balls: &balls,
-            chaos: &self.chaos,
-            patience: self.patience,
+        let batch = Batch {
+            map: self.map,
+            starts,
+            known: Known {
+                balls: &balls,
+                chaos: &self.chaos,
+                patience: self.patience,
+            },
+            options: &self.options.classify,
+            control: self.control,
+            progress: (&self.done, self.last),
         };
-        // Of few starts most places side by side would be empty.
-        let side_by_side = self.map.side_by_side() > 1 && indices.len() >= LEAST_TOGETHER;
-        let together = if side_by_side {
-            let share = indices.len().div_ceil(PACKS * rayon::current_num_threads());
-            share.clamp(LEAST_TOGETHER, self.map.side_by_side())
-        } else {
-            1
-        };
-        let options = &self.options.classify;
-        let follow = |map: &mut M, indices: &[usize]| -> Vec<Option<RunEnd>> {
-            let cancelled = || self.control.is_cancelled();
-            let start = |&k: &usize| self.starts.start(k).unwrap_or_default();
-            let arrivals = if side_by_side {
-                let starts: Vec<Vec<f64>> = indices.iter().map(start).collect();
-                follow_starts(map, &starts, known, options, cancelled)
-            } else {
-                let alone =
-                    |k| (!cancelled()).then(|| follow_start(map, &start(k), known, options));
-                indices.iter().map(alone).collect()
-            };
-            for _ in arrivals.iter().filter(|arrival| count && arrival.is_some()) {
-                self.control.report(&self.done, self.last);
-            }
-            arrivals
-        };
-        indices
-            .par_chunks(together)
-            .map_init(|| self.map.clone(), follow)
-            .flatten_iter()
-            .collect()
+        batch.followed()
     }
 
     fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize]) -> Outcome {
@@ -526,15 +521,26 @@ impl<M: StroboscopicMap> Work<'_, M> {
                 _ => false,
             })
             .collect();
+        let balls = self.balls();
+        let entries: Vec<Option<(usize, usize)>> = checked
+            .par_iter()
+            .with_max_len(1)
+            .map_init(
+                || self.map.clone(),
+                |map, &k| {
+                    if self.control.is_cancelled() {
+                        return None;
+                    }
+                    let periods = assemble::periods_of(&self.outcomes[k]);
+                    let start = self.starts.start(k)?;
+                    first_entry(map, &start, &balls, periods, &self.options.classify)
+                },
+            )
+            .collect();
         let mut discarded = Vec::new();
-        for (&k, arrival) in checked.iter().zip(self.run(&checked, false)) {
-            let (
-                Outcome::Orbit { index, periods },
-                Some(RunEnd::Entered {
-                    index: ball,
-                    periods: after,
-                }),
-            ) = (&mut self.outcomes[k], arrival)
+        for (k, entry) in checked.into_iter().zip(entries) {
+            let (Outcome::Orbit { index, periods }, Some((ball, after))) =
+                (&mut self.outcomes[k], entry)
             else {
                 continue;
             };

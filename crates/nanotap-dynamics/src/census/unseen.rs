@@ -32,12 +32,10 @@ pub struct Unseen {
 
 impl Unseen {
     pub(crate) fn new(motions: usize, starts: usize) -> Self {
-        let k = motions.max(1) as f64;
-        let error = ERROR / (k * (k + 1.0));
         let share = if starts == 0 {
             1.0
         } else {
-            -nanotap_arithmetic::exp_m1(nanotap_arithmetic::ln(error) / starts as f64)
+            -nanotap_arithmetic::exp_m1(log_error(motions) / starts as f64)
         };
         Self {
             motions,
@@ -45,6 +43,17 @@ impl Unseen {
             share,
         }
     }
+
+    /// Starts in a row after which the share is bounded by this one.
+    pub(crate) fn row_for(motions: usize, share: f64) -> usize {
+        (log_error(motions) / nanotap_arithmetic::ln_1p(-share)).ceil() as usize
+    }
+}
+
+/// Logarithm of the error for the row after so many motions.
+fn log_error(motions: usize) -> f64 {
+    let k = motions.max(1) as f64;
+    nanotap_arithmetic::ln(ERROR / (k * (k + 1.0)))
 }
 
 #[cfg(test)]
@@ -59,6 +68,20 @@ mod tests {
         let one = Unseen::new(1, 10_000).share;
         assert!((one * 10_000.0 - 3.689).abs() < 2e-3);
         assert!(Unseen::new(5, 1000).share > Unseen::new(4, 1000).share);
+    }
+
+    #[test]
+    fn the_row_for_a_share_is_the_shortest_that_bounds_it() {
+        for motions in [0, 1, 2, 7, 100] {
+            for share in [0.5, 0.01, 0.002, 1e-6] {
+                let row = Unseen::row_for(motions, share);
+                assert!(Unseen::new(motions, row).share <= share);
+                assert!(Unseen::new(motions, row - 1).share > share);
+            }
+        }
+        // Nothing bounds a share to none, and any row to all.
+        assert_eq!(Unseen::row_for(1, 0.0), usize::MAX);
+        assert_eq!(Unseen::row_for(1, 1.0), 0);
     }
 
     /// A thousand censuses of ten motions with shares 1/2, 1/4 … 1/512, 1/512, each

@@ -41,8 +41,8 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
 pub use outlook::{Outlook, outlook};
-pub(crate) use pack::follow_starts;
-pub(crate) use run::{Known, RECOGNISABLE, RunEnd, follow_start, watch};
+pub(crate) use pack::{Followed, follow_starts};
+pub(crate) use run::{Known, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
 
 /// Budgets of [`classify`].

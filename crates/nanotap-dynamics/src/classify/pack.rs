@@ -6,7 +6,7 @@
 //! What comes of a start depends on no other.
 
 use crate::classify::run::{AfterLook, LONGEST_PARTING, Resembled, Run, Stop, refused};
-use crate::classify::{ClassifyOptions, Known, MotionKind, RunEnd};
+use crate::classify::{ClassifyOptions, Known, RunEnd};
 use crate::failure::{MapFailure, finite};
 use crate::map::StroboscopicMap;
 
@@ -36,42 +36,87 @@ struct Passed {
     failure: Option<MapFailure>,
 }
 
-/// Follows all `starts`; `None` for those that were under way when the work was `cancelled`.
-pub(crate) fn follow_starts<M: StroboscopicMap>(
+/// What a start came to that was followed.
+pub(crate) enum Followed<'a> {
+    Ended(RunEnd),
+    /// Its exponents are to be measured; nothing else is left to follow side by side but what is
+    /// under way.
+    Unmeasured(Unmeasured<'a>),
+}
+
+/// A run that does not close.
+pub(crate) struct Unmeasured<'a>(Run<'a>);
+
+impl Unmeasured<'_> {
+    pub(crate) fn measured<M: StroboscopicMap>(mut self, map: &mut M) -> RunEnd {
+        match self.0.measure(map) {
+            Ok(kind) => self.0.classified(kind),
+            Err(stop) => self.0.stopped(stop),
+        }
+    }
+}
+
+/// Follows starts, each with its number, as many at a time as there are `places`: one that was
+/// `followed` makes place for the `next`, until there is none or the work is `cancelled`.
+pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
     map: &mut M,
-    starts: &[Vec<f64>],
-    known: Known<'_>,
-    options: &ClassifyOptions,
+    places: impl Fn() -> usize,
+    mut next: impl FnMut() -> Option<(usize, Vec<f64>)>,
+    known: Known<'a>,
+    options: &'a ClassifyOptions,
     cancelled: impl Fn() -> bool,
-) -> Vec<Option<RunEnd>> {
+    mut followed: impl FnMut(usize, Followed<'a>),
+) {
     let d = map.dimension();
-    let mut ends: Vec<Option<RunEnd>> = starts.iter().map(|start| refused(start, d)).collect();
-    let mut members: Vec<Member<'_>> = (0..starts.len())
-        .filter(|&number| ends[number].is_none())
-        .map(|number| Member {
-            number,
-            run: Run::new(&starts[number], known, options),
-            beside: None,
-        })
-        .collect();
-    while !members.is_empty() {
+    let mut members: Vec<Member<'_>> = Vec::new();
+    let mut are_more = true;
+    loop {
+        while are_more && members.len() < places() {
+            let Some((number, start)) = next() else {
+                are_more = false;
+                break;
+            };
+            match refused(&start, d) {
+                Some(end) => followed(number, Followed::Ended(end)),
+                None => members.push(Member {
+                    number,
+                    run: Run::new(&start, known, options),
+                    beside: None,
+                }),
+            }
+        }
+        if members.is_empty() {
+            return;
+        }
         let mut passed = pass(map, &members).into_iter();
         let mut left = Vec::with_capacity(members.len());
         for mut member in members {
             if cancelled() {
-                return ends;
+                return;
             }
             let own = passed.next().unwrap_or_default();
             let neighbour = member.beside.as_ref().and_then(|_| passed.next());
-            match member.go_on(map, own, &neighbour.unwrap_or_default()) {
-                Ok(None) => left.push(member),
-                Ok(Some(kind)) => ends[member.number] = Some(member.run.classified(kind)),
-                Err(stop) => ends[member.number] = Some(member.run.stopped(stop)),
-            }
+            let after = member.go_on(map, own, &neighbour.unwrap_or_default());
+            let Member { number, run, .. } = match after {
+                Ok(AfterLook::GoOn | AfterLook::Perhaps(_)) => {
+                    left.push(member);
+                    continue;
+                }
+                _ => member,
+            };
+            let end = match after {
+                Err(stop) => run.stopped(stop),
+                Ok(AfterLook::Known(kind)) => run.classified(kind),
+                Ok(_) if are_more => Unmeasured(run).measured(map),
+                Ok(_) => {
+                    followed(number, Followed::Unmeasured(Unmeasured(run)));
+                    continue;
+                }
+            };
+            followed(number, Followed::Ended(end));
         }
         members = left;
     }
-    ends
 }
 
 /// Passes some periods of every run, and of its neighbour after it where it has one.
@@ -97,14 +142,13 @@ fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> 
 }
 
 impl Member<'_> {
-    /// Takes in what was passed, and looks where the run goes when it is time to: what its motion is,
-    /// once that is known.
+    /// Takes in what was passed, and looks where the run goes when it is time to.
     fn go_on<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
         own: Passed,
         neighbour: &Passed,
-    ) -> Result<Option<MotionKind>, Stop> {
+    ) -> Result<AfterLook, Stop> {
         let mut after = match self.beside.take() {
             None => {
                 for state in own.states.chunks_exact(map.dimension()) {
@@ -115,23 +159,23 @@ impl Member<'_> {
             }
             Some(beside) => match self.go_on_beside(map, beside, own, neighbour)? {
                 Some(after) => after,
-                None => return Ok(None),
+                None => return Ok(AfterLook::GoOn),
             },
         };
         loop {
             after = match after {
-                AfterLook::Known(kind) => return Ok(Some(kind)),
-                AfterLook::Measure => return self.run.measure(map).map(Some),
                 AfterLook::Perhaps(chaos) => {
                     self.beside = Some(Beside {
                         neighbour: chaos.neighbour(&self.run.state),
                         chaos,
                         periods: 0,
                     });
-                    return Ok(None);
+                    return Ok(AfterLook::GoOn);
                 }
-                AfterLook::GoOn if self.run.periods < self.run.next_look() => return Ok(None),
-                AfterLook::GoOn => self.run.at_look(map)?,
+                AfterLook::GoOn if self.run.periods >= self.run.next_look() => {
+                    self.run.at_look(map)?
+                }
+                after => return Ok(after),
             }
         }
     }
@@ -175,7 +219,7 @@ mod tests {
 
     use super::*;
     use crate::classify::run::tests::Logistic;
-    use crate::classify::{Classified, classify, follow_start};
+    use crate::classify::{Classified, MotionKind, classify, follow_start};
     use crate::lyapunov::LyapunovSpectrum;
     use crate::neighbourhood::Neighbourhood;
 
@@ -198,16 +242,36 @@ mod tests {
         format!("{end:?}")
     }
 
-    /// One after the other, `map` gives the same bits.
+    /// One after the other, `map` gives the same bits, however many are followed at a time.
     fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: Known<'_>) -> Vec<RunEnd> {
         let options = ClassifyOptions::default();
-        let together = follow_starts(&mut map.clone(), &starts(), known, &options, || false);
-        let together: Vec<RunEnd> = together.into_iter().map(Option::unwrap).collect();
-        for (start, end) in starts().iter().zip(&together) {
-            let alone = follow_start(&mut map.clone(), start, known, &options);
-            assert_eq!(written(end), written(&alone), "{start:?}");
+        let alone: Vec<RunEnd> = starts()
+            .iter()
+            .map(|start| follow_start(&mut map.clone(), start, known, &options))
+            .collect();
+        for most in [1, 3, STARTS.len(), 100] {
+            let mut next = starts().into_iter().enumerate();
+            let mut ends = vec![None; STARTS.len()];
+            follow_starts(
+                &mut map.clone(),
+                || most,
+                || next.next(),
+                known,
+                &options,
+                || false,
+                |number, followed| {
+                    let end = match followed {
+                        Followed::Ended(end) => end,
+                        Followed::Unmeasured(run) => run.measured(&mut map.clone()),
+                    };
+                    ends[number] = Some(written(&end));
+                },
+            );
+            for (end, alone) in ends.into_iter().zip(&alone) {
+                assert_eq!(end, Some(written(alone)));
+            }
         }
-        together
+        alone
     }
 
     fn chaos(r: f64) -> LyapunovSpectrum {
@@ -343,17 +407,21 @@ mod tests {
             asked.set(asked.get() + 1);
             asked.get() > 20
         };
-        let ends = follow_starts(
+        let mut next = starts().into_iter().enumerate();
+        let mut ended = Vec::new();
+        follow_starts(
             &mut Logistic(3.9),
-            &starts(),
+            || STARTS.len(),
+            || next.next(),
             Known::default(),
             &options,
             cancelled,
+            |number, _| ended.push(number),
         );
         assert!(
-            ends[2].is_some() && ends[6].is_some(),
+            ended.contains(&2) && ended.contains(&6),
             "no states, and what runs off"
         );
-        assert!(ends[0].is_none());
+        assert!(!ended.contains(&0));
     }
 }

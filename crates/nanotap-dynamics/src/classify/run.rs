@@ -93,6 +93,28 @@ pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
     })))
 }
 
+/// The first of some neighbourhoods that a start enters within so many periods, and after how many.
+pub(crate) fn first_entry<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    balls: &[Neighbourhood],
+    periods: usize,
+    options: &ClassifyOptions,
+) -> Option<(usize, usize)> {
+    let known = Known {
+        balls,
+        ..Known::default()
+    };
+    let mut run = Run::new(start, known, options);
+    while run.periods < periods {
+        match run.step(map) {
+            Err(Stop::Entered(index)) => return Some((index, run.periods)),
+            other => other.ok()?,
+        }
+    }
+    None
+}
+
 /// Follows a motion for so many periods more: its state then, or where it went instead.
 pub(crate) fn watch<M: StroboscopicMap>(
     map: &mut M,

@@ -438,25 +438,41 @@ fn small_motions_are_found_by_small_starts() {
 fn the_census_stops_when_nothing_new_has_come_for_long_enough() {
     let sides = StartBox::new(vec![-1.0], vec![1.0]).unwrap();
     let set = StartSet::drawn(sides, 5).with_given([vec![0.3]]);
-    let of = |unseen: f64, max_starts: usize| {
-        let options = CensusOptions {
-            unseen,
-            max_starts,
-            ..CensusOptions::default()
-        };
-        census_of(&System(Cubic(1.5)), &set, &options, &Control::default())
+    let of = |options: &CensusOptions| {
+        census_of(&System(Cubic(1.5)), &set, options, &Control::default())
     };
-    // Two motions: ln(0.05/6) = −4.787, so 479 starts for a bound of a per cent.
-    let long = of(0.01, 100_000);
-    let unseen = long.unseen.unwrap();
+    // Two motions: ln(0.05/6) = −4.787, over ln(1 − p).
+    for (share, row) in [(0.01, 477), (0.002, 2392)] {
+        let found = of(&CensusOptions {
+            unseen: share,
+            ..CensusOptions::default()
+        });
+        let unseen = found.unseen.unwrap();
+        assert!((row..row + 128).contains(&unseen.starts), "{unseen:?}");
+        assert_eq!(found.counted + 1, found.outcomes_by_start.len());
+    }
+    let few = of(&CensusOptions {
+        max_starts: 100,
+        ..CensusOptions::default()
+    });
+    assert_eq!(few.counted, 100);
+    assert!(few.unseen.unwrap().share > 0.04);
+    // Without the budget a batch ends at 1952 starts.
+    let budget = 3000;
+    let short = of(&CensusOptions {
+        max_periods: budget,
+        ..CensusOptions::default()
+    });
+    let periods = short.outcomes_by_start.iter().map(|outcome| match outcome {
+        StartOutcome::Attractor { periods, .. } => *periods,
+        other => panic!("{other:?}"),
+    });
+    let enough = budget * short.counted / periods.sum::<usize>();
     assert!(
-        unseen.starts >= 478 && unseen.starts < 478 + 32 + 128,
-        "{unseen:?}"
+        short.counted.abs_diff(enough) < 128,
+        "{} instead of {enough}",
+        short.counted
     );
-    assert!(long.counted + 1 == long.outcomes_by_start.len());
-    let short = of(0.01, 100);
-    assert_eq!(short.counted, 100);
-    assert!(short.unseen.unwrap().share > 0.04);
 }
 
 /// A motion that a neighbour has is found from its state alone, and counts as found

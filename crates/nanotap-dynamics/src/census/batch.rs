@@ -1,0 +1,126 @@
+//! A batch of starts, which threads take one by one.
+//!
+//! Each thread follows some of them side by side, fewer towards the end, so that none is left with many.
+//! A run that does not close is measured by whoever has nothing else to do. What comes of a start does
+//! not depend on who follows it, nor beside which others.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Sender, channel};
+
+use rayon::Scope;
+
+use crate::classify::{ClassifyOptions, Followed, Known, RunEnd, follow_start, follow_starts};
+use crate::control::Control;
+use crate::map::StroboscopicMap;
+
+/// Starts that are worth following side by side.
+const LEAST_TOGETHER: usize = 8;
+/// Parts of a thread's share of what is left of which it follows one at a time: with fewer, others
+/// have nothing left to do while it follows its last.
+const SHARES: usize = 2;
+
+/// Starts to be followed, and with what in mind.
+pub(super) struct Batch<'a, M> {
+    pub(super) map: &'a M,
+    pub(super) starts: &'a [Vec<f64>],
+    pub(super) known: Known<'a>,
+    pub(super) options: &'a ClassifyOptions,
+    pub(super) control: &'a Control<'a>,
+    /// Starts followed by the whole census, and how many these are at most.
+    pub(super) progress: (&'a AtomicUsize, usize),
+}
+
+impl<M: StroboscopicMap> Batch<'_, M> {
+    /// Where each start goes; `None` for those that were under way when the work was stopped.
+    pub(super) fn followed(&self) -> Vec<Option<RunEnd>> {
+        let (sender, ended) = channel();
+        let taken = AtomicUsize::new(0);
+        let threads = rayon::current_num_threads();
+        rayon::scope(|scope| {
+            for _ in 0..threads {
+                let turn = Turn {
+                    batch: self,
+                    taken: &taken,
+                    threads,
+                    sender: sender.clone(),
+                };
+                scope.spawn(move |scope| turn.follow(scope));
+            }
+        });
+        let mut ends: Vec<Option<RunEnd>> = self.starts.iter().map(|_| None).collect();
+        for (place, end) in ended.try_iter() {
+            ends[place] = Some(end);
+        }
+        ends
+    }
+}
+
+/// What one thread does of a batch.
+#[derive(Clone)]
+struct Turn<'s, 'a, M> {
+    batch: &'s Batch<'a, M>,
+    /// Starts that some thread has taken.
+    taken: &'s AtomicUsize,
+    threads: usize,
+    sender: Sender<(usize, RunEnd)>,
+}
+
+impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
+    /// Follows starts until all are taken.
+    fn follow(self, scope: &Scope<'s>) {
+        let Batch {
+            map,
+            starts,
+            known,
+            options,
+            control,
+            ..
+        } = *self.batch;
+        let mut map = map.clone();
+        let cancelled = || control.is_cancelled();
+        // Of few starts most places side by side would be empty.
+        if map.side_by_side() > 1 && starts.len() >= LEAST_TOGETHER {
+            let most = map.side_by_side().max(LEAST_TOGETHER);
+            let places = || (self.left() / (SHARES * self.threads)).clamp(LEAST_TOGETHER, most);
+            let followed = |place, followed| match followed {
+                Followed::Ended(end) => self.tell(place, end),
+                Followed::Unmeasured(run) => {
+                    let other = self.clone();
+                    scope.spawn(move |_| {
+                        other.tell(place, run.measured(&mut other.batch.map.clone()));
+                    });
+                }
+            };
+            follow_starts(
+                &mut map,
+                places,
+                || self.next(),
+                known,
+                options,
+                cancelled,
+                followed,
+            );
+        } else {
+            while let (false, Some((place, start))) = (cancelled(), self.next()) {
+                self.tell(place, follow_start(&mut map, &start, known, options));
+            }
+        }
+    }
+
+    fn next(&self) -> Option<(usize, Vec<f64>)> {
+        let place = self.taken.fetch_add(1, Ordering::Relaxed);
+        Some((place, self.batch.starts.get(place)?.clone()))
+    }
+
+    fn left(&self) -> usize {
+        let taken = self.taken.load(Ordering::Relaxed);
+        self.batch.starts.len().saturating_sub(taken)
+    }
+
+    fn tell(&self, place: usize, end: RunEnd) {
+        let (done, all) = self.batch.progress;
+        self.batch.control.report(done, all);
+        // What receives it outlives whoever sends.
+        let _ = self.sender.send((place, end));
+    }
+}

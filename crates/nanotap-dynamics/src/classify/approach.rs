@@ -15,11 +15,16 @@ const LONGEST_STRETCH: f64 = 512.0;
 const ARRIVED: f64 = 0.01;
 /// Part of the orbit's size at which the rest of the way is looked at.
 const BESIDE: f64 = 0.1;
+/// How many times longer than four such stretches a decay time is that is watched to its end.
+const SLOWEST: f64 = 10.0;
 /// Decay times that this takes, and more where the run comes from so many sizes away.
 const LONGEST_WATCH: f64 = 5.0;
 const FARTHEST: f64 = 1e9;
 /// Places of the rest of the way at which the map is tried.
 const PLACES: usize = 16;
+/// Returns after which the slowest turns beside a flip or a strong resonance (of three or four
+/// returns) have come round: on one side of such an orbit a single return may lead away.
+const DOZEN: usize = 12;
 /// Phases of the slowest turns at which it is tried, at every halving of the distance.
 const PHASES: usize = 8;
 
@@ -28,12 +33,13 @@ const PHASES: usize = 8;
 /// its size away, for one decay time with the peaks of four stretches falling one after the other, at
 /// half the linear rate at least, and with a free way ahead. Peaks, because beside a flip or a
 /// Neimark–Sacker point the distance falls only on average over the turns. The way ahead is the
-/// linear decay from there and all phases of its slowest turns, where the map must contract. Where it
-/// is not free, as where a beat will bring the tip to a sample that it does not touch yet, or the
-/// distance falls by less, the run is watched for decay times more.
+/// linear decay from there and all phases of its slowest turns, where the map must contract, over one
+/// return or a dozen. Where it is not free, as where a beat will bring the tip to a sample that it does
+/// not touch yet, or the distance falls by less, the run is watched for decay times more. One that has
+/// not arrived by then is not seen to approach.
 ///
 /// Four stretches are one decay time long, or 2048 returns; a torus around the orbit that beats
-/// more slowly than that, and happens to shrink meanwhile, would be mistaken.
+/// more slowly than that, and happens to shrink meanwhile with a free way ahead, would be mistaken.
 pub(crate) fn approaches<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
@@ -50,7 +56,7 @@ pub(crate) fn approaches<M: StroboscopicMap>(
             Progress::Falls | Progress::Nearer => {}
         }
     }
-    Ok(approach.has_fallen())
+    Ok(false)
 }
 
 /// What a decay time does to the distance.
@@ -83,7 +89,7 @@ struct Approach<'a> {
     /// Distance beside the orbit, where what is far from it no longer counts.
     beside: f64,
     now: f64,
-    /// Decay times that this takes.
+    /// Times four stretches that this takes.
     longest_watch: usize,
 }
 
@@ -115,10 +121,12 @@ impl<'a> Approach<'a> {
         let size = adapted.radius(orbit.scale());
         // A motion at rest has no size.
         let far = if size > floor { first / size } else { 1.0 }.clamp(1.0, FARTHEST);
+        let rate = nanotap_arithmetic::ln(orbit.spectral_radius());
+        let shortened = (0.25 / -rate / LONGEST_STRETCH).clamp(1.0, SLOWEST);
         Ok(Some(Self {
             center,
             period: n,
-            rate: nanotap_arithmetic::ln(orbit.spectral_radius()),
+            rate,
             floor,
             monodromy,
             adapted,
@@ -127,7 +135,8 @@ impl<'a> Approach<'a> {
             near: floor.max(ARRIVED * first / far),
             beside: if size > floor { BESIDE * size } else { first },
             now: first,
-            longest_watch: (LONGEST_WATCH + nanotap_arithmetic::ln(far)).ceil() as usize,
+            longest_watch: (shortened * (LONGEST_WATCH + nanotap_arithmetic::ln(far))).ceil()
+                as usize,
         }))
     }
 
@@ -173,12 +182,6 @@ impl<'a> Approach<'a> {
         })
     }
 
-    /// Whether it has come nearer at half the linear rate at least, all in all.
-    fn has_fallen(&self) -> bool {
-        let returns = (4 * self.longest_watch * self.stretch()) as f64;
-        nanotap_arithmetic::ln(self.now / self.first) <= 0.5 * returns * self.rate
-    }
-
     /// Whether the map contracts all along the linear decay from where the run is to where it has
     /// arrived, and at all phases of the slowest turns that it makes on the way.
     fn has_free_way<M: StroboscopicMap>(&self, map: &mut M) -> bool {
@@ -206,15 +209,23 @@ impl<'a> Approach<'a> {
             })
     }
 
-    /// Whether a return from so far `away` comes nearer; not where none can be made.
+    /// Whether a return from so far `away` comes nearer, or else a dozen returns together; not where
+    /// they cannot be made.
     fn contracts<M: StroboscopicMap>(&self, map: &mut M, away: &DVector<f64>) -> bool {
         let mut place: Vec<f64> = self.center.iter().zip(away).map(|(c, a)| c + a).collect();
         let before = self.adapted.distance(&place, self.center);
-        if (0..self.period).any(|_| advance(map, &mut place).is_err()) {
-            return false;
+        let mut wanted = before;
+        for returns in 1..=DOZEN {
+            if (0..self.period).any(|_| advance(map, &mut place).is_err()) {
+                return false;
+            }
+            wanted *= self.adapted.rate_of_return();
+            let after = self.adapted.distance(&place, self.center);
+            if (returns == 1 || returns == DOZEN) && after <= wanted + self.floor {
+                return true;
+            }
         }
-        let after = self.adapted.distance(&place, self.center);
-        after <= self.adapted.rate_of_return() * before + self.floor
+        false
     }
 
     /// Directions all around, of length 1 in the adapted norm, in the plane in which what is left
@@ -306,6 +317,12 @@ mod tests {
     fn no_run_approaches_an_orbit_that_something_bars() {
         let barred = |x: f64| if (0.1..0.2).contains(&x) { 1.1 } else { 0.98 };
         assert!(!from_one(barred));
+        // Within five decay times it comes twenty times nearer, and then no further.
+        assert!(!from_one(|x| match x {
+            0.05.. => 0.9994,
+            0.02.. => 1.0001,
+            _ => 0.999,
+        }));
         assert!(from_one(|x| if x < 0.2 { 0.985 } else { 0.98 }));
     }
 }

@@ -48,11 +48,14 @@ fn fractions_match_the_exact_basins() {
     assert!(result.transient_chaos.is_none());
 }
 
-/// The same bits on one thread and on four, and with the pilots changed.
+/// The same bits on one thread and on more, where starts go to orbits, run off or are chaotic, one
+/// after the other and side by side; the same counts with the pilots changed.
 #[test]
 fn the_result_does_not_depend_on_threads_or_pilots() {
-    let points = starts(&[-1.5, -0.5], &[1.5, 0.5], 60);
-    let on = |threads: usize, pilots: usize| {
+    fn on<F: Formula>(system: F, threads: usize, pilots: usize) -> Census {
+        let low = [-1.5, -0.5];
+        let high = [1.5, 0.5];
+        let points = starts(&low[..F::DIMENSION], &high[..F::DIMENSION], 300);
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
@@ -61,14 +64,22 @@ fn the_result_does_not_depend_on_threads_or_pilots() {
             pilots,
             ..CensusOptions::default()
         };
-        pool.install(|| taken(Henon { a: 0.9, b: 0.3 }, &points, &options))
-    };
-    let one = on(1, 32);
-    assert_eq!(format!("{one:?}"), format!("{:?}", on(4, 32)));
-    let fewer = on(2, 5);
-    let counts =
-        |c: &Census| -> Vec<usize> { c.attractors.iter().map(|a| a.fraction.count).collect() };
-    assert_eq!(counts(&one), counts(&fewer));
+        pool.install(|| taken(system, &points, &options))
+    }
+    fn assert_same<F: Formula>(system: &F) {
+        let one = on(system.clone(), 1, 32);
+        for threads in [2, 4] {
+            let more = on(system.clone(), threads, 32);
+            assert_eq!(format!("{one:?}"), format!("{more:?}"));
+        }
+        let fewer = on(system.clone(), 2, 5);
+        let counts =
+            |c: &Census| -> Vec<usize> { c.attractors.iter().map(|a| a.fraction.count).collect() };
+        assert_eq!(counts(&one), counts(&fewer));
+    }
+    assert_same(&Cubic(1.5));
+    assert_same(&Henon { a: 0.9, b: 0.3 });
+    assert_same(&Henon { a: 1.4, b: 0.3 });
 }
 
 /// Hénon's attractor: one chaotic attractor, no escape, the rest runs off.

@@ -9,6 +9,8 @@ pub(crate) trait Formula: Clone + Send + Sync {
     const DIMENSION: usize;
     /// How many of the last entries are whole numbers that the map sets.
     const DISCRETE: usize = 0;
+    /// How many motions at a time a census follows.
+    const SIDE_BY_SIDE: usize = 1;
     fn image(&self, x: &[f64], out: &mut [f64]);
     fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>);
     /// Derivative with respect to the family's parameter.
@@ -36,6 +38,10 @@ impl<F: Formula> StroboscopicMap for System<F> {
 
     fn discrete_entries(&self) -> usize {
         F::DISCRETE
+    }
+
+    fn side_by_side(&self) -> usize {
+        F::SIDE_BY_SIDE
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
@@ -111,6 +117,7 @@ impl Henon {
 
 impl Formula for Henon {
     const DIMENSION: usize = 2;
+    const SIDE_BY_SIDE: usize = 16;
     fn image(&self, x: &[f64], out: &mut [f64]) {
         out[0] = 1.0 - self.a * x[0] * x[0] + x[1];
         out[1] = self.b * x[0];

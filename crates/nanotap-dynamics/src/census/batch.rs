@@ -87,7 +87,9 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
                 Followed::Unmeasured(run) => {
                     let other = self.clone();
                     scope.spawn(move |_| {
-                        other.tell(place, run.measured(&mut other.batch.map.clone()));
+                        if !cancelled() {
+                            other.tell(place, run.measured(&mut other.batch.map.clone()));
+                        }
                     });
                 }
             };

@@ -257,7 +257,7 @@ impl<'a> Approach<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::convert::Infallible;
 
     use super::*;
@@ -265,7 +265,7 @@ mod tests {
 
     /// x → f(|x|) x on a line, with f'(0) f(0) = 0.999 for the orbit at rest.
     #[derive(Clone)]
-    struct Line(fn(f64) -> f64);
+    pub(in crate::classify) struct Line(pub(in crate::classify) fn(f64) -> f64);
 
     impl StroboscopicMap for Line {
         type Error = Infallible;
@@ -293,6 +293,11 @@ mod tests {
         }
     }
 
+    /// Rest at 0 attracts, but nothing comes in from beyond 0.2.
+    pub(in crate::classify) fn barred(x: f64) -> f64 {
+        if (0.1..0.2).contains(&x) { 1.1 } else { 0.98 }
+    }
+
     fn from_one(factor: fn(f64) -> f64) -> bool {
         let mut map = Line(factor);
         let rest = close_orbit(&mut map, &[0.0], 1, &ShootingOptions::default()).unwrap();
@@ -315,7 +320,6 @@ mod tests {
     /// At 0.98 a decay time ends at 0.27, beyond a place from which the run comes back.
     #[test]
     fn no_run_approaches_an_orbit_that_something_bars() {
-        let barred = |x: f64| if (0.1..0.2).contains(&x) { 1.1 } else { 0.98 };
         assert!(!from_one(barred));
         // Within five decay times it comes twenty times nearer, and then no further.
         assert!(!from_one(|x| match x {

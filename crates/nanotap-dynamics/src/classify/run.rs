@@ -286,23 +286,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Follows it from an orbit that Newton closed, with the guesses that are left.
-    pub(super) fn follow_from<M: StroboscopicMap>(
-        &mut self,
-        map: &mut M,
-        closed: Closed,
-        mut guesses: Guesses,
-    ) -> Result<MotionKind, Stop> {
-        if let Some(kind) = self.verdict(map, closed, &mut guesses)? {
-            return Ok(kind);
-        }
-        let after = self.looked(map, guesses)?;
-        match self.after_look(map, after)? {
-            Some(kind) => Ok(kind),
-            None => self.follow(map),
-        }
-    }
-
     fn follow<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         loop {
             self.run_to_look(map)?;
@@ -477,7 +460,7 @@ impl<'a> Run<'a> {
     }
 
     /// What a closed orbit makes of the motion; nothing if the run does not go to it.
-    fn verdict<M: StroboscopicMap>(
+    pub(super) fn verdict<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
         closed: Closed,

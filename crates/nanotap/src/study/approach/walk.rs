@@ -4,7 +4,8 @@
 //! orbit, or to measure what does not close, takes most of the time. So a distance is left as soon
 //! as Newton has closed an orbit there or the transient is over, and other threads name and measure
 //! the motion. Where it turns out to be another than it seemed, what was made of the distances
-//! after it is thrown away; so the table is the same on any number of threads.
+//! after it is thrown away; so the table is the same on any number of threads. The next distances
+//! are then left only when it is seen whether the run goes to the orbit.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -154,11 +155,14 @@ impl<'a> Walk<'a> {
                 *told += 1;
             }
         };
+        // Where one motion was not what it seemed the next may not be either.
+        let mut doubt = first > 0;
         let needless = |step: usize| control.is_cancelled() || step >= end.load(Ordering::Relaxed);
         rayon::scope_fifo(|scope| {
             while !needless(passed.len()) {
                 let step = passed.len();
-                let (ahead, seems) = self.look_ahead(passed)?;
+                let (ahead, seems) = self.look_ahead(passed, doubt)?;
+                doubt &= seems.orbit.is_none();
                 passed.push(seems.clone());
                 unnamed.fetch_add(1, Ordering::Relaxed);
                 let (known, end, unnamed, tell) = (&known, &end, &unnamed, &tell);
@@ -180,9 +184,11 @@ impl<'a> Walk<'a> {
                         report(step + 1, self.steps());
                     }
                 });
-                // Where one motion was not what it seemed the next may not be either.
-                let most = AHEAD * (rayon::current_num_threads() - 1);
-                while unnamed.load(Ordering::Relaxed) > most.min(step - first) {
+                let mut most = AHEAD * (rayon::current_num_threads() - 1);
+                if !doubt {
+                    most = most.min(step - first);
+                }
+                while unnamed.load(Ordering::Relaxed) > most {
                     rayon::yield_local();
                 }
             }
@@ -193,10 +199,15 @@ impl<'a> Walk<'a> {
         known.map_while(|step| step).collect()
     }
 
-    /// The next step, and what it seems to hand on. Where the way back is on the orbit that the way
+    /// The next step, and what it seems to hand on: in `doubt`, once it is seen to go to an orbit or its
+    /// transient is over. Where the way back is on the orbit that the way
     /// there has passed, it goes on as that did, and is likely to stay with it: such a step need
     /// not be made to be left.
-    fn look_ahead(&'a self, passed: &[Passed]) -> Result<(Ahead<'a>, Passed), CaseError> {
+    fn look_ahead(
+        &'a self,
+        passed: &[Passed],
+        doubt: bool,
+    ) -> Result<(Ahead<'a>, Passed), CaseError> {
         let step = passed.len();
         let back = step > self.distances.len();
         let there = back.then(|| &passed[self.opposite(step - 1)]);
@@ -209,7 +220,10 @@ impl<'a> Walk<'a> {
         {
             return Ok((Ahead::Start(start.cloned()), there.clone()));
         }
-        let reached = self.reach(step, start)?;
+        let mut reached = self.reach(step, start)?;
+        if doubt {
+            reached.outlook = reached.outlook.settled(&mut Strobe::new(&reached.model));
+        }
         let seems = reached.seems();
         Ok((Ahead::Reached(Box::new(reached)), seems))
     }
@@ -231,10 +245,12 @@ impl<'a> Walk<'a> {
             Ahead::Start(start) => self.reach(step, start.as_ref())?,
             Ahead::Reached(reached) => *reached,
         };
+        let map = &mut Strobe::new(&model);
+        let outlook = outlook.settled(map);
         // A motion that does not close is followed from where its transient ended, before it was
         // measured.
         let settled = outlook.orbit().is_none().then(|| outlook.state().to_vec());
-        let classified = outlook.verified(&mut Strobe::new(&model));
+        let classified = outlook.verified(map);
         let named = Named::of(&classified.kind);
         let settled = settled.filter(|_| named.orbit.is_none());
         let state = settled.as_ref().unwrap_or(&classified.state);

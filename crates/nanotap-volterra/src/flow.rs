@@ -64,8 +64,8 @@ impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
     }
 }
 
-/// A motion of a [`System`] with its work space. Cloning shares the system.
-#[derive(Clone, Debug)]
+/// A motion of a [`System`] with its work space. Cloning shares the system's tables.
+#[derive(Debug)]
 pub struct Flow {
     pub(crate) system: Arc<System>,
     time: f64,
@@ -85,6 +85,28 @@ pub struct Flow {
     /// Length numbers that were accepted last on each branch.
     hints: Vec<usize>,
     work: Work,
+}
+
+impl Clone for Flow {
+    /// With a system of its own: threads that counted their use of one at every period would wait for
+    /// each other.
+    fn clone(&self) -> Self {
+        Self {
+            system: Arc::new(System::clone(&self.system)),
+            time: self.time,
+            branch: self.branch,
+            modal: self.modal.clone(),
+            pinned: self.pinned,
+            onset: self.onset,
+            solver: self.solver.clone(),
+            step: self.step.clone(),
+            pending: self.pending.clone(),
+            has_pending: self.has_pending,
+            reached: self.reached,
+            hints: self.hints.clone(),
+            work: self.work.clone(),
+        }
+    }
 }
 
 #[derive(Clone, Debug, Default)]

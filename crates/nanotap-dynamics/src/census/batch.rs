@@ -35,13 +35,11 @@ impl<M: StroboscopicMap> Batch<'_, M> {
     pub(super) fn followed(&self) -> Vec<Option<RunEnd>> {
         let (sender, ended) = channel();
         let taken = AtomicUsize::new(0);
-        let threads = rayon::current_num_threads();
         rayon::scope(|scope| {
-            for _ in 0..threads {
+            for _ in 0..rayon::current_num_threads() {
                 let turn = Turn {
                     batch: self,
                     taken: &taken,
-                    threads,
                     sender: sender.clone(),
                 };
                 scope.spawn(move |scope| turn.follow(scope));
@@ -61,7 +59,6 @@ struct Turn<'s, 'a, M> {
     batch: &'s Batch<'a, M>,
     /// Starts that some thread has taken.
     taken: &'s AtomicUsize,
-    threads: usize,
     sender: Sender<(usize, RunEnd)>,
 }
 
@@ -81,7 +78,8 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         // Of few starts most places side by side would be empty.
         if map.side_by_side() > 1 && starts.len() >= LEAST_TOGETHER {
             let most = map.side_by_side().max(LEAST_TOGETHER);
-            let places = || (self.left() / (SHARES * self.threads)).clamp(LEAST_TOGETHER, most);
+            let parts = SHARES * rayon::current_num_threads();
+            let places = || (self.left() / parts).clamp(LEAST_TOGETHER, most);
             let followed = |place, followed| match followed {
                 Followed::Ended(end) => self.tell(place, end),
                 Followed::Unmeasured(run) => {
@@ -104,14 +102,14 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
             );
         } else {
             while let (false, Some((place, start))) = (cancelled(), self.next()) {
-                self.tell(place, follow_start(&mut map, &start, known, options));
+                self.tell(place, follow_start(&mut map, start, known, options));
             }
         }
     }
 
-    fn next(&self) -> Option<(usize, Vec<f64>)> {
+    fn next(&self) -> Option<(usize, &'s [f64])> {
         let place = self.taken.fetch_add(1, Ordering::Relaxed);
-        Some((place, self.batch.starts.get(place)?.clone()))
+        Some((place, self.batch.starts.get(place)?))
     }
 
     fn left(&self) -> usize {

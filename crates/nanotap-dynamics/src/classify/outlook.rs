@@ -66,11 +66,7 @@ fn looked<'a, M: StroboscopicMap>(
 /// What a run that knows nothing beforehand ended with.
 fn named(run: Run<'_>, how: Result<MotionKind, Stop>) -> Classified {
     let state = run.state.clone();
-    let end = match how {
-        Ok(kind) => run.classified(kind),
-        Err(stop) => run.stopped(stop),
-    };
-    ended(end, &state)
+    ended(run.ended(how), &state)
 }
 
 impl Outlook<'_> {
@@ -138,10 +134,9 @@ fn settled<'a, M: StroboscopicMap>(
             Stage::Unclosed(run) => return Err(run),
             Stage::Known(end) => return Ok(end),
         };
-        stage = match run.verdict(map, closed, &mut guesses) {
-            Ok(None) => looked(map, run, guesses),
-            Ok(Some(kind)) => Stage::Known(Box::new(named(run, Ok(kind)))),
-            Err(stop) => Stage::Known(Box::new(named(run, Err(stop)))),
+        stage = match run.verdict(map, closed, &mut guesses).transpose() {
+            None => looked(map, run, guesses),
+            Some(how) => Stage::Known(Box::new(named(run, how))),
         };
     }
 }

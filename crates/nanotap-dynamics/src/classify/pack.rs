@@ -49,10 +49,8 @@ pub(crate) struct Unmeasured<'a>(Run<'a>);
 
 impl Unmeasured<'_> {
     pub(crate) fn measured<M: StroboscopicMap>(mut self, map: &mut M) -> RunEnd {
-        match self.0.measure(map) {
-            Ok(kind) => self.0.classified(kind),
-            Err(stop) => self.0.stopped(stop),
-        }
+        let how = self.0.measure(map);
+        self.0.ended(how)
     }
 }
 
@@ -61,7 +59,7 @@ impl Unmeasured<'_> {
 pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
     map: &mut M,
     places: impl Fn() -> usize,
-    mut next: impl FnMut() -> Option<(usize, Vec<f64>)>,
+    mut next: impl FnMut() -> Option<(usize, &'a [f64])>,
     known: Known<'a>,
     options: &'a ClassifyOptions,
     cancelled: impl Fn() -> bool,
@@ -76,11 +74,11 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
                 are_more = false;
                 break;
             };
-            match refused(&start, d) {
+            match refused(start, d) {
                 Some(end) => followed(number, Followed::Ended(end)),
                 None => members.push(Member {
                     number,
-                    run: Run::new(&start, known, options),
+                    run: Run::new(start, known, options),
                     beside: None,
                 }),
             }
@@ -96,24 +94,21 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
             }
             let own = passed.next().unwrap_or_default();
             let neighbour = member.beside.as_ref().and_then(|_| passed.next());
-            let after = member.go_on(map, own, &neighbour.unwrap_or_default());
-            let Member { number, run, .. } = match after {
+            let how = match member.go_on(map, own, &neighbour.unwrap_or_default()) {
                 Ok(AfterLook::GoOn | AfterLook::Perhaps(_)) => {
                     left.push(member);
                     continue;
                 }
-                _ => member,
-            };
-            let end = match after {
-                Err(stop) => run.stopped(stop),
-                Ok(AfterLook::Known(kind)) => run.classified(kind),
-                Ok(_) if are_more => Unmeasured(run).measured(map),
-                Ok(_) => {
-                    followed(number, Followed::Unmeasured(Unmeasured(run)));
+                Ok(AfterLook::Measure) if are_more => member.run.measure(map),
+                Ok(AfterLook::Measure) => {
+                    let run = Unmeasured(member.run);
+                    followed(member.number, Followed::Unmeasured(run));
                     continue;
                 }
+                Ok(AfterLook::Known(kind)) => Ok(kind),
+                Err(stop) => Err(stop),
             };
-            followed(number, Followed::Ended(end));
+            followed(member.number, Followed::Ended(member.run.ended(how)));
         }
         members = left;
     }
@@ -234,10 +229,6 @@ mod tests {
         &[0.5],
     ];
 
-    fn starts() -> Vec<Vec<f64>> {
-        STARTS.iter().map(|start| start.to_vec()).collect()
-    }
-
     fn written(end: &RunEnd) -> String {
         format!("{end:?}")
     }
@@ -245,12 +236,12 @@ mod tests {
     /// One after the other, `map` gives the same bits, however many are followed at a time.
     fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: Known<'_>) -> Vec<RunEnd> {
         let options = ClassifyOptions::default();
-        let alone: Vec<RunEnd> = starts()
+        let alone: Vec<RunEnd> = STARTS
             .iter()
             .map(|start| follow_start(&mut map.clone(), start, known, &options))
             .collect();
         for most in [1, 3, STARTS.len(), 100] {
-            let mut next = starts().into_iter().enumerate();
+            let mut next = STARTS.into_iter().enumerate();
             let mut ends = vec![None; STARTS.len()];
             follow_starts(
                 &mut map.clone(),
@@ -407,7 +398,7 @@ mod tests {
             asked.set(asked.get() + 1);
             asked.get() > 20
         };
-        let mut next = starts().into_iter().enumerate();
+        let mut next = STARTS.into_iter().enumerate();
         let mut ended = Vec::new();
         follow_starts(
             &mut Logistic(3.9),

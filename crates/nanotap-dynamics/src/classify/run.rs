@@ -71,10 +71,8 @@ pub(crate) fn follow_start<M: StroboscopicMap>(
         return end;
     }
     let mut run = Run::new(start, known, options);
-    match run.follow(map) {
-        Ok(kind) => run.classified(kind),
-        Err(stop) => run.stopped(stop),
-    }
+    let how = run.follow(map);
+    run.ended(how)
 }
 
 /// The end of a start that is no state of dimension `d`.
@@ -106,13 +104,10 @@ pub(crate) fn first_entry<M: StroboscopicMap>(
         ..Known::default()
     };
     let mut run = Run::new(start, known, options);
-    while run.periods < periods {
-        match run.step(map) {
-            Err(Stop::Entered(index)) => return Some((index, run.periods)),
-            other => other.ok()?,
-        }
+    match run.run_to(map, periods) {
+        Err(Stop::Entered(index)) => Some((index, run.periods)),
+        _ => None,
     }
-    None
 }
 
 /// Follows a motion for so many periods more: its state then, or where it went instead.
@@ -128,10 +123,8 @@ pub(crate) fn watch<M: StroboscopicMap>(
         ..Known::default()
     };
     let mut run = Run::new(state, known, options);
-    while run.periods < periods {
-        if let Err(stop) = run.step(map) {
-            return Err(run.stopped(stop));
-        }
+    if let Err(stop) = run.run_to(map, periods) {
+        return Err(run.stopped(stop));
     }
     // It may have gone to an orbit that no other start found.
     if !run.guesses(longest(options), LONG_WORTH_TRYING).is_empty() {
@@ -265,7 +258,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    pub(super) fn classified(self, kind: MotionKind) -> RunEnd {
+    pub(super) fn ended(self, how: Result<MotionKind, Stop>) -> RunEnd {
+        match how {
+            Ok(kind) => self.classified(kind),
+            Err(stop) => self.stopped(stop),
+        }
+    }
+
+    fn classified(self, kind: MotionKind) -> RunEnd {
         RunEnd::Classified(Box::new(Classified {
             kind,
             periods: self.periods,
@@ -274,7 +274,7 @@ impl<'a> Run<'a> {
         }))
     }
 
-    pub(super) fn stopped(self, stop: Stop) -> RunEnd {
+    fn stopped(self, stop: Stop) -> RunEnd {
         let periods = self.periods;
         match stop {
             Stop::Entered(index) => RunEnd::Entered { index, periods },
@@ -298,7 +298,12 @@ impl<'a> Run<'a> {
 
     /// Runs until it is time to look where it goes.
     pub(super) fn run_to_look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
-        while self.periods < self.next_look() {
+        self.run_to(map, self.next_look())
+    }
+
+    /// Runs until so many periods are over.
+    fn run_to<M: StroboscopicMap>(&mut self, map: &mut M, periods: usize) -> Result<(), Stop> {
+        while self.periods < periods {
             self.step(map)?;
         }
         Ok(())

@@ -23,6 +23,7 @@
 
 pub mod frequency_modulation;
 mod meanwhile;
+mod steps;
 mod walk;
 
 use std::sync::mpsc::Sender;

@@ -3,18 +3,20 @@
 //! At each distance the motion goes on from where the one before it ended. To see a run go to an
 //! orbit, or to measure what does not close, takes most of the time. So a distance is left as soon
 //! as Newton has closed an orbit there or the transient is over, and other threads name and measure
-//! the motion. Where it turns out to be another than it seemed, what was made of the distances
-//! after it is thrown away; so the table is the same on any number of threads. The next distances
-//! are then left only when it is seen whether the run goes to the orbit.
+//! the motion. Where it turns out to be another than it seemed, the walk turns back to it as soon as
+//! that is seen, and what was made of the distances after it is thrown away; so the table is the
+//! same on any number of threads. The next distance is then left only when it is seen whether the
+//! run goes to the orbit.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
 
 use nanotap_dynamics::{ClassifyOptions, Control, Outlook, PeriodicOrbit, outlook};
+use rayon::ScopeFifo;
 
 use crate::case::{Case, CaseError};
 use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::study::approach::steps::{Step, Steps};
 use crate::study::approach::{ApproachPoint, Met, Way};
 use crate::study::simulate::{Classification, Named};
 
@@ -93,29 +95,26 @@ impl Reached<'_> {
     }
 }
 
-/// A distance whose motion is known.
-struct Known {
-    point: ApproachPoint,
-    passed: Passed,
-}
-
 impl<'a> Walk<'a> {
     /// The motions at all distances in the order of the way: there, then back.
     pub(super) fn there_and_back(
         &'a self,
         control: &Control<'_>,
     ) -> Result<Vec<ApproachPoint>, CaseError> {
-        let mut table: Vec<ApproachPoint> = Vec::with_capacity(self.steps());
-        let mut passed: Vec<Passed> = Vec::with_capacity(self.steps());
-        while table.len() < self.steps() && !control.is_cancelled() {
-            let known = self.go_on(&mut passed, control)?;
-            passed.truncate(table.len());
-            for step in known {
-                passed.push(step.passed);
-                table.push(step.point);
+        let work = Work {
+            walk: self,
+            steps: Steps::new(self.steps(), self.told),
+            waiting: AtomicUsize::new(0),
+            control,
+        };
+        let mut passed = Vec::with_capacity(self.steps());
+        let mut doubt = false;
+        loop {
+            work.go_on(&mut passed, &mut doubt)?;
+            if control.is_cancelled() || !work.steps.is_any_corrected() {
+                return work.steps.into_found();
             }
         }
-        Ok(table)
     }
 
     fn steps(&self) -> usize {
@@ -134,75 +133,10 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The steps that follow those `passed`, up to the first whose motion is not what it seemed.
-    /// What these hand on is added to `passed`, and may be wrong after that one.
-    fn go_on(
-        &'a self,
-        passed: &mut Vec<Passed>,
-        control: &Control<'_>,
-    ) -> Result<Vec<Known>, CaseError> {
-        let first = passed.len();
-        let known: Vec<OnceLock<_>> = (first..self.steps()).map(|_| OnceLock::new()).collect();
-        let end = AtomicUsize::new(self.steps());
-        let unnamed = AtomicUsize::new(0);
-        let told = Mutex::new(0);
-        let tell = || {
-            let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
-            while first + *told < end.load(Ordering::Relaxed)
-                && let Some(Ok(Known { point, .. })) = known[*told].get()
-            {
-                (self.told)(point);
-                *told += 1;
-            }
-        };
-        // Where one motion was not what it seemed the next may not be either.
-        let mut doubt = first > 0;
-        let needless = |step: usize| control.is_cancelled() || step >= end.load(Ordering::Relaxed);
-        rayon::scope_fifo(|scope| {
-            while !needless(passed.len()) {
-                let step = passed.len();
-                let (ahead, seems) = self.look_ahead(passed, doubt)?;
-                doubt &= seems.orbit.is_none();
-                passed.push(seems.clone());
-                unnamed.fetch_add(1, Ordering::Relaxed);
-                let (known, end, unnamed, tell) = (&known, &end, &unnamed, &tell);
-                scope.spawn_fifo(move |_| {
-                    unnamed.fetch_sub(1, Ordering::Relaxed);
-                    if needless(step) {
-                        return;
-                    }
-                    let named = self.name(step, ahead);
-                    if !named
-                        .as_ref()
-                        .is_ok_and(|known| known.passed.leads_on_as(&seems))
-                    {
-                        end.fetch_min(step + 1, Ordering::Relaxed);
-                    }
-                    known[step - first].get_or_init(|| named);
-                    tell();
-                    if let Some(report) = control.progress {
-                        report(step + 1, self.steps());
-                    }
-                });
-                let mut most = AHEAD * (rayon::current_num_threads() - 1);
-                if !doubt {
-                    most = most.min(step - first);
-                }
-                while unnamed.load(Ordering::Relaxed) > most {
-                    rayon::yield_local();
-                }
-            }
-            Ok::<_, CaseError>(())
-        })?;
-        let certain = end.into_inner() - first;
-        let known = known.into_iter().take(certain).map(OnceLock::into_inner);
-        known.map_while(|step| step).collect()
-    }
-
-    /// The next step, and what it seems to hand on: in `doubt`, once it is seen to go to an orbit or its
-    /// transient is over. Where the way back is on the orbit that the way
-    /// there has passed, it goes on as that did, and is likely to stay with it: such a step need
-    /// not be made to be left.
+    /// The next step, and what it seems to hand on: in `doubt`, once it is seen to go to an orbit
+    /// or its transient is over. Where the way back is on the orbit that the way there has passed,
+    /// it goes on as that did, and is likely to stay with it: such a step need not be made to be
+    /// left.
     fn look_ahead(
         &'a self,
         passed: &[Passed],
@@ -239,23 +173,28 @@ impl<'a> Walk<'a> {
         Ok(Reached { model, outlook })
     }
 
-    /// What the motion at a distance is and looks like.
-    fn name(&'a self, step: usize, ahead: Ahead<'a>) -> Result<Known, CaseError> {
-        let Reached { model, outlook } = match ahead {
+    /// The motion of a step, seen to go to an orbit or its transient over.
+    fn settled(&'a self, step: usize, ahead: Ahead<'a>) -> Result<Reached<'a>, CaseError> {
+        let mut reached = match ahead {
             Ahead::Start(start) => self.reach(step, start.as_ref())?,
             Ahead::Reached(reached) => *reached,
         };
-        let map = &mut Strobe::new(&model);
-        let outlook = outlook.settled(map);
-        // A motion that does not close is followed from where its transient ended, before it was
-        // measured.
-        let settled = outlook.orbit().is_none().then(|| outlook.state().to_vec());
-        let classified = outlook.verified(map);
+        reached.outlook = reached.outlook.settled(&mut Strobe::new(&reached.model));
+        Ok(reached)
+    }
+
+    /// What the motion of a step is and looks like, and what it hands on.
+    fn measured(&'a self, step: usize, settled: Reached<'a>) -> (ApproachPoint, Passed) {
+        let passed = settled.seems();
+        let Reached { model, outlook } = settled;
+        let classified = outlook.verified(&mut Strobe::new(&model));
         let named = Named::of(&classified.kind);
-        let settled = settled.filter(|_| named.orbit.is_none());
-        let state = settled.as_ref().unwrap_or(&classified.state);
         let unbounded = named.classification == Classification::Unbounded;
-        let passed = Passed::new(named.orbit.as_ref(), state, unbounded);
+        let passed = match &named.orbit {
+            // It is followed from where its transient ended, before it was measured.
+            None if !unbounded => passed,
+            orbit => Passed::new(orbit.as_ref(), &classified.state, unbounded),
+        };
         let met = Met {
             classification: named.classification,
             evidence: named.evidence,
@@ -263,9 +202,89 @@ impl<'a> Walk<'a> {
             state: classified.state,
         };
         let (way, gap) = self.place(step);
-        Ok(Known {
-            point: (self.observed)(way, gap, &model, met),
-            passed,
+        ((self.observed)(way, gap, &model, met), passed)
+    }
+}
+
+/// A walk that threads are at work on.
+struct Work<'w, 'a> {
+    walk: &'a Walk<'a>,
+    steps: Steps<'a, ApproachPoint, Passed>,
+    /// Tasks that no thread has begun.
+    waiting: AtomicUsize,
+    control: &'w Control<'w>,
+}
+
+impl<'a> Work<'_, 'a> {
+    /// Makes the steps that follow those `passed`, and makes anew those after one that hands on
+    /// something else than it seemed to. Where one motion was not what it seemed the next may not
+    /// be either: from then on there is `doubt`, until one closes.
+    fn go_on(&self, passed: &mut Vec<Passed>, doubt: &mut bool) -> Result<(), CaseError> {
+        let most = AHEAD * (rayon::current_num_threads() - 1);
+        rayon::scope_fifo(|scope| {
+            loop {
+                if let Some((step, corrected)) = self.steps.take_correction() {
+                    passed.truncate(step);
+                    passed.push(corrected);
+                    *doubt = true;
+                }
+                if passed.len() == self.walk.steps() || self.control.is_cancelled() {
+                    return Ok(());
+                }
+                let step = self.steps.begin(passed.len());
+                let (ahead, seems) = self.walk.look_ahead(passed, *doubt)?;
+                *doubt &= seems.orbit.is_none();
+                passed.push(seems.clone());
+                self.spawn(scope, step, move |scope| {
+                    self.name(scope, step, ahead, &seems);
+                });
+                while self.waiting.load(Ordering::Relaxed) > most {
+                    rayon::yield_local();
+                }
+            }
         })
+    }
+
+    /// Leaves a task on a step to the next free thread.
+    fn spawn<'s>(
+        &'s self,
+        scope: &ScopeFifo<'s>,
+        step: Step,
+        task: impl FnOnce(&ScopeFifo<'s>) + Send + 's,
+    ) {
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        scope.spawn_fifo(move |scope| {
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
+            if !self.control.is_cancelled() && !self.steps.is_vain(step) {
+                task(scope);
+            }
+        });
+    }
+
+    /// Sees whether a step hands on what it seems to, and measures its motion.
+    fn name<'s>(&'s self, scope: &ScopeFifo<'s>, step: Step, ahead: Ahead<'a>, seems: &Passed) {
+        let settled = match self.walk.settled(step.index(), ahead) {
+            Ok(settled) => settled,
+            Err(error) => return self.steps.write(step, Err(error)),
+        };
+        let passed = settled.seems();
+        if passed.leads_on_as(seems) {
+            return self.measure(step, settled, seems);
+        }
+        // To measure it takes longer. The walk, if it was this thread's, goes on meanwhile.
+        self.steps.correct(step, passed.clone());
+        self.spawn(scope, step, move |_| self.measure(step, settled, &passed));
+    }
+
+    /// Measures the motion of a step that seems to hand that on.
+    fn measure(&self, step: Step, settled: Reached<'a>, seems: &Passed) {
+        let (point, passed) = self.walk.measured(step.index(), settled);
+        if !passed.leads_on_as(seems) {
+            self.steps.correct(step, passed);
+        }
+        self.steps.write(step, Ok(point));
+        if let Some(report) = self.control.progress {
+            report(step.index() + 1, self.walk.steps());
+        }
     }
 }

@@ -1,12 +1,15 @@
 //! What a command says: results on standard output, remarks on standard error.
 
-use std::io::{ErrorKind, Write as _};
+use std::io::{BufWriter, ErrorKind, Write as _};
 
 use nanotap::study::registry::Document;
 use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::{page, progress, style};
+
+/// Bytes of JSON that are written at once.
+const JSON_AT_ONCE: usize = 1 << 16;
 
 /// How results are to be shown.
 #[derive(Debug)]
@@ -34,10 +37,7 @@ impl Output {
         text: impl FnOnce(&R) -> String,
     ) -> Result<(), Failure> {
         if self.json {
-            let mut json = serde_json::to_string_pretty(result)
-                .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
-            json.push('\n');
-            print(&json)
+            print_json(result)
         } else {
             print(&text(result))
         }
@@ -82,14 +82,26 @@ impl Output {
     }
 }
 
-/// Prints `text` on standard output.
+/// Prints `text` on standard output, without its colours where nobody sees them.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     progress::end();
     let mut stream = anstream::stdout().lock();
-    match stream
-        .write_all(text.as_bytes())
-        .and_then(|()| stream.flush())
-    {
+    let written = stream.write_all(text.as_bytes());
+    printed(written.and_then(|()| stream.flush()))
+}
+
+/// Prints a result as JSON, which has no colours, on standard output.
+fn print_json<R: Serialize>(result: &R) -> Result<(), Failure> {
+    progress::end();
+    let mut stream = BufWriter::with_capacity(JSON_AT_ONCE, std::io::stdout().lock());
+    let written = serde_json::to_writer_pretty(&mut stream, result).map_err(std::io::Error::from);
+    let written = written.and_then(|()| writeln!(stream));
+    printed(written.and_then(|()| stream.flush()))
+}
+
+/// What came of writing to standard output.
+fn printed(written: std::io::Result<()>) -> Result<(), Failure> {
+    match written {
         // Whoever reads has seen enough (`| head`).
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Failure::numerics(format!(

@@ -63,6 +63,8 @@ pub use unseen::Unseen;
 const FIRST_PILOTS: usize = 4;
 /// Starts of the first batch after the pilots, of which all others are multiples.
 const BATCH: usize = 128;
+/// Starts that a thread draws at once, each in a microsecond or two.
+const DRAWN_AT_ONCE: usize = 16;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
 const LEAST_PATIENCE: usize = 64;
@@ -353,7 +355,8 @@ impl<M: StroboscopicMap> Work<'_, M> {
     fn follow(&mut self, size: usize) -> Vec<usize> {
         let first = self.outcomes.len();
         let range = first..self.last.min(first + size);
-        let starts: Vec<Vec<f64>> = range.clone().map_while(|k| self.starts.start(k)).collect();
+        let drawn = range.clone().into_par_iter().with_min_len(DRAWN_AT_ONCE);
+        let starts: Vec<_> = drawn.filter_map(|k| self.starts.start(k)).collect();
         for start in &starts {
             extend(&mut self.ends, start);
         }

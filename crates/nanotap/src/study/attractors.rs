@@ -324,11 +324,10 @@ pub fn attractors(
         },
         control,
     );
-    let starts: Vec<Vec<f64>> = (0..found.outcomes_by_start.len())
-        .map_while(|k| set.start(k))
-        .collect();
     let unstable = if options.unstable > 0 {
-        Some(unstable_orbits(model, &map, &starts, options, control)?)
+        let searched = found.outcomes_by_start.len().min(SEARCHED_STARTS);
+        let searched: Vec<_> = (0..searched).map_while(|k| set.start(k)).collect();
+        Some(unstable_orbits(model, &map, &searched, options, control)?)
     } else {
         None
     };
@@ -341,7 +340,7 @@ pub fn attractors(
             upper,
         })
         .collect();
-    described(model, &found, &starts, options, sides, unstable)
+    described(model, &found, &set, options, sides, unstable)
 }
 
 /// The budgets with a bound on the states that fits the box.
@@ -365,11 +364,12 @@ fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions 
 fn described(
     model: &Model,
     found: &Census,
-    starts: &[Vec<f64>],
+    set: &StartSet,
     options: &AttractorsOptions,
     sides: Vec<Side>,
     unstable: Option<Vec<OrbitReport>>,
 ) -> Result<Attractors, AttractorsError> {
+    let starts = found.outcomes_by_start.len();
     let attractors = found
         .attractors
         .iter()
@@ -388,7 +388,7 @@ fn described(
             destinations: t.destinations.clone(),
         });
     Ok(Attractors {
-        starts: starts.len(),
+        starts,
         seed: options.seed,
         sides,
         attractors,
@@ -411,11 +411,11 @@ fn described(
             .iter()
             .map(|(k, reason)| UndecidedStart {
                 start: *k,
-                state: starts[*k].clone(),
+                state: set.start(*k).unwrap_or_default(),
                 reason: reason.to_string(),
             })
             .collect(),
-        undecided_fraction: Fraction::new(found.undecided.len(), starts.len()).into(),
+        undecided_fraction: Fraction::new(found.undecided.len(), starts).into(),
         unbounded: found.unbounded.into(),
         transient_chaos,
         unstable,
@@ -511,7 +511,7 @@ const SEARCHED_STARTS: usize = 64;
 fn unstable_orbits(
     model: &Model,
     map: &Strobe,
-    starts: &[Vec<f64>],
+    searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,
 ) -> Result<Vec<OrbitReport>, AttractorsError> {
@@ -519,7 +519,6 @@ fn unstable_orbits(
         max_period: options.unstable,
         ..OrbitSearch::default()
     };
-    let searched = &starts[..starts.len().min(SEARCHED_STARTS)];
     find_orbits(map, searched, &search, control)
         .iter()
         .filter(|orbit| !orbit.is_stable())

@@ -21,9 +21,12 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct BlockCyclic {
     d: usize,
     n: usize,
-    /// n − 1 panels of 2d rows × (3d + 2) columns, column major:
+    /// n − 1 panels of 2d rows × (3d + 2) columns, row by row:
     /// δ_k | δ_0 | δ_{k+1} | δ_λ | right side.
     panels: Vec<f64>,
+    /// Present reflector, and what it is subtracted with from each column.
+    reflector: Vec<f64>,
+    factors: Vec<f64>,
     /// Closing d × d block, parameter column and right side.
     closing: DMatrix<f64>,
     column: DVector<f64>,
@@ -35,7 +38,9 @@ impl BlockCyclic {
         Self {
             d,
             n,
-            panels: vec![0.0; n.saturating_sub(1) * 2 * d * (3 * d + 2)],
+            panels: Vec::with_capacity(n.saturating_sub(1) * 2 * d * (3 * d + 2)),
+            reflector: vec![0.0; 2 * d],
+            factors: vec![0.0; 3 * d + 2],
             closing: DMatrix::zeros(d, d),
             column: DVector::zeros(d),
             right: DVector::zeros(d),
@@ -45,8 +50,8 @@ impl BlockCyclic {
     /// Eliminates δ_1 … δ_{n−1}. `f` and `b` hold n rows of d values.
     pub(crate) fn factor(&mut self, jacobians: &[DMatrix<f64>], f: &[f64], b: Option<&[f64]>) {
         let (d, n) = (self.d, self.n);
-        let rows = 2 * d;
-        let size = rows * (3 * d + 2);
+        let columns = 3 * d + 2;
+        let size = 2 * d * columns;
         let parameter = |k: usize, i: usize| b.map_or(0.0, |b| b[k * d + i]);
         // The running relation U δ_0 + V δ_k + w δ_λ = r.
         let mut u = jacobians[0].clone();
@@ -55,33 +60,36 @@ impl BlockCyclic {
             self.column[i] = parameter(0, i);
             self.right[i] = -f[i];
         }
+        self.panels.clear();
         for k in 1..n {
-            let panel = &mut self.panels[(k - 1) * size..k * size];
-            panel.fill(0.0);
-            for j in 0..d {
-                for i in 0..d {
-                    panel[j * rows + i] = v[(i, j)];
-                    panel[j * rows + d + i] = jacobians[k][(i, j)];
-                    panel[(d + j) * rows + i] = u[(i, j)];
+            self.panels.resize(k * size, 0.0);
+            let panel = &mut self.panels[(k - 1) * size..];
+            let (relation, segment) = panel.split_at_mut(d * columns);
+            for (i, row) in relation.chunks_exact_mut(columns).enumerate() {
+                for j in 0..d {
+                    row[j] = v[(i, j)];
+                    row[d + j] = u[(i, j)];
                 }
-                panel[(2 * d + j) * rows + d + j] = -1.0;
+                row[3 * d] = self.column[i];
+                row[3 * d + 1] = self.right[i];
             }
-            for i in 0..d {
-                panel[3 * d * rows + i] = self.column[i];
-                panel[3 * d * rows + d + i] = parameter(k, i);
-                panel[(3 * d + 1) * rows + i] = self.right[i];
-                panel[(3 * d + 1) * rows + d + i] = -f[k * d + i];
-            }
-            triangularise(panel, rows, d);
-            for j in 0..d {
-                for i in 0..d {
-                    u[(i, j)] = panel[(d + j) * rows + d + i];
-                    v[(i, j)] = panel[(2 * d + j) * rows + d + i];
+            for (i, row) in segment.chunks_exact_mut(columns).enumerate() {
+                for j in 0..d {
+                    row[j] = jacobians[k][(i, j)];
                 }
+                row[2 * d + i] = -1.0;
+                row[3 * d] = parameter(k, i);
+                row[3 * d + 1] = -f[k * d + i];
             }
-            for i in 0..d {
-                self.column[i] = panel[3 * d * rows + d + i];
-                self.right[i] = panel[(3 * d + 1) * rows + d + i];
+            triangularise(panel, d, &mut self.reflector, &mut self.factors);
+            let relation = panel[d * columns..].chunks_exact(columns);
+            for (i, row) in relation.enumerate() {
+                for j in 0..d {
+                    u[(i, j)] = row[d + j];
+                    v[(i, j)] = row[2 * d + j];
+                }
+                self.column[i] = row[3 * d];
+                self.right[i] = row[3 * d + 1];
             }
         }
         self.closing = u + v;
@@ -124,58 +132,66 @@ impl BlockCyclic {
 
     fn back_substitute(&self, first: &[f64], parameter: f64, with_residual: bool, out: &mut [f64]) {
         let (d, n) = (self.d, self.n);
-        let rows = 2 * d;
-        let size = rows * (3 * d + 2);
+        let columns = 3 * d + 2;
+        let size = 2 * d * columns;
         out[..d].copy_from_slice(first);
         for k in (1..n).rev() {
             let panel = &self.panels[(k - 1) * size..k * size];
             let next = if k + 1 == n { 0 } else { k + 1 };
-            for i in (0..d).rev() {
-                let mut sum = -panel[3 * d * rows + i] * parameter;
+            for (i, row) in panel.chunks_exact(columns).take(d).enumerate().rev() {
+                let mut sum = -row[3 * d] * parameter;
                 if with_residual {
-                    sum += panel[(3 * d + 1) * rows + i];
+                    sum += row[3 * d + 1];
                 }
                 for j in 0..d {
-                    sum -= panel[(d + j) * rows + i] * first[j];
-                    sum -= panel[(2 * d + j) * rows + i] * out[next * d + j];
+                    sum -= row[d + j] * first[j];
+                    sum -= row[2 * d + j] * out[next * d + j];
                 }
                 for j in i + 1..d {
-                    sum -= panel[j * rows + i] * out[k * d + j];
+                    sum -= row[j] * out[k * d + j];
                 }
-                out[k * d + i] = sum / panel[i * rows + i];
+                out[k * d + i] = sum / row[i];
             }
         }
     }
 }
 
-/// Householder triangularisation of the first `d` columns of a column-major panel,
-/// applied to all its columns.
-fn triangularise(panel: &mut [f64], rows: usize, d: usize) {
+/// Householder triangularisation of the first `d` columns of a panel of 2d rows, applied to all
+/// its columns. `reflector` and `factors` have room for a column and for a row.
+fn triangularise(panel: &mut [f64], d: usize, reflector: &mut [f64], factors: &mut [f64]) {
+    let columns = factors.len();
     for j in 0..d {
-        let (head, tail) = panel.split_at_mut((j + 1) * rows);
-        let pivot = &mut head[j * rows + j..(j + 1) * rows];
-        let length = pivot.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let rows = panel.chunks_exact(columns).skip(j);
+        let reflector = &mut reflector[j..];
+        for (v, row) in reflector.iter_mut().zip(rows) {
+            *v = row[j];
+        }
+        let length = reflector.iter().map(|v| v * v).sum::<f64>().sqrt();
         if length == 0.0 {
             continue;
         }
-        let alpha = if pivot[0] > 0.0 { -length } else { length };
-        // The reflector I − v vᵀ/(v₀ length'), v = pivot − alpha e_0.
-        pivot[0] -= alpha;
-        let half = -alpha * pivot[0];
-        for column in tail.chunks_exact_mut(rows) {
-            let part = &mut column[j..];
-            let factor = pivot
-                .iter()
-                .zip(part.iter())
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                / half;
-            for (p, v) in part.iter_mut().zip(pivot.iter()) {
-                *p -= factor * v;
+        let alpha = if reflector[0] > 0.0 { -length } else { length };
+        // The reflector I − v vᵀ/(v₀ length'), v = column − alpha e_0.
+        reflector[0] -= alpha;
+        let half = -alpha * reflector[0];
+        let factors = &mut factors[j + 1..];
+        factors.fill(0.0);
+        for (v, row) in reflector.iter().zip(panel.chunks_exact(columns).skip(j)) {
+            for (factor, x) in factors.iter_mut().zip(&row[j + 1..]) {
+                *factor += v * x;
             }
         }
-        pivot.fill(0.0);
-        pivot[0] = alpha;
+        for factor in factors.iter_mut() {
+            *factor /= half;
+        }
+        let rows = panel.chunks_exact_mut(columns).skip(j);
+        for (v, row) in reflector.iter().zip(rows) {
+            row[j] = 0.0;
+            for (x, factor) in row[j + 1..].iter_mut().zip(factors.iter()) {
+                *x -= factor * v;
+            }
+        }
+        panel[j * columns + j] = alpha;
     }
 }
 

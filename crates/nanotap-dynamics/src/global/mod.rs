@@ -3,7 +3,8 @@
 //!
 //! A census is taken at every value. Then each attractor is tried at the neighbouring
 //! values: of an orbit Newton looks for the same orbit there; where that fails, or finds
-//! it unstable, the motion from its state is classified; of chaos and tori likewise.
+//! it unstable, the motion from its state is classified; of chaos and tori likewise. One
+//! that is seen to go on at the neighbouring value from there need not be tried from here.
 //! What is new at a value is tried at its neighbours in turn, both ways, until no value
 //! gains an attractor (global continuation, as Datseris, Luiz Rossi and Wagemakers,
 //! Chaos 33, 073151, 2023, with Newton in place of recurrences).
@@ -17,6 +18,8 @@
 //! Fails: an attractor whose whole range lies between two values of the grid, or that no
 //! census meets anywhere in its range, stays unseen; one that moves by more than half
 //! its size from value to value is found but not joined to its branch.
+
+use std::collections::{BTreeMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -179,33 +182,29 @@ fn shared<M: StroboscopicMap>(
     control: &Control<'_>,
 ) -> Vec<GlobalValue> {
     let mut links: Vec<(Place, Place)> = Vec::new();
+    // Attractors that are known to go on at a neighbouring value.
+    let mut continued: HashSet<(Place, usize)> = HashSet::new();
     let mut fresh: Vec<Place> = places(&values);
     while !fresh.is_empty() && !control.is_cancelled() {
-        let tasks: Vec<(Place, usize)> = fresh
-            .iter()
-            .flat_map(|&from| neighbours(from.0).into_iter().map(move |at| (from, at)))
-            .filter(|&(_, at)| values[at].failure.is_none())
-            .collect();
-        let trials: Vec<Option<Trial>> = tasks
-            .par_iter()
-            .with_max_len(1)
-            .map(|&(from, k)| {
-                if control.is_cancelled() {
-                    return None;
+        // Two neighbouring values, and what is to be tried from either at the other.
+        let mut pairs: BTreeMap<[usize; 2], Vec<Place>> = BTreeMap::new();
+        for from in fresh.drain(..) {
+            for at in neighbours(from.0) {
+                if values[at].failure.is_none() && !continued.contains(&(from, at)) {
+                    let pair = [from.0.min(at), from.0.max(at)];
+                    pairs.entry(pair).or_default().push(from);
                 }
-                let attractor = &values[from.0].attractors[from.1].attractor;
-                let mut map = at(k).ok()?;
-                let (kind, state, continued) = tried(&mut map, attractor, classify)?;
-                Some(Trial {
-                    from,
-                    at: k,
-                    kind,
-                    state,
-                    continued,
-                })
+            }
+        }
+        let pairs: Vec<_> = pairs.into_iter().collect();
+        let trials: Vec<Vec<Trial>> = pairs
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|(pair, places)| {
+                let cancelled = || control.is_cancelled();
+                trials(&values, pair, &places, &at, classify, cancelled)
             })
             .collect();
-        fresh.clear();
         for trial in trials.into_iter().flatten() {
             let known = &mut values[trial.at].attractors;
             let index = known
@@ -226,12 +225,57 @@ fn shared<M: StroboscopicMap>(
                 known.len() - 1
             });
             if trial.continued {
-                links.push((trial.from, (trial.at, index)));
+                let found = (trial.at, index);
+                links.push((trial.from, found));
+                continued.extend([(trial.from, trial.at), (found, trial.from.0)]);
             }
         }
     }
     number_branches(&mut values, &links);
     values
+}
+
+/// What comes of trying attractors of two neighbouring values, each at the other: of orbits by
+/// Newton, then of those that were not seen to go on, in either direction, by a run.
+fn trials<M: StroboscopicMap>(
+    values: &[GlobalValue],
+    pair: [usize; 2],
+    places: &[Place],
+    at: impl Fn(usize) -> Result<M, String>,
+    classify: &ClassifyOptions,
+    cancelled: impl Fn() -> bool,
+) -> Vec<Trial> {
+    let known = |(k, a): Place| &values[k].attractors[a].attractor;
+    let mut maps = pair.map(|k| at(k).ok());
+    let mut trials: Vec<Trial> = Vec::new();
+    for by_newton in [true, false] {
+        for &from in places {
+            let at = usize::from(from.0 == pair[0]);
+            let goes_on = |trial: &Trial| {
+                trial.at == from.0 && trial.continued && trial.kind.is_same_as(&known(from).kind)
+            };
+            if trials.iter().any(|t| t.from == from || goes_on(t)) {
+                continue;
+            }
+            if cancelled() {
+                return trials;
+            }
+            let Some(map) = &mut maps[at] else { continue };
+            let found = if by_newton {
+                closed(map, known(from), classify)
+            } else {
+                arrived(map, known(from), classify)
+            };
+            trials.extend(found.map(|(kind, state, continued)| Trial {
+                from,
+                at: pair[at],
+                kind,
+                state,
+                continued,
+            }));
+        }
+    }
+    trials
 }
 
 fn from_census(census: Census) -> GlobalValue {
@@ -259,22 +303,34 @@ fn places(values: &[GlobalValue]) -> Vec<Place> {
         .collect()
 }
 
-/// The attractor to which a neighbour's leads, a state on it, and whether it is the
-/// same one.
-fn tried<M: StroboscopicMap>(
+/// The attractor to which a neighbour's leads, a state on it, and whether it is the same one.
+type Led = (AttractorKind, Vec<f64>, bool);
+
+/// The stable orbit that Newton closes from a neighbour's.
+fn closed<M: StroboscopicMap>(
     map: &mut M,
     attractor: &Attractor,
     options: &ClassifyOptions,
-) -> Option<(AttractorKind, Vec<f64>, bool)> {
-    if let AttractorKind::Periodic(orbit) = &attractor.kind
-        && let Ok(closed) =
-            close_orbit_from_points(map, &orbit.flat(), orbit.period, &options.shooting)
-        && closed.is_stable()
-    {
-        let continued = is_continuation(orbit, &closed);
-        let state = closed.states[0].clone();
-        return Some((AttractorKind::Periodic(closed), state, continued));
+) -> Option<Led> {
+    let AttractorKind::Periodic(orbit) = &attractor.kind else {
+        return None;
+    };
+    let closed =
+        close_orbit_from_points(map, &orbit.flat(), orbit.period, &options.shooting).ok()?;
+    if !closed.is_stable() {
+        return None;
     }
+    let continued = is_continuation(orbit, &closed);
+    let state = closed.states[0].clone();
+    Some((AttractorKind::Periodic(closed), state, continued))
+}
+
+/// The attractor at which a run from a neighbour's arrives.
+fn arrived<M: StroboscopicMap>(
+    map: &mut M,
+    attractor: &Attractor,
+    options: &ClassifyOptions,
+) -> Option<Led> {
     let classified = classify(map, &attractor.state, options);
     let (kind, continued) = match classified.kind {
         MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {

@@ -1,11 +1,14 @@
 //! Attractors over grids of parameter values.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use nanotap_dynamics::{
-    AttractorKind, CensusOptions, Control, GlobalOptions, GlobalValue, MotionKind, StartBox,
-    StartSet, attractors_along, classify, grid_neighbours, orbits_shared,
+    AttractorKind, CensusOptions, Control, DMatrix, GlobalOptions, GlobalValue, MotionKind,
+    StartBox, StartSet, attractors_along, classify, grid_neighbours, orbits_shared,
 };
 
-use crate::systems::{Cubic, Family, Logistic, Nested, System};
+use crate::systems::{Cubic, Family, Formula, Logistic, Nested, System};
 
 fn few() -> GlobalOptions {
     GlobalOptions {
@@ -148,4 +151,75 @@ fn a_plane_fills_from_one_corner() {
         .unwrap();
     let again = pool.install(filled);
     assert_eq!(format!("{one:?}"), format!("{again:?}"));
+}
+
+/// A rest at `centre`, to which all goes. From the left of it Newton does not find it: where the
+/// step of the map is least, (x − centre + 1.2)² + 0.15, there is no rest.
+#[derive(Clone)]
+struct OneSided {
+    centre: f64,
+    /// How often the map was taken of a state on the last way to the rest, where Newton needs one
+    /// step.
+    near: Arc<AtomicUsize>,
+}
+
+impl Formula for OneSided {
+    const DIMENSION: usize = 1;
+
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let y = x[0] - self.centre;
+        if (1e-9..0.4).contains(&y.abs()) {
+            self.near.fetch_add(1, Ordering::Relaxed);
+        }
+        out[0] = if y < -0.4 {
+            x[0] + (y + 1.2).powi(2) + 0.15
+        } else {
+            self.centre + 0.5 * y
+        };
+    }
+
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        let y = x[0] - self.centre;
+        out[(0, 0)] = if y < -0.4 { 1.0 + 2.0 * (y + 1.2) } else { 0.5 };
+    }
+
+    fn derivative(&self, _: &[f64], _: &mut [f64]) {}
+}
+
+/// An orbit that Newton follows from one value to the next in one direction only is not run after
+/// in the other.
+#[test]
+fn what_goes_on_one_way_is_not_tried_the_other() {
+    for direction in [1.0, -1.0] {
+        let near = Arc::new(AtomicUsize::new(0));
+        let centre = |k: usize| direction * (10.0 + k as f64);
+        let at = |k: usize| {
+            let centre = centre(k);
+            let near = Arc::clone(&near);
+            Ok(System(OneSided { centre, near }))
+        };
+        let classify_options = few().census.classify;
+        let known: Vec<_> = (0..20)
+            .map(|k| {
+                match classify(&mut at(k).unwrap(), &[centre(k) + 0.1], &classify_options).kind {
+                    MotionKind::Periodic(orbit) => vec![orbit],
+                    other => panic!("{other:?}"),
+                }
+            })
+            .collect();
+        assert!(near.swap(0, Ordering::Relaxed) > 20);
+        let neighbours = grid_neighbours(&[20]);
+        let shared = orbits_shared(
+            known,
+            at,
+            neighbours,
+            &classify_options,
+            &Control::default(),
+        );
+        for (k, value) in shared.iter().enumerate() {
+            assert!((fixed_points(value)[0] - centre(k)).abs() < 1e-12);
+            assert_eq!((value.attractors.len(), value.attractors[0].branch), (1, 0));
+        }
+        assert_eq!(near.load(Ordering::Relaxed), 0);
+    }
 }

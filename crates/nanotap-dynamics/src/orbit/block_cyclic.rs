@@ -24,7 +24,7 @@ pub(crate) struct BlockCyclic {
     /// n − 1 panels of 2d rows × (3d + 2) columns, row by row:
     /// δ_k | δ_0 | δ_{k+1} | δ_λ | right side.
     panels: Vec<f64>,
-    /// Present reflector, and what it is subtracted with from each column.
+    /// The present reflector, and with which factor it is subtracted from each column.
     reflector: Vec<f64>,
     factors: Vec<f64>,
     /// Closing d × d block, parameter column and right side.

@@ -89,6 +89,26 @@ impl Tests {
             tangencies: solver.tangencies(node).ok()?,
         })
     }
+
+    /// Whether there may be anything [`between`] two neighbouring points of an orbit of period
+    /// `n`.
+    pub(crate) fn any_changes([a, b]: [&Self; 2], n: usize) -> bool {
+        let signs = |tests: &Self| {
+            [tests.fold, tests.crossing, tests.flip, tests.neimark_sacker].map(|test| test < 0.0)
+        };
+        let goes_on = |t: &OrbitTangency| {
+            nearest(&b.tangencies, *t, n as f64)
+                .is_none_or(|(k, _)| t.value * b.tangencies[k].value >= 0.0)
+        };
+        signs(a) != signs(b)
+            || negative(&a.tangencies) != negative(&b.tangencies)
+            || !a.tangencies.iter().all(goes_on)
+    }
+}
+
+/// How many extrema are below zero.
+fn negative(tangencies: &[OrbitTangency]) -> usize {
+    tangencies.iter().filter(|t| t.value < 0.0).count()
 }
 
 /// Π(1 − μ), as sign times smallest factor.
@@ -406,8 +426,7 @@ fn grazings<F: MapFamily>(
             zeros.push((kind, zero));
         }
     }
-    let negative = |tests: &Tests| tests.tangencies.iter().filter(|t| t.value < 0.0).count();
-    if found == 0 && depth > 0 && negative(first) != negative(last) {
+    if found == 0 && depth > 0 && negative(&first.tangencies) != negative(&last.tangencies) {
         let middle = 0.5 * (span.0 + span.1);
         let Ok(node) = solver.along_cubic(stretch.from, middle, stretch.ends) else {
             return;

@@ -1,7 +1,10 @@
 //! From a first point step by step until the branch ends.
 
+use std::sync::{Mutex, PoisonError};
+
 use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, Tests, between};
 use crate::continuation::end::dead_end;
+use crate::continuation::locating::Locating;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
 use crate::continuation::passing::closing;
 use crate::continuation::solver::{BranchSolver, Node};
@@ -81,6 +84,29 @@ pub(crate) fn follow<F: MapFamily>(
     options: &ContinuationOptions,
     control: &Control<'_>,
 ) -> Result<Branch, ContinuationError> {
+    let found = Mutex::new(Vec::new());
+    let mut branch = rayon::in_place_scope(|scope| {
+        let locating = Locating {
+            scope,
+            found: &found,
+            control,
+        };
+        step_by_step(solver, first, options, &locating)
+    })?;
+    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    branch.take(found, options.range);
+    branch.bifurcations.sort_by_key(|b| b.after_point);
+    Ok(branch)
+}
+
+/// The branch without the bifurcations that other threads locate.
+fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
+    solver: &mut BranchSolver<'a, F>,
+    first: Node,
+    options: &ContinuationOptions,
+    locating: &Locating<'_, 'scope>,
+) -> Result<Branch, ContinuationError> {
+    let control = locating.control;
     let least = solver.size(&first.points);
     let mut tests = tests_at(solver, &first)?;
     let mut arclength = 0.0;
@@ -180,7 +206,12 @@ pub(crate) fn follow<F: MapFamily>(
             };
             break;
         }
-        let found = between(solver, [&node, &next], [&tests, &next_tests], taken, index);
+        let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
+        let found = if options.until_fold {
+            between(solver, nodes, changes, taken, index)
+        } else {
+            locating.between(solver, nodes, changes, taken, index)
+        };
         branch.take(found, options.range);
         let folds = |b: &Bifurcation| matches!(b.kind, BifurcationKind::Fold);
         if options.until_fold && branch.bifurcations.iter().any(folds) {

@@ -17,6 +17,7 @@ pub mod bifurcation;
 pub mod diagram;
 mod end;
 mod follow;
+mod locating;
 mod meeting;
 mod passing;
 pub(crate) mod solver;

@@ -121,6 +121,19 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         }
     }
 
+    /// Another work space with the same scales.
+    pub(crate) fn another(&self) -> Self {
+        Self::new(
+            self.family,
+            self.d,
+            self.continuous,
+            self.n,
+            self.state_scale,
+            self.parameter_scale,
+            self.tolerance,
+        )
+    }
+
     /// Largest entry of any state, discrete ones apart.
     pub(crate) fn size(&self, points: &[f64]) -> f64 {
         let states = points.chunks(self.d);

@@ -4,9 +4,9 @@ use std::convert::Infallible;
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
-    BifurcationKind, Branch, BranchEnd, ContinuationError, ContinuationOptions, Control, DMatrix,
-    Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability, StroboscopicMap, Tangency,
-    close_orbit, continue_orbit, switch_at_flip,
+    Bifurcation, BifurcationKind, Branch, BranchEnd, ContinuationError, ContinuationOptions,
+    Control, DMatrix, Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability,
+    StroboscopicMap, Tangency, close_orbit, continue_orbit, switch_at_flip,
 };
 
 use crate::systems::{
@@ -396,6 +396,25 @@ fn extrema_that_move_meet_and_are_born_are_told_apart() {
             panic!()
         };
         assert!((time - exact).abs() < 1e-12, "{time} {exact}");
+    }
+}
+
+/// Other threads locate them while the branch goes on; each comes to its place, to the last digit.
+#[test]
+fn bifurcations_are_the_same_whoever_locates_them() {
+    let located = || {
+        let watched = branch(&WatchedFamily, 0.05, &[0.05], 1, 1.0, (0.05, 1.0));
+        let circle = branch(&Family(Isola), 0.1, &[1.0], 1, 1.0, (-2.0, 2.0));
+        [watched, circle].map(|branch| {
+            let of = |b: &Bifurcation| (b.kind, b.parameter, b.uncertainty, b.after_point);
+            branch.bifurcations.iter().map(of).collect::<Vec<_>>()
+        })
+    };
+    let alone = located();
+    assert_eq!(alone.each_ref().map(Vec::len), [4, 2]);
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        assert_eq!(pool.build().unwrap().install(located), alone, "{threads}");
     }
 }
 

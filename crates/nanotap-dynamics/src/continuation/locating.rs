@@ -10,6 +10,7 @@ use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::control::Control;
 use crate::map::MapFamily;
+use crate::orbit::side_by_side::is_alone;
 
 /// Who locates the bifurcations of one branch.
 pub(crate) struct Locating<'s, 'scope> {
@@ -30,8 +31,7 @@ impl<'scope> Locating<'_, 'scope> {
         step: f64,
         after_point: usize,
     ) -> Vec<Bifurcation> {
-        let alone = rayon::current_thread_index().is_none() || rayon::current_num_threads() == 1;
-        if alone || !Tests::any_changes(tests, solver.n) {
+        if is_alone() || !Tests::any_changes(tests, solver.n) {
             return between(solver, nodes, tests, step, after_point);
         }
         let mut solver = solver.another();

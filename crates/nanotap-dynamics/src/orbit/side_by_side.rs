@@ -16,12 +16,17 @@ pub(crate) fn side_by_side<M: StroboscopicMap, T: Send>(
     items: &mut [T],
     one: &(impl Fn(&mut M, &mut T) -> Result<(), MapFailure> + Sync),
 ) -> Result<(), MapFailure> {
-    if !map.is_costly() || rayon::current_thread_index().is_none() {
+    if !map.is_costly() || is_alone() {
         return items.iter_mut().try_for_each(|item| one(map, item));
     }
     // Two stretches a thread: they do not take equally long.
     let longest = items.len().div_ceil(2 * rayon::current_num_threads());
     shared_out(map, items, longest.max(1), one)
+}
+
+/// Whether no other thread of a pool can take work from this one.
+pub(crate) fn is_alone() -> bool {
+    rayon::current_thread_index().is_none() || rayon::current_num_threads() == 1
 }
 
 fn shared_out<M: StroboscopicMap, T: Send>(
@@ -30,7 +35,7 @@ fn shared_out<M: StroboscopicMap, T: Send>(
     longest: usize,
     one: &(impl Fn(&mut M, &mut T) -> Result<(), MapFailure> + Sync),
 ) -> Result<(), MapFailure> {
-    if items.len() <= longest || rayon::current_num_threads() == 1 {
+    if items.len() <= longest {
         return items.iter_mut().try_for_each(|item| one(map, item));
     }
     let (first, second) = items.split_at_mut(items.len() / 2);

@@ -93,6 +93,13 @@ impl Reached<'_> {
         let Self { outlook, .. } = self;
         Passed::new(outlook.orbit(), outlook.state(), outlook.is_unbounded())
     }
+
+    /// It followed until its motion is seen to go to an orbit or its transient is over.
+    fn settled(self) -> Self {
+        let Self { model, outlook } = self;
+        let outlook = outlook.settled(&mut Strobe::new(&model));
+        Self { model, outlook }
+    }
 }
 
 impl<'a> Walk<'a> {
@@ -156,7 +163,7 @@ impl<'a> Walk<'a> {
         }
         let mut reached = self.reach(step, start)?;
         if doubt {
-            reached.outlook = reached.outlook.settled(&mut Strobe::new(&reached.model));
+            reached = reached.settled();
         }
         let seems = reached.seems();
         Ok((Ahead::Reached(Box::new(reached)), seems))
@@ -175,12 +182,11 @@ impl<'a> Walk<'a> {
 
     /// The motion of a step, seen to go to an orbit or its transient over.
     fn settled(&'a self, step: usize, ahead: Ahead<'a>) -> Result<Reached<'a>, CaseError> {
-        let mut reached = match ahead {
+        let reached = match ahead {
             Ahead::Start(start) => self.reach(step, start.as_ref())?,
             Ahead::Reached(reached) => *reached,
         };
-        reached.outlook = reached.outlook.settled(&mut Strobe::new(&reached.model));
-        Ok(reached)
+        Ok(reached.settled())
     }
 
     /// What the motion of a step is and looks like, and what it hands on.

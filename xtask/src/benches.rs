@@ -51,10 +51,10 @@ const HEAD: &str = "\
 
 <!-- Written by `cargo xtask bench`. -->
 
-The fastest of the samples of each bench, on one core unless the bench says otherwise: other
-programs only ever add time. Datasets are in memory where the system has a place for them. A `period`
-is 100 drive periods.
-`crates/*/benches` says what each does, `docs/performance.md` what follows from them.
+The fastest sample of each bench, on one core unless the bench says otherwise; other programs on
+the machine can only add time. Datasets are in memory if the system provides a file system in memory.
+`period` benches run 100 drive periods. The code in `crates/*/benches` describes each bench;
+`docs/performance.md` discusses the results.
 ";
 
 fn succeeds_with_results(lines: &[String], succeeded: bool) -> bool {

@@ -1,5 +1,5 @@
-//! Work for a request: off the threads that serve, few pieces at a time, and ended when its
-//! client has gone.
+//! Computations for requests: on separate threads, few at a time, and cancelled when the client
+//! disconnects.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,16 +15,16 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use crate::answer::Refusal;
 
-/// Motions computed at once.
+/// Number of motions computed at once.
 const MOTIONS: usize = 2;
-/// Studies computed at once; each uses every core by itself.
+/// Number of studies computed at once; each uses all cores.
 const STUDIES: usize = 2;
-/// Longest time that one request is worked on.
+/// Longest time of a computation.
 const LONGEST: Duration = Duration::from_secs(300);
-/// Messages that may wait for a slow client; a study has fewer stages.
+/// Number of messages that may wait for a slow client; a study has fewer stages.
 const WAITING: usize = 64;
 
-/// The places in which requests are worked on: a long study holds up no motion.
+/// Limits of the computations: a long study does not delay motions.
 pub(crate) struct Workers {
     motions: Arc<Semaphore>,
     studies: Arc<Semaphore>,
@@ -39,7 +39,7 @@ impl Default for Workers {
     }
 }
 
-/// Stops the work when dropped, as happens when the client goes away.
+/// Stops the computation when dropped, which happens when the client disconnects.
 struct StopOnDrop(Arc<AtomicBool>);
 
 impl Drop for StopOnDrop {
@@ -56,7 +56,7 @@ fn control(stop: &AtomicBool) -> Control<'_> {
 }
 
 impl Workers {
-    /// Runs `work` that follows a dragged knob, and waits for what it gives.
+    /// Runs `work` that follows a slider, and waits for its result.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
@@ -64,7 +64,7 @@ impl Workers {
         Self::run_in(&self.motions, work).await
     }
 
-    /// Runs `work` that may take long, beside the studies.
+    /// Runs `work` that may take long, within the limit of the studies.
     pub(crate) async fn run_long<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
@@ -90,7 +90,7 @@ impl Workers {
         }
     }
 
-    /// Runs `work` and sends what it hands over as lines of JSON, as they come.
+    /// Runs `work` and sends its results as lines of JSON as they come.
     pub(crate) fn stream(
         &self,
         work: impl FnOnce(&Control<'_>, &dyn Fn(Value)) -> Result<(), Refusal> + Send + 'static,
@@ -108,7 +108,7 @@ impl Workers {
             let task = tokio::task::spawn_blocking(move || {
                 let _place = place;
                 let hand_over = |value: Value| {
-                    // A client that went away, or does not read, stops the work.
+                    // A client that disconnects, or does not read, stops the computation.
                     if sender.try_send(Ok(format!("{value}\n"))).is_err() {
                         stop.store(true, Ordering::Relaxed);
                     }

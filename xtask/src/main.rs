@@ -1,8 +1,8 @@
-//! The project's own chores, each by name: `cargo xtask test` is all of them.
+//! The project's tasks, each by name; `cargo xtask test` runs all checks.
 //!
-//! Every chore runs the tool a person would run by hand, shows its output as it
-//! comes, and counts what passed. A failed step does not stop the next one: one
-//! run tells everything that is wrong.
+//! Every task runs the tool that a person would run by hand, shows its output as it comes, and
+//! counts what passed. A failed step does not stop the next one, so that one run reports everything
+//! that is wrong.
 
 mod benches;
 mod book;
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// How a chore ended that is no check.
+/// Exit code of a task that is not a check.
 fn finished(outcome: Result<(), String>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -51,15 +51,15 @@ fn finished(outcome: Result<(), String>) -> ExitCode {
     }
 }
 
-/// What the words on the command line ask for.
+/// The tasks requested on the command line.
 enum Selection {
     Help,
     Run(Vec<&'static Step>),
     /// The benches.
     Bench,
-    /// The site of documents, with its own options.
+    /// The site of the documents, with its options.
     Book(Vec<String>),
-    /// The comparison with other solvers, with its own options.
+    /// The comparison with other solvers, with its options.
     Peers(Vec<String>),
 }
 
@@ -110,7 +110,7 @@ fn usage() -> String {
 struct Line {
     name: &'static str,
     tally: Tally,
-    /// The reason, where the step could not be run at all.
+    /// The reason, if the step could not be run.
     trouble: Option<String>,
     time: Duration,
 }
@@ -168,7 +168,7 @@ fn summarise(lines: &[Line]) -> ExitCode {
         );
     }
     println!();
-    // The plain closing line that continuous integration reads.
+    // The last line, which continuous integration reads.
     println!("{} passed, {} failed", total.passed, total.failed);
     if total.failed == 0 {
         ExitCode::SUCCESS

@@ -52,7 +52,7 @@ pub(super) fn page() -> String {
     text
 }
 
-/// Without the rounding that a unit's factor leaves.
+/// The number without the rounding error of a conversion of units.
 fn rounded(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -39,7 +39,7 @@ pub(super) fn page(entry: &StudyEntry) -> String {
     text
 }
 
-/// A table of what an object holds.
+/// A table of the entries of an object.
 fn entries(schema: &Value) -> String {
     let required: Vec<&str> = schema["required"]
         .as_array()
@@ -65,7 +65,7 @@ fn entries(schema: &Value) -> String {
     text
 }
 
-/// A table that entries of others name.
+/// A table to which entries of other tables refer.
 fn definition(name: &str, schema: &Value) -> String {
     let mut text = format!("\n### {name}\n\n");
     let about = meaning(schema);

@@ -65,7 +65,7 @@ enum Selection {
 
 fn select(arguments: &[String]) -> Result<Selection, String> {
     if arguments.is_empty() {
-        return Err("name at least one chore".into());
+        return Err("name at least one task".into());
     }
     match (arguments[0].as_str(), &arguments[1..]) {
         ("bench", []) => return Ok(Selection::Bench),
@@ -83,7 +83,7 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
                     .iter()
                     .chain(BESIDE)
                     .find(|step| step.name == name)
-                    .ok_or_else(|| format!("no chore is called `{name}`"))?,
+                    .ok_or_else(|| format!("no task is called `{name}`"))?,
             ),
         }
     }
@@ -92,17 +92,18 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
 
 fn usage() -> String {
     use std::fmt::Write as _;
-    let mut text = String::from("usage: cargo xtask <chore>...\n\n  test         all of these:\n");
+    let mut text =
+        String::from("usage: cargo xtask <task>...\n\n  test         all of these checks:\n");
     for step in STEPS {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
-    text.push_str("\n  beside them:\n");
+    text.push_str("\n  other tasks:\n");
     for step in BESIDE {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
-    text += "  bench        every bench, and docs/benches.md with what came out\n";
-    text += "  book         the documents as a site, in target/book/site (--quick: the paper's report too)\n";
-    text += "  peers        nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
+    text += "  bench        run every bench and write docs/benches.md\n";
+    text += "  book         build the documents as a site in target/book/site (--quick: a quick report on the paper)\n";
+    text += "  peers        compare nanotap with general solvers and write docs/peers.md (--quick, --help)\n";
     text
 }
 

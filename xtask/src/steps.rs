@@ -64,7 +64,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "package",
-        about: "every crate and the Python package, built from what would be published",
+        about: "build every crate and the Python package from the archives to be published",
         run: package,
     },
 ];
@@ -73,12 +73,12 @@ pub(crate) static STEPS: &[Step] = &[
 pub(crate) static BESIDE: &[Step] = &[
     Step {
         name: "wheel",
-        about: "the Python package, installable, in target/wheels",
+        about: "build the Python package in target/wheels",
         run: wheel,
     },
     Step {
         name: "signatures",
-        about: "Python's functions written anew from what the studies declare",
+        about: "write the Python functions from the studies' declarations",
         run: write_signatures,
     },
 ];

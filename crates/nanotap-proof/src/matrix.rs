@@ -170,9 +170,9 @@ impl Matrix<Rectangle> {
 
     /// The inverses of all matrices in it; `None` if some may be singular.
     ///
-    /// With an approximate inverse W and E = 1 − W V, ‖E‖ < 1, the inverse is (1 − E)⁻¹ W = W + E W
-    /// + …, and the terms after W are at most ‖E‖ ‖W‖_j / (1 − ‖E‖), where ‖W‖_j is the largest
-    /// entry of column j.
+    /// With an approximate inverse W and E = 1 − W V, ‖E‖ < 1, the inverse is
+    /// (1 − E)⁻¹ W = W + E W + …, and the terms after W are at most ‖E‖ ‖W‖_j / (1 − ‖E‖), where
+    /// ‖W‖_j is the largest entry of column j.
     pub fn inverse(&self) -> Option<Self> {
         let approximate = Self::points(&self.middle().try_inverse()?);
         if !approximate.iter().all(|z| z.is_finite()) {

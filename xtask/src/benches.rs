@@ -10,9 +10,9 @@ use crate::tools::Workspace;
 const CRATES: [(&str, &str); 2] = [
     (
         "nanotap-flow",
-        "The floor: exponentials and rotations alone",
+        "Lower bound: exponentials and rotations alone",
     ),
-    ("nanotap", "The exact flow and what is built upon it"),
+    ("nanotap", "The exact flow and the studies that use it"),
 ];
 
 /// Folder for datasets in memory, if the system has one.

@@ -61,7 +61,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Re
         }))
     });
     let unstable = found.unstable.iter().flatten();
-    let unstable = unstable.map(|orbit| entry(orbit, Some(orbit.period), "unstable"));
+    let unstable = unstable.map(|o| entry(&o.motion, Some(o.motion.period), "unstable"));
     let motions: Vec<Value> = stable.chain(unstable).collect();
     Ok(json!({ "motions": motions, "bound": bound(&found) }))
 }

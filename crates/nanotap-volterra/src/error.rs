@@ -99,7 +99,10 @@ pub enum VolterraError {
         reason: Refusal,
     },
     /// More steps were needed than are allowed.
-    #[error("{steps} steps reached only time {time}: the force changes too fast for the modes")]
+    #[error(
+        "the limit of {steps} steps was reached at time {time}: the force changes too fast for the \
+         modes, as under a damping that grows without bound in the contact"
+    )]
     TooManySteps {
         /// The steps taken.
         steps: usize,

@@ -155,6 +155,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
     }
     undecided(&mut text, found);
     if let Some(orbits) = &found.unstable {
+        let orbits: Vec<_> = orbits.iter().map(|orbit| &orbit.motion).collect();
         let _ = writeln!(
             text,
             "\n  {}",
@@ -167,7 +168,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             ("tip", Align::Left),
             ("contact (%)", Align::Point),
         ]);
-        for orbit in orbits {
+        for orbit in &orbits {
             let moduli = orbit
                 .multipliers
                 .iter()

@@ -52,7 +52,7 @@ Exit codes: 0 done, 1 failed, 2 bad input.";
 /// What an AFM cantilever does when its tip taps a sample: every motion, its
 /// stability, and what an experimenter would measure in it.
 #[derive(Debug, Parser)]
-#[command(name = "nanotap", version, styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
+#[command(name = "nanotap", version, long_version = long_version(), styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {
     /// Print one JSON document on standard output, and nothing else there
     #[arg(long, global = true)]
@@ -68,6 +68,13 @@ pub(crate) struct Arguments {
 
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// The version, and what the speed of this machine depends on.
+fn long_version() -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let instructions = nanotap::model::vector_instructions();
+    format!("{version}\nvector instructions: {instructions}")
 }
 
 /// Every command that there is.

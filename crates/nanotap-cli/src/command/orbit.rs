@@ -7,7 +7,7 @@ use nanotap::control::Control;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{PhysicalMotion, Set, time_series};
-use nanotap::study::orbit::{OrbitReport, OrbitRequest, OrbitStudy};
+use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitReport, OrbitRequest, OrbitStudy};
 use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -118,9 +118,21 @@ fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set
     let mut text = format!("{}\n\n", style::bold(&heading));
     let verdict = format!("a period-{} orbit, {}", orbit.period, orbit.stability);
     let _ = writeln!(text, "  {}", style::bold(&verdict));
+    let defect = orbit.determinant_defect;
+    let check = if defect <= MAX_DETERMINANT_DEFECT {
+        format!("its multipliers agree with the trace formula to {defect:.1e}")
+    } else if orbit.stability == "undecided" {
+        format!(
+            "its multipliers contradict the trace formula by {defect:.1e}, so that its stability is \
+             undecided"
+        )
+    } else {
+        "its smallest multiplier is lost in rounding, so that the trace formula does not check them"
+            .to_owned()
+    };
     text.push_str(&motion::paragraph(&format!(
-        "Newton closed it to {:.1e}; it is known to {:.1e}; its multipliers agree with the trace formula to {:.1e}",
-        orbit.residual, orbit.error, orbit.determinant_defect
+        "Newton closed it to {:.1e}; it is known to {:.1e}; {check}",
+        orbit.residual, orbit.error
     )));
     let _ = writeln!(text, "\n  {}", style::bold("state at drive phase 0"));
     let mut table = Table::new([("", Align::Left), ("", Align::Point)]);

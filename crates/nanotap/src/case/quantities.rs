@@ -49,7 +49,7 @@ impl Quantities {
         }
     }
 
-    /// The same, its quantities mapped; where neither lever nor tip changed, the lever stays.
+    /// The same, its quantities mapped; where neither lever nor tip nor modes changed, the lever stays.
     pub(super) fn mapped(mut self, same_lever: bool) -> Self {
         let lever = self.view.as_ref().ok().map(|view| view.lever);
         let lever = lever.filter(|_| same_lever);
@@ -91,7 +91,7 @@ impl Quantities {
         }
         if key == Key::Modes {
             varied.stated.put(key, Value::Number(value, Kind::Number));
-            return varied.mapped(true);
+            return varied.mapped(false);
         }
         if let (false, Ok(view)) = (self.held, &self.view) {
             varied.stated = view.held(&self.stated);

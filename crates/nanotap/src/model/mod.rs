@@ -33,9 +33,9 @@ mod tangent;
 use std::sync::{Arc, OnceLock};
 
 pub use motion_error::MotionError;
-pub use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
+pub use nanotap_flow::{FlowError, vector_instructions};
 pub use tangent::ModelTangent;
 
 use crate::model::beam::Modes;

@@ -33,6 +33,10 @@ const NODES: usize = 20;
 /// away: a few units of rounding.
 const TOLERANCE: f64 = 3e-15;
 
+/// Steps of a period of the drive, tens of times what tapping with twenty modes takes: a tenth of a
+/// second.
+const MAX_STEPS: f64 = 10_000.0;
+
 /// The lever under a nonlinear force.
 #[derive(Clone, Debug)]
 pub struct Nonlinear {
@@ -85,7 +89,18 @@ impl Nonlinear {
             offset: height.constant,
             tones,
         };
-        let system = System::new(kernel, Arc::clone(&law), forcing, Options::new(tolerance))?;
+        // A repetition of two tones has several of the drive's periods.
+        let slowest = drive
+            .frequencies()
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let repetitions = (drive.period() * slowest / TAU).max(1.0);
+        let options = Options {
+            max_steps: (MAX_STEPS * repetitions) as usize,
+            ..Options::new(tolerance)
+        };
+        let system = System::new(kernel, Arc::clone(&law), forcing, options)?;
         Ok(Self {
             system: Arc::new(system),
             contact: (0..law.branches()).map(|b| law.touches(b)).collect(),

@@ -16,6 +16,7 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::in_si::InSi;
 use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitReport, report};
@@ -119,7 +120,7 @@ pub struct Attractors {
     pub transient_chaos: Option<TransientChaosReport>,
     /// Unstable orbits, if they were looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub unstable: Option<Vec<OrbitReport>>,
+    pub unstable: Option<Vec<InSi<OrbitReport>>>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
 }
@@ -209,12 +210,13 @@ impl Attractors {
     fn prove(&mut self, case: &Case) {
         let prover = Prover::new(case);
         let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
-        for orbit in stable.chain(self.unstable.iter_mut().flatten()) {
-            orbit.proof = Some(prover.report(&orbit.trajectory, orbit.period));
+        let unstable = self.unstable.iter_mut().flatten();
+        for orbit in stable.chain(unstable.map(|orbit| &mut orbit.motion)) {
+            orbit.prove(&prover);
         }
     }
 
-    /// The same with every attractor told in SI too, of the case `view`.
+    /// The same with every motion told in SI too, of the case `view`.
     #[must_use]
     pub fn in_si(mut self, view: &Physical) -> Self {
         for attractor in &mut self.attractors {
@@ -227,6 +229,10 @@ impl Attractors {
                 (None, Some(seen)) => Some(PhysicalMotion::alone(&seen.observables, None, view)),
                 (None, None) => None,
             };
+        }
+        for orbit in self.unstable.iter_mut().flatten() {
+            let (observables, spectrum) = (&orbit.motion.observables, &orbit.motion.spectrum);
+            orbit.physical = Some(PhysicalMotion::alone(observables, Some(spectrum), view));
         }
         self
     }
@@ -367,7 +373,7 @@ fn described(
     set: &StartSet,
     options: &AttractorsOptions,
     sides: Vec<Side>,
-    unstable: Option<Vec<OrbitReport>>,
+    unstable: Option<Vec<InSi<OrbitReport>>>,
 ) -> Result<Attractors, AttractorsError> {
     let starts = found.outcomes_by_start.len();
     let attractors = found
@@ -514,7 +520,7 @@ fn unstable_orbits(
     searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Vec<OrbitReport>, AttractorsError> {
+) -> Result<Vec<InSi<OrbitReport>>, AttractorsError> {
     let search = OrbitSearch {
         max_period: options.unstable,
         ..OrbitSearch::default()
@@ -522,7 +528,12 @@ fn unstable_orbits(
     find_orbits(map, searched, &search, control)
         .iter()
         .filter(|orbit| !orbit.is_stable())
-        .map(|orbit| Ok(report(model, orbit, options.harmonics)?))
+        .map(|orbit| {
+            Ok(InSi {
+                motion: report(model, orbit, options.harmonics)?,
+                physical: None,
+            })
+        })
         .collect()
 }
 

@@ -9,6 +9,7 @@ mod common;
 mod derivatives;
 mod frequency_modulation;
 mod grazing;
+mod permanent_contact;
 mod reference;
 mod refusals;
 mod studies;

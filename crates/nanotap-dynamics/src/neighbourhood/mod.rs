@@ -30,15 +30,29 @@ use crate::vector::unit;
 const SHRINK: f64 = 0.75;
 /// Radii tried: down to 1e-10 of the orbit's scale.
 const TRIALS: usize = 80;
+/// Factor by which a block of returns contracts the distance at the samples.
+const BLOCK_RATE: f64 = 0.75;
+/// Radius that is tried first of a block, as a part of the orbit's scale.
+const FIRST_RADIUS: f64 = 1e-3;
+/// Factors between radii tried as long as a block contracts: large ones first.
+const GROWTH: [f64; 2] = [2.0, 1.4];
+/// Pseudo-random directions in which a block is tried, in addition to the axes.
+const DIRECTIONS: usize = 12;
+/// Part of the distance to the nearest other orbit up to which a ball reaches.
+const REACH: f64 = 0.7;
 
 /// A contracting ball around the first state of a stable orbit.
 #[derive(Clone, Debug)]
 pub struct Neighbourhood {
     center: Vec<f64>,
+    /// Drive periods over which it contracts: one return, or a block of them.
     period: usize,
     norm: AdaptedNorm,
     radius: f64,
+    /// Factor by which it contracts in these.
     rate: f64,
+    /// Periods after which a state in it that came no nearer is worth looking at again.
+    retry: usize,
     /// −ln|μ| of the largest multiplier, per period.
     decay: f64,
     /// Half width of the box that holds the ball: a cheap first test.
@@ -57,50 +71,112 @@ impl Neighbourhood {
         map: &mut M,
         orbit: &PeriodicOrbit,
     ) -> Result<Option<Self>, MapFailure> {
-        if !orbit.is_stable() {
-            return Ok(None);
-        }
-        let d = orbit.dimension();
-        let mut work = Return::new(d);
-        let center = orbit.states[0].clone();
-        let monodromy = work.jacobian(map, &center, orbit.period)?.clone();
-        let Some(norm) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
+        let Some(mut ball) = Self::empty(map, orbit)? else {
             return Ok(None);
         };
-        let rate = norm.rate_of_return();
-        let unit_extents = norm.extents();
-        let floor = 10.0 * norm.floor(&center, &work.state);
-        let scale = orbit.scale().max(1e3 * orbit.error);
-        let mut radius = norm.radius(scale);
+        let mut work = Return::new(orbit.dimension());
+        let mut radius = ball.norm.radius(orbit.scale().max(1e3 * orbit.error));
         for _ in 0..TRIALS {
-            if radius < 8.0 * floor {
+            if radius < 8.0 * ball.floor {
                 break;
             }
-            if contracts(
-                map,
-                &center,
-                orbit.period,
-                &norm,
-                radius,
-                rate,
-                floor,
-                &mut work,
-            ) {
-                let radius = SHRINK * radius;
-                return Ok(Some(Self {
-                    extents: unit_extents.iter().map(|e| e * radius).collect(),
-                    center,
-                    period: orbit.period,
-                    norm,
-                    radius,
-                    rate,
-                    decay: -nanotap_arithmetic::ln(orbit.spectral_radius()) / orbit.period as f64,
-                    floor,
-                }));
+            if ball.contracts(map, radius, &mut work) {
+                ball.set_radius(SHRINK * radius);
+                return Ok(Some(ball));
             }
             radius *= SHRINK;
         }
         Ok(None)
+    }
+
+    /// The largest ball in which a block of returns, one decay time long, contracts by
+    /// [`BLOCK_RATE`] at sample points, and that reaches over none of the `others`; `None` if the
+    /// orbit is not stable or none passes.
+    ///
+    /// # Errors
+    /// When the orbit itself cannot be followed.
+    pub(crate) fn over_block<'a, M: StroboscopicMap>(
+        map: &mut M,
+        orbit: &PeriodicOrbit,
+        others: impl Iterator<Item = &'a PeriodicOrbit>,
+    ) -> Result<Option<Self>, MapFailure> {
+        let Some(mut ball) = Self::empty(map, orbit)? else {
+            return Ok(None);
+        };
+        let returns = (1.0 / (ball.decay * orbit.period as f64)).ceil().max(1.0);
+        ball.period = orbit.period.saturating_mul(returns as usize);
+        ball.rate = BLOCK_RATE;
+        ball.retry = ball.period;
+        let size = orbit.scale().max(1e3 * orbit.error);
+        let mut largest = ball.norm.radius(size);
+        for other in others {
+            largest = largest.min(REACH * ball.distance_to(other));
+        }
+        let mut radius = ball.norm.radius(FIRST_RADIUS * size).min(largest);
+        while !ball.block_contracts(map, radius) {
+            radius *= 0.25;
+            if radius < 8.0 * ball.floor {
+                return Ok(None);
+            }
+        }
+        for growth in GROWTH {
+            while growth * radius <= largest && ball.block_contracts(map, growth * radius) {
+                radius *= growth;
+            }
+        }
+        ball.set_radius(radius);
+        Ok(Some(ball))
+    }
+
+    /// The ball of radius 0 around the first state of an orbit, with the rate of one return; `None`
+    /// if the orbit is not stable.
+    fn empty<M: StroboscopicMap>(
+        map: &mut M,
+        orbit: &PeriodicOrbit,
+    ) -> Result<Option<Self>, MapFailure> {
+        if !orbit.is_stable() {
+            return Ok(None);
+        }
+        let center = orbit.states[0].clone();
+        let mut work = Return::new(center.len());
+        let monodromy = work.jacobian(map, &center, orbit.period)?.clone();
+        let Some(norm) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            period: orbit.period,
+            radius: 0.0,
+            rate: norm.rate_of_return(),
+            retry: 1,
+            decay: -nanotap_arithmetic::ln(orbit.spectral_radius()) / orbit.period as f64,
+            extents: vec![0.0; center.len()],
+            floor: 10.0 * norm.floor(&center, &work.state),
+            center,
+            norm,
+        }))
+    }
+
+    fn set_radius(&mut self, radius: f64) {
+        self.radius = radius;
+        self.extents = self.norm.extents();
+        for extent in &mut self.extents {
+            *extent *= radius;
+        }
+    }
+
+    /// Distance of the centre from the nearest state of an orbit.
+    fn distance_to(&self, orbit: &PeriodicOrbit) -> f64 {
+        let distances = orbit.states.iter();
+        let distances = distances.map(|state| self.norm.distance(state, &self.center));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Shrinks the ball if it reaches over an orbit that was found since.
+    pub(crate) fn keep_clear_of(&mut self, orbit: &PeriodicOrbit) {
+        let largest = REACH * self.distance_to(orbit);
+        if self.radius > largest {
+            self.set_radius(largest);
+        }
     }
 
     /// True if `state` lies in the ball.
@@ -152,9 +228,49 @@ impl Neighbourhood {
         Ok(after <= self.rate * before || after <= self.floor)
     }
 
+    /// The checks of one return at one radius.
+    fn contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64, work: &mut Return) -> bool {
+        let d = self.center.len();
+        let mut samples = (0..2 * d + 16 + 2 * d).flat_map(|k| [(k, 1.0), (k, 0.5)]);
+        samples.all(|(sample, fraction)| {
+            let point = self.point(sample, radius * fraction);
+            let Ok(jacobian) = work.jacobian(map, &point, self.period) else {
+                return false;
+            };
+            let before = self.norm.distance(&point, &self.center);
+            self.norm.is_contracted_by(jacobian, self.rate)
+                && self.norm.distance(&work.state, &self.center) <= self.rate * before + self.floor
+        })
+    }
+
+    /// Whether a block of returns comes nearer from all samples at one radius.
+    fn block_contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64) -> bool {
+        (0..2 * self.center.len() + DIRECTIONS).all(|sample| {
+            let mut point = self.point(sample, radius);
+            let before = self.norm.distance(&point, &self.center);
+            (0..self.period).all(|_| advance(map, &mut point).is_ok())
+                && self.norm.distance(&point, &self.center) <= self.rate * before + self.floor
+        })
+    }
+
+    /// A sample point so far from the centre.
+    fn point(&self, sample: usize, radius: f64) -> Vec<f64> {
+        let d = self.center.len();
+        let (mut direction, mut offset) = (vec![0.0; d], vec![0.0; d]);
+        sample_direction(sample, &mut direction);
+        self.norm.unit_vector(&direction, &mut offset);
+        let places = self.center.iter().zip(&offset);
+        places.map(|(c, o)| c + radius * o).collect()
+    }
+
     /// Drive periods after which it comes round again.
     pub(crate) fn period(&self) -> usize {
         self.period
+    }
+
+    /// Periods after which a state in it that came no nearer is worth looking at again.
+    pub(crate) fn retry(&self) -> usize {
+        self.retry
     }
 
     /// Periods after which `state` would have come to the ball if it came at the rate of the
@@ -222,43 +338,6 @@ impl Return {
         }
         Ok(&self.product)
     }
-}
-
-/// The checks at one radius.
-fn contracts<M: StroboscopicMap>(
-    map: &mut M,
-    center: &[f64],
-    period: usize,
-    norm: &AdaptedNorm,
-    radius: f64,
-    rate: f64,
-    floor: f64,
-    work: &mut Return,
-) -> bool {
-    let d = center.len();
-    let mut direction = vec![0.0; d];
-    let mut offset = vec![0.0; d];
-    let mut point = vec![0.0; d];
-    for sample in 0..2 * d + 16 + 2 * d {
-        sample_direction(sample, &mut direction);
-        norm.unit_vector(&direction, &mut offset);
-        for fraction in [1.0, 0.5] {
-            for ((p, c), o) in point.iter_mut().zip(center).zip(&offset) {
-                *p = c + radius * fraction * o;
-            }
-            let Ok(jacobian) = work.jacobian(map, &point, period) else {
-                return false;
-            };
-            if !norm.is_contracted_by(jacobian, rate) {
-                return false;
-            }
-            let before = norm.distance(&point, center);
-            if norm.distance(&work.state, center) > rate * before + floor {
-                return false;
-            }
-        }
-    }
-    true
 }
 
 /// The axes both ways, then pseudo-random directions of length 1.

@@ -2,8 +2,8 @@
 
 use crate::census::escapes::Escapes;
 use crate::census::{
-    Attractor, AttractorKind, Census, CensusEnd, Fraction, Lifetime, Outcome, SizeCount, StartOrigin,
-    StartOutcome, StartSet, TransientChaos, Unseen,
+    Attractor, AttractorKind, Census, CensusEnd, Fraction, Lifetime, Outcome, SizeCount,
+    StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen,
 };
 use crate::lyapunov::LyapunovSpectrum;
 use crate::orbit::PeriodicOrbit;

@@ -383,7 +383,8 @@ impl<M: StroboscopicMap> Work<'_, M> {
     fn next_batch(&self) -> usize {
         let mut size = self.row;
         if self.starts.len().is_none() {
-            let bound = Unseen::row_for(self.motions.count(), self.options.unseen).saturating_sub(self.row);
+            let bound =
+                Unseen::row_for(self.motions.count(), self.options.unseen).saturating_sub(self.row);
             let periods = self.options.max_periods.saturating_sub(self.periods) as f64;
             let budget = periods * self.outcomes.len() as f64 / self.periods.max(1) as f64;
             size = size.min(bound).min(budget.ceil() as usize);
@@ -486,9 +487,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
     fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize]) -> Outcome {
         match arrival {
             None => Outcome::Undecided(UndecidedReason::Cancelled),
-            Some(RunEnd::Entered { index, periods }) => {
-                self.motions.arrival(known[index], periods)
-            }
+            Some(RunEnd::Entered { index, periods }) => self.motions.arrival(known[index], periods),
             Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified),
         }
     }
@@ -544,7 +543,10 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .copied()
             .filter(|&k| match self.outcomes[k] {
                 Outcome::Orbit { index, .. } => {
-                    let mut leads = self.neighbourhoods.iter().map(|(own, _)| self.leads_to(*own));
+                    let mut leads = self
+                        .neighbourhoods
+                        .iter()
+                        .map(|(own, _)| self.leads_to(*own));
                     leads.any(|other| other == Some(index))
                 }
                 _ => false,
@@ -572,7 +574,11 @@ impl<M: StroboscopicMap> Work<'_, M> {
             )
             .collect();
         let mut discarded = Vec::new();
-        let leads: Vec<_> = self.neighbourhoods.iter().map(|(own, _)| self.leads_to(*own)).collect();
+        let leads: Vec<_> = self
+            .neighbourhoods
+            .iter()
+            .map(|(own, _)| self.leads_to(*own))
+            .collect();
         for (k, entry) in checked.into_iter().zip(entries) {
             let (Outcome::Orbit { index, periods }, Some((ball, after))) =
                 (&mut self.outcomes[k], entry)

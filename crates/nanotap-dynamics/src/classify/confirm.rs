@@ -50,10 +50,8 @@ pub(crate) fn confirm<M: StroboscopicMap>(
         }
         _ => None,
     };
-    if let (
-        MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. },
-        Some(closed),
-    ) = (&mut found.kind, closed)
+    if let (MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. }, Some(closed)) =
+        (&mut found.kind, closed)
     {
         *orbit = closed;
         found.state = orbit.nearest(&found.state).0.to_vec();

@@ -185,7 +185,11 @@ pub struct Chaos {
 
 impl Chaos {
     /// On a motion of this spectrum for so many periods.
-    pub(crate) fn of(spectrum: LyapunovSpectrum, periods: usize, options: &ClassifyOptions) -> Self {
+    pub(crate) fn of(
+        spectrum: LyapunovSpectrum,
+        periods: usize,
+        options: &ClassifyOptions,
+    ) -> Self {
         let mut chaos = Self {
             spectrum,
             observed: 0,

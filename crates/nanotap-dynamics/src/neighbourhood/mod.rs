@@ -492,4 +492,100 @@ mod tests {
             "{square:?}"
         );
     }
+
+    /// z → 0.98 e^{iθ} (1 + |z|²/40) z with θ = 1 + 40 |z|² turns faster farther out: near rest 0.98
+    /// contracts, and beyond |z| = 0.9 the distance grows. The shear keeps a single return from
+    /// contracting every vector where a block of them still contracts.
+    #[derive(Clone)]
+    struct Twist;
+
+    impl StroboscopicMap for Twist {
+        type Error = Infallible;
+
+        fn dimension(&self) -> usize {
+            2
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+            let [x, y] = [state[0], state[1]];
+            let square = x * x + y * y;
+            let (sin, cos) = (1.0 + 40.0 * square).sin_cos();
+            let factor = 0.98 * (1.0 + square / 40.0);
+            state[0] = factor * (cos * x - sin * y);
+            state[1] = factor * (sin * x + cos * y);
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Infallible> {
+            let step = 1e-7;
+            for j in 0..2 {
+                let [mut up, mut down] = [state.to_vec(), state.to_vec()];
+                up[j] += step;
+                down[j] -= step;
+                self.advance(&mut up)?;
+                self.advance(&mut down)?;
+                for i in 0..2 {
+                    jacobian[(i, j)] = (up[i] - down[i]) / (2.0 * step);
+                }
+            }
+            self.advance(state)
+        }
+    }
+
+    /// A block of ⌈1/−ln 0.98⌉ = 50 returns contracts by 0.98⁵⁰ = 0.36 at rest, and by 3/4 from
+    /// |z| = 0.7, which iterating the factor gives.
+    #[test]
+    fn blocks_contract_farther_out_than_single_returns() {
+        let mut map = Twist;
+        let options = ShootingOptions {
+            residual_tolerance: 1e-6,
+            ..ShootingOptions::default()
+        };
+        let orbit = PeriodicOrbit {
+            states: vec![vec![0.0, 0.0]],
+            error: 1e-3,
+            ..close_orbit(&mut map, &[1e-3, 0.0], 1, &options).unwrap()
+        };
+        let single = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let none = || std::iter::empty::<&PeriodicOrbit>();
+        let block = Neighbourhood::over_block(&mut map, &orbit, none())
+            .unwrap()
+            .unwrap();
+        assert_eq!(block.period(), 50);
+        assert!(
+            block.extents()[0] > 10.0 * single.extents()[0],
+            "{block:?} {single:?}"
+        );
+        let contraction = |from: f64| {
+            let image = |r: f64, _| 0.98 * (1.0 + r * r / 40.0) * r;
+            (0..50).fold(from, image) / from
+        };
+        assert!(contraction(block.extents()[0]) <= 0.75);
+        assert!(
+            block
+                .holds(&mut map, &[0.9 * block.extents()[0], 0.0], &mut [0.0; 2])
+                .unwrap()
+        );
+        // Another orbit in it ends it before that.
+        let other = PeriodicOrbit {
+            states: vec![vec![0.5 * block.extents()[0], 0.0]],
+            ..orbit.clone()
+        };
+        let apart = other.states[0][0];
+        let smaller = Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other));
+        let smaller = smaller.unwrap().unwrap();
+        assert!(smaller.extents()[0] < 0.75 * apart && !smaller.contains(&other.states[0]));
+        let mut cut = block;
+        cut.keep_clear_of(&other);
+        assert!(!cut.contains(&other.states[0]));
+        near(cut.extents()[0], 0.7 * apart);
+    }
 }

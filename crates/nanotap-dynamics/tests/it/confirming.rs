@@ -181,7 +181,12 @@ fn seeds_are_attractors_without_starts() {
     let nested = Nested { r: 1.5, s: 1e-9 };
     let map = Pair::new(nested.clone(), nested);
     let start = drawn(-3.0, 3.0);
-    let found = taken(&map, &start.clone().with_seeds([(1, vec![6e-10]), (1, vec![1e-15])]));
+    let found = taken(
+        &map,
+        &start
+            .clone()
+            .with_seeds([(1, vec![6e-10]), (1, vec![1e-15])]),
+    );
     assert_eq!(found.attractors.len(), 3);
     assert_eq!(found.attractors[2].fraction.count, 0);
     assert_eq!(found.attractors[2].first_start, None);

@@ -13,12 +13,12 @@
 //! smooth function of the start only to that error. Nothing is certified here; results are
 //! computed by [`Flow`](crate::Flow).
 
+use crate::VolterraError;
 use crate::error::Refusal;
 use crate::law::{Approach, Exit, Guard};
 use crate::modes::Block;
 use crate::step::Statistics;
 use crate::system::System;
-use crate::VolterraError;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ const LEVELS: usize = 20;
 const FIRST_LEVEL: usize = 2;
 /// How much a step may change the gap's rate by its estimated error, as a part of the drive's
 /// frequency times the size of the motion.
-const TOLERANCE: f64 = 1e-4;
+const TOLERANCE: f64 = 2e-5;
 /// A step with less than this part of the allowed error is followed by one twice as long.
 const GROWTH: f64 = 1.0 / 12.0;
 /// Part of the amplitude that counts as the size of the motion where the gap is smaller.
@@ -239,10 +239,7 @@ impl Level {
                     sum[i] += dot(readout, weight);
                 }
             }
-            self.blocks.push(BlockStep {
-                half,
-                weights,
-            });
+            self.blocks.push(BlockStep { half, weights });
             if block.rate() * 0.5 * h > RESOLVED {
                 self.unresolved.push(k);
             }
@@ -277,7 +274,13 @@ impl Tables {
         let kernel = system.kernel();
         let blocks = kernel.modes().blocks();
         let parts = |v: &[f64]| -> Vec<[f64; 2]> {
-            let second = |block: &Block| if block.size == 2 { v[block.start + 1] } else { 0.0 };
+            let second = |block: &Block| {
+                if block.size == 2 {
+                    v[block.start + 1]
+                } else {
+                    0.0
+                }
+            };
             blocks.iter().map(|b| [v[b.start], second(b)]).collect()
         };
         let readout = parts(&kernel.readout);
@@ -364,7 +367,9 @@ impl Tables {
         let frequency = if swing > 0.0 {
             speed / swing
         } else {
-            slowest.fold(f64::INFINITY, f64::min).min(TAU / period * oscillations)
+            slowest
+                .fold(f64::INFINITY, f64::min)
+                .min(TAU / period * oscillations)
         };
         Ok(Self {
             mobility: (rate_readout.iter().zip(&source))
@@ -486,8 +491,7 @@ impl Tables {
         let k2 = self.force(branch, second[0], second[1]);
         let third = [0, 1].map(|i| mid[i] + level.middle[i] * k2);
         let k3 = self.force(branch, third[0], third[1]);
-        let fourth =
-            [0, 1].map(|i| end[i] + level.fourth[i] * k1 + 2.0 * level.middle[i] * k3);
+        let fourth = [0, 1].map(|i| end[i] + level.fourth[i] * k1 + 2.0 * level.middle[i] * k3);
         let k4 = self.force(branch, fourth[0], fourth[1]);
         for (y, block) in to.modal.iter_mut().zip(&level.blocks) {
             for i in 0..2 {
@@ -496,8 +500,9 @@ impl Tables {
                     + block.weights[2][i] * k4;
             }
         }
-        let [gap, rate] =
-            [0, 1].map(|i| end[i] + level.end[0][i] * k1 + level.end[1][i] * (k2 + k3) + level.end[2][i] * k4);
+        let [gap, rate] = [0, 1].map(|i| {
+            end[i] + level.end[0][i] * k1 + level.end[1][i] * (k2 + k3) + level.end[2][i] * k4
+        });
         (to.gap, to.rate) = (gap, rate);
         to.time = from.time + level.length;
         to.branch = branch;
@@ -566,7 +571,8 @@ impl Tables {
         for column in columns.chunks_exact_mut(motion.modal.len()) {
             let mut change = 0.0;
             for (k, y) in column.iter().enumerate() {
-                change += by_gap * dot(self.readout[k], *y) + by_rate * dot(self.rate_readout[k], *y);
+                change +=
+                    by_gap * dot(self.readout[k], *y) + by_rate * dot(self.rate_readout[k], *y);
             }
             let kick = jump * change / speed;
             for (y, b) in column.iter_mut().zip(&self.source) {
@@ -623,7 +629,11 @@ impl Stretch {
         } else {
             (root - q) / (2.0 * r)
         };
-        Some(if x.is_finite() { x.clamp(0.0, 1.0) } else { 0.5 })
+        Some(if x.is_finite() {
+            x.clamp(0.0, 1.0)
+        } else {
+            0.5
+        })
     }
 
     /// Where the cubic falls to zero between 0 and `end`, with opposite signs there.
@@ -888,12 +898,24 @@ impl Work {
                 if !tabulated {
                     self.part.set(&tables.system, &tables.readouts(), rest);
                 }
-                let level = if tabulated { &tables.levels[l] } else { &self.part };
+                let level = if tabulated {
+                    &tables.levels[l]
+                } else {
+                    &self.part
+                };
                 let error = tables.step(level, &self.now, &mut self.next, &mut self.stages);
                 self.statistics.evaluations += 3;
                 let mut refused = !(error <= allowed);
                 if !refused {
-                    match search(tables, level, &self.now, &self.next, &self.stages, self.size, allowed) {
+                    match search(
+                        tables,
+                        level,
+                        &self.now,
+                        &self.next,
+                        &self.stages,
+                        self.size,
+                        allowed,
+                    ) {
                         Search::Refused => refused = true,
                         Search::Fall(found) => fall = Some(found),
                         Search::None => {}

@@ -534,7 +534,10 @@ impl NonlinearStrobe {
         jacobian: &mut DMatrix<f64>,
         derivatives: Option<&mut DMatrix<f64>>,
     ) -> Result<(), MotionError> {
-        let (n, whole) = (self.nonlinear.system.dimension(), self.nonlinear.dimension());
+        let (n, whole) = (
+            self.nonlinear.system.dimension(),
+            self.nonlinear.dimension(),
+        );
         let start = state.to_vec();
         let varied = derivatives.is_some();
         let changes: Vec<Change> = self

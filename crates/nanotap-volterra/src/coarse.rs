@@ -905,7 +905,7 @@ impl Work {
                 };
                 let error = tables.step(level, &self.now, &mut self.next, &mut self.stages);
                 self.statistics.evaluations += 3;
-                let mut refused = !(error <= allowed);
+                let mut refused = error > allowed || error.is_nan();
                 if !refused {
                     match search(
                         tables,

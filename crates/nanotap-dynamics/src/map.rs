@@ -56,12 +56,6 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         1
     }
 
-    /// A cheaper, approximate map of the same state, for following transients; `None` where this map
-    /// is cheap itself. Nothing is reported from it.
-    fn coarse(&self) -> Option<Self> {
-        None
-    }
-
     /// Replaces `state` (length `dimension`) by `P(state)`.
     ///
     /// # Errors

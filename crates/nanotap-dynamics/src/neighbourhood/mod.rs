@@ -21,7 +21,7 @@ use nalgebra::DMatrix;
 
 pub(crate) use adapted_norm::AdaptedNorm;
 
-use crate::failure::{MapFailure, advance, advance_with_jacobian};
+use crate::failure::{MapFailure, advance_by, advance_with_jacobian};
 use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
 use crate::vector::unit;
@@ -220,9 +220,7 @@ impl Neighbourhood {
             return Ok(false);
         }
         scratch.copy_from_slice(state);
-        for _ in 0..self.period {
-            advance(map, scratch)?;
-        }
+        advance_by(map, scratch, self.period)?;
         let before = self.norm.distance(state, &self.center);
         let after = self.norm.distance(scratch, &self.center);
         Ok(after <= self.rate * before || after <= self.floor)
@@ -248,7 +246,7 @@ impl Neighbourhood {
         (0..2 * self.center.len() + DIRECTIONS).all(|sample| {
             let mut point = self.point(sample, radius);
             let before = self.norm.distance(&point, &self.center);
-            (0..self.period).all(|_| advance(map, &mut point).is_ok())
+            advance_by(map, &mut point, self.period).is_ok()
                 && self.norm.distance(&point, &self.center) <= self.rate * before + self.floor
         })
     }

@@ -6,6 +6,7 @@ use nanotap_dynamics::{
     AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
     OrbitSearch, PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
 };
+use nanotap_volterra::coarse;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -317,8 +318,6 @@ const STARTS_IN_A_BOX: usize = 256;
 /// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
 /// law.
 pub const NONLINEAR_UNSEEN: f64 = 0.01;
-/// Relative tolerance of the approximate flow on which starts are followed.
-const COARSE_TOLERANCE: f64 = 1e-4;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -476,7 +475,7 @@ fn described(
                 limit: budgets.max_periods,
             },
         },
-        followed_at: found.followed_coarsely.then_some(COARSE_TOLERANCE),
+        followed_at: found.followed_coarsely.then_some(coarse::TOLERANCE),
         undecided: found
             .undecided
             .iter()

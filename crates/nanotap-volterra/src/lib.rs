@@ -15,6 +15,7 @@
 //! - [`law`]: what a law is to the flow; [`laws`]: the table of contact laws;
 //! - [`system`]: modes, drive and law together; [`flow`] runs it;
 //! - [`coarse`]: a cheap, approximate flow for following transients;
+//! - [`averaging`]: guesses of periodic motions by harmonic balance;
 //! - [`tangent`]: derivatives by the initial state and by parameters;
 //! - [`trajectory`]: dense output, extrema, integrals.
 //!
@@ -103,6 +104,7 @@
     )
 )]
 
+pub mod averaging;
 pub mod coarse;
 pub mod dual;
 pub mod error;

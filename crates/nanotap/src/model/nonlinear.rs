@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::{Output, Regime};
+use nanotap_volterra::averaging::{about_rest, distances, motions};
 use nanotap_volterra::{
     Coarse, Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
     ToneChange, Trajectory, VolterraError,
@@ -130,6 +131,37 @@ impl Nonlinear {
         usize::from(self.remembers)
     }
 
+    /// The state of the model with these coordinates of the lever, on a branch of the law.
+    fn state(&self, mut lever: Vec<f64>, branch: usize) -> Vec<f64> {
+        if self.remembers {
+            lever.push(branch as f64);
+        }
+        lever
+    }
+
+    /// Guesses of periodic motions at drive phase 0, by averaging over the drive's strongest tone
+    /// and by the linear response about each rest of the lever.
+    pub(crate) fn averaged_states(&self) -> Vec<Vec<f64>> {
+        let rests = self.equilibria();
+        let gaps: Vec<f64> = rests.iter().map(|rest| rest.gap).collect();
+        let about = |rest: &Equilibrium| about_rest(&self.system, rest.branch, rest.gap);
+        let motions = motions(&self.system, &gaps).into_iter();
+        motions
+            .chain(rests.iter().filter_map(about))
+            .map(|motion| self.state(motion.state, motion.branch))
+            .collect()
+    }
+
+    /// Guesses of the distances at which the gap swings with this amplitude, the farthest first,
+    /// by averaging: the constant part of the gap, as [`Model::height`] has it, and the state at
+    /// drive phase 0.
+    pub(crate) fn averaged_distances(&self, amplitude: f64) -> Vec<(f64, Vec<f64>)> {
+        let motions = distances(&self.system, amplitude).into_iter();
+        motions
+            .map(|motion| (motion.offset, self.state(motion.state, motion.branch)))
+            .collect()
+    }
+
     /// Puts `flow` at a state of the model at drive phase 0.
     pub(crate) fn start(&self, flow: &mut Flow, state: &[f64]) -> Result<(), MotionError> {
         let (n, expected) = (self.system.dimension(), self.dimension());
@@ -199,6 +231,9 @@ pub struct Equilibrium {
     pub contact: bool,
     /// Whether it is stable: the lever is stiffer than the attraction.
     pub stable: bool,
+    /// The branch of the law.
+    #[serde(skip)]
+    pub branch: usize,
 }
 
 /// Points at which a force is looked at, on each branch of the law.
@@ -260,6 +295,7 @@ impl Nonlinear {
                     force: force.value,
                     contact: self.contact[branch],
                     stable: compliance * force.by_gap < 1.0,
+                    branch,
                 });
             }
         }

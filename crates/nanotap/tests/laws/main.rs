@@ -5,6 +5,7 @@
     reason = "references are the platform's own functions"
 )]
 
+mod averaging;
 mod common;
 mod derivatives;
 mod frequency_modulation;

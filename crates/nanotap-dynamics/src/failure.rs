@@ -40,7 +40,8 @@ pub(crate) fn advance_by<M: StroboscopicMap>(
     state: &mut [f64],
     periods: usize,
 ) -> Result<(), MapFailure> {
-    map.advance_by(state, periods).map_err(MapFailure::refused)?;
+    map.advance_by(state, periods)
+        .map_err(MapFailure::refused)?;
     finite(state)
 }
 

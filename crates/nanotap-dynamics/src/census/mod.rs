@@ -78,8 +78,12 @@ const COARSE_PATIENCE: f64 = 1.3;
 const MAX_COARSE_PATIENCE: usize = 16_384;
 /// Periods for which chaotic starts together are watched, where periods are cheap, and the rounds in
 /// which they are: each takes as long as all before it.
-const WATCHED_TOGETHER: usize = 1_000_000;
+const WATCHED_TOGETHER: usize = 400_000;
 const WATCH_ROUNDS: u32 = 4;
+/// Escapes after which a lifetime is known well enough.
+const ENOUGH_ESCAPES: usize = 16;
+/// Pilots where orbits are known from seeds and periods are cheap.
+const COARSE_PILOTS: usize = 8;
 /// Chaos is watched for so many times the periods after which escapes are counted.
 const WATCHED_TRANSIENTS: f64 = 8.0;
 
@@ -310,9 +314,14 @@ pub fn census_of<M: StroboscopicMap>(
     if work.motions.count() > 0 {
         work.know_neighbourhoods(&[]);
     }
+    let count = if work.motions.is_coarse && !work.neighbourhoods.is_empty() {
+        options.pilots.min(COARSE_PILOTS)
+    } else {
+        options.pilots
+    };
     // Chaos that the first of the pilots are on need not be measured again by the others.
-    let mut pilots = work.follow(options.pilots.clamp(1, FIRST_PILOTS));
-    pilots.extend(work.follow(options.pilots.saturating_sub(FIRST_PILOTS)));
+    let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
+    pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
     work.know_neighbourhoods(&pilots);
     while work.outcomes.len() < last && !work.is_enough() {
         let classified = work.follow(work.next_batch());
@@ -633,6 +642,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
             for round in (0..WATCH_ROUNDS).rev() {
                 self.watch_for(enough.max(together >> round), after, &mut budget);
                 self.find_neighbourhoods();
+                if Escapes::count(&self.outcomes, *after).escaped.len() >= ENOUGH_ESCAPES {
+                    break;
+                }
             }
         } else {
             self.watch_for(enough, after, &mut budget);

@@ -12,7 +12,7 @@ use crate::classify::{
     Chaos, Classified, ClassifyOptions, Known, MotionKind, Torus, UndecidedReason, classify_on,
     close_exactly,
 };
-use crate::lyapunov::LyapunovSpectrum;
+use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
 use crate::map::StroboscopicMap;
 use crate::orbit::search::merge;
 use crate::orbit::{PeriodicOrbit, close_orbit};
@@ -22,6 +22,8 @@ const MAX_UNCONFIRMED: usize = 8;
 /// States of a motion that does not close from which it is classified exactly, until one shows what
 /// it is.
 const MAX_TRIES: usize = 4;
+/// Periods for which exponents are measured on the map itself at most.
+const MAX_EXACT_PERIODS: usize = 4000;
 
 pub(super) struct Motions<'a, M> {
     /// The map itself.
@@ -31,6 +33,8 @@ pub(super) struct Motions<'a, M> {
     pub(super) is_coarse: bool,
     /// Budgets on the map itself.
     options: &'a ClassifyOptions,
+    /// The same for a motion that a coarse one has come to.
+    budgets: ClassifyOptions,
     cancel: Option<&'a AtomicBool>,
     /// Stable orbits of the map itself, each once.
     pub(super) orbits: Vec<PeriodicOrbit>,
@@ -68,7 +72,17 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         cancel: Option<&'a AtomicBool>,
     ) -> Self {
         let coarse = map.coarse();
+        let longest = options.lyapunov.max_periods.min(MAX_EXACT_PERIODS);
+        let budgets = ClassifyOptions {
+            lyapunov: LyapunovOptions {
+                min_periods: options.lyapunov.min_periods.min(longest),
+                max_periods: longest,
+                ..options.lyapunov.clone()
+            },
+            ..options.clone()
+        };
         Self {
+            budgets,
             exact: map.clone(),
             is_coarse: coarse.is_some(),
             followed: coarse.unwrap_or_else(|| map.clone()),
@@ -216,7 +230,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             cancel: self.cancel,
             ..Known::default()
         };
-        let mut found = classify_on(&mut self.exact, state, known, self.options);
+        let mut found = classify_on(&mut self.exact, state, known, &self.budgets);
         found.periods += periods;
         if let MotionKind::Chaotic(chaos) = &mut found.kind {
             chaos.watched(found.periods);

@@ -33,6 +33,9 @@ const LAST_WORTH_TRYING: f64 = 0.1;
 pub(crate) const RECOGNISABLE: usize = 256;
 /// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
 const TELLING: f64 = 0.2;
+/// Error of an orbit, as a part of its size, that says whether a run is on it: on a coarse map it is
+/// known to less.
+const DETERMINED: f64 = 1e-8;
 /// Distance of a neighbour, in standard deviations of the motion.
 const NEIGHBOUR: f64 = 1e-9;
 /// How many times its distance grows on chaos.
@@ -466,7 +469,8 @@ impl<'a> Run<'a> {
                 return Some(Closed::Attracting(orbit));
             }
             let mut states = orbit.states.iter();
-            if states.any(|x| distance(x, &self.state) <= 10.0 * orbit.error) {
+            let reach = 10.0 * orbit.error.min(DETERMINED * orbit.scale());
+            if states.any(|x| distance(x, &self.state) <= reach) {
                 return Some(Closed::Occupied(orbit));
             }
             guesses.tried.push(orbit);

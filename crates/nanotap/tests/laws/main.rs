@@ -6,6 +6,7 @@
 )]
 
 mod averaging;
+mod census;
 mod common;
 mod derivatives;
 mod frequency_modulation;

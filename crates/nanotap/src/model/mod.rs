@@ -309,6 +309,7 @@ impl Model {
                 force: at(&self.force[r]),
                 contact: self.contact[r],
                 stable: regime.basis().eigenvalues.iter().all(|z| z.re < 0.0),
+                branch: 0,
             });
         }
         found.sort_by(|a, b| b.gap.total_cmp(&a.gap));

@@ -2,6 +2,7 @@
 
 pub mod approach;
 pub mod attractors;
+pub mod averaged_orbits;
 pub mod basin;
 pub mod branch;
 pub mod contact_laws;

@@ -5,6 +5,8 @@
     reason = "references are the platform's own functions"
 )]
 
+mod averaging;
+mod census;
 mod common;
 mod derivatives;
 mod frequency_modulation;

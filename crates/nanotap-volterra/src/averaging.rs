@@ -1,0 +1,364 @@
+//! Approximate periodic motions by averaging: guesses for Newton's method.
+//!
+//! The gap is taken as `d̄ + A cos θ`, `θ = Ωt + φ`, with the frequency of the strongest tone. Over
+//! one oscillation the law gives a mean force `F̄` and the complex first harmonic `f`
+//! (`F ≈ F̄ + Re f e^{iθ}`), its memory included. With the gap's static compliance `c`, its
+//! receptance `H(Ω)`, and `G` the tone's part in the gap without the force, harmonic balance says
+//!
+//! `d̄ = d₀ + c F̄`, `|A − H f| = |G|`, `e^{iφ} = G/(A − H f)`
+//!
+//! (Garcia and San Paulo, Phys. Rev. B 60, 4961, 1999, for one mode). The roots in `A` at a given
+//! distance `d₀` are the motions; those in `d₀` at a given `A` the distances of a setpoint.
+//! Higher harmonics of the force enter the state by the modes' response to them. Wrong where the
+//! gap has strong harmonics: whatever is found here is a guess.
+
+use crate::law::Guard;
+use crate::system::System;
+use crate::{Complex, VolterraError};
+use nalgebra::DVector;
+use nanotap_arithmetic::ComplexFunctions as _;
+use std::f64::consts::{PI, TAU};
+
+/// Amplitudes at which the equation is evaluated.
+const AMPLITUDES: usize = 400;
+/// Phases over one oscillation, denser towards the sample.
+const PHASES: usize = 240;
+/// Harmonics of the force in the state.
+const HARMONICS: usize = 12;
+/// Mean gaps at which the equation of a setpoint is evaluated.
+const MEAN_GAPS: usize = 600;
+/// Newton steps for the mean gap.
+const MAX_ITERATIONS: usize = 12;
+/// Halvings of an interval that holds a root.
+const BISECTIONS: usize = 30;
+
+/// A guess of a periodic motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AveragedMotion {
+    /// The state at drive phase 0.
+    pub state: Vec<f64>,
+    /// The branch of the law there.
+    pub branch: usize,
+    /// The constant part of the gap, `d₀` less the drive's static deflection: the system's, or
+    /// that solved for.
+    pub offset: f64,
+    /// Amplitude of the gap at the strongest tone.
+    pub amplitude: f64,
+}
+
+/// The system as averaging sees it.
+struct Averaging<'a> {
+    system: &'a System,
+    frequency: f64,
+    /// Of the tone in the gap without the force.
+    drive: Complex,
+    compliance: f64,
+    receptance: Complex,
+    /// Phases and weights over one oscillation from the far turning point.
+    phases: Vec<Phase>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Phase {
+    angle: f64,
+    cos: f64,
+    sin: f64,
+    weight: f64,
+}
+
+/// Averages of the force over one oscillation.
+#[derive(Clone, Copy, Debug, Default)]
+struct Average {
+    mean: f64,
+    /// Of the mean by the mean gap.
+    slope: f64,
+    first: Complex,
+}
+
+impl<'a> Averaging<'a> {
+    /// `None` without a drive that moves the gap, or where a mode has no response.
+    fn new(system: &'a System) -> Option<Self> {
+        let tones = system.drive().tones.iter().zip(&system.gap_tones);
+        let (tone, drive) = tones.max_by(|a, b| a.1.modulus().total_cmp(&b.1.modulus()))?;
+        let unit = |frequency| {
+            let modal = response(system, frequency).ok()?;
+            Some(system.kernel().read(&modal))
+        };
+        // u from −1 to 1, θ = π + π u³: the force acts near π.
+        let phases = (0..PHASES).map(|i| {
+            let width = 2.0 / PHASES as f64;
+            let u = (i as f64 + 0.5) * width - 1.0;
+            let angle = PI + PI * u * u * u;
+            let (sin, cos) = nanotap_arithmetic::sin_cos(angle);
+            Phase {
+                angle,
+                cos,
+                sin,
+                weight: 1.5 * u * u * width,
+            }
+        });
+        Some(Self {
+            system,
+            frequency: tone.frequency,
+            drive: *drive,
+            compliance: unit(0.0)?.re,
+            receptance: unit(tone.frequency)?,
+            phases: phases.collect(),
+        })
+        .filter(|averaging| averaging.drive.modulus() > 0.0)
+    }
+
+    /// Calls `visit` with each phase, the force there and the branch, over one oscillation that
+    /// begins at the far turning point.
+    fn oscillate(&self, mean: f64, amplitude: f64, mut visit: impl FnMut(&Phase, f64, usize)) {
+        let law = self.system.law();
+        let mut branch = law.branch_at(mean + amplitude, 0.0);
+        for phase in &self.phases {
+            let gap = mean + amplitude * phase.cos;
+            let rate = -amplitude * self.frequency * phase.sin;
+            branch = if law.remembers() {
+                self.next_branch(branch, gap, rate)
+            } else {
+                law.branch_at(gap, rate)
+            };
+            visit(phase, law.value(branch, gap, rate), branch);
+        }
+    }
+
+    /// The branch at this gap and rate, coming from another.
+    fn next_branch(&self, mut branch: usize, gap: f64, rate: f64) -> usize {
+        let law = self.system.law();
+        for _ in 0..law.branches() {
+            let left = self.system.exits(branch).iter().find(|exit| {
+                let guard = match exit.guard {
+                    Guard::Falls(level) => gap - level,
+                    Guard::Rises(level) => level - gap,
+                    Guard::Turns => -rate,
+                    Guard::Own(index) => law.guard(index, gap, rate).value,
+                };
+                guard < 0.0
+            });
+            let Some(exit) = left else { break };
+            branch = exit.target;
+        }
+        branch
+    }
+
+    fn average(&self, mean: f64, amplitude: f64) -> Average {
+        let mut out = Average::default();
+        self.oscillate(mean, amplitude, |phase, force, _| {
+            let part = phase.weight * force;
+            out.mean += part;
+            out.first += Complex::new(2.0 * part * phase.cos, -2.0 * part * phase.sin);
+        });
+        out
+    }
+
+    /// With the derivative of the mean force by the mean gap.
+    fn average_with_slope(&self, mean: f64, amplitude: f64, step: f64) -> Average {
+        let mut here = self.average(mean, amplitude);
+        here.slope = (self.average(mean + step, amplitude).mean - here.mean) / step;
+        here
+    }
+
+    /// The mean gap at this amplitude, near a guess.
+    fn mean_gap(&self, amplitude: f64, guess: f64, size: f64) -> (f64, Average) {
+        let rest = self.system.gap_constant;
+        let (mut mean, mut average) = (guess, Average::default());
+        for _ in 0..MAX_ITERATIONS {
+            average = self.average_with_slope(mean, amplitude, 1e-6 * size);
+            let excess = mean - rest - self.compliance * average.mean;
+            let slope = (1.0 - self.compliance * average.slope).max(0.05);
+            let change = (-excess / slope).clamp(-0.02 * size, 0.02 * size);
+            if !change.is_finite() {
+                break;
+            }
+            mean += change;
+            if change.abs() < 1e-7 * size {
+                break;
+            }
+        }
+        (mean, average)
+    }
+
+    /// By how much the drive's amplitude falls short of what this motion takes.
+    fn residual(&self, amplitude: f64, average: &Average) -> f64 {
+        (amplitude - self.receptance * average.first).modulus() - self.drive.modulus()
+    }
+
+    /// The state at phase 0 of the motion with this mean gap and amplitude.
+    fn motion(&self, mean: f64, amplitude: f64) -> Option<AveragedMotion> {
+        let average = self.average(mean, amplitude);
+        let shift = self.drive / (amplitude - self.receptance * average.first);
+        let shift = shift / shift.modulus();
+        // Harmonics of the force in θ.
+        let mut harmonics = [Complex::new(0.0, 0.0); HARMONICS + 1];
+        let own = shift.argument();
+        let angle = if own < 0.0 { own + TAU } else { own };
+        let mut branch = None;
+        self.oscillate(mean, amplitude, |phase, force, at| {
+            let turn = Complex::new(phase.cos, -phase.sin);
+            let mut power = Complex::new(1.0, 0.0);
+            for (n, harmonic) in harmonics.iter_mut().enumerate() {
+                let factor = if n == 0 { 1.0 } else { 2.0 };
+                *harmonic += power * (factor * phase.weight * force);
+                power *= turn;
+            }
+            if phase.angle <= angle || branch.is_none() {
+                branch = Some(at);
+            }
+        });
+        let mut modal = DVector::zeros(self.system.dimension());
+        let mut power = Complex::new(1.0, 0.0);
+        for (n, harmonic) in harmonics.iter().enumerate() {
+            let Ok(unit) = response(self.system, n as f64 * self.frequency) else {
+                continue;
+            };
+            modal += unit.map(|z| (z * harmonic * power).re);
+            power *= shift;
+        }
+        let offset = mean - self.compliance * average.mean - self.system.gap_constant;
+        self.finish(modal.as_slice(), branch?, offset, amplitude)
+    }
+
+    fn finish(
+        &self,
+        modal: &[f64],
+        branch: usize,
+        offset: f64,
+        amplitude: f64,
+    ) -> Option<AveragedMotion> {
+        let mut state = vec![0.0; modal.len()];
+        self.system.to_state(0.0, modal, &mut state);
+        let finite = state.iter().all(|x| x.is_finite());
+        finite.then_some(AveragedMotion {
+            state,
+            branch,
+            offset: self.system.drive().offset + offset,
+            amplitude,
+        })
+    }
+
+    /// The size of gaps and amplitudes.
+    fn size(&self) -> f64 {
+        self.drive.modulus().max(self.system.gap_constant.abs())
+    }
+}
+
+/// Modal response to a unit of force at a frequency.
+fn response(system: &System, frequency: f64) -> Result<DVector<Complex>, VolterraError> {
+    let source = system.kernel().source.iter();
+    let source = source.map(|b| Complex::new(*b, 0.0)).collect();
+    system
+        .kernel()
+        .modes()
+        .response(frequency, &DVector::from_vec(source))
+}
+
+/// Motions of `system` by averaging, those of small amplitude first: the roots in the amplitude,
+/// with the mean gap followed from each of `rests`, gaps at which the lever can rest.
+pub fn motions(system: &System, rests: &[f64]) -> Vec<AveragedMotion> {
+    let Some(averaging) = Averaging::new(system) else {
+        return Vec::new();
+    };
+    let size = averaging.size();
+    let largest = 1.6 * averaging.drive.modulus() + 0.6 * system.gap_constant.abs();
+    let mut found = Vec::new();
+    for &rest in rests {
+        let mut before: Option<(f64, f64, f64)> = None;
+        for k in 1..=AMPLITUDES {
+            let amplitude = largest * k as f64 / AMPLITUDES as f64;
+            let guess = before.map_or(rest, |(_, mean, _)| mean);
+            let (mean, average) = averaging.mean_gap(amplitude, guess, size);
+            let residual = averaging.residual(amplitude, &average);
+            if let Some((low, mean_low, at_low)) = before
+                && residual * at_low < 0.0
+            {
+                let (mut low, mut high, mut near) = (low, amplitude, mean_low);
+                for _ in 0..BISECTIONS {
+                    let middle = 0.5 * (low + high);
+                    let (mean, average) = averaging.mean_gap(middle, near, size);
+                    near = mean;
+                    if averaging.residual(middle, &average) * at_low > 0.0 {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                found.extend(averaging.motion(near, 0.5 * (low + high)));
+            }
+            before = residual.is_finite().then_some((amplitude, mean, residual));
+        }
+    }
+    found.sort_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
+    found.dedup_by(|a, b| {
+        let pairs = a.state.iter().zip(&b.state);
+        let scale = b.state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        a.branch == b.branch
+            && pairs.fold(0.0, |m: f64, (x, y)| m.max((x - y).abs())) < 1e-6 * scale
+    });
+    found
+}
+
+/// Distances at which a motion has this amplitude of the gap, the farthest first: the roots of
+/// the averaged equation in the mean gap. [`AveragedMotion::offset`] has the system's offset at
+/// each.
+pub fn distances(system: &System, amplitude: f64) -> Vec<AveragedMotion> {
+    let Some(averaging) = Averaging::new(system) else {
+        return Vec::new();
+    };
+    let residual = |mean: f64| averaging.residual(amplitude, &averaging.average(mean, amplitude));
+    // From where hardly any force is left to where the tip never leaves the sample.
+    let (far, near) = (6.0 * amplitude, -amplitude);
+    let contact = (0..system.law().branches())
+        .flat_map(|branch| system.exits(branch))
+        .filter_map(|exit| match exit.guard {
+            Guard::Falls(level) if level > 0.0 => Some(level),
+            _ => None,
+        })
+        .fold(0.0, f64::max);
+    let mut found = Vec::new();
+    let mut before: Option<(f64, f64)> = None;
+    for k in 0..=MEAN_GAPS {
+        // Denser about the amplitude, where the tip comes to the sample.
+        let u = 1.0 - 2.0 * k as f64 / MEAN_GAPS as f64;
+        let side = if u > 0.0 {
+            far - amplitude
+        } else {
+            amplitude - near
+        };
+        let mean = contact + amplitude + side * u * u * u;
+        let here = residual(mean);
+        if let Some((mean_before, at)) = before
+            && here * at < 0.0
+        {
+            let (mut far, mut near) = (mean_before, mean);
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (far + near);
+                if residual(middle) * at > 0.0 {
+                    far = middle;
+                } else {
+                    near = middle;
+                }
+            }
+            found.extend(averaging.motion(0.5 * (far + near), amplitude));
+        }
+        before = here.is_finite().then_some((mean, here));
+    }
+    found
+}
+
+/// The linear response to the drive about a rest of the lever at `gap` on a branch of the law.
+pub fn about_rest(system: &System, branch: usize, gap: f64) -> Option<AveragedMotion> {
+    let averaging = Averaging::new(system)?;
+    let force = system.law().force(branch, gap, 0.0);
+    let unit = response(system, 0.0).ok()?;
+    let mut modal = unit.map(|z| z.re * force.value);
+    for (tone, drive) in system.drive().tones.iter().zip(&system.gap_tones) {
+        let unit = response(system, tone.frequency).ok()?;
+        let slope = Complex::new(force.by_gap, tone.frequency * force.by_rate);
+        let swing = drive / (1.0 - system.kernel().read(&unit) * slope);
+        modal += unit.map(|z| (z * slope * swing).re);
+    }
+    averaging.finish(modal.as_slice(), branch, 0.0, 0.0)
+}

@@ -1,0 +1,123 @@
+//! Orbits from averaging, and the approximate map, on reference cases.
+//!
+//! `tests/reference/census` has cases and the orbits to expect, each closed by the exact flow,
+//! from a census with an independent program.
+
+use nanotap::case::Case;
+use nanotap::case::file::Source;
+use nanotap::model::Model;
+use nanotap::model::strobe::Strobe;
+use nanotap::study::averaged_orbits::{averaged_distances, averaged_orbits};
+use nanotap_dynamics::StroboscopicMap;
+use std::path::Path;
+
+/// The cases of the folder with their expected orbits.
+pub(crate) fn cases() -> Vec<(String, Model, serde_json::Value)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/census");
+    let read = |name: &Path| std::fs::read_to_string(name).unwrap();
+    let mut names: Vec<_> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|end| end == "toml"))
+        .collect();
+    names.sort();
+    let case = |path: &std::path::PathBuf| {
+        let expected = read(&path.with_extension("expected.json"));
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let source = Source {
+            name: name.clone(),
+            text: read(path),
+        };
+        let case = Case::parse(Some(source), &[]).unwrap();
+        let model = case.model().unwrap();
+        (name, model, serde_json::from_str(&expected).unwrap())
+    };
+    names.iter().map(case).collect()
+}
+
+pub(crate) fn numbers(value: &serde_json::Value) -> Vec<f64> {
+    let values = value.as_array().unwrap().iter();
+    values.map(|v| v.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn averaging_finds_every_period_1_orbit() {
+    let cases = cases();
+    assert_eq!(cases.len(), 11);
+    for (name, model, expected) in cases {
+        let start = std::time::Instant::now();
+        let orbits = averaged_orbits(&model);
+        println!("{name}: {} orbits in {:?}", orbits.len(), start.elapsed());
+        for expected in expected["orbits"].as_array().unwrap() {
+            if expected["period"] != 1 {
+                continue;
+            }
+            let state = numbers(&expected["state"]);
+            let scale = state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let found = orbits.iter().find(|orbit| {
+                let pairs = orbit.states[0].iter().zip(&state);
+                pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) < 1e-6 * scale
+            });
+            let Some(orbit) = found else {
+                panic!("{name}: no orbit at {state:?}");
+            };
+            assert_eq!(orbit.is_stable(), expected["stable"], "{name}");
+            let largest = expected["largest_multiplier"].as_f64().unwrap();
+            let radius = orbit.spectral_radius();
+            assert!(
+                (radius - largest).abs() < 1e-6 * largest,
+                "{name}: {radius} {largest}"
+            );
+        }
+    }
+}
+
+/// The approximate map returns to each stable orbit within its error, and knows its multipliers.
+#[test]
+fn the_coarse_map_keeps_stable_orbits() {
+    for (name, model, expected) in cases() {
+        let mut exact = Strobe::new(&model);
+        let mut coarse = exact.coarse().unwrap();
+        assert!(coarse.coarse().is_none());
+        for expected in expected["orbits"].as_array().unwrap() {
+            let mut state = numbers(&expected["state"]);
+            state.resize(coarse.dimension(), 0.0);
+            let scale = state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let mut end = state.clone();
+            let before = std::time::Instant::now();
+            for _ in 0..20 {
+                exact.advance(&mut end).unwrap();
+            }
+            let spent = before.elapsed() / 20;
+            end.clone_from(&state);
+            exact.advance(&mut end).unwrap();
+            let mut near = state.clone();
+            coarse.advance(&mut near).unwrap();
+            let pairs = near.iter().zip(&end);
+            let off = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale;
+            assert!(off < 1e-4, "{name}: {off:.1e}");
+            let before = std::time::Instant::now();
+            coarse.advance_by(&mut near, 1000).unwrap();
+            println!(
+                "{name}: exact {spent:?}, coarse {:?}, {off:.1e}",
+                before.elapsed() / 1000
+            );
+        }
+    }
+}
+
+/// `c01`, whose free amplitude is 20 nm, at a setpoint of 0.9: 18.220, 17.653 and 17.465 nm after
+/// Newton (`shared` note on the census, section "Found").
+#[test]
+fn averaging_finds_every_distance_of_a_setpoint() {
+    let (_, model, _) = cases().swap_remove(0);
+    let unit = model.height.constant / 18.0;
+    let found: Vec<f64> = averaged_distances(&model, 18.0 * unit)
+        .iter()
+        .map(|(gap, _)| gap / unit)
+        .collect();
+    assert_eq!(found.len(), 3, "{found:?}");
+    for (found, expected) in found.iter().zip([18.220, 17.653, 17.465]) {
+        assert!((found - expected).abs() < 0.05, "{found} {expected}");
+    }
+}

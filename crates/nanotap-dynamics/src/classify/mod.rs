@@ -29,7 +29,6 @@
 mod approach;
 mod birkhoff;
 mod candidates;
-mod outlook;
 mod pack;
 mod run;
 mod undecided;
@@ -40,7 +39,6 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
-pub use outlook::{Outlook, outlook};
 pub(crate) use pack::{Followed, follow_starts};
 pub(crate) use run::{Known, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
@@ -177,7 +175,7 @@ pub fn classify<M: StroboscopicMap>(
     start: &[f64],
     options: &ClassifyOptions,
 ) -> Classified {
-    outlook(map, start, options).verified(map)
+    ended(follow_start(map, start, Known::default(), options), start)
 }
 
 /// As [`classify`], where chaotic motions of the map are known: a run from which neighbours part,

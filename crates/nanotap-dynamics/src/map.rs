@@ -44,6 +44,12 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         false
     }
 
+    /// A cheaper, approximate map of the same state, for following transients; `None` where this
+    /// map is cheap itself. Nothing is reported from it.
+    fn coarse(&self) -> Option<Self> {
+        None
+    }
+
     /// How many motions at a time are best given to [`advance_each`](Self::advance_each): one where
     /// they go one after the other.
     fn side_by_side(&self) -> usize {

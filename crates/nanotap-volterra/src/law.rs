@@ -98,6 +98,11 @@ pub trait ForceLaw: Debug + Send + Sync {
     /// The force on a branch, also a little beyond where it is left.
     fn force(&self, branch: usize, gap: f64, rate: f64) -> Force;
 
+    /// The force on a branch without its derivatives.
+    fn value(&self, branch: usize, gap: f64, rate: f64) -> f64 {
+        self.force(branch, gap, rate).value
+    }
+
     /// Whether the force depends on the gap's rate.
     fn depends_on_rate(&self) -> bool {
         true

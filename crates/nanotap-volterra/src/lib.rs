@@ -14,6 +14,7 @@
 //!   integrated against a step's polynomials, tabulated by step length;
 //! - [`law`]: what a law is to the flow; [`laws`]: the table of contact laws;
 //! - [`system`]: modes, drive and law together; [`flow`] runs it;
+//! - [`coarse`]: a cheap, approximate flow for following transients;
 //! - [`tangent`]: derivatives by the initial state and by parameters;
 //! - [`trajectory`]: dense output, extrema, integrals.
 //!
@@ -102,6 +103,7 @@
     )
 )]
 
+pub mod coarse;
 pub mod dual;
 pub mod error;
 pub mod flow;
@@ -122,6 +124,7 @@ mod step;
 /// The complex numbers used throughout.
 pub type Complex = nalgebra::Complex<f64>;
 
+pub use coarse::Coarse;
 pub use error::{Refusal, VolterraError};
 pub use flow::{Flow, Switch};
 pub use kernel::Kernel;

@@ -29,6 +29,7 @@
 mod approach;
 mod birkhoff;
 mod candidates;
+mod confirm;
 mod pack;
 mod run;
 mod undecided;
@@ -39,6 +40,8 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
+pub(crate) use confirm::close_exactly;
+use confirm::confirm;
 pub(crate) use pack::{Followed, follow_starts};
 pub(crate) use run::{Known, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
@@ -89,6 +92,24 @@ impl Default for ClassifyOptions {
     }
 }
 
+/// Residual, relative to the orbit, of Newton's method on a coarse map, whose steps change in number
+/// from state to state.
+const COARSE_RESIDUAL: f64 = 1e-5;
+
+impl ClassifyOptions {
+    /// The same budgets on a coarse map.
+    pub(crate) fn on_coarse_map(&self) -> Self {
+        let residual = self.shooting.residual_tolerance.max(COARSE_RESIDUAL);
+        Self {
+            shooting: ShootingOptions {
+                residual_tolerance: residual,
+                ..self.shooting.clone()
+            },
+            ..self.clone()
+        }
+    }
+}
+
 /// What the motion from a start was found to be.
 #[derive(Clone, Debug)]
 pub struct Classified {
@@ -112,7 +133,7 @@ pub enum MotionKind {
     TransientChaos {
         /// Where it went.
         orbit: PeriodicOrbit,
-        /// The exponents before it escaped.
+        /// The exponents before it escaped, on the map that was followed.
         spectrum: LyapunovSpectrum,
         /// Periods after which the escape was noticed (looks are a factor 2 apart).
         lasted: usize,
@@ -161,6 +182,22 @@ pub struct Chaos {
 }
 
 impl Chaos {
+    /// On a motion of this spectrum for so many periods.
+    pub(crate) fn of(
+        spectrum: LyapunovSpectrum,
+        periods: usize,
+        options: &ClassifyOptions,
+    ) -> Self {
+        let mut chaos = Self {
+            spectrum,
+            observed: 0,
+            lifetime_above: 0.0,
+            longest_period: options.long_period.max(options.max_period),
+        };
+        chaos.watched(periods);
+        chaos
+    }
+
     /// Seen for so many periods in all: what happens with probability 1/τ a period and did not
     /// happen in T of them has τ > T/3 at 95 %.
     pub(crate) fn watched(&mut self, periods: usize) {
@@ -169,13 +206,15 @@ impl Chaos {
     }
 }
 
-/// Follows the motion from `start` until it can be named, within the budgets.
+/// Follows the motion from `start` until it can be named, within the budgets. Where the map has a
+/// [coarse](StroboscopicMap::coarse) one, the transient is followed on that, and the map itself
+/// confirms what it comes to.
 pub fn classify<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
     options: &ClassifyOptions,
 ) -> Classified {
-    ended(follow_start(map, start, Known::default(), options), start)
+    classify_beside(map, start, &[], options)
 }
 
 /// As [`classify`], where chaotic motions of the map are known: a run from which neighbours part,
@@ -191,14 +230,28 @@ pub fn classify_beside<M: StroboscopicMap>(
         chaos,
         ..Known::default()
     };
+    let Some(mut coarse) = map.coarse() else {
+        return classify_on(map, start, known, options);
+    };
+    let found = classify_on(&mut coarse, start, known, &options.on_coarse_map());
+    confirm(map, found, start, known, options)
+}
+
+/// As [`classify_beside`], on the given map alone. No neighbourhood is `known`.
+pub(crate) fn classify_on<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    known: Known<'_>,
+    options: &ClassifyOptions,
+) -> Classified {
     let mut end = ended(follow_start(map, start, known, options), start);
     if let MotionKind::Chaotic(found) = &mut end.kind
-        && chaos.contains(&found.spectrum)
+        && known.chaos.contains(&found.spectrum)
     {
         let measured = &options.lyapunov;
         let least = options.max_transient + measured.alignment + measured.min_periods;
         let more = least.saturating_sub(end.periods);
-        match watch(map, &end.state, &[], more, options) {
+        match watch(map, &end.state, known, more, options) {
             Ok(state) => {
                 end.state = state;
                 end.periods += more;

@@ -1,5 +1,7 @@
 //! One start followed until its motion is known.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::classify::approach::approaches;
 use crate::classify::birkhoff::birkhoff_digits;
 use crate::classify::candidates::candidate_periods;
@@ -48,6 +50,8 @@ pub(crate) struct Known<'a> {
     /// Periods after which most runs are in one of the neighbourhoods, or on known chaos:
     /// before that, looking where a run goes costs more than waiting.
     pub(crate) patience: usize,
+    /// A run stops within a period after this becomes true.
+    pub(crate) cancel: Option<&'a AtomicBool>,
 }
 
 /// Where a start arrives when some attractors are known already.
@@ -95,14 +99,10 @@ pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
 pub(crate) fn first_entry<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
-    balls: &[Neighbourhood],
+    known: Known<'_>,
     periods: usize,
     options: &ClassifyOptions,
 ) -> Option<(usize, usize)> {
-    let known = Known {
-        balls,
-        ..Known::default()
-    };
     let mut run = Run::new(start, known, options);
     match run.run_to(map, periods) {
         Err(Stop::Entered(index)) => Some((index, run.periods)),
@@ -114,14 +114,10 @@ pub(crate) fn first_entry<M: StroboscopicMap>(
 pub(crate) fn watch<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
-    balls: &[Neighbourhood],
+    known: Known<'_>,
     periods: usize,
     options: &ClassifyOptions,
 ) -> Result<Vec<f64>, RunEnd> {
-    let known = Known {
-        balls,
-        ..Known::default()
-    };
     let mut run = Run::new(state, known, options);
     if let Err(stop) = run.run_to(map, periods) {
         return Err(run.stopped(stop));
@@ -146,6 +142,7 @@ fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Mot
 pub(super) enum Stop {
     Entered(usize),
     Unbounded,
+    Cancelled,
     Failed(MapFailure),
 }
 
@@ -166,6 +163,8 @@ pub(super) struct Run<'a> {
     keep: usize,
     /// Periods after which it is looked at, if no budget ends before.
     target: usize,
+    /// Periods before which it is not looked for in a neighbourhood.
+    next_entry: usize,
     known: Known<'a>,
     options: &'a ClassifyOptions,
     closing: ShootingOptions,
@@ -245,6 +244,7 @@ impl<'a> Run<'a> {
             recent: start.to_vec(),
             keep,
             target: options.first_look.max(known.patience).max(1),
+            next_entry: 0,
             known,
             options,
             closing: ShootingOptions {
@@ -279,6 +279,7 @@ impl<'a> Run<'a> {
         match stop {
             Stop::Entered(index) => RunEnd::Entered { index, periods },
             Stop::Unbounded => self.classified(MotionKind::Unbounded),
+            Stop::Cancelled => self.classified(undecided(UndecidedReason::Cancelled, None)),
             Stop::Failed(failure) => {
                 let reason = UndecidedReason::Map { periods, failure };
                 self.classified(undecided(reason, None))
@@ -398,9 +399,18 @@ impl<'a> Run<'a> {
         if norm(&self.state) > self.options.bound {
             return Err(Stop::Unbounded);
         }
+        if self.known.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            return Err(Stop::Cancelled);
+        }
+        if self.periods < self.next_entry {
+            return Ok(());
+        }
         for (index, ball) in self.known.balls.iter().enumerate() {
-            if ball.contains(&self.state) && ball.holds(map, &self.state, &mut self.scratch)? {
-                return Err(Stop::Entered(index));
+            if ball.contains(&self.state) {
+                if ball.holds(map, &self.state, &mut self.scratch)? {
+                    return Err(Stop::Entered(index));
+                }
+                self.next_entry = self.periods + ball.retry();
             }
         }
         Ok(())
@@ -563,14 +573,7 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn chaotic(&self, spectrum: LyapunovSpectrum) -> MotionKind {
-        let mut chaos = Chaos {
-            spectrum,
-            observed: 0,
-            lifetime_above: 0.0,
-            longest_period: longest(self.options),
-        };
-        chaos.watched(self.periods);
-        MotionKind::Chaotic(chaos)
+        MotionKind::Chaotic(Chaos::of(spectrum, self.periods, self.options))
     }
 
     /// Exponents of what does not close, looking for an escape after every doubling.
@@ -771,7 +774,7 @@ pub(super) mod tests {
     #[test]
     fn a_motion_that_is_watched_may_go_to_an_orbit_that_nobody_knows() {
         let options = ClassifyOptions::default();
-        let watched = |r: f64| watch(&mut Logistic(r), &[0.3], &[], 200, &options);
+        let watched = |r: f64| watch(&mut Logistic(r), &[0.3], Known::default(), 200, &options);
         let Err(RunEnd::Classified(end)) = watched(3.2) else {
             panic!("the orbit was not noticed")
         };

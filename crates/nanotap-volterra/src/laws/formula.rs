@@ -236,6 +236,10 @@ impl<F: Formula> ForceLaw for Law<F> {
         ))
     }
 
+    fn value(&self, branch: usize, gap: f64, rate: f64) -> f64 {
+        self.formula.force(&self.constants, branch, gap, rate)
+    }
+
     fn depends_on_rate(&self) -> bool {
         self.formula.depends_on_rate()
     }

@@ -105,6 +105,12 @@ impl ForceLaw for Sum {
         sum
     }
 
+    fn value(&self, branch: usize, gap: f64, rate: f64) -> f64 {
+        self.split(branch)
+            .map(|(_, term, own)| term.value(own, gap, rate))
+            .sum()
+    }
+
     fn depends_on_rate(&self) -> bool {
         self.terms.iter().any(|t| t.depends_on_rate())
     }

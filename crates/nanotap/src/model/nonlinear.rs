@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::{Output, Regime};
 use nanotap_volterra::{
-    Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
+    Coarse, Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
     ToneChange, Trajectory, VolterraError,
 };
 use serde::Serialize;
@@ -119,6 +119,11 @@ impl Nonlinear {
             .unwrap_or_else(|| law.branch_at(gap, rate))
     }
 
+    /// Dimension of the state of the model: the lever's, and the branch where it is remembered.
+    pub(crate) fn dimension(&self) -> usize {
+        self.system.dimension() + self.discrete_entries()
+    }
+
     /// How many of the last entries of a state are whole numbers: the branch of the law, where it
     /// is remembered.
     pub(crate) fn discrete_entries(&self) -> usize {
@@ -127,8 +132,7 @@ impl Nonlinear {
 
     /// Puts `flow` at a state of the model at drive phase 0.
     pub(crate) fn start(&self, flow: &mut Flow, state: &[f64]) -> Result<(), MotionError> {
-        let n = self.system.dimension();
-        let expected = n + usize::from(self.remembers);
+        let (n, expected) = (self.system.dimension(), self.dimension());
         if state.len() != expected {
             return Err(MotionError::Nonlinear(VolterraError::Shape {
                 what: "the state",
@@ -512,16 +516,9 @@ impl NonlinearStrobe {
         }
     }
 
-    pub(crate) fn dimension(&self) -> usize {
-        self.nonlinear.system.dimension() + usize::from(self.nonlinear.remembers)
-    }
-
-    pub(crate) fn discrete_entries(&self) -> usize {
-        self.nonlinear.discrete_entries()
-    }
-
-    pub(crate) fn period(&self) -> f64 {
-        self.nonlinear.period
+    /// The lever.
+    pub(crate) fn nonlinear(&self) -> &Arc<Nonlinear> {
+        &self.nonlinear
     }
 
     pub(crate) fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
@@ -537,7 +534,10 @@ impl NonlinearStrobe {
         jacobian: &mut DMatrix<f64>,
         derivatives: Option<&mut DMatrix<f64>>,
     ) -> Result<(), MotionError> {
-        let (n, whole) = (self.nonlinear.system.dimension(), self.dimension());
+        let (n, whole) = (
+            self.nonlinear.system.dimension(),
+            self.nonlinear.dimension(),
+        );
         let start = state.to_vec();
         let varied = derivatives.is_some();
         let changes: Vec<Change> = self
@@ -593,10 +593,9 @@ impl NonlinearStrobe {
         self.flow.statistics().evaluations
     }
 
-    /// log|det DP| where it is the same everywhere; a law that remembers loses a direction.
+    /// See [`Nonlinear::log_determinant_everywhere`].
     pub(crate) fn log_determinant(&self) -> Option<f64> {
-        let known = self.nonlinear.constant_log_determinant();
-        known.filter(|_| !self.nonlinear.remembers)
+        self.nonlinear.log_determinant_everywhere()
     }
 
     /// The extrema of the gap over a period, as times and values over what they can graze.
@@ -612,7 +611,78 @@ impl NonlinearStrobe {
     }
 }
 
+/// The approximate map of a lever under a nonlinear force, for transients.
+#[derive(Clone, Debug)]
+pub(crate) struct CoarseStrobe {
+    nonlinear: Arc<Nonlinear>,
+    coarse: Coarse,
+}
+
+impl CoarseStrobe {
+    /// `None` where a mode of the lever has no tables.
+    pub(crate) fn new(nonlinear: &Arc<Nonlinear>) -> Option<Self> {
+        Some(Self {
+            coarse: Coarse::new(&nonlinear.system, nonlinear.period).ok()?,
+            nonlinear: Arc::clone(nonlinear),
+        })
+    }
+
+    /// The lever.
+    pub(crate) fn nonlinear(&self) -> &Arc<Nonlinear> {
+        &self.nonlinear
+    }
+
+    pub(crate) fn advance_by(
+        &mut self,
+        state: &mut [f64],
+        periods: usize,
+    ) -> Result<(), MotionError> {
+        let (state, memory) = self.nonlinear.split(state)?;
+        let branch = memory.as_deref().map(|b| b.round().max(0.0) as usize);
+        let branch = self.coarse.run_periods(state, branch, periods)?;
+        memory.map(|memory| *memory = branch as f64);
+        Ok(())
+    }
+
+    pub(crate) fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        let whole = state.len();
+        let (state, memory) = self.nonlinear.split(state)?;
+        let branch = memory.as_deref().map(|b| b.round().max(0.0) as usize);
+        let mut own = DMatrix::zeros(state.len(), state.len());
+        let branch = self.coarse.run_with_jacobian(state, branch, &mut own)?;
+        memory.map(|memory| *memory = branch as f64);
+        *jacobian = own.resize(whole, whole, 0.0);
+        Ok(())
+    }
+
+    /// Evaluations of the law so far.
+    pub(crate) fn evaluations(&self) -> u64 {
+        self.coarse.statistics().evaluations
+    }
+}
+
 impl Nonlinear {
+    /// The lever's part of a state of the model and the branch that it remembers.
+    fn split<'a>(
+        &self,
+        state: &'a mut [f64],
+    ) -> Result<(&'a mut [f64], Option<&'a mut f64>), MotionError> {
+        let (n, expected) = (self.system.dimension(), self.dimension());
+        if state.len() != expected {
+            return Err(MotionError::Nonlinear(VolterraError::Shape {
+                what: "the state",
+                found: state.len(),
+                expected,
+            }));
+        }
+        let (own, memory) = state.split_at_mut(n);
+        Ok((own, memory.first_mut()))
+    }
+
     /// log|det DP| of the lever's state where every motion has the same: a force that depends
     /// on the gap alone has no part in the trace, nor in the determinant of a switch at a gap.
     pub(crate) fn constant_log_determinant(&self) -> Option<f64> {
@@ -622,6 +692,12 @@ impl Nonlinear {
             .any(|exit| exit.guard == Guard::Turns);
         let varies = law.depends_on_rate() || turns;
         (!varies).then(|| self.free_log_determinant())
+    }
+
+    /// log|det DP| where it is the same everywhere; a law that remembers loses a direction.
+    pub(crate) fn log_determinant_everywhere(&self) -> Option<f64> {
+        let known = self.constant_log_determinant();
+        known.filter(|_| !self.remembers)
     }
 
     /// log|det DP| of the lever's state over a recorded period, from the trace of the equations

@@ -14,7 +14,7 @@ use nanotap_flow::signal::Signal;
 use nanotap_flow::system::{Switch, Transition};
 use nanotap_flow::{Ensemble, Flow, FlowError, Output, System};
 
-use crate::model::nonlinear::NonlinearStrobe;
+use crate::model::nonlinear::{CoarseStrobe, NonlinearStrobe};
 use crate::model::{Model, MotionError, Tangent, TangentKind};
 
 /// The map from the state at drive phase 0 to the state one drive period later.
@@ -29,6 +29,7 @@ pub struct Strobe(Engine);
 enum Engine {
     Exact(ExactStrobe),
     Nonlinear(Box<NonlinearStrobe>),
+    Coarse(Box<CoarseStrobe>),
 }
 
 impl Strobe {
@@ -62,7 +63,7 @@ impl Strobe {
     fn ensemble(&mut self) -> Option<&mut Ensemble> {
         match &mut self.0 {
             Engine::Exact(map) => map.ensemble(),
-            Engine::Nonlinear(_) => None,
+            Engine::Nonlinear(_) | Engine::Coarse(_) => None,
         }
     }
 
@@ -71,11 +72,13 @@ impl Strobe {
         match &self.0 {
             Engine::Exact(map) => map.flow.statistics().evaluations,
             Engine::Nonlinear(map) => map.evaluations(),
+            Engine::Coarse(map) => map.evaluations(),
         }
     }
 
     /// Replaces `state` by `P(state)`, `jacobian` by `∂P/∂state` and `derivatives`
-    /// (`n × p`) by the derivative of `P` with respect to each of the map's parameters.
+    /// (`n × p`) by the derivative of `P` with respect to each of the map's parameters, of which
+    /// a coarse map has none.
     ///
     /// # Errors
     /// When the flow fails.
@@ -90,6 +93,10 @@ impl Strobe {
             Engine::Nonlinear(map) => {
                 map.advance_with_derivatives(state, jacobian, Some(derivatives))
             }
+            Engine::Coarse(map) => {
+                *derivatives = DMatrix::zeros(state.len(), 0);
+                map.advance_with_jacobian(state, jacobian)
+            }
         }
     }
 }
@@ -100,22 +107,35 @@ impl StroboscopicMap for Strobe {
     fn dimension(&self) -> usize {
         match &self.0 {
             Engine::Exact(map) => map.flow.system().dimension(),
-            Engine::Nonlinear(map) => map.dimension(),
+            Engine::Nonlinear(map) => map.nonlinear().dimension(),
+            Engine::Coarse(map) => map.nonlinear().dimension(),
         }
     }
 
     fn period(&self) -> f64 {
         match &self.0 {
             Engine::Exact(map) => map.flow.system().drive().period(),
-            Engine::Nonlinear(map) => map.period(),
+            Engine::Nonlinear(map) => map.nonlinear().period,
+            Engine::Coarse(map) => map.nonlinear().period,
         }
     }
 
     fn discrete_entries(&self) -> usize {
         match &self.0 {
             Engine::Exact(_) => 0,
-            Engine::Nonlinear(map) => map.discrete_entries(),
+            Engine::Nonlinear(map) => map.nonlinear().discrete_entries(),
+            Engine::Coarse(map) => map.nonlinear().discrete_entries(),
         }
+    }
+
+    /// Of the exact flow under a nonlinear force, by the Runge–Kutta method of
+    /// [`nanotap_volterra::coarse`].
+    fn coarse(&self) -> Option<Self> {
+        let Engine::Nonlinear(map) = &self.0 else {
+            return None;
+        };
+        let coarse = CoarseStrobe::new(map.nonlinear())?;
+        Some(Self(Engine::Coarse(Box::new(coarse))))
     }
 
     /// Under a nonlinear force.
@@ -136,6 +156,7 @@ impl StroboscopicMap for Strobe {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance(state)?),
             Engine::Nonlinear(map) => map.advance(state),
+            Engine::Coarse(map) => map.advance_by(state, 1),
         }
     }
 
@@ -143,6 +164,7 @@ impl StroboscopicMap for Strobe {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance_by(state, periods)?),
             Engine::Nonlinear(map) => (0..periods).try_for_each(|_| map.advance(state)),
+            Engine::Coarse(map) => map.advance_by(state, periods),
         }
     }
 
@@ -179,6 +201,7 @@ impl StroboscopicMap for Strobe {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance_with_jacobian(state, jacobian)?),
             Engine::Nonlinear(map) => map.advance_with_derivatives(state, jacobian, None),
+            Engine::Coarse(map) => map.advance_with_jacobian(state, jacobian),
         }
     }
 
@@ -198,6 +221,10 @@ impl StroboscopicMap for Strobe {
                 map.advance_with_derivatives(state, jacobian, None)?;
                 Ok(map.log_determinant())
             }
+            Engine::Coarse(map) => {
+                map.advance_with_jacobian(state, jacobian)?;
+                Ok(map.nonlinear().log_determinant_everywhere())
+            }
         }
     }
 
@@ -205,6 +232,10 @@ impl StroboscopicMap for Strobe {
         match &self.0 {
             Engine::Exact(map) => map.log_determinant_bound(),
             Engine::Nonlinear(map) => map.log_determinant().unwrap_or(f64::INFINITY),
+            Engine::Coarse(map) => {
+                let known = map.nonlinear().log_determinant_everywhere();
+                known.unwrap_or(f64::INFINITY)
+            }
         }
     }
 
@@ -216,7 +247,7 @@ impl StroboscopicMap for Strobe {
         match &mut self.0 {
             Engine::Exact(map) => Ok(map.advance_with_tangencies(state, tangencies)?),
             Engine::Nonlinear(map) => {
-                let period = map.period();
+                let period = map.nonlinear().period;
                 let extrema = map.advance_with_extrema(state)?.into_iter();
                 tangencies.extend(extrema.map(|(time, value)| Tangency {
                     phase: time / period,
@@ -224,6 +255,7 @@ impl StroboscopicMap for Strobe {
                 }));
                 Ok(())
             }
+            Engine::Coarse(map) => map.advance_by(state, 1),
         }
     }
 }

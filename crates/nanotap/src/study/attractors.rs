@@ -3,9 +3,10 @@
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, ClassifyOptions, Control, Fraction, OrbitSearch,
-    PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
+    AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
+    OrbitSearch, PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
 };
+use nanotap_volterra::coarse;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +40,9 @@ pub struct AttractorsOptions {
     pub classify: ClassifyOptions,
     /// Starts settled before any attractor is known.
     pub pilots: usize,
+    /// Share of drawn starts that may lead to motions not found, with 95 % confidence, at which no more
+    /// are drawn; `None`: [`NONLINEAR_UNSEEN`] under a nonlinear law, else [`CensusOptions`]'s.
+    pub unseen: Option<f64>,
     /// Longest period of unstable orbits to list; 0: none.
     pub unstable: usize,
     /// Harmonics reported of each orbit.
@@ -54,6 +58,7 @@ impl Default for AttractorsOptions {
             start_box: None,
             classify: census.classify,
             pilots: census.pilots,
+            unseen: None,
             unstable: 0,
             harmonics: 20,
         }
@@ -109,6 +114,13 @@ pub struct Attractors {
     /// How much may have been missed, where starts were drawn until that was small.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen: Option<UnseenReport>,
+    /// Why no further start was followed.
+    pub end: EndReport,
+    /// Relative tolerance of the approximate flow on which starts were followed, if they were: shares,
+    /// lifetimes and the bound of what was not seen are of that flow. Orbits, multipliers and exponents
+    /// are always those of the exact flow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub followed_at: Option<f64>,
     /// Starts left undecided.
     pub undecided: Vec<UndecidedStart>,
     /// Part of the starts left undecided.
@@ -144,6 +156,30 @@ pub struct UnseenReport {
     pub starts: usize,
     /// With 95 % confidence at most this part of the starts leads to motions not found.
     pub fraction: f64,
+    /// The part at which no more starts were to be drawn.
+    pub target: f64,
+}
+
+/// Why a census ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "reason", rename_all = "snake_case")]
+pub enum EndReport {
+    /// All given starts were followed.
+    AllStarts,
+    /// The share of starts that may lead to motions not found is as small as requested.
+    BoundMet,
+    /// As many starts were drawn as a census draws at most.
+    MaxStarts {
+        /// How many that is.
+        limit: usize,
+    },
+    /// The starts took as many drive periods as a census takes at most.
+    MaxPeriods {
+        /// How many that is.
+        limit: usize,
+    },
+    /// The work was stopped.
+    Cancelled,
 }
 
 /// A side of the box of starts.
@@ -279,6 +315,9 @@ pub struct TransientChaosReport {
 pub const MOST_STARTS: usize = 10_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
+/// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
+/// law.
+pub const NONLINEAR_UNSEEN: f64 = 0.01;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -312,21 +351,15 @@ pub fn attractors(
         Some(count) => StartSet::given(start_box.starts(options.seed, count)),
         None => default_starts(model, options.seed)?,
     };
+    let set = set.with_seeds(seeds(model));
     let map = Strobe::new(model);
-    let classify = bounded(&options.classify, &start_box);
-    let found = census_of(
-        &map,
-        &set,
-        &CensusOptions {
-            pilots: options.pilots,
-            classify,
-            ..CensusOptions::default()
-        },
-        control,
-    );
+    let budgets = budgets(model, options, &start_box);
+    let found = census_of(&map, &set, &budgets, control);
     let unstable = if options.unstable > 0 {
         let searched = found.outcomes_by_start.len().min(SEARCHED_STARTS);
-        let searched: Vec<_> = (0..searched).map_while(|k| set.start(k)).collect();
+        let seeds = set.seeds().iter().map(|(_, state)| state.clone());
+        let starts = (0..searched).map_while(|k| set.start(k));
+        let searched: Vec<_> = seeds.chain(starts).collect();
         Some(unstable_orbits(model, &map, &searched, options, control)?)
     } else {
         None
@@ -340,10 +373,34 @@ pub fn attractors(
             upper,
         })
         .collect();
-    described(model, &found, &set, options, sides, unstable)
+    described(model, &found, &set, (options, &budgets), sides, unstable)
 }
 
-/// The budgets with a bound on the states that fits the box.
+/// Periods and states near orbits that are known before any start is drawn.
+fn seeds(_model: &Model) -> Vec<(usize, Vec<f64>)> {
+    Vec::new()
+}
+
+/// How the census is taken. A smaller bound than the default has larger budgets.
+fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> CensusOptions {
+    let default = CensusOptions::default();
+    let usual = if model.nonlinear.is_some() {
+        NONLINEAR_UNSEEN
+    } else {
+        default.unseen
+    };
+    let unseen = options.unseen.unwrap_or(usual);
+    let times = (usual / unseen).max(1.0);
+    CensusOptions {
+        pilots: options.pilots,
+        classify: bounded(&options.classify, start_box),
+        unseen,
+        max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
+        max_periods: (times * default.max_periods as f64) as usize,
+    }
+}
+
+/// The budgets of each start with a bound on the states that fits the box.
 fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions {
     let widest = start_box
         .lower()
@@ -365,7 +422,7 @@ fn described(
     model: &Model,
     found: &Census,
     set: &StartSet,
-    options: &AttractorsOptions,
+    (options, budgets): (&AttractorsOptions, &CensusOptions),
     sides: Vec<Side>,
     unstable: Option<Vec<OrbitReport>>,
 ) -> Result<Attractors, AttractorsError> {
@@ -405,7 +462,20 @@ fn described(
             motions: unseen.motions,
             starts: unseen.starts,
             fraction: unseen.share,
+            target: budgets.unseen,
         }),
+        end: match found.end {
+            _ if found.cancelled => EndReport::Cancelled,
+            CensusEnd::AllStarts => EndReport::AllStarts,
+            CensusEnd::BoundMet => EndReport::BoundMet,
+            CensusEnd::MaxStarts => EndReport::MaxStarts {
+                limit: budgets.max_starts,
+            },
+            CensusEnd::MaxPeriods => EndReport::MaxPeriods {
+                limit: budgets.max_periods,
+            },
+        },
+        followed_at: found.followed_coarsely.then_some(coarse::TOLERANCE),
         undecided: found
             .undecided
             .iter()
@@ -532,9 +602,14 @@ fn unstable_orbits(
 pub struct AttractorsRequest {
     /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
     /// resonant response down to below the gap, go on until the share of starts that may lead to
-    /// motions not found is below 0.2 % (with 95 % confidence), or 5000 are done
+    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods are done
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: Option<usize>,
+    /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
+    /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
+    /// one raises the limits of {starts} and drive periods in proportion
+    #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
+    pub unseen: Option<f64>,
     /// Seed of the starts: the same seed gives the same answer on any number of threads
     #[schemars(extend("x-value" = "K"))]
     pub seed: u64,
@@ -558,6 +633,7 @@ impl Default for AttractorsRequest {
         let options = AttractorsOptions::default();
         Self {
             starts: options.starts,
+            unseen: options.unseen,
             seed: options.seed,
             sides: Intervals::default(),
             max_period: options.classify.max_period,
@@ -579,6 +655,7 @@ impl AttractorsRequest {
                 .starts
                 .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
             seed: self.seed,
+            unseen: self.unseen,
             start_box: Some(box_with(model, &self.sides.numbers()?)?),
             classify: ClassifyOptions {
                 max_period: self.max_period,

@@ -17,6 +17,7 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::approach::states_near;
 use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitReport, report};
@@ -43,6 +44,8 @@ pub struct AttractorsOptions {
     /// Share of drawn starts that may lead to motions not found, with 95 % confidence, at which no more
     /// are drawn; `None`: [`NONLINEAR_UNSEEN`] under a nonlinear law, else [`CensusOptions`]'s.
     pub unseen: Option<f64>,
+    /// Periods and states at drive phase 0 near orbits that are known before any start is drawn.
+    pub seeds: Vec<(usize, Vec<f64>)>,
     /// Longest period of unstable orbits to list; 0: none.
     pub unstable: usize,
     /// Harmonics reported of each orbit.
@@ -59,6 +62,7 @@ impl Default for AttractorsOptions {
             classify: census.classify,
             pilots: census.pilots,
             unseen: None,
+            seeds: Vec::new(),
             unstable: 0,
             harmonics: 20,
         }
@@ -351,7 +355,7 @@ pub fn attractors(
         Some(count) => StartSet::given(start_box.starts(options.seed, count)),
         None => default_starts(model, options.seed)?,
     };
-    let set = set.with_seeds(seeds(model));
+    let set = set.with_seeds(options.seeds.iter().cloned());
     let map = Strobe::new(model);
     let budgets = budgets(model, options, &start_box);
     let found = census_of(&map, &set, &budgets, control);
@@ -374,11 +378,6 @@ pub fn attractors(
         })
         .collect();
     described(model, &found, &set, (options, &budgets), sides, unstable)
-}
-
-/// Periods and states near orbits that are known before any start is drawn.
-fn seeds(_model: &Model) -> Vec<(usize, Vec<f64>)> {
-    Vec::new()
 }
 
 /// How the census is taken. A smaller bound than the default has larger budgets.
@@ -684,7 +683,17 @@ impl Study for AttractorsStudy {
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let mut found = attractors(&model, &request.options(&model)?, control)?;
+        let options = request.options(&model)?;
+        let known = states_near(case, options.classify.max_period, control)?;
+        let seeds = known.into_iter().filter_map(|orbit| {
+            let state = orbit.states.into_iter().next()?;
+            Some((orbit.period, state))
+        });
+        let options = AttractorsOptions {
+            seeds: seeds.collect(),
+            ..options
+        };
+        let mut found = attractors(&model, &options, control)?;
         if request.prove {
             found.prove(case);
         }

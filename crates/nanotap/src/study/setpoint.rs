@@ -331,10 +331,13 @@ impl Search<'_> {
     fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece) -> bool {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
-            Motion::Unclosed(found) => {
-                let what = found.first().map(|(_, met)| met.classification.name());
+            Motion::OnGrid(found) => {
+                let what = found.first().map_or("undecided", |(_, met)| match met.orbit {
+                    Some(_) => "of a long period",
+                    None => met.classification.name(),
+                });
                 self.found = Some(Err(SetpointError::NotPeriodic {
-                    what: what.unwrap_or("undecided"),
+                    what,
                     at: self.told(piece.from),
                     ratio: self.ratio,
                 }));

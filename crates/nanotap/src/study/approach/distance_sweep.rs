@@ -15,8 +15,9 @@ use std::fmt;
 
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
-    ContinuationOptions, Control, Direction, PeriodicOrbit, ShootingOptions, classify,
-    close_orbit, close_orbit_from_points, continue_orbit, switch_at_flip,
+    ContinuationOptions, Control, Direction, MotionKind, PeriodicOrbit, ShootingOptions,
+    UndecidedReason, classify, close_orbit, close_orbit_from_points, continue_orbit,
+    switch_at_flip,
 };
 
 use crate::case::{Case, CaseError, Family};
@@ -28,15 +29,18 @@ use crate::study::sweep::SweepOptions;
 
 use super::BEYOND;
 
-/// Steps of the grid on which motions that do not close are followed, in the scale of distances.
+/// Steps of the grid on which motions without a branch are followed, in the scale of distances.
 const GRID: f64 = 100.0;
-/// Distance beyond a fold, in the scale of distances, at which the jump is followed.
-const BEYOND_FOLD: f64 = 1e-6;
-/// The same beyond other ends, where a disturbance grows in proportion to this distance.
-const BEYOND_END: f64 = 1e-3;
-/// How far from the orbit at an end the run starts, as a part of its size: towards the unstable
-/// side of a fold, and elsewhere.
-const PUSH: f64 = 1e-2;
+/// Longest period of orbits whose branches are followed.
+const LONGEST_BRANCH: usize = 8;
+/// Distance between places, in the scale of distances, that are one.
+const SAME_PLACE: f64 = 1e-7;
+/// Distances beyond a fold, in the scale of distances, at which the jump is followed, and how far
+/// from the orbit at the fold the run starts, as a part of its size, towards the unstable side.
+/// The farther ones are for where the nearer leave the run beside the fold for too long.
+const BEYOND_FOLD: [(f64, f64); 2] = [(1e-5, 0.02), (1e-3, 0.1)];
+/// The same beyond other ends, where a disturbance grows in proportion to the distance.
+const BEYOND_END: (f64, f64) = (1e-3, 0.01);
 /// Part of an orbit's size by which a motion may differ and still be its continuation.
 const CONTINUOUS: f64 = 0.05;
 /// How often a grid step is halved where no motion can be followed over it.
@@ -45,6 +49,8 @@ const HALVINGS: usize = 6;
 const MAX_PIECES: usize = 200;
 /// Points after which a branch is not followed further.
 const MAX_POINTS: usize = 2000;
+/// Periods after which a motion that is followed on the grid is measured at the latest.
+const GRID_TRANSIENT: usize = 512;
 /// Decay times that a jump is given to settle, and periods at most.
 const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
@@ -61,7 +67,7 @@ pub(in crate::study) enum End {
     },
     /// The orbits meet a branch of this shorter period.
     Meeting { period: usize },
-    /// A motion that does not close goes over into a periodic one.
+    /// A motion without a branch goes over into one that has one.
     Closes,
     /// The branch could not be followed further.
     Lost(String),
@@ -96,20 +102,6 @@ impl Stretch {
     fn end(&self, direction: Direction) -> &(f64, End) {
         &self.ends[usize::from(direction == Direction::Increasing)]
     }
-
-    /// The points from a distance on in a direction, in the order of the way.
-    pub(in crate::study) fn points_from(
-        &self,
-        gap: f64,
-        direction: Direction,
-    ) -> Box<dyn Iterator<Item = &BranchPoint> + '_> {
-        match direction {
-            Direction::Increasing => Box::new(self.points.iter().filter(move |p| p.parameter > gap)),
-            Direction::Decreasing => {
-                Box::new(self.points.iter().rev().filter(move |p| p.parameter < gap))
-            }
-        }
-    }
 }
 
 /// A motion as it was found.
@@ -119,6 +111,8 @@ pub(in crate::study) struct Met {
     pub(in crate::study) evidence: String,
     pub(in crate::study) orbit: Option<PeriodicOrbit>,
     pub(in crate::study) state: Vec<f64>,
+    /// Whether the motion from the start could not be computed.
+    failed: bool,
 }
 
 impl Met {
@@ -128,6 +122,7 @@ impl Met {
             evidence: String::new(),
             state: orbit.states.first().cloned().unwrap_or_default(),
             orbit: Some(orbit),
+            failed: false,
         }
     }
 
@@ -137,6 +132,7 @@ impl Met {
             evidence,
             orbit: None,
             state: state.to_vec(),
+            failed: true,
         }
     }
 
@@ -154,8 +150,9 @@ impl Met {
 pub(in crate::study) enum Motion {
     /// The stable orbits of a stretch, by its index.
     Periodic(usize),
-    /// A motion that does not close, as it was found at distances in the order of the way.
-    Unclosed(Vec<(f64, Met)>),
+    /// A motion without a branch that is followed, as it was found at distances in the order of
+    /// the way: none that closes, or one of a long period.
+    OnGrid(Vec<(f64, Met)>),
 }
 
 /// A piece of a way.
@@ -165,6 +162,8 @@ pub(in crate::study) struct Piece {
     pub(in crate::study) from: f64,
     pub(in crate::study) to: f64,
     pub(in crate::study) motion: Motion,
+    /// Where the motion was first seen.
+    pub(in crate::study) entered: f64,
     /// Why it ends.
     pub(in crate::study) end: End,
     /// Whether the lever jumps there.
@@ -275,27 +274,42 @@ impl<'a> DistanceSweep<'a> {
     }
 
     /// Where a run from a state at a distance goes.
-    pub(in crate::study) fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
-        match self.met(gap, start) {
-            Met {
-                orbit: Some(orbit), ..
-            } => self.on(gap, orbit),
-            met => Place::Off { gap, met },
+    fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
+        let met = self.met(gap, start, self.classify.max_transient);
+        self.place(gap, met)
+    }
+
+    /// The place of a motion: on its branch, where that is followed.
+    fn place(&mut self, gap: f64, met: Met) -> Place {
+        match met.orbit {
+            Some(orbit) if orbit.period <= LONGEST_BRANCH => self.on(gap, orbit),
+            _ => Place::Off { gap, met },
         }
     }
 
     /// What a run from a state at a distance goes to.
-    pub(in crate::study) fn met(&self, gap: f64, start: &[f64]) -> Met {
+    fn met(&self, gap: f64, start: &[f64], max_transient: usize) -> Met {
         let model = match self.model(gap) {
             Ok(model) => model,
             Err(error) => return Met::undecided(error.to_string(), start),
         };
-        let classified = classify(&mut Strobe::new(&model), start, &self.classify);
+        let options = ClassifyOptions {
+            max_transient,
+            ..self.classify.clone()
+        };
+        let classified = classify(&mut Strobe::new(&model), start, &options);
         let named = Named::of(&classified.kind);
         Met {
             classification: named.classification,
             evidence: named.evidence,
             orbit: named.orbit,
+            failed: matches!(
+                classified.kind,
+                MotionKind::Undecided {
+                    reason: UndecidedReason::Map { .. } | UndecidedReason::BadStart(_),
+                    ..
+                }
+            ),
             state: classified.state,
         }
     }
@@ -306,7 +320,7 @@ impl<'a> DistanceSweep<'a> {
             let stretch = &self.stretches[k];
             stretch.period == orbit.period
                 && stretch.holds(gap)
-                && (self.orbit_at(k, gap)).is_some_and(|own| own.is_same_as(&orbit))
+                && (self.orbit_at(k, gap)).is_some_and(|own| is_same(&own, &orbit))
         });
         let stretch = known.unwrap_or_else(|| {
             self.stretches.push(self.continued(gap, orbit));
@@ -443,7 +457,7 @@ impl<'a> DistanceSweep<'a> {
                 });
                 nearest.and_then(|p| p.orbit.states.first().cloned())
             }
-            Motion::Unclosed(found) => {
+            Motion::OnGrid(found) => {
                 if let Some((_, met)) = found.iter().find(|(at, _)| *at == gap) {
                     return met.clone();
                 }
@@ -452,8 +466,7 @@ impl<'a> DistanceSweep<'a> {
                 last.map(|(_, met)| met.onwards())
             }
         };
-        let start = beside.unwrap_or_default();
-        self.met(gap, &start)
+        self.met(gap, &beside.unwrap_or_default(), GRID_TRANSIENT)
     }
 
     /// The pieces of the way from a place to a distance, until one is `enough`.
@@ -465,7 +478,9 @@ impl<'a> DistanceSweep<'a> {
     ) -> (Vec<Piece>, Place) {
         let mut pieces: Vec<Piece> = Vec::new();
         loop {
-            let (piece, next) = self.piece(place.clone(), to);
+            let (mut piece, next) = self.piece(place.clone(), to);
+            // A jump takes no distance.
+            piece.from = pieces.last().map_or(piece.from, |last| last.to);
             let done = enough(self, &piece) || self.control.is_cancelled();
             pieces.push(piece);
             match next {
@@ -475,7 +490,7 @@ impl<'a> DistanceSweep<'a> {
                     let last = pieces.last().map(|p| (p.motion.clone(), p.to));
                     let end = match last {
                         Some((Motion::Periodic(stretch), gap)) => Place::On { stretch, gap },
-                        Some((Motion::Unclosed(mut found), gap)) => match found.pop() {
+                        Some((Motion::OnGrid(mut found), gap)) => match found.pop() {
                             Some((_, met)) => Place::Off { gap, met },
                             None => place,
                         },
@@ -497,6 +512,7 @@ impl<'a> DistanceSweep<'a> {
                 let beyond = (at - to) * sign(direction) >= 0.0;
                 let piece = |to: f64, end: End, jumps: bool| Piece {
                     from: gap,
+                    entered: gap,
                     to,
                     motion: Motion::Periodic(stretch),
                     uncertainty: match &end {
@@ -524,59 +540,65 @@ impl<'a> DistanceSweep<'a> {
                 };
                 (piece(at, end, jumps), Some(next))
             }
-            Place::Off { gap, met } => self.unclosed(gap, met, to),
+            Place::Off { gap, met } => self.on_grid(gap, met, to),
         }
     }
 
     /// Where the lever goes from the end of a stretch, and whether by a jump.
     fn beyond(&mut self, stretch: usize, direction: Direction, to: f64) -> (Place, bool) {
         let (at, end) = self.stretches[stretch].end(direction).clone();
-        let side = sign(direction);
-        let scale = self.scale;
-        let further = |step: f64| {
-            let gap = at + side * step * scale;
-            if (gap - to) * side > 0.0 { to } else { gap }
-        };
+        let (side, scale) = (sign(direction), self.scale);
         let points = &self.stretches[stretch].points;
         let last = match direction {
             Direction::Increasing => points.last(),
             Direction::Decreasing => points.first(),
         };
         let last = last.map(|p| p.orbit.clone());
-        let (orbit, gap, start) = match &end {
+        let (orbit, unstable, tries) = match end {
             End::Bifurcation { at: found, unstable } => {
                 if found.kind == BifurcationKind::Flip
-                    && let Some(doubled) = self.doubled(found, direction)
+                    && let Some(stretch) = self.doubled(&found, direction)
                 {
-                    let place = Place::On {
-                        stretch: doubled,
-                        gap: at,
-                    };
-                    return (place, false);
+                    return (Place::On { stretch, gap: at }, false);
                 }
-                let folds = matches!(found.kind, BifurcationKind::Fold);
-                let gap = further(if folds { BEYOND_FOLD } else { BEYOND_END });
-                (Some(found.orbit.clone()), gap, pushed(&found.orbit, unstable.as_deref()))
+                let tries: &[_] = match found.kind {
+                    BifurcationKind::Fold => &BEYOND_FOLD,
+                    _ => &[BEYOND_END],
+                };
+                (Some(found.orbit), unstable, tries)
             }
             End::Meeting { period } => {
                 let met = (0..self.stretches.len()).find(|&k| {
                     let other = &self.stretches[k];
-                    let near = |(gap, _): &(f64, End)| (gap - at).abs() <= BEYOND_FOLD * self.scale;
-                    other.period == *period && other.ends.iter().any(near)
+                    let near = |(gap, _): &(f64, End)| (gap - at).abs() <= SAME_PLACE * scale;
+                    other.period == period && other.ends.iter().any(near)
                 });
                 if let Some(stretch) = met {
                     return (Place::On { stretch, gap: at }, false);
                 }
-                let start = last.as_ref().map(|o| pushed(o, None));
-                (last, further(BEYOND_END), start.unwrap_or_default())
+                (last, None, &[BEYOND_END][..])
             }
-            _ => {
-                let start = last.as_ref().and_then(|o| o.states.first().cloned());
-                (last, further(BEYOND_END), start.unwrap_or_default())
-            }
+            _ => (last, None, &[BEYOND_END][..]),
         };
-        let next = self.arrive(gap, &start);
-        let jumps = orbit.is_none_or(|orbit| !self.goes_on(&orbit, &next));
+        let Some(orbit) = orbit else {
+            let met = Met::undecided(NO_ORBIT.to_owned(), &[]);
+            return (Place::Off { gap: at, met }, true);
+        };
+        let mut next = None;
+        for &(step, push) in tries {
+            let gap = at + side * step * scale;
+            let gap = if (gap - to) * side > 0.0 { to } else { gap };
+            let place = self.arrive(gap, &pushed(&orbit, unstable.as_deref(), push));
+            let settled = !matches!(&place, Place::Off { met, .. }
+                if met.classification == Classification::Undecided);
+            next = Some(place);
+            if settled {
+                break;
+            }
+        }
+        let met = || Met::undecided(NO_ORBIT.to_owned(), &[]);
+        let next = next.unwrap_or_else(|| Place::Off { gap: at, met: met() });
+        let jumps = !self.goes_on(&orbit, &next);
         (next, jumps)
     }
 
@@ -586,14 +608,17 @@ impl<'a> DistanceSweep<'a> {
         match place {
             Place::On { stretch, gap } => (self.orbit_at(*stretch, *gap))
                 .is_some_and(|next| next.states.iter().all(|state| near(state))),
-            Place::Off { met, .. } => near(&met.state),
+            Place::Off { met, .. } => match &met.orbit {
+                Some(next) => next.states.iter().all(|state| near(state)),
+                None => near(&met.state),
+            },
         }
     }
 
     /// The stretch of doubled period that begins at a flip and goes on in a direction.
     fn doubled(&mut self, flip: &Bifurcation, direction: Direction) -> Option<usize> {
         let period = 2 * flip.orbit.period;
-        if period > self.classify.max_period {
+        if period > LONGEST_BRANCH.min(self.classify.max_period) {
             return None;
         }
         let at = flip.parameter;
@@ -602,7 +627,7 @@ impl<'a> DistanceSweep<'a> {
             let born = matches!(end, End::Meeting { period } if *period == flip.orbit.period);
             self.stretches[k].period == period
                 && born
-                && (gap - at).abs() <= BEYOND_FOLD * self.scale
+                && (gap - at).abs() <= SAME_PLACE * self.scale
         });
         if known.is_some() {
             return known;
@@ -637,20 +662,22 @@ impl<'a> DistanceSweep<'a> {
         Some(self.stretches.len() - 1)
     }
 
-    /// A motion that does not close, from grid distance to grid distance until it does.
-    fn unclosed(&mut self, from: f64, met: Met, to: f64) -> (Piece, Option<Place>) {
-        let direction = direction(from, to);
-        let side = sign(direction);
+    /// A motion without a branch that is followed, from grid distance to grid distance until it
+    /// has one.
+    fn on_grid(&mut self, from: f64, met: Met, to: f64) -> (Piece, Option<Place>) {
+        let side = sign(direction(from, to));
         let step = self.scale / GRID;
-        let mut found = vec![(from, met)];
-        let piece = |found: Vec<(f64, Met)>, to: f64, end: End, jumps: bool, uncertainty: f64| Piece {
+        let mut piece = Piece {
             from,
+            entered: from,
             to,
-            motion: Motion::Unclosed(found),
-            end,
-            jumps,
-            uncertainty,
+            motion: Motion::OnGrid(Vec::new()),
+            end: End::Range,
+            jumps: false,
+            uncertainty: 0.0,
         };
+        let mut found = vec![(from, met)];
+        let mut onwards = None;
         while let Some((gap, before)) = found.last().cloned() {
             if (gap - to) * side >= 0.0 || self.control.is_cancelled() {
                 break;
@@ -661,40 +688,60 @@ impl<'a> DistanceSweep<'a> {
                 next = to;
             }
             let start = before.onwards();
-            let mut met = self.met(next, &start);
+            let mut met = self.met(next, &start, GRID_TRANSIENT);
             for _ in 0..HALVINGS {
-                if met.classification != Classification::Undecided {
+                if !met.failed {
                     break;
                 }
-                let nearer = 0.5 * (gap + next);
-                if !((nearer - gap) * side > 0.0) {
-                    break;
-                }
-                next = nearer;
-                met = self.met(next, &start);
+                next = 0.5 * (gap + next);
+                met = self.met(next, &start, GRID_TRANSIENT);
             }
-            let Some(orbit) = met.orbit.clone() else {
+            let Place::On { stretch, .. } = self.place(next, met.clone()) else {
                 found.push((next, met));
                 continue;
             };
-            let place = self.on(next, orbit);
-            let Place::On { stretch, .. } = place else {
-                return (piece(found, next, End::Closes, true, step), Some(place));
-            };
+            let direction = direction(from, to);
             let (begins, how) = self.stretches[stretch].end(reversed(direction)).clone();
-            if (begins - gap) * side > 0.0 && (next - begins) * side >= 0.0 {
-                let place = Place::On {
-                    stretch,
-                    gap: begins,
-                };
-                let jumps = !matches!(&how, End::Bifurcation { at, .. }
-                    if !matches!(at.kind, BifurcationKind::Fold | BifurcationKind::Grazing { .. }));
-                return (piece(found, begins, how, jumps, 0.0), Some(place));
-            }
-            let uncertainty = (next - gap).abs();
-            return (piece(found, next, End::Closes, true, uncertainty), Some(place));
+            let inside = (begins - gap) * side > 0.0 && (next - begins) * side >= 0.0;
+            let place = Place::On {
+                stretch,
+                gap: if inside { begins } else { next },
+            };
+            piece.jumps = !match &before.orbit {
+                Some(orbit) => self.goes_on(orbit, &place),
+                None => is_continuous(&how),
+            };
+            (piece.to, piece.end) = if inside { (begins, how) } else { (next, End::Closes) };
+            piece.uncertainty = if inside { 0.0 } else { (next - gap).abs() };
+            onwards = Some(place);
+            break;
         }
-        (piece(found, to, End::Range, false, 0.0), None)
+        piece.motion = Motion::OnGrid(found);
+        (piece, onwards)
+    }
+}
+
+/// Why nothing is known beyond an end.
+const NO_ORBIT: &str = "the branch that ends here has no orbit to start from";
+
+/// Part of an orbit's size within which two stable orbits at one distance are one.
+const SAME_ORBIT: f64 = 1e-9;
+
+fn is_same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
+    a.is_same_as(b) || a.distance_to(b).1 <= SAME_ORBIT * a.scale()
+}
+
+/// Whether a motion goes over into another at an end without a jump.
+const fn is_continuous(end: &End) -> bool {
+    match end {
+        End::Bifurcation { at, .. } => matches!(
+            at.kind,
+            BifurcationKind::Flip
+                | BifurcationKind::NeimarkSacker { .. }
+                | BifurcationKind::Crossing
+        ),
+        End::Meeting { .. } => true,
+        End::Range | End::Closes | End::Lost(_) => false,
     }
 }
 
@@ -743,13 +790,14 @@ fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
     (branch.points, end)
 }
 
-/// A state beside the orbit at an end: pushed from it towards an unstable one, if there is one.
-fn pushed(orbit: &PeriodicOrbit, unstable: Option<&PeriodicOrbit>) -> Vec<f64> {
+/// A state beside the orbit at an end: pushed from it by a part of its size, towards an unstable
+/// one, if there is one.
+fn pushed(orbit: &PeriodicOrbit, unstable: Option<&PeriodicOrbit>, push: f64) -> Vec<f64> {
     let Some(state) = orbit.states.first() else {
         return Vec::new();
     };
     let continuous = state.len() - orbit.discrete.min(state.len());
-    let push = PUSH * orbit.scale();
+    let push = push * orbit.scale();
     let towards = unstable.and_then(|other| other.states.first());
     let away: Vec<f64> = match towards {
         Some(other) => other.iter().zip(state).map(|(x, y)| x - y).collect(),

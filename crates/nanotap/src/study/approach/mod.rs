@@ -46,6 +46,7 @@ use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
 };
 use distance_sweep::Met;
+pub use quasistatic::{states_at, states_near};
 
 /// How to approach. Distances are in the model's unit of length.
 #[derive(Clone, Debug, PartialEq)]

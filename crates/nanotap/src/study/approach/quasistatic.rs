@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
-use super::distance_sweep::{DistanceSweep, Met, Motion, Piece, Place};
+use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place};
 use super::ramp::ramp;
 use super::{
     ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
@@ -122,7 +122,12 @@ fn branches(
     };
     let how = branching(curve.case.gap_key(), (far, near), curve.options);
     let mut branches = BranchesThrough::new(curve.case, &how)?;
-    let seeds = (0..sweep.stretches.len()).filter_map(|k| {
+    // A doubled branch is followed from its flip, as deep as the options say.
+    let is_doubled = |k: &usize| {
+        let ends = sweep.stretches[*k].ends.iter();
+        ends.into_iter().any(|(_, end)| matches!(end, End::Meeting { .. }))
+    };
+    let seeds = (0..sweep.stretches.len()).filter(|k| !is_doubled(k)).filter_map(|k| {
         let stretch = &sweep.stretches[k];
         let low = stretch.ends[0].0.max(near);
         let high = stretch.ends[1].0.min(far);
@@ -256,7 +261,7 @@ impl Written<'_> {
                     uncertainty: before.uncertainty,
                     reason: before.end.to_string(),
                     before: self.row(way, before.to, self.sweep.motion_at(before, before.to))?,
-                    after: self.row(way, after.from, self.sweep.motion_at(after, after.from))?,
+                    after: self.row(way, after.entered, self.sweep.motion_at(after, after.entered))?,
                 });
             }
         }
@@ -305,14 +310,14 @@ impl Written<'_> {
         let [Some(there), Some(back)] = self.ways.each().map(on) else {
             return Ok(None);
         };
-        let unclosed = |piece: &Piece| match &piece.motion {
+        let on_grid = |piece: &Piece| match &piece.motion {
             Motion::Periodic(_) => None,
-            Motion::Unclosed(found) => {
+            Motion::OnGrid(found) => {
                 let inside = found.iter().map(|(gap, _)| *gap);
                 Some(inside.filter(|gap| (near..=far).contains(gap)).collect::<Vec<_>>())
             }
         };
-        let gaps: Vec<f64> = match (unclosed(&there), unclosed(&back)) {
+        let gaps: Vec<f64> = match (on_grid(&there), on_grid(&back)) {
             (Some(_), Some(_)) => return Ok(None),
             (Some(gaps), None) | (None, Some(gaps)) => gaps,
             (None, None) if there.is_on_stretch_of(&back) => return Ok(None),

@@ -414,6 +414,7 @@ impl Search<'_> {
                 ..ContinuationOptions::over(0.0, sweep.farthest())
             },
             doublings: 0,
+            stable_doublings: false,
             max_branches: 8,
         };
         let quiet = Control {

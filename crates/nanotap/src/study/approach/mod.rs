@@ -459,6 +459,7 @@ impl Curve<'_> {
 fn branching(key: Key, (from, to): (f64, f64), options: &ApproachOptions) -> BranchOptions {
     BranchOptions {
         doublings: options.doublings,
+        stable_doublings: true,
         max_multiplier: MAX_MULTIPLIER,
         ..BranchOptions::over(key, from, to)
     }
@@ -563,7 +564,7 @@ pub struct ApproachRequest {
     /// Also continue the branches that coexist, stable and unstable
     #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
     pub branches: bool,
-    /// Doublings of branches to follow
+    /// Doublings of branches to follow, as far as their orbits are stable
     #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
     pub switch: usize,
     /// Longest period looked for

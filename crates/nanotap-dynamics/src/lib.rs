@@ -46,8 +46,8 @@ pub use census::{
     census_of,
 };
 pub use classify::{
-    Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Outlook, Torus, UndecidedReason,
-    birkhoff_digits, candidate_periods, classify, classify_beside, outlook,
+    Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,
+    birkhoff_digits, candidate_periods, classify, classify_beside,
 };
 pub use continuation::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ContinuationError,

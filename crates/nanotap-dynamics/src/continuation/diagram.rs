@@ -27,6 +27,8 @@ pub struct DiagramOptions {
     pub continuation: ContinuationOptions,
     /// Doublings to follow from each seed: 0 for none.
     pub doublings: usize,
+    /// Whether a doubled branch ends at its first orbit that is not stable.
+    pub stable_doublings: bool,
     /// Branches after which assembly stops.
     pub max_branches: usize,
 }
@@ -268,7 +270,11 @@ impl Diagram {
                     continue;
                 }
             }
-            let doubled = switch_at_flip(family, &flip, &options.continuation, control);
+            let doubled = ContinuationOptions {
+                until_unstable: options.stable_doublings,
+                ..options.continuation.clone()
+            };
+            let doubled = switch_at_flip(family, &flip, &doubled, control);
             self.take(
                 family,
                 doubled,

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, Tests, between};
+use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::end::dead_end;
 use crate::continuation::locating::Locating;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
@@ -116,6 +116,12 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         bifurcations: Vec::new(),
         end: BranchEnd::PointLimit,
     };
+    if options.until_unstable && !branch.points[0].orbit.is_stable() {
+        branch.end = BranchEnd::Unstable {
+            parameter: first.parameter,
+        };
+        return Ok(branch);
+    }
     let start = first.clone();
     let mut before = None;
     let mut node = first;
@@ -207,21 +213,20 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             break;
         }
         let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
-        let found = if options.until_fold {
-            between(solver, nodes, changes, taken, index)
-        } else {
-            locating.between(solver, nodes, changes, taken, index)
-        };
+        let found = locating.between(solver, nodes, changes, taken, index);
         branch.take(found, options.range);
-        let folds = |b: &Bifurcation| matches!(b.kind, BifurcationKind::Fold);
-        if options.until_fold && branch.bifurcations.iter().any(folds) {
-            branch.end = BranchEnd::Fold;
-            break;
-        }
         arclength += taken;
         let reached = point(solver, &next, &next_tests, arclength)?;
         let multiplier = reached.orbit.spectral_radius();
+        let turns = node.slope * next.slope < 0.0;
+        let unstable = turns || !reached.orbit.is_stable();
         branch.points.push(reached);
+        if options.until_unstable && unstable {
+            branch.end = BranchEnd::Unstable {
+                parameter: node.parameter,
+            };
+            break;
+        }
         if multiplier > options.max_multiplier {
             branch.end = BranchEnd::Repelling {
                 parameter: next.parameter,

@@ -142,8 +142,14 @@ class Case:
 
     @property
     def physical(self) -> Record | None:
-        """Quantities in SI (frequencies in Hz), if it is a physical case."""
-        physical = self._document.get("physical")
+        """Quantities in SI (frequencies in Hz), if it is a physical case.
+
+        Where the distance is left to a setpoint, it is solved for.
+        """
+        document = self._document
+        if self._core.leaves_distance_to_setpoint:
+            document = Record(json.loads(self._core.document_at_setpoint))
+        physical = document.get("physical")
         return physical if isinstance(physical, Record) else None
 
     @property

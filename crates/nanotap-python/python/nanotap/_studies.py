@@ -208,6 +208,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ds.attrs.update(
         parameter=name,
         hysteresis=json.dumps(report["hysteresis"]),
+        jumps=json.dumps(report["jumps"]),
         returned=int(report["returned"]),
     )
     if "modulation" in report:

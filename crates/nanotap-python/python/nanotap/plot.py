@@ -493,9 +493,17 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
         shown *= scale
 
         def curve(
-            way: str, values: Any = ds[plain], by: float = shown
+            way: str, values: Any = ds[plain], by: float = shown, plain: str = plain
         ) -> list[list[float]]:
-            return _points(factor * distance, by * values.sel(way=way).values)
+            # The ends of a jump belong to the curve.
+            ends = [
+                jump[end]
+                for jump in json.loads(ds.attrs.get("jumps", "[]"))
+                for end in ("before", "after")
+                if jump["way"] == way and jump[end].get(plain) is not None
+            ]
+            points = _points(factor * distance, by * values.sel(way=way).values)
+            return points + [[x_scale * end["gap"], by * end[plain]] for end in ends]
 
         def branches(
             prefix: str, by: float = shown, plain: str = plain, **more: Any

@@ -361,7 +361,16 @@ impl Case {
         Ok(match &self.what {
             What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
             What::Oscillator(oscillator) => oscillator.model()?,
-            What::Quantities(quantities) => Model::cantilever(&quantities.view()?.cantilever)?,
+            What::Quantities(quantities) => {
+                let model = Model::cantilever(&quantities.view()?.cantilever)?;
+                // Another number of modes has other states.
+                let start = quantities.start.as_ref();
+                let start = start.filter(|state| state.len() == model.dimension());
+                Model {
+                    start: start.cloned(),
+                    ..model
+                }
+            }
         })
     }
 
@@ -591,12 +600,18 @@ impl Case {
     }
 
     /// The same with the tip at `distance` (in m) from the sample, where its setpoint is
-    /// reached, and a note that says so. The unit of length stays; the beam, which moves with
-    /// the tip, is out of place by less than the free amplitude.
+    /// reached, and a note that says so. Its motions start from `state`, at drive phase 0. The
+    /// unit of length stays; the beam, which moves with the tip, is out of place by less than the
+    /// free amplitude.
     ///
     /// # Errors
     /// When the quantities make no sense there.
-    pub fn at_distance(&self, distance: f64, note: Remark) -> Result<Self, CaseFileError> {
+    pub fn at_distance(
+        &self,
+        distance: f64,
+        note: Remark,
+        state: Vec<f64>,
+    ) -> Result<Self, CaseFileError> {
         let What::Quantities(quantities) = &self.what else {
             return Ok(self.clone());
         };
@@ -609,6 +624,7 @@ impl Case {
             quantities.stated.put(Key::GapBeam, beam);
         }
         quantities.notes.push(note);
+        quantities.start = Some(state);
         Ok(Self {
             title: Arc::clone(&self.title),
             what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),

@@ -26,6 +26,8 @@ pub(super) struct Quantities {
     pub(super) view: Result<Box<Physical>, Box<CaseFileError>>,
     /// What a study found out about the case.
     pub(super) notes: Vec<Remark>,
+    /// State at drive phase 0 of the orbit at the setpoint, from which motions start.
+    pub(super) start: Option<Vec<f64>>,
 }
 
 impl Quantities {
@@ -38,6 +40,7 @@ impl Quantities {
             held: false,
             view: Err(Box::new(empty)),
             notes: Vec::new(),
+            start: None,
         };
         quantities.mapped(false)
     }

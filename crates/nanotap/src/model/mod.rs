@@ -96,6 +96,8 @@ pub struct Model {
     pub forgetting: Option<Forgetting>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
+    /// State at drive phase 0 from which a motion starts when no other is given; `None`: rest.
+    pub start: Option<Vec<f64>>,
 }
 
 /// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
@@ -225,6 +227,7 @@ impl Model {
             forgetting: outputs.forgetting,
             second_phase: case.tone2_phase.to_radians(),
             nonlinear: None,
+            start: None,
             system,
         })
     }
@@ -256,6 +259,7 @@ impl Model {
             forgetting: None,
             second_phase,
             nonlinear: Some(Arc::new(nonlinear)),
+            start: None,
             system: Arc::new(system),
         })
     }

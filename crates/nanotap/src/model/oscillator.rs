@@ -310,6 +310,7 @@ impl Oscillator {
             memory: 0,
             forgetting: None,
             nonlinear: None,
+            start: None,
             second_phase: 0.0,
             height: gap.clone(),
             gap,

@@ -17,6 +17,7 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
 use crate::study::kind::Study;
@@ -697,7 +698,17 @@ impl Study for AttractorsStudy {
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let mut found = attractors(&model, &request.options(&model)?, control)?;
+        let options = request.options(&model)?;
+        let known = states_near(case, options.classify.max_period, control)?;
+        let seeds = known.into_iter().filter_map(|orbit| {
+            let state = orbit.states.into_iter().next()?;
+            Some((orbit.period, state))
+        });
+        let options = AttractorsOptions {
+            seeds: seeds.collect(),
+            ..options
+        };
+        let mut found = attractors(&model, &options, control)?;
         if request.prove {
             found.prove(case);
         }

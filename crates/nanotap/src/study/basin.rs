@@ -296,7 +296,8 @@ impl Basin {
         }
         let model = case.model()?;
         let names = state_names(&model);
-        let origin = starting_state(&model, options.state.as_deref())?;
+        let rest = vec![0.0; model.dimension()];
+        let origin = starting_state(&model, Some(options.state.as_deref().unwrap_or(&rest)))?;
         if options.x.name == options.y.name {
             return Err(BasinError::SameAxis {
                 name: options.x.name.clone(),

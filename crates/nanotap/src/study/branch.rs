@@ -37,6 +37,8 @@ pub struct BranchOptions {
     pub state: Option<Vec<f64>>,
     /// Doublings to follow: 0 for the one branch alone.
     pub doublings: usize,
+    /// Whether doubled branches end at their first orbit that is not stable.
+    pub stable_doublings: bool,
     /// Seeds from a census instead of the one orbit at the start.
     pub census: Option<SeedOptions>,
     /// A second parameter and its range: loci of the bifurcations are traced in both.
@@ -88,6 +90,7 @@ impl BranchOptions {
             period: None,
             state: None,
             doublings: 0,
+            stable_doublings: false,
             census: None,
             second: None,
             max_step: continuation.max_step,
@@ -113,6 +116,7 @@ impl BranchOptions {
         DiagramOptions {
             continuation: self.continuation(),
             doublings: self.doublings,
+            stable_doublings: self.stable_doublings,
             max_branches: self.max_branches,
         }
     }

@@ -100,6 +100,8 @@ pub enum Classification {
     Chaotic,
     /// It leaves every bound.
     Unbounded,
+    /// It is observed before it has settled, as where the distance changes at a finite speed.
+    Transient,
     /// None of these could be shown.
     Undecided,
 }
@@ -112,6 +114,7 @@ impl Classification {
             Self::QuasiPeriodic => "quasi-periodic",
             Self::Chaotic => "chaotic",
             Self::Unbounded => "unbounded",
+            Self::Transient => "transient",
             Self::Undecided => "undecided",
         }
     }
@@ -230,15 +233,15 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     })
 }
 
-/// The state to start from: as given, or rest. A sample with a memory is relaxed where the
-/// state does not say otherwise.
+/// The state to start from: as given, or that of the model ([`Model::start`]), or rest. A sample
+/// with a memory is relaxed where the state does not say otherwise.
 ///
 /// # Errors
 /// [`SimulateError::State`] when its length does not fit.
 pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
     let n = model.dimension();
     let Some(state) = state else {
-        return Ok(vec![0.0; n]);
+        return Ok(model.start.clone().unwrap_or_else(|| vec![0.0; n]));
     };
     let mut state = state.to_vec();
     if state.len() + model.memory == n {

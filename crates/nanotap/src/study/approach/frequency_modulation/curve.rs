@@ -138,6 +138,7 @@ pub fn modulated_approach(
         .shift
         .map(|shift| curve.setpoints(held, shift, &table, control));
     Ok(ApproachReport {
+        jumps: Vec::new(),
         parameter: case.gap_key().path(),
         from,
         to,

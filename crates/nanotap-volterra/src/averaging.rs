@@ -12,6 +12,7 @@
 //! Higher harmonics of the force enter the state by the modes' response to them. Wrong where the
 //! gap has strong harmonics: whatever is found here is a guess.
 
+use crate::gap_table::GapTable;
 use crate::law::Guard;
 use crate::system::System;
 use crate::{Complex, VolterraError};
@@ -54,6 +55,7 @@ struct Averaging<'a> {
     drive: Complex,
     compliance: f64,
     receptance: Complex,
+    table: GapTable,
     /// Phases and weights over one oscillation from the far turning point.
     phases: Vec<Phase>,
 }
@@ -103,6 +105,7 @@ impl<'a> Averaging<'a> {
             drive: *drive,
             compliance: unit(0.0)?.re,
             receptance: unit(tone.frequency)?,
+            table: GapTable::new(system),
             phases: phases.collect(),
         })
         .filter(|averaging| averaging.drive.modulus() > 0.0)
@@ -121,7 +124,11 @@ impl<'a> Averaging<'a> {
             } else {
                 law.branch_at(gap, rate)
             };
-            visit(phase, law.value(branch, gap, rate), branch);
+            visit(
+                phase,
+                self.table.force(self.system, branch, gap, rate),
+                branch,
+            );
         }
     }
 

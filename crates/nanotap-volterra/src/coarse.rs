@@ -52,8 +52,6 @@ const MAX_SWITCHES_AT_ONCE: usize = 64;
 const MAX_LOCATED_BRANCHES: usize = 8;
 /// Steps of the bracketed search for a switch.
 const MAX_BISECTIONS: usize = 48;
-/// Relative change of the state, in units of the motion's size, for a Jacobian by differences.
-const DIFFERENCE: f64 = 1e-4;
 
 /// An approximate motion of a [`System`] over drive periods, with its work space. Cloning shares
 /// the tables.
@@ -102,8 +100,6 @@ struct Tables {
     by_gap_alone: Vec<bool>,
     /// Whether the branch is looked up at each evaluation.
     by_lookup: bool,
-    /// Whether the law's derivative is unbounded at a switch.
-    steep: bool,
     max_steps: u64,
 }
 
@@ -339,7 +335,6 @@ impl Tables {
         let branches = if by_lookup { 1 } else { law.branches() };
         let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; branches];
         let mut exits = vec![Vec::new(); branches];
-        let mut steep = false;
         if !by_lookup {
             for branch in 0..branches {
                 for exit in system.exits(branch) {
@@ -358,7 +353,6 @@ impl Tables {
                         let [a, b] = [branch, exit.target].map(|b| law.value(b, level, 0.0));
                         (a - b).abs() <= 1e-9 * a.abs().max(b.abs()) && !law.depends_on_rate()
                     });
-                    steep |= exit.before == Approach::Half || exit.after == Approach::Half;
                     exits[branch].push(CoarseExit {
                         exit: *exit,
                         beyond: BEYOND[usize::from(continuous)],
@@ -401,7 +395,6 @@ impl Tables {
                 .collect(),
             exits,
             by_lookup,
-            steep,
             max_steps: MAX_STEPS.saturating_mul(oscillations as u64),
             system: Arc::clone(system),
         })
@@ -529,10 +522,35 @@ impl Tables {
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
     }
 
-    /// Carries derivatives of the modal coordinates along the step with these stages.
-    fn carry(&self, level: &Level, branch: usize, stages: &Stages, columns: &mut [[f64; 2]]) {
-        let slopes: [[f64; 2]; 4] =
+    /// Carries derivatives of the modal coordinates along the step with these stages to
+    /// `end_gap`. Where the slope by the gap is infinite at an end of the step, its mean over the
+    /// step stands for it at all stages.
+    fn carry(
+        &self,
+        level: &Level,
+        branch: usize,
+        stages: &Stages,
+        mean_slope_to: Option<f64>,
+        columns: &mut [[f64; 2]],
+    ) {
+        let mut slopes: [[f64; 2]; 4] =
             std::array::from_fn(|i| self.slopes(branch, stages.gaps[i], stages.rates[i]));
+        if let Some(end) = mean_slope_to {
+            let [start, rate] = [stages.gaps[0], stages.rates[2]];
+            let rise = self.force(branch, end, rate) - self.force(branch, start, rate);
+            let mean = if end == start {
+                0.0
+            } else {
+                rise / (end - start)
+            };
+            for slope in &mut slopes {
+                slope[0] = mean;
+                // Numbers with derivatives make 0 · ∞ of it where it vanishes.
+                if !slope[1].is_finite() {
+                    slope[1] = 0.0;
+                }
+            }
+        }
         for column in columns.chunks_exact_mut(level.blocks.len()) {
             let (mut start, mut mid, mut end) = ([0.0; 2], [0.0; 2], [0.0; 2]);
             for (k, (y, block)) in column.iter_mut().zip(&level.blocks).enumerate() {
@@ -730,9 +748,8 @@ impl Coarse {
         Ok(work.end(tables, state))
     }
 
-    /// As [`Coarse::run_periods`] over one period, with the Jacobian (`n × n`) by the state:
-    /// from the equations linearised along the steps, or from central differences where the
-    /// law's slope is unbounded at a switch.
+    /// As [`Coarse::run_periods`] over one period, with the Jacobian (`n × n`) by the state, from
+    /// the equations linearised along the steps.
     ///
     /// # Errors
     /// As [`Coarse::run_periods`].
@@ -745,11 +762,7 @@ impl Coarse {
         let Self { tables, work } = self;
         work.columns.clear();
         work.begin(tables, state, branch)?;
-        let by_modal = if tables.steep {
-            work.period_with_differences(tables)?
-        } else {
-            work.period_with_columns(tables)?
-        };
+        let by_modal = work.period_with_columns(tables)?;
         let modes = tables.system.kernel().modes();
         jacobian.copy_from(&(modes.right() * by_modal * modes.left()));
         Ok(work.end(tables, state))
@@ -757,33 +770,6 @@ impl Coarse {
 }
 
 impl Work {
-    /// Runs one period and differentiates it by modal coordinates, by central differences.
-    fn period_with_differences(&mut self, tables: &Tables) -> Result<DMatrix<f64>, VolterraError> {
-        let blocks = tables.system.kernel().modes().blocks();
-        let n = tables.system.dimension();
-        let mut out = DMatrix::zeros(n, n);
-        let start = self.now.clone();
-        for (k, block) in blocks.iter().enumerate() {
-            let reading = dot(tables.readout[k], tables.readout[k]).sqrt();
-            let width = DIFFERENCE * self.size / if reading > 0.0 { reading } else { 1.0 };
-            for j in 0..block.size {
-                for shift in [-width, width] {
-                    self.now.clone_from(&start);
-                    self.now.modal[k][j] += shift;
-                    self.period(tables)?;
-                    for (block_i, y) in blocks.iter().zip(&self.now.modal) {
-                        for i in 0..block_i.size {
-                            out[(block_i.start + i, block.start + j)] += y[i] / (2.0 * shift);
-                        }
-                    }
-                }
-            }
-        }
-        self.now.clone_from(&start);
-        self.period(tables)?;
-        Ok(out)
-    }
-
     /// Runs one period with derivatives by modal coordinates.
     fn period_with_columns(&mut self, tables: &Tables) -> Result<DMatrix<f64>, VolterraError> {
         let blocks = tables.system.kernel().modes().blocks();
@@ -894,6 +880,8 @@ impl Work {
         let allowed = TOLERANCE * tables.frequency * self.size;
         let mut l = FIRST_LEVEL;
         let mut at_once = (0.0, 0);
+        // Whether the slope of the force is infinite where the step begins.
+        let mut steep = false;
         // After a switch the new branch may end at once.
         let mut fresh = true;
         let mut tried = 0;
@@ -946,12 +934,15 @@ impl Work {
                 }
                 if fall.is_none() {
                     if !self.columns.is_empty() {
-                        tables.carry(level, self.now.branch, &self.stages, &mut self.columns);
+                        let to = steep.then_some(self.next.gap);
+                        let branch = self.now.branch;
+                        tables.carry(level, branch, &self.stages, to, &mut self.columns);
                     }
                     std::mem::swap(&mut self.now, &mut self.next);
                     self.now.force = tables.force(self.now.branch, self.now.gap, self.now.rate);
                     self.statistics.evaluations += 1;
                     self.statistics.steps += 1;
+                    steep = false;
                     if error < GROWTH * allowed {
                         l = l.saturating_sub(1);
                     }
@@ -959,9 +950,11 @@ impl Work {
                 }
             }
             let Some(fall) = fall else { continue };
-            if !self.switch(tables, fall)? {
+            if !self.switch(tables, fall, steep)? {
+                steep = false;
                 continue;
             }
+            steep = fall.exit.exit.after == Approach::Half;
             fresh = true;
             l = (l + 1).min(LEVELS - 1);
             if self.now.time - at_once.0 > 1e-13 * end {
@@ -1000,7 +993,7 @@ impl Work {
     /// Goes to where the guard of `fall` has just fallen, on partial steps, and switches.
     /// Returns whether it has switched: where the guard does not fall after all, the motion
     /// only goes on to the end of the search.
-    fn switch(&mut self, tables: &Tables, fall: Fall) -> Result<bool, VolterraError> {
+    fn switch(&mut self, tables: &Tables, fall: Fall, steep: bool) -> Result<bool, VolterraError> {
         let exit = fall.exit.exit;
         let beyond = exit_tolerance(tables, &fall.exit, &self.now, self.size);
         let mut fell = true;
@@ -1049,7 +1042,9 @@ impl Work {
                 });
             }
             if !self.columns.is_empty() {
-                tables.carry(&self.part, self.now.branch, &self.stages, &mut self.columns);
+                let steep = steep || exit.before == Approach::Half;
+                let (to, branch) = (steep.then_some(self.next.gap), self.now.branch);
+                tables.carry(&self.part, branch, &self.stages, to, &mut self.columns);
             }
             std::mem::swap(&mut self.now, &mut self.next);
             self.statistics.steps += 1;

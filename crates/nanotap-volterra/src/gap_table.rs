@@ -6,6 +6,8 @@ use crate::system::System;
 
 /// Intervals of a table.
 const INTERVALS: usize = 2048;
+/// Laws of more branches are not tabulated.
+const MAX_BRANCHES: usize = 64;
 /// How far a table reaches, as a part of the size of gaps and amplitudes.
 const REACH: f64 = 2.0;
 
@@ -20,6 +22,8 @@ struct Curve {
     density: f64,
     /// At −1, 0, 1 … intervals.
     values: Vec<f64>,
+    /// The derivative by the rate there; empty where the force is none of the rate.
+    by_rate: Vec<f64>,
 }
 
 /// The force of a law, tabulated on the branches where the law solves an equation for it.
@@ -32,7 +36,7 @@ impl GapTable {
     pub(crate) fn new(system: &System) -> Self {
         let law = system.law();
         let size = system.drive().offset.abs() + system.gap_sizes[0];
-        let tabulated = law.branches() <= 64 && !law.depends_on_rate() && size > 0.0;
+        let tabulated = law.branches() <= MAX_BRANCHES && size > 0.0;
         let curve = |branch| Curve::new(system, branch, REACH * size).filter(|_| tabulated);
         Self {
             curves: (0..law.branches()).map(curve).collect(),
@@ -43,7 +47,7 @@ impl GapTable {
     #[inline]
     pub(crate) fn force(&self, system: &System, branch: usize, gap: f64, rate: f64) -> f64 {
         let curve = self.curves.get(branch).and_then(Option::as_ref);
-        let tabulated = curve.and_then(|curve| curve.at(gap));
+        let tabulated = curve.and_then(|curve| curve.at(gap, rate));
         tabulated.unwrap_or_else(|| system.law().value(branch, gap, rate))
     }
 }
@@ -67,35 +71,58 @@ impl Curve {
             _ => reach,
         });
         let density = INTERVALS as f64 / reach.sqrt();
-        let force = |k: usize| {
+        let law = system.law();
+        let at = |k: usize, rate: f64| {
             let root = k as f64 / density;
-            system.law().value(branch, level + side * root * root, 0.0)
+            law.value(branch, level + side * root * root, rate)
         };
+        // A force in proportion to the rate and one without it; any other is not tabulated.
+        let linear = |k: usize| {
+            let [a, b, c] = [-1.0, 0.0, 2.0].map(|rate| at(k, rate * reach));
+            (c - b - 2.0 * (b - a)).abs() <= 1e-9 * (a.abs() + b.abs() + c.abs())
+        };
+        let rates = law.depends_on_rate();
+        if rates && ![1, INTERVALS / 3, INTERVALS].into_iter().all(linear) {
+            return None;
+        }
         // Beyond the end the cubic through the first four.
-        let [a, b, c, d] = [0, 1, 2, 3].map(force);
-        let before = 4.0 * a - 6.0 * b + 4.0 * c - d;
-        let values: Vec<f64> = std::iter::once(before)
-            .chain((0..=INTERVALS + 1).map(force))
-            .collect();
-        let finite = values.iter().all(|v| v.is_finite());
-        finite.then_some(Self {
+        let table = |value: &dyn Fn(usize) -> f64| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(value);
+            let before = 4.0 * a - 6.0 * b + 4.0 * c - d;
+            let values = std::iter::once(before).chain((0..=INTERVALS + 1).map(value));
+            values.collect::<Vec<f64>>()
+        };
+        let curve = Self {
             level,
             side,
             density,
-            values,
-        })
+            values: table(&|k| at(k, 0.0)),
+            by_rate: if rates {
+                table(&|k| (at(k, reach) - at(k, -reach)) / (2.0 * reach))
+            } else {
+                Vec::new()
+            },
+        };
+        let mut all = curve.values.iter().chain(&curve.by_rate);
+        all.all(|v| v.is_finite()).then_some(curve)
     }
 
-    /// The cubic through the four nearest values; `None` outside the table.
+    /// The cubics through the four nearest values; `None` outside the table.
     #[inline]
-    fn at(&self, gap: f64) -> Option<f64> {
+    fn at(&self, gap: f64, rate: f64) -> Option<f64> {
         let x = (self.side * (gap - self.level)).max(0.0).sqrt() * self.density;
         let k = x as usize;
-        let [a, b, c, d] = *self.values.get(k..k + 4)? else {
-            return None;
-        };
         let t = x - k as f64;
         let (s, u, v) = (1.0 - t, 1.0 + t, 2.0 - t);
-        Some((-t * s * v * a + 3.0 * u * s * v * b + 3.0 * u * t * v * c - u * t * s * d) / 6.0)
+        let weights = [-t * s * v, 3.0 * u * s * v, 3.0 * u * t * v, -u * t * s];
+        let read = |values: &[f64]| {
+            let near = values.get(k..k + 4)?.iter().zip(weights);
+            Some(near.map(|(value, weight)| value * weight).sum::<f64>() / 6.0)
+        };
+        let value = read(&self.values)?;
+        if self.by_rate.is_empty() {
+            return Some(value);
+        }
+        Some(value + rate * read(&self.by_rate)?)
     }
 }

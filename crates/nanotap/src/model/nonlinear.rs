@@ -262,6 +262,19 @@ impl Nonlinear {
         let (rest, compliance) = (self.system.drive().offset, self.compliance());
         let tip = rest.abs();
         let mut found: Vec<Equilibrium> = Vec::new();
+        // From where contact begins outwards and inwards, ever farther.
+        let contact = self.contact_gap().unwrap_or(0.0);
+        let reach = 10.0 * (tip + contact.abs());
+        let ladder = |k: i32| {
+            reach * nanotap_arithmetic::powf(1e-9, f64::from(k) / f64::from(EQUILIBRIUM_POINTS))
+        };
+        let steps: Vec<f64> = (0..=EQUILIBRIUM_POINTS).map(ladder).collect();
+        let inwards = steps.iter().rev().map(|step| contact - step);
+        let points: Vec<f64> = steps
+            .iter()
+            .map(|step| contact + step)
+            .chain(inwards)
+            .collect();
         for branch in 0..law.branches() {
             let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
             for exit in self.system.exits(branch) {
@@ -272,19 +285,11 @@ impl Nonlinear {
                 }
             }
             let excess = |gap: f64| gap - rest - compliance * law.force(branch, gap, 0.0).value;
-            // From where contact begins outwards and inwards, ever farther.
-            let contact = self.contact_gap().unwrap_or(0.0);
-            let reach = 10.0 * (tip + contact.abs());
-            let ladder = |k: i32| {
-                reach * nanotap_arithmetic::powf(1e-9, f64::from(k) / f64::from(EQUILIBRIUM_POINTS))
-            };
-            let outwards = (0..=EQUILIBRIUM_POINTS).map(|k| contact + ladder(k));
-            let inwards = (0..=EQUILIBRIUM_POINTS).rev().map(|k| contact - ladder(k));
-            let mut gaps: Vec<f64> = outwards
-                .chain(inwards)
-                .filter(|gap| *gap >= low && *gap <= high)
-                .chain([low, high].into_iter().filter(|end| end.is_finite()))
-                .collect();
+            // The points fall.
+            let first = points.partition_point(|gap| *gap > high);
+            let end = points.partition_point(|gap| *gap >= low).max(first);
+            let mut gaps = points[first..end].to_vec();
+            gaps.extend([low, high].into_iter().filter(|end| end.is_finite()));
             gaps.sort_by(|a, b| b.total_cmp(a));
             for pair in gaps.windows(2) {
                 let (mut a, mut b) = (pair[0], pair[1]);

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::continuation::{Bifurcation, BifurcationKind, ContinuationError, OrbitTangency};
 use crate::curve::{CurveOptions, CurvePoint};
 use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
-use crate::map::TwoParameterFamily;
+use crate::map::{StroboscopicMap, TwoParameterFamily};
 use crate::orbit::Multipliers;
 use crate::orbit::shooting::{MOST_SETTINGS, Segments, set_discrete_entries};
 use crate::vector::{distance, norm, unit};
@@ -98,10 +98,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     fn orbit_from(&self, u: &[f64]) -> Result<Trajectory, MapFailure> {
         let (d, n) = (self.d, self.n);
         let parameters = [u[d], u[d + 1]];
-        let mut map = self
-            .family
-            .at(parameters[0], parameters[1])
-            .map_err(MapFailure::refused)?;
+        let mut map = self.map_at(u)?;
         let mut segments = Segments::new(d, n);
         segments.discrete = d - self.continuous;
         let mut state = u[..d].to_vec();
@@ -154,9 +151,14 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     }
 
     pub(super) fn map_at(&self, u: &[f64]) -> Result<F::Map, MapFailure> {
-        self.family
+        let mut map = self
+            .family
             .at(u[self.d], u[self.d + 1])
-            .map_err(MapFailure::refused)
+            .map_err(MapFailure::refused)?;
+        if matches!(self.kind, BifurcationKind::Grazing { .. }) {
+            map.pass_touches();
+        }
+        Ok(map)
     }
 
     /// The function that vanishes on the locus, from the Jacobians of an orbit.

@@ -208,6 +208,13 @@ impl StroboscopicMap for Strobe {
         }
     }
 
+    fn pass_touches(&mut self) {
+        if let Engine::Exact(map) = &mut self.0 {
+            let period = map.flow.system().drive().period();
+            map.flow.pass_touches(LONGEST_TOUCH * period);
+        }
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -227,6 +234,9 @@ impl StroboscopicMap for Strobe {
         }
     }
 }
+
+/// The longest touch of a rigid stop that is passed through near a grazing, in drive periods.
+const LONGEST_TOUCH: f64 = 0.1;
 
 /// The most states that are advanced together.
 const TOGETHER: usize = 64;
@@ -309,7 +319,7 @@ impl ExactStrobe {
     ) -> Result<(), FlowError> {
         // Threads that share the system count no references to it every period.
         let flow = &mut self.flow;
-        self.carried.begin(&flow.system().regimes()[flow.regime()]);
+        self.carried.begin(flow.system(), flow.regime());
         flow.run_period(&mut (&mut self.carried, observer))?;
         let regime = &flow.system().regimes()[flow.regime()];
         self.carried.to_state(regime, jacobian);
@@ -355,7 +365,8 @@ impl ExactStrobe {
         jacobian: &mut DMatrix<f64>,
     ) -> Result<f64, FlowError> {
         self.begin(state)?;
-        let mut sum = LogDeterminant(0.0);
+        let sticks = self.flow.system().sticks(self.flow.regime());
+        let mut sum = LogDeterminant(if sticks { f64::NAN } else { 0.0 });
         self.run_with_jacobian(&mut sum, jacobian)?;
         self.end(state);
         Ok(sum.0)
@@ -416,7 +427,8 @@ fn log_impact(transition: &Transition) -> Option<f64> {
     Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))
 }
 
-/// Sums log|det| over a period: tr A · t in every regime, and the switches.
+/// Sums log|det| over a period: tr A · t in every regime, and the switches. Not a number of a motion
+/// that sticks, by which volumes vanish.
 struct LogDeterminant(f64);
 
 impl Observer for LogDeterminant {
@@ -425,6 +437,10 @@ impl Observer for LogDeterminant {
     }
 
     fn switch(&mut self, switch: &SwitchView<'_>) {
+        if switch.stuck {
+            self.0 = f64::NAN;
+            return;
+        }
         let transitions = &switch.system.transitions()[switch.switch.from];
         let impact = transitions.get(switch.transition).and_then(log_impact);
         let continuous = || switch.switch.log_determinant(switch.rate);
@@ -473,11 +489,12 @@ impl Observer for GapExtrema<'_> {
         }
     }
 
-    /// Where what only grazes breaks off, no extremum is left beyond a grazing: in its place is the
-    /// one that the gap would have had without the switch, ġ²/(2|g̈|) behind it.
+    /// Where what only grazes breaks off, and at impacts, no extremum is left beyond a grazing: in its
+    /// place is the one that the gap would have had without the switch, ġ²/(2|g̈|) behind it.
     fn switch(&mut self, switch: &SwitchView<'_>) {
         self.switched = true;
-        if !switch.switch.breaks_grazing() {
+        let (from, to) = (switch.switch.from, switch.switch.to);
+        if !(switch.switch.breaks_grazing() || from == to) {
             return;
         }
         let system = switch.system;

@@ -238,7 +238,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
     let n = model.dimension();
     let Some(state) = state else {
-        return Ok(vec![0.0; n]);
+        return Ok(model.rest());
     };
     let mut state = state.to_vec();
     if state.len() + model.memory == n {

@@ -29,8 +29,8 @@ const LONG_WORTH_TRYING: f64 = 1e-2;
 const LAST_WORTH_TRYING: f64 = 0.1;
 /// Periods after which the means of a run may tell that it is on chaos that is known.
 pub(crate) const RECOGNISABLE: usize = 256;
-/// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
-const TELLING: f64 = 0.2;
+/// Exponents are measured for so many times their budget at most, where chaotic transients end.
+const LONGEST_MEASUREMENT: usize = 4;
 /// Distance of a neighbour, in standard deviations of the motion.
 const NEIGHBOUR: f64 = 1e-9;
 /// How many times its distance grows on chaos.
@@ -531,10 +531,7 @@ impl<'a> Run<'a> {
         let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
         let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
         let deviations = means.deviations();
-        let telling = deviations
-            .iter()
-            .zip(&means.errors)
-            .all(|(deviation, error)| *error <= TELLING * deviation);
+        let telling = means.is_telling();
         let found = known.find(|k| telling && k.strobe.agree_with(&means));
         found.map(|spectrum| Resembled {
             spectrum: spectrum.clone(),
@@ -574,8 +571,8 @@ impl<'a> Run<'a> {
     }
 
     /// Exponents of what does not close, looking for an escape after every doubling. Where the last
-    /// half of the run differs from the first, or is not chaotic where the whole run is, the first
-    /// was a transient and is discarded.
+    /// half of the run differs from what was before, or is not chaotic where the whole run is, all
+    /// before it was a transient and is discarded.
     pub(super) fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
         let mut exponents = LyapunovRun::new(self.d);
@@ -584,7 +581,7 @@ impl<'a> Run<'a> {
         }
         let mut before: Option<LyapunovSpectrum> = None;
         let first = budget.min_periods.max(64);
-        let (mut measured, mut target) = (first / 2, first);
+        let (mut measured, mut target, mut end) = (first / 2, first, budget.max_periods);
         self.record(map, &mut exponents, measured)?;
         let mut early = exponents.spectrum();
         let spectrum = loop {
@@ -607,23 +604,32 @@ impl<'a> Run<'a> {
                 });
             }
             let last = exponents.last_spectrum();
-            if !early.agrees_with(&last) || is_chaotic(&exponents.spectrum()) != stays_chaotic(&last) {
+            let calmed_down = is_chaotic(&exponents.spectrum()) && !stays_chaotic(&last);
+            if calmed_down {
+                end = (measured + budget.max_periods).min(LONGEST_MEASUREMENT * budget.max_periods);
+            }
+            if calmed_down || !early.agrees_with(&last) {
                 exponents.keep_last_stretch();
             }
             let spectrum = exponents.spectrum();
             let known = &mut self.known.chaos.iter();
             let is_known = known.any(|k| k.agrees_with(&spectrum));
-            let is_settled = if is_chaotic(&spectrum) {
-                budget.is_met_by(&spectrum) || is_known
-            } else {
-                // On a torus that is known.
-                is_known && early.agrees_with(&last)
-            };
-            if target >= budget.max_periods || is_settled {
+            if is_chaotic(&spectrum) {
+                if budget.is_met_by(&spectrum) || is_known {
+                    break spectrum;
+                }
+            } else if is_known && spectrum.is_telling() {
+                // Perhaps on a torus that is known.
+                let kind = self.neither_periodic_nor_chaotic(map, spectrum.clone())?;
+                if !matches!(kind, MotionKind::Undecided { .. }) {
+                    return Ok(kind);
+                }
+            }
+            if measured >= end {
                 break spectrum;
             }
             before = Some(spectrum);
-            target = (2 * target).min(budget.max_periods);
+            target = (measured + exponents.periods()).min(end);
         };
         let last = exponents.last_spectrum();
         let mut tori = self.known.chaos.iter().filter(|k| !is_chaotic(k));

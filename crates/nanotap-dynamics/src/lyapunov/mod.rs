@@ -25,6 +25,8 @@ use crate::map::StroboscopicMap;
 pub use strobe_means::StrobeMeans;
 use strobe_means::{agree, sampled};
 
+/// Standard error of an exponent up to which exponents tell motions apart.
+const TELLING_ERROR: f64 = 0.01;
 /// Part of a Jacobian's largest entry below which a stretch is rounding.
 const ROUNDING: f64 = 1e-10;
 
@@ -92,6 +94,11 @@ impl LyapunovSpectrum {
             self.exponents.first().copied().unwrap_or(f64::NAN),
             self.errors.first().copied().unwrap_or(f64::NAN),
         )
+    }
+
+    /// True if exponents and means are known well enough to tell motions apart.
+    pub(crate) fn is_telling(&self) -> bool {
+        self.errors.iter().all(|e| *e <= TELLING_ERROR) && self.strobe.is_telling()
     }
 
     /// True if two motions have the same exponents and the same means of the strobe states and

@@ -261,6 +261,8 @@ struct ExactStrobe {
     gap: Arc<Output>,
     /// Whether tip and surface part at equal speeds.
     parts_at_rest: bool,
+    /// Whether the sample is a rigid stop.
+    is_rigid: bool,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
 }
@@ -274,6 +276,7 @@ impl ExactStrobe {
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
             parts_at_rest: model.forgetting.is_some(),
+            is_rigid: model.rigid_stop.is_some(),
             tangents: tangents.into(),
         }
     }
@@ -411,6 +414,7 @@ impl ExactStrobe {
         let mut collector = GapExtrema {
             gap: &self.gap,
             parts_at_rest: self.parts_at_rest,
+            is_rigid: self.is_rigid,
             switched: false,
             tangencies,
         };
@@ -454,6 +458,9 @@ struct GapExtrema<'a> {
     /// Whether tip and surface part at equal speeds: the gap is then least, and zero, where they
     /// part, which is no grazing.
     parts_at_rest: bool,
+    /// Whether nothing but a least gap can graze: the tops of ever lower flights of a chatter end in
+    /// rounding.
+    is_rigid: bool,
     /// Whether the stretch begins with a switch.
     switched: bool,
     tangencies: &'a mut Vec<Tangency>,
@@ -479,6 +486,9 @@ impl Observer for GapExtrema<'_> {
         let period = system.drive().period();
         for s in sign_changes(&rate, segment.length) {
             if self.parts_at_rest && self.switched && s < PARTING * period {
+                continue;
+            }
+            if self.is_rigid && rate.differentiated(segment.length).at(s) <= 0.0 {
                 continue;
             }
             let phase = (segment.phase + s) / period;

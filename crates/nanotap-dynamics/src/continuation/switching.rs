@@ -84,7 +84,8 @@ pub fn switch_at_flip<F: MapFamily>(
         }
         amplitude *= 0.5;
     }
-    let initial_step = found.ok_or_else(|| failed("no orbit of doubled period was found near it"))?;
+    let initial_step =
+        found.ok_or_else(|| failed("no orbit of doubled period was found near it"))?;
     let options = ContinuationOptions {
         initial_step,
         min_step: options.min_step.min(initial_step),

@@ -13,6 +13,10 @@ use crate::vector::{distance, norm, unit};
 /// Part of the unit in which its branch was followed up to which an orbit has no size of its own.
 const NO_SIZE: f64 = 1e-6;
 
+/// Steps of differences, as parts of the scales.
+const LONGEST_DIFFERENCE: f64 = 1e-6;
+const SHORTEST_DIFFERENCE: f64 = 1e-8;
+
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.
 #[derive(Clone, Debug)]
 pub(super) struct CurveNode {
@@ -265,13 +269,25 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         Ok(nearest.map(|(_, t)| t))
     }
 
+    /// The step of the differences, in units of the scales: short against the distance to the next
+    /// grazing, near which derivatives of the map change fast.
+    fn difference_step(&self, map: &mut F::Map, x: &[f64]) -> f64 {
+        if let BifurcationKind::Grazing { .. } = self.kind {
+            return LONGEST_DIFFERENCE;
+        }
+        let closest = self.all_tangencies(map, x).iter().map(|t| t.value.abs());
+        let closest = closest.fold(f64::INFINITY, f64::min) / self.scales[0];
+        (0.01 * closest).clamp(SHORTEST_DIFFERENCE, LONGEST_DIFFERENCE)
+    }
+
     fn gradient(&self, u: &[f64]) -> Result<Vec<f64>, MapFailure> {
         let d = self.d;
         let mut here = self.map_at(u)?;
+        let step = self.difference_step(&mut here, &u[..d]);
         let mut shifted = u.to_vec();
         let mut gradient = Vec::with_capacity(u.len());
         for i in 0..u.len() {
-            let h = 1e-6 * self.scales[i];
+            let h = step * self.scales[i];
             let (high, low) = (u[i] + h, u[i] - h);
             let mut at = |value: f64| -> Result<f64, MapFailure> {
                 shifted[i] = value;
@@ -415,15 +431,20 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
 
     /// Every extremum of the switching functions along the orbit.
     pub(super) fn tangencies(&self, node: &CurveNode) -> Vec<OrbitTangency> {
+        match self.map_at(&node.u) {
+            Ok(mut map) => self.all_tangencies(&mut map, &node.u[..self.d]),
+            Err(_) => Vec::new(),
+        }
+    }
+
+    /// The same of the run from `x`, as far as it can be followed.
+    fn all_tangencies(&self, map: &mut F::Map, x: &[f64]) -> Vec<OrbitTangency> {
         let mut found = Vec::new();
-        let Ok(mut map) = self.map_at(&node.u) else {
-            return found;
-        };
-        let mut state = node.u[..self.d].to_vec();
+        let mut state = x.to_vec();
         let mut one = Vec::new();
         for k in 0..self.n {
             one.clear();
-            if advance_with_tangencies(&mut map, &mut state, &mut one).is_err() {
+            if advance_with_tangencies(map, &mut state, &mut one).is_err() {
                 break;
             }
             found.extend(one.iter().map(|t| OrbitTangency {

@@ -4,7 +4,9 @@ use nanotap_dynamics::{
     Chaos, ClassifyOptions, LyapunovOptions, MotionKind, UndecidedReason, classify, classify_beside,
 };
 
-use crate::systems::{Calming, Cubic, DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning};
+use crate::systems::{
+    Calming, Cubic, DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning,
+};
 
 fn period_of(verdict: &MotionKind) -> usize {
     match verdict {

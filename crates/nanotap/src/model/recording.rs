@@ -157,7 +157,10 @@ impl Recording {
         let (Self::Exact(trajectory), Some(stop)) = (self, model.rigid_stop) else {
             return Vec::new();
         };
-        let hits = trajectory.events().iter().filter(|e| !model.contact[e.from]);
+        let hits = trajectory
+            .events()
+            .iter()
+            .filter(|e| !model.contact[e.from]);
         hits.map(|e| (e.time, -e.rate * stop.impulse(e.from, e.to)))
             .collect()
     }

@@ -59,10 +59,8 @@ impl Starts {
             Self::Rest => model.rest(),
             Self::Given(state) => state.clone(),
             // A box that cannot be had was refused when the sweep was made.
-            Self::Seeded { seed, sides, .. } => box_with(model, sides).map_or_else(
-                |_| model.rest(),
-                |sides| sides.start(*seed, index as u64),
-            ),
+            Self::Seeded { seed, sides, .. } => box_with(model, sides)
+                .map_or_else(|_| model.rest(), |sides| sides.start(*seed, index as u64)),
             Self::Spread { seed, .. } => default_starts(model, *seed)
                 .ok()
                 .and_then(|starts| starts.start(index))

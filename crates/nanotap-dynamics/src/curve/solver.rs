@@ -275,8 +275,8 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         if let BifurcationKind::Grazing { .. } = self.kind {
             return LONGEST_DIFFERENCE;
         }
-        let closest = self.all_tangencies(map, x).iter().map(|t| t.value.abs());
-        let closest = closest.fold(f64::INFINITY, f64::min) / self.scales[0];
+        let all = self.all_tangencies(map, x).into_iter();
+        let closest = all.fold(f64::INFINITY, |m, t| m.min(t.value.abs())) / self.scales[0];
         (0.01 * closest).clamp(SHORTEST_DIFFERENCE, LONGEST_DIFFERENCE)
     }
 

@@ -455,7 +455,7 @@ impl Observer for LogDeterminant {
 /// Collects the local extrema of the gap over a period.
 struct GapExtrema<'a> {
     gap: &'a Output,
-    /// Whether tip and surface part at equal speeds: the gap is then least, and zero, where they
+    /// Whether tip and surface part at equal speeds, as from a rigid stop to which the tip stuck: the gap is then least, and zero, where they
     /// part, which is no grazing.
     parts_at_rest: bool,
     /// Whether nothing but a least gap can graze: the tops of ever lower flights of a chatter end in
@@ -485,7 +485,8 @@ impl Observer for GapExtrema<'_> {
         let rate = signal.differentiated(segment.length);
         let period = system.drive().period();
         for s in sign_changes(&rate, segment.length) {
-            if self.parts_at_rest && self.switched && s < PARTING * period {
+            let parts_at_rest = self.parts_at_rest || self.is_rigid;
+            if parts_at_rest && self.switched && s < PARTING * period {
                 continue;
             }
             if self.is_rigid && rate.differentiated(segment.length).at(s) <= 0.0 {

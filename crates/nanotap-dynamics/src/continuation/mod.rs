@@ -201,7 +201,11 @@ impl BranchEnd {
                 shown(*parameter)
             ),
             Self::Grazing { parameter } => {
-                format!("the orbit ends where it grazes, at {}", shown(*parameter))
+                format!(
+                    "the orbit grazes at {}, where the multipliers of orbits with this contact grow \
+                     without bound",
+                    shown(*parameter)
+                )
             }
             Self::Unstable { parameter } => {
                 format!("the orbit is not stable beyond {}", shown(*parameter))

@@ -100,7 +100,7 @@ pub struct LyapunovReport {
     /// The same from the trace of the equations and the time in each regime, with twice the
     /// logarithm of the restitution at every impact, over the same periods: the check.
     pub sum_by_trace: f64,
-    /// Kaplan–Yorke dimension of the strobe points.
+    /// Kaplan–Yorke dimension of the strobe points: 1 of a circle.
     pub kaplan_yorke_dimension: f64,
     /// Mean strobe state.
     pub mean: Vec<f64>,
@@ -263,7 +263,10 @@ pub fn lyapunov(
         periods: spectrum.periods,
         sum: spectrum.exponents.iter().sum(),
         sum_by_trace: spectrum.log_determinant,
-        kaplan_yorke_dimension: spectrum.kaplan_yorke_dimension(),
+        kaplan_yorke_dimension: match named.classification {
+            Classification::QuasiPeriodic => spectrum.neutral_directions() as f64,
+            _ => spectrum.kaplan_yorke_dimension(),
+        },
         exponents: spectrum.exponents,
         errors: spectrum.errors,
         mean: spectrum.strobe.mean_state().to_vec(),

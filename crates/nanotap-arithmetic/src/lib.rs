@@ -7,9 +7,13 @@
 //!
 //! [`VERSION`] is part of every dataset: what was computed with another arithmetic is not mixed
 //! with it.
+//!
+//! [`CancelFlag`] is here too, since every crate that computes for long polls it.
 
+mod cancel;
 mod eigenvalues;
 
+pub use cancel::CancelFlag;
 pub use eigenvalues::eigenvalues;
 
 use nalgebra::{Complex, DMatrix};

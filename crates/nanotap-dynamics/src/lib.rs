@@ -53,7 +53,7 @@ pub use continuation::{
     ContinuationOptions, Diagram, DiagramBranch, DiagramOptions, Direction, OrbitTangency,
     assemble_diagram, continue_orbit, switch_at_flip,
 };
-pub use control::Control;
+pub use control::{CancelFlag, Control};
 pub use curve::{BifurcationCurve, CurveEnd, CurveOptions, CurvePoint, trace_curve};
 pub use failure::MapFailure;
 pub use global::{

@@ -2,7 +2,6 @@
 //! stops them.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use axum::Json;
 use axum::extract::State;
@@ -298,8 +297,7 @@ impl Studied<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        let cancel = self.control.cancel;
-        cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+        self.control.is_cancelled()
     }
 
     fn branches(&self) -> Result<(), Refusal> {

@@ -69,6 +69,9 @@ pub enum ProofError {
         /// How many at most.
         limit: usize,
     },
+    /// The work was cancelled from outside.
+    #[error("stopped from outside")]
+    Cancelled,
     /// The approximate orbit is no orbit of this system.
     #[error("what was given is no orbit: {what}")]
     Candidate {

@@ -6,6 +6,8 @@
 //! from an [`Eigenbasis`], the motion from x at time t is
 //! x(t + s) = p(t + s) + Re(R e^{λs} L (x − p(t))).
 
+use nanotap_arithmetic::CancelFlag;
+
 use crate::ProofError;
 use crate::complex::Rectangle;
 use crate::eigen::Eigenbasis;
@@ -91,6 +93,7 @@ pub struct System {
     pub(crate) period: Interval,
     pub(crate) frequencies: Vec<Interval>,
     pub(crate) regimes: Vec<Regime>,
+    cancel: CancelFlag,
 }
 
 impl HarmonicVector {
@@ -162,7 +165,24 @@ impl System {
             period,
             frequencies,
             regimes,
+            cancel: CancelFlag::default(),
         })
+    }
+
+    /// The same system, proofs about which end with [`ProofError::Cancelled`] once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// An error once proofs are to end.
+    pub(crate) fn check_cancel(&self) -> Result<(), ProofError> {
+        if self.cancel.is_cancelled() {
+            Err(ProofError::Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Dimension d of the state.

@@ -90,7 +90,7 @@ pub(crate) fn simulate<'py>(
         let report = SimulateStudy::run(&studied, &request, control)?;
         let (names, values) = match &report {
             SimulateReport::Exact(run) => {
-                let model = studied.model()?;
+                let model = studied.cancelled_by(control).model()?;
                 let start = &run.motion.start;
                 let values = rows(&model, start, series_periods, request.resolution)?;
                 (time_series::columns(&model), values)
@@ -139,8 +139,8 @@ pub(crate) fn series<'py>(
     resolution: usize,
 ) -> PyResult<Table<'py>> {
     let studied = case.studied(py)?;
-    let done = watched_alone(py, None, move |_| {
-        let model = studied.model()?;
+    let done = watched_alone(py, None, move |control| {
+        let model = studied.cancelled_by(control).model()?;
         let values = rows(&model, &state, periods, resolution)?;
         Ok((time_series::columns(&model), values))
     })?;
@@ -219,12 +219,16 @@ pub(crate) fn observe(
                     return Ok(Err("stopped before its turn".into()));
                 }
                 let request = requests[index % requests.len()].clone();
-                let alone = Control::default();
+                let alone = Control {
+                    cancel: control.cancel,
+                    progress: None,
+                };
                 let found = variants
                     .with(words)
                     .and_then(|case| Ok(at_setpoint(case, &alone)?.0))
                     .and_then(|case| report(&name, &case, request, &alone));
                 let found = match found {
+                    _ if control.is_cancelled() => return Ok(Err("stopped before it was done".into())),
                     Ok(report) => Ok(entries(report)),
                     Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
                     Err(other) => return Err(other.into()),
@@ -245,7 +249,7 @@ pub(crate) fn observe(
             if let Ok(entries) = found
                 && !names.contains_key(&entries.dimension)
             {
-                let case = at_setpoint(variants.with(words)?, &Control::default())?.0;
+                let case = at_setpoint(variants.with(words)?, control)?.0;
                 names.insert(entries.dimension, state_names(&case.model()?));
             }
         }

@@ -3,12 +3,12 @@
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -60,10 +60,10 @@ pub(crate) fn watched_alone<R: Send + 'static>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&Control<'_>) -> Result<R, Failure> + Send + 'static,
 ) -> PyResult<Watched<R>> {
-    let cancel = Arc::new(AtomicBool::new(false));
+    let cancel = CancelFlag::new();
     let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
     let (sender, receiver) = channel();
-    let inside = (Arc::clone(&cancel), Arc::clone(&counts));
+    let inside = (cancel.clone(), Arc::clone(&counts));
     elsewhere(Box::new(move || {
         let (cancel, counts) = inside;
         let report = |done: usize, total: usize| {
@@ -99,7 +99,7 @@ pub(crate) fn watched_alone<R: Send + 'static>(
             if stopped.is_none() && (done.is_none() || seen != told) {
                 told = seen;
                 if let Err(error) = Python::attach(|py| look(py, progress.as_ref(), seen)) {
-                    cancel.store(true, Ordering::Relaxed);
+                    cancel.cancel();
                     stopped = Some((Instant::now(), error));
                 }
             }

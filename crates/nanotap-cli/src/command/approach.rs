@@ -58,11 +58,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::watched(ApproachStudy::COUNTED, |control| {
+    let report = progress::study::<ApproachStudy, _>(|control| {
         arguments
             .threads
             .install(|| ApproachStudy::run(&case, &request, control))
-    })???;
+    })??;
     if report.cancelled {
         output.warning("stopped before it was done");
     }

@@ -605,6 +605,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
                 },
             )
             .collect();
+        if self.control.is_cancelled() {
+            return;
+        }
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         for (k, end) in watched.into_iter().zip(ends) {
             let Outcome::Chaos(chaos, at) = &mut self.outcomes[k] else {

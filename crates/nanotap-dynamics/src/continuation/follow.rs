@@ -122,7 +122,6 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
     let mut step = options.initial_step;
     while branch.points.len() < options.max_points {
         if control.is_cancelled() {
-            branch.end = BranchEnd::Cancelled;
             break;
         }
         if let Some(progress) = control.progress {
@@ -212,6 +211,9 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         } else {
             locating.between(solver, nodes, changes, taken, index)
         };
+        if control.is_cancelled() {
+            break;
+        }
         branch.take(found, options.range);
         let folds = |b: &Bifurcation| matches!(b.kind, BifurcationKind::Fold);
         if options.until_fold && branch.bifurcations.iter().any(folds) {
@@ -243,6 +245,10 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             branch.end = BranchEnd::Closed;
             break;
         }
+    }
+    // The map may have ended the last step.
+    if control.is_cancelled() {
+        branch.end = BranchEnd::Cancelled;
     }
     Ok(branch)
 }

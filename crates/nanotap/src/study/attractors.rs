@@ -313,6 +313,8 @@ pub fn attractors(
         None => default_starts(model, options.seed)?,
     };
     let map = Strobe::new(model);
+    // Motions that were found are measured, also of work that was cancelled.
+    let model = &model.with_grace();
     let classify = bounded(&options.classify, &start_box);
     let found = census_of(
         &map,
@@ -598,10 +600,11 @@ impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
     const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
     const COUNTED: &'static str = "starts";
+    const PARTIAL: bool = true;
     type Request = AttractorsRequest;
     type Report = Attractors;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &AttractorsRequest,
         control: &Control<'_>,

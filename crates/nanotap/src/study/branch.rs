@@ -606,6 +606,8 @@ fn census_seeds(
 }
 
 fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchReport {
+    // Branches that were followed are measured, also of work that was cancelled.
+    let case = &case.with_grace();
     let key = options.key;
     let mut report = BranchReport {
         parameter: key.path(),
@@ -664,6 +666,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         for point in points {
             match point {
                 Ok(point) => report.points.push(point),
+                Err(_) if case.cancel().is_cancelled() => {}
                 Err(failure) => report.failures.push(failure),
             }
         }
@@ -677,6 +680,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         for bifurcation in bifurcations {
             match bifurcation {
                 Ok(found) => report.bifurcations.push(found),
+                Err(_) if case.cancel().is_cancelled() => {}
                 Err(failure) => report.failures.push(failure),
             }
         }
@@ -850,6 +854,7 @@ fn loci(
                 meets: [0, 1].map(|k| locus.ends[k].meets()),
                 ends: locus.ends.map(|end| end.to_string()),
             }),
+            Err(_) if control.is_cancelled() => break,
             Err(error) => failures.push(FailureReport {
                 parameter: b.parameter,
                 reason: format!("the locus of its {}: {error}", kind_name(b.kind)),
@@ -987,10 +992,11 @@ impl Study for BranchStudy {
     const ABOUT: &'static str =
         "Periodic orbits followed in a parameter, stable and unstable, with their bifurcations";
     const COUNTED: &'static str = "points";
+    const PARTIAL: bool = true;
     type Request = BranchRequest;
     type Report = BranchReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &BranchRequest,
         control: &Control<'_>,

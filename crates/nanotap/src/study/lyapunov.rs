@@ -470,7 +470,7 @@ impl Study for LyapunovStudy {
     type Request = LyapunovRequest;
     type Report = LyapunovReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &LyapunovRequest,
         control: &Control<'_>,

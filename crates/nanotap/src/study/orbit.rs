@@ -512,7 +512,7 @@ impl Study for OrbitStudy {
     type Request = OrbitRequest;
     type Report = InSi<OrbitReport>;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &OrbitRequest,
         _: &Control<'_>,

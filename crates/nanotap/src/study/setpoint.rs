@@ -171,6 +171,10 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     let target = ratio * curve.free_amplitude;
     let (before, after) = bracket(&curve, ratio, target)?;
     let mut solutions = all_solutions(case, &curve, target);
+    // The map may have ended one that was being solved for.
+    if control.is_cancelled() {
+        return Err(SetpointError::Cancelled);
+    }
     // What the approach reaches lies between two of its distances, on a branch that attracts.
     let step = before.gap - after.gap;
     let reached = solutions
@@ -218,7 +222,7 @@ pub fn at_setpoint(
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    let report = solve_setpoint(&case, control)?;
+    let report = solve_setpoint(&case.cancelled_by(control), control)?;
     let there = case.at_distance(report.zc(), report.remark());
     let there = there.map_err(|error| ApproachError::Model(Box::new(error).into()))?;
     Ok((there, Some(report)))
@@ -405,6 +409,7 @@ impl From<SetpointError> for crate::Error {
     fn from(error: SetpointError) -> Self {
         match error {
             SetpointError::Approach(error) => error.into(),
+            SetpointError::Cancelled => Self::new(crate::ErrorKind::Stopped, error.to_string()),
             SetpointError::None => Self::input(error.to_string(), "give drive.setpoint"),
             other => Self::numerics(other.to_string()),
         }

@@ -721,10 +721,11 @@ impl Study for ApproachStudy {
                                  sample, both ways, with the branches that coexist";
     const COUNTED: &'static str = "distances";
     const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
     type Request = ApproachRequest;
     type Report = ApproachReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &ApproachRequest,
         control: &Control<'_>,

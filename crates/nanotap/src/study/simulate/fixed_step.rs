@@ -189,14 +189,14 @@ pub fn fixed_step_run(
     let clock = Instant::now();
     for period in 0..options.transient {
         run.run_period(|_, _| {});
-        finite(run.state(), period)?;
+        check(model, run.state(), period)?;
     }
     let start = run.state().to_vec();
     let mut grid = Grid::new(model, &start);
     let mut strobes = Vec::with_capacity(options.periods);
     for period in 0..options.periods {
         run.run_period(|phase, x| grid.see(period, phase, x));
-        finite(run.state(), options.transient + period)?;
+        check(model, run.state(), options.transient + period)?;
         strobes.push(run.state().to_vec());
     }
     let seconds = clock.elapsed().as_secs_f64().max(1e-9);
@@ -241,7 +241,11 @@ pub fn fixed_step_run(
     })
 }
 
-fn finite(state: &[f64], period: usize) -> Result<(), FixedStepError> {
+/// An error once the work is cancelled, or where the state is not finite after a period.
+fn check(model: &Model, state: &[f64], period: usize) -> Result<(), FixedStepError> {
+    if model.system.cancel().is_cancelled() {
+        return Err(SimulateError::Stopped.into());
+    }
     if state.iter().all(|v| v.is_finite()) {
         Ok(())
     } else {

@@ -548,7 +548,7 @@ impl Study for SimulateStudy {
     type Request = SimulateRequest;
     type Report = SimulateReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &SimulateRequest,
         _: &Control<'_>,

@@ -31,9 +31,12 @@ pub(crate) fn at_setpoint(case: Case) -> Result<(Case, Option<SetpointReport>), 
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    Ok(progress::watched("setpoint", "distances", false, |control| {
-        setpoint::at_setpoint(case, control)
-    })?)
+    Ok(progress::watched(
+        "setpoint",
+        "distances",
+        false,
+        |control| setpoint::at_setpoint(case, control),
+    )?)
 }
 
 impl GivenCase {

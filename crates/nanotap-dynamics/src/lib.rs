@@ -65,5 +65,5 @@ pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
 pub use orbit::{
     DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
-    ShootingOptions, Stability, close_orbit, close_orbit_from_points, find_orbits,
+    ShootingOptions, Stability, check_size, close_orbit, close_orbit_from_points, find_orbits,
 };

@@ -308,7 +308,11 @@ impl Ensemble {
 
     /// Ends all motions that are under way.
     fn cancel(&mut self) {
-        for member in self.waiting.iter_mut().flat_map(|waiting| waiting.drain(..)) {
+        for member in self
+            .waiting
+            .iter_mut()
+            .flat_map(|waiting| waiting.drain(..))
+        {
             self.members[member].failure = Some(FlowError::Cancelled);
         }
     }

@@ -483,7 +483,7 @@ mod tests {
     #[test]
     fn work_that_was_stopped_gives_no_report() {
         let stop = nanotap::control::CancelFlag::new();
-    stop.cancel();
+        stop.cancel();
         let control = Control {
             cancel: Some(&stop),
             progress: None,

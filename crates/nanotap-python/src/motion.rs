@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
 use nanotap::control::Control;
+use nanotap::map::MOST_NUMBERS;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
 use nanotap::observe::time_series::{self, state_names};
@@ -68,6 +69,17 @@ fn rows(
     periods: usize,
     resolution: usize,
 ) -> Result<Vec<f64>, Failure> {
+    let numbers = periods
+        .saturating_mul(resolution)
+        .saturating_mul(time_series::columns(model).len());
+    if numbers > MOST_NUMBERS {
+        let words =
+            format!("a time series of {numbers} numbers is too long; {MOST_NUMBERS} at most");
+        return Err(Failure(Error::input(
+            words,
+            "take fewer {periods} or a lower {resolution}",
+        )));
+    }
     let mut values = Vec::new();
     time_series::sample(model, start, periods, resolution, |row| {
         values.extend_from_slice(row);
@@ -228,7 +240,9 @@ pub(crate) fn observe(
                     .and_then(|case| Ok(at_setpoint(case, &alone)?.0))
                     .and_then(|case| report(&name, &case, request, &alone));
                 let found = match found {
-                    _ if control.is_cancelled() => return Ok(Err("stopped before it was done".into())),
+                    _ if control.is_cancelled() => {
+                        return Ok(Err("stopped before it was done".into()));
+                    }
                     Ok(report) => Ok(entries(report)),
                     Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
                     Err(other) => return Err(other.into()),

@@ -20,12 +20,12 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// How long a message is looked for before its thread goes to sleep: to be woken takes as long as
 /// many a motion, and the next of many calls mostly comes before.
 const AWAKE: Duration = Duration::from_micros(250);
-/// How long work that was told to stop may take to do so. What does not listen is left
+/// How long work that was told to stop may take to do so. What takes longer is left
 /// alone to end by itself: it holds nothing of Python's.
 const PATIENCE: Duration = Duration::from_millis(900);
-/// The same of work that tells its progress: it listens, and what it has done is worth waiting for.
+/// The same of work that reports its progress: what it has done is worth waiting for.
 /// A second Ctrl-C does not wait.
-const LONG_PATIENCE: Duration = Duration::from_secs(30);
+const LONG_PATIENCE: Duration = Duration::from_secs(5);
 
 /// What came of watched work.
 pub(crate) struct Watched<R> {

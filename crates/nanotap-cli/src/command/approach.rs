@@ -222,7 +222,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         table.row(row(p));
     }
     text.push_str(&thinned(&table, step, report));
-    if report.hysteresis.is_empty() {
+    if report.hysteresis.is_empty() && !report.cancelled {
         text.push_str("  both ways show the same motions\n");
     }
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {

@@ -20,9 +20,8 @@ pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let table = progress::study::<ModesStudy, _>(|control| {
-        ModesStudy::run(&case, &request, control)
-    })?;
+    let table =
+        progress::study::<ModesStudy, _>(|control| ModesStudy::run(&case, &request, control))?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     arguments.out.write(|| shapes(&beam, request.points))?;
     arguments.plot.draw(|| shapes_figure(&beam))?;

@@ -44,9 +44,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;
-    let found = progress::study::<OrbitStudy, _>(|control| {
-        OrbitStudy::run(&case, &request, control)
-    })?;
+    let found =
+        progress::study::<OrbitStudy, _>(|control| OrbitStudy::run(&case, &request, control))?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
         case.say_held(&[key], output);

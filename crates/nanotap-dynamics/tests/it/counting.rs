@@ -3,8 +3,9 @@
 use std::sync::Mutex;
 
 use nanotap_dynamics::{
-    AttractorKind, CancelFlag, Census, CensusOptions, ClassifyOptions, Control, LyapunovOptions, Neighbourhood,
-    OrbitSearch, ShootingOptions, StartBox, StartOutcome, StartSet, census, census_of, find_orbits,
+    AttractorKind, CancelFlag, Census, CensusOptions, ClassifyOptions, Control, LyapunovOptions,
+    Neighbourhood, OrbitSearch, ShootingOptions, StartBox, StartOutcome, StartSet, census,
+    census_of, find_orbits,
 };
 use rayon::ThreadPoolBuilder;
 

@@ -33,8 +33,8 @@ mod tangent;
 use std::sync::{Arc, OnceLock};
 
 pub use motion_error::MotionError;
-pub use nanotap_flow::FlowError;
 use nanotap_arithmetic::CancelFlag;
+pub use nanotap_flow::FlowError;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
 pub use tangent::ModelTangent;
@@ -321,9 +321,9 @@ impl Model {
     pub fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
         let system = Arc::unwrap_or_clone(self.system);
         self.system = Arc::new(system.cancelled_by(cancel.clone()));
-        self.nonlinear = self.nonlinear.map(|nonlinear| {
-            Arc::new(Arc::unwrap_or_clone(nonlinear).cancelled_by(cancel))
-        });
+        self.nonlinear = self
+            .nonlinear
+            .map(|nonlinear| Arc::new(Arc::unwrap_or_clone(nonlinear).cancelled_by(cancel)));
         self
     }
 

@@ -276,7 +276,7 @@ pub struct TransientChaosReport {
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
-pub const MOST_STARTS: usize = 10_000_000;
+pub const MOST_STARTS: usize = 1_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
 /// Drive periods over which a motion that does not repeat is observed.
@@ -309,7 +309,7 @@ pub fn attractors(
         return Err(AttractorsError::Dimension { found, expected });
     }
     let set = match options.starts {
-        Some(count) => StartSet::given(start_box.starts(options.seed, count)),
+        Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
     };
     let map = Strobe::new(model);

@@ -311,7 +311,7 @@ impl Basin {
                 }
                 states.clone()
             }
-            None => starts_in(&slice, model.dimension(), options)?,
+            None => starts_in(&slice, model.dimension(), options, control)?,
         };
         let map = Strobe::new(&model);
         let how = CensusOptions {
@@ -509,6 +509,7 @@ fn starts_in(
     slice: &Slice,
     dimension: usize,
     options: &BasinOptions,
+    control: &Control<'_>,
 ) -> Result<Vec<Vec<f64>>, BasinError> {
     // The first point has the least values along both axes, the last the greatest.
     let (mut lower, mut upper) = (vec![0.0; dimension], vec![0.0; dimension]);
@@ -518,7 +519,7 @@ fn starts_in(
         given: options.x.name.clone(),
         what: error.to_string(),
     })?;
-    Ok(sides.starts(options.seed, options.starts))
+    Ok(sides.starts_until(options.seed, options.starts, control))
 }
 
 impl Known {

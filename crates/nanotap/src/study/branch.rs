@@ -17,7 +17,7 @@ use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::kind::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
+use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit, pairs};
 use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, key_and_ends};
@@ -914,7 +914,7 @@ pub struct BranchRequest {
     #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
     pub values: usize,
     /// Of the {diagram}: starts at each
-    #[schemars(range(min = 1, max = MOST_POINTS), extend("x-value" = "S"))]
+    #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
     pub starts: usize,
     /// Of the {diagram}: seed of the starts
     #[schemars(extend("x-value" = "K"))]

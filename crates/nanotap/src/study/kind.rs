@@ -85,7 +85,11 @@ pub trait DatasetStudy {
     /// # Errors
     /// When the request is not right, what must be known beforehand cannot be found, or the work
     /// was stopped.
-    fn recipe(case: &Case, request: &Self::Request, control: &Control<'_>) -> Result<Recipe, Error> {
+    fn recipe(
+        case: &Case,
+        request: &Self::Request,
+        control: &Control<'_>,
+    ) -> Result<Recipe, Error> {
         let recipe = Self::plan(&case.cancelled_by(control), request, control);
         if control.is_cancelled() {
             return Err(Error::stopped());

@@ -1,7 +1,6 @@
 //! Whatever is typed, a study answers or refuses: no panic, and nothing is allocated by a number
 //! that nobody checked.
 
-
 use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
 use nanotap::study::registry::{Run, STUDIES, StudyEntry, study};

@@ -1,7 +1,6 @@
 //! Requests as a browser or a script may send them: whatever stands in them, every study refuses
 //! what is no request with a reason that names it.
 
-
 use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
 use nanotap::study::registry::{Run, STUDIES};

@@ -126,12 +126,11 @@ fn bytes_do_not_depend_on_threads_or_stops() {
     let basin = Basin::new(&subject, &options, &Control::default()).unwrap();
     let store = Store::create_or_resume(&path, basin.schema().clone()).unwrap();
     let cancel = CancelFlag::new();
-    let progress =
-        |done: usize, _: usize| {
-            if done > 4 {
-                cancel.cancel();
-            }
-        };
+    let progress = |done: usize, _: usize| {
+        if done > 4 {
+            cancel.cancel();
+        }
+    };
     let control = Control {
         cancel: Some(&cancel),
         progress: Some(&progress),

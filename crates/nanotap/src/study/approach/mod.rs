@@ -43,7 +43,7 @@ use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport, BranchesThrough};
 use crate::study::kind::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
+use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
 use crate::study::simulate::Classification;
 use crate::study::sweep::SweepOptions;
 use crate::study::value::Amount;
@@ -622,7 +622,7 @@ pub struct ApproachRequest {
     #[schemars(extend("x-value" = "DISTANCE"))]
     pub to: Option<Amount>,
     /// Distances each way
-    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
     pub points: usize,
     /// Also continue the branches that coexist, stable and unstable
     #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]

@@ -137,7 +137,11 @@ impl Study for FitStudy {
     type Request = FitRequest;
     type Report = FitReport;
 
-    fn compute(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+    fn compute(
+        case: &Case,
+        request: &FitRequest,
+        control: &Control<'_>,
+    ) -> Result<FitReport, Error> {
         fit(case, request, control)
     }
 }

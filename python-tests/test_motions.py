@@ -66,6 +66,7 @@ def test_observables_are_those_that_are_named(regular):
     assert some.gap_range == every.gap_range
     with pytest.raises(AttributeError, match="there is no `tip_max`"):
         _ = some.tip_max
+    assert "W from" in repr(every) and "W from" not in repr(some)
     many = nanotap.orbit(regular, omega=[3.0, 3.01], **asked)
     assert {"first_harmonic", "phase", "gap_range"} <= set(many)
     assert not {"tip_max", "beam_clearance", "dissipation"} & set(many)

@@ -6,9 +6,13 @@
 //! uniquely. A motion, and every file computed from it, is therefore the same on every machine.
 //!
 //! [`VERSION`] is part of every dataset: results of another arithmetic are not mixed with it.
+//!
+//! [`CancelFlag`] is here too, since every crate that computes for long polls it.
 
+mod cancel;
 mod eigenvalues;
 
+pub use cancel::CancelFlag;
 pub use eigenvalues::eigenvalues;
 
 use nalgebra::{Complex, DMatrix};

@@ -54,7 +54,7 @@ pub use continuation::{
     ContinuationOptions, Diagram, DiagramBranch, DiagramOptions, Direction, OrbitTangency,
     assemble_diagram, continue_orbit, switch_at_flip,
 };
-pub use control::Control;
+pub use control::{CancelFlag, Control};
 pub use curve::{BifurcationCurve, CurveEnd, CurveOptions, CurvePoint, trace_curve};
 pub use failure::MapFailure;
 pub use global::{
@@ -66,5 +66,5 @@ pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
 pub use orbit::{
     DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
-    ShootingOptions, Stability, close_orbit, close_orbit_from_points, find_orbits,
+    ShootingOptions, Stability, check_size, close_orbit, close_orbit_from_points, find_orbits,
 };

@@ -152,7 +152,7 @@ fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refu
         "figure": unlettered(motion.figure(&model, &case), &asked.views, "portrait")?,
         "contact": unlettered(motion.contact_figure(&model, &case), &asked.views, "contact")?,
         "film": film(&case, &model, motion.state(), motion.periods())?,
-        "fixed_step": fixed_step(&case, &model, asked.steps, start.state)?,
+        "fixed_step": fixed_step(&case, &model, asked.steps, start.state, control)?,
         "forms": forms::forms(&case, &base, &model),
         "command": commands::command(app, asked, motion.study())?,
         "python": commands::python(app, asked, motion.study())?,
@@ -207,6 +207,7 @@ fn fixed_step(
     model: &Model,
     steps: u32,
     state: Option<Vec<f64>>,
+    control: &Control<'_>,
 ) -> Result<Option<Value>, Refusal> {
     if steps == 0 {
         return Ok(None);
@@ -218,7 +219,7 @@ fn fixed_step(
         state,
         ..SimulateRequest::default()
     };
-    let run = match SimulateStudy::run(case, &request, &Control::default()) {
+    let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,
         Ok(SimulateReport::Exact(_)) => return Ok(None),
         // With too few steps only the exact motion is shown.

@@ -195,25 +195,29 @@ impl Wanted {
         })
     }
 
-    /// The case at its setpoint.
+    /// The case at its setpoint; its motions end once `control` cancels the work.
     pub(crate) fn case(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
-        Ok(at_setpoint(self.any_distance(app)?, control)
-            .map_err(Refusal::of)?
-            .0)
+        Ok(self.at_setpoint(app, control)?.cancelled_by(control))
     }
 
-    /// The case of the preset, without changes.
+    fn at_setpoint(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+        let solved = at_setpoint(self.any_distance(app)?, control);
+        Ok(solved.map_err(Refusal::of)?.0)
+    }
+
+    /// The case of the preset, without changes; its motions end once `control` cancels the work.
     pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
         let solved = &self.preset(app)?.solved;
         if let Some(case) = solved.get() {
-            return Ok(case.clone());
+            return Ok(case.cancelled_by(control));
         }
         let unchanged = Self {
             preset: self.preset.clone(),
             set: Vec::new(),
         };
-        let case = unchanged.case(app, control)?;
-        Ok(solved.get_or_init(|| case).clone())
+        // Other requests share it: it does not carry what cancels this one.
+        let case = unchanged.at_setpoint(app, control)?;
+        Ok(solved.get_or_init(|| case).cancelled_by(control))
     }
 }
 

@@ -1,7 +1,6 @@
 //! The terminal's studies, in stages of increasing resolution until they are cancelled.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use axum::Json;
 use axum::extract::State;
@@ -297,8 +296,7 @@ impl Studied<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        let cancel = self.control.cancel;
-        cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+        self.control.is_cancelled()
     }
 
     fn branches(&self) -> Result<(), Refusal> {

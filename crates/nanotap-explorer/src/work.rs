@@ -2,13 +2,12 @@
 //! disconnects.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
@@ -40,15 +39,15 @@ impl Default for Workers {
 }
 
 /// Stops the computation when dropped, which happens when the client disconnects.
-struct StopOnDrop(Arc<AtomicBool>);
+struct StopOnDrop(CancelFlag);
 
 impl Drop for StopOnDrop {
     fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.cancel();
     }
 }
 
-fn control(stop: &AtomicBool) -> Control<'_> {
+fn control(stop: &CancelFlag) -> Control<'_> {
     Control {
         cancel: Some(stop),
         progress: None,
@@ -77,8 +76,8 @@ impl Workers {
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Refusal> {
         let place = Arc::clone(places).acquire_owned().await;
-        let stop = Arc::new(AtomicBool::new(false));
-        let _guard = StopOnDrop(Arc::clone(&stop));
+        let stop = CancelFlag::new();
+        let _guard = StopOnDrop(stop.clone());
         let task = tokio::task::spawn_blocking(move || {
             let _place = place;
             work(&control(&stop))
@@ -103,14 +102,14 @@ impl Workers {
                 place = places.acquire_owned() => place,
                 () = gone.closed() => return,
             };
-            let stop = Arc::new(AtomicBool::new(false));
-            let guard = StopOnDrop(Arc::clone(&stop));
+            let stop = CancelFlag::new();
+            let guard = StopOnDrop(stop.clone());
             let task = tokio::task::spawn_blocking(move || {
                 let _place = place;
                 let hand_over = |value: Value| {
                     // A client that disconnects, or does not read, stops the computation.
                     if sender.try_send(Ok(format!("{value}\n"))).is_err() {
-                        stop.store(true, Ordering::Relaxed);
+                        stop.cancel();
                     }
                 };
                 if let Err(refusal) = work(&control(&stop), &hand_over) {

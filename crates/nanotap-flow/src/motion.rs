@@ -228,6 +228,7 @@ impl Motion {
         left: &mut usize,
         stalled: &mut u32,
     ) -> Result<(), FlowError> {
+        system.check_cancel()?;
         let period = system.drive().period();
         let ends = if *left > 1 {
             [self.phase + period, f64::INFINITY]
@@ -252,6 +253,7 @@ impl Motion {
     ) -> Result<(), FlowError> {
         let mut stalled = 0;
         while self.phase < end {
+            system.check_cancel()?;
             let reach = self.reach::<S>(system, end);
             let found = self.next_crossing::<S>(system, reach)?;
             self.go_on::<S, O>(system, end, reach, found, &mut stalled, observer)?;

@@ -9,7 +9,7 @@ use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, layout};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
-use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 
 /// A jump of the state at a switch: `x⁺ = matrix · x⁻ + offset(t)`.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,6 +135,8 @@ pub struct System {
     rates: Vec<Vec<ComplexVector>>,
     /// The largest `|λ|` of any regime or tone.
     fastest: f64,
+    /// What ends its motions from outside.
+    cancel: CancelFlag,
 }
 
 /// What a transition needs at run time.
@@ -336,6 +338,7 @@ impl System {
             reaches: Vec::new(),
             rates: Vec::new(),
             fastest: 0.0,
+            cancel: CancelFlag::default(),
         };
         system.switches = (0..system.regimes.len())
             .map(|r| {
@@ -381,6 +384,28 @@ impl System {
             })
             .fold(0.0, f64::max);
         Ok(system)
+    }
+
+    /// The same system, whose motions end with [`FlowError::Cancelled`] once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// What ends its motions from outside.
+    pub fn cancel(&self) -> &CancelFlag {
+        &self.cancel
+    }
+
+    /// An error once its motions are to end.
+    #[inline]
+    pub(crate) fn check_cancel(&self) -> Result<(), FlowError> {
+        if self.cancel.is_cancelled() {
+            Err(FlowError::Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Dimension of the state.

@@ -483,7 +483,8 @@ mod tests {
 
     #[test]
     fn work_that_was_stopped_gives_no_report() {
-        let stop = std::sync::atomic::AtomicBool::new(true);
+        let stop = nanotap::control::CancelFlag::new();
+        stop.cancel();
         let control = Control {
             cancel: Some(&stop),
             progress: None,

@@ -64,7 +64,8 @@ pub(crate) fn stays_positive(
         }
         pieces += 1;
         let middle = 0.5 * (from + to);
-        if pieces > MOST_PIECES || to - from <= SHORTEST * whole {
+        let is_over = pieces > MOST_PIECES || to - from <= SHORTEST * whole;
+        if is_over || system.check_cancel().is_err() {
             return Err(Undecided { at: middle });
         }
         open.push((middle, to));

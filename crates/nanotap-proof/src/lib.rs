@@ -69,6 +69,9 @@ pub enum ProofError {
         /// Largest number of equations.
         limit: usize,
     },
+    /// The work was cancelled from outside.
+    #[error("stopped from outside")]
+    Cancelled,
     /// The approximate orbit is not an orbit of this system.
     #[error("what was given is no orbit: {what}")]
     Candidate {

@@ -127,6 +127,12 @@ const TIGHTENING: usize = 3;
 /// # Errors
 /// [`ProofError`] says what could not be proved.
 pub fn prove(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
+    let proved = proved(system, candidate);
+    // What was cancelled did not fail for the reason that it ended with.
+    proved.or_else(|error| system.check_cancel().and(Err(error)))
+}
+
+fn proved(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
     if candidate.period == 0 {
         return Err(ProofError::Candidate {
             what: "its period is 0",
@@ -389,6 +395,7 @@ impl<'a> Equations<'a> {
         let mut inverse = DMatrix::zeros(0, 0);
         let mut residual = Vec::new();
         for step in 0..=NEWTON_STEPS {
+            self.system.check_cancel()?;
             let at = self.unknowns(&points(&center));
             // C in units of the weights, so that its rows are comparable.
             if step < 2 {
@@ -465,7 +472,8 @@ impl<'a> Equations<'a> {
                     .sum();
                 (moved + Interval::point(offsets[k])).hi()
             };
-            let rows: Vec<Vec<f64>> = (0..size).map(defects).collect();
+            let row = |k| self.system.check_cancel().map(|()| defects(k));
+            let rows = (0..size).map(row).collect::<Result<Vec<_>, _>>()?;
             let radii: Vec<f64> = (0..size)
                 .map(|k| mapped(&rows[k], &|_| radius, k))
                 .collect();

@@ -5,6 +5,8 @@
 //! = p₀ + Σ Re(P_k e^{iω_k t}), p₀ = −A⁻¹f₀ and P_k = (iω_k − A)⁻¹F_k, and with L, R and λ from an
 //! [`Eigenbasis`], the motion from x at time t is x(t + s) = p(t + s) + Re(R e^{λs} L (x − p(t))).
 
+use nanotap_arithmetic::CancelFlag;
+
 use crate::ProofError;
 use crate::complex::Rectangle;
 use crate::eigen::Eigenbasis;
@@ -90,6 +92,7 @@ pub struct System {
     pub(crate) period: Interval,
     pub(crate) frequencies: Vec<Interval>,
     pub(crate) regimes: Vec<Regime>,
+    cancel: CancelFlag,
 }
 
 impl HarmonicVector {
@@ -162,7 +165,24 @@ impl System {
             period,
             frequencies,
             regimes,
+            cancel: CancelFlag::default(),
         })
+    }
+
+    /// The same system, proofs about which end with [`ProofError::Cancelled`] once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// An error once proofs are to end.
+    pub(crate) fn check_cancel(&self) -> Result<(), ProofError> {
+        if self.cancel.is_cancelled() {
+            Err(ProofError::Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Dimension d of the state.

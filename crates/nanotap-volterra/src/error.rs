@@ -82,6 +82,9 @@ pub enum VolterraError {
         /// What is wrong there.
         reason: &'static str,
     },
+    /// The work was cancelled from outside.
+    #[error("stopped from outside")]
+    Cancelled,
     /// The motion left the range of double precision.
     #[error("the motion grew beyond the range of double precision at time {time}")]
     Diverged {

@@ -284,6 +284,9 @@ impl Flow {
                 self.commit_pending(&system, end, observer);
                 return Ok(());
             }
+            if system.cancel().is_cancelled() {
+                return Err(VolterraError::Cancelled);
+            }
             if count >= most {
                 return Err(VolterraError::TooManySteps {
                     steps: count,

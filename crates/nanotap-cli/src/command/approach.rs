@@ -59,11 +59,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::watched(ApproachStudy::COUNTED, |control| {
+    let report = progress::study::<ApproachStudy, _>(|control| {
         arguments
             .threads
             .install(|| ApproachStudy::run(&case, &request, control))
-    })???;
+    })??;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -222,7 +222,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     text.push_str(&thinned(&table, step, report));
     text.push_str(&jumps(report, &shown));
     let settles = !report.table.iter().any(|p| p.classification == Classification::Transient);
-    if report.hysteresis.is_empty() && settles {
+    if report.hysteresis.is_empty() && settles && !report.cancelled {
         text.push_str("  both ways show the same motions\n");
     }
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {

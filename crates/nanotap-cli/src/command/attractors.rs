@@ -34,11 +34,11 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
-    let found = progress::watched(AttractorsStudy::COUNTED, |control| {
+    let found = progress::study::<AttractorsStudy, _>(|control| {
         arguments
             .threads
             .install(|| AttractorsStudy::run(&case, &request, control))
-    })???;
+    })??;
     arguments.study.out.write(|| csv(&model, &found))?;
     arguments
         .study

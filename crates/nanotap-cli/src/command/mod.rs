@@ -47,7 +47,8 @@ A case is a TOML file:
     alpha6 = 0.2    # contact_damping
     omega = 2.6     # drive_frequency
 
-Exit codes: 0 done, 1 failed, 2 bad input.";
+Exit codes: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM (what is finished
+is kept: reports of what was found so far, chunks of datasets).";
 
 /// What an AFM cantilever does when its tip taps a sample: every motion, its
 /// stability, and what an experimenter would measure in it.
@@ -84,6 +85,13 @@ pub(crate) enum Command {
     Own(Own),
     #[command(flatten)]
     Study(study::Arguments),
+}
+
+impl Command {
+    /// Whether it hears Ctrl-C by itself.
+    pub(crate) const fn listens_itself(&self) -> bool {
+        matches!(self, Self::Own(Own::Explore(_)))
+    }
 }
 
 /// The commands with a text of their own.

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::control::Control;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{PhysicalMotion, Set, time_series};
@@ -17,7 +16,7 @@ use crate::motion;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, number, series, style};
+use crate::{file, number, progress, series, style};
 
 /// A periodic orbit by Newton, stable or not.
 #[derive(Args, Debug)]
@@ -45,7 +44,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;
-    let found = OrbitStudy::run(&case, &request, &Control::default())?;
+    let found =
+        progress::study::<OrbitStudy, _>(|control| OrbitStudy::run(&case, &request, control))?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
         case.say_held(&[key], output);

@@ -406,7 +406,11 @@ impl<M: StroboscopicMap> Work<'_, M> {
         let first = self.outcomes.len();
         let range = first..self.last.min(first + size);
         let drawn = range.clone().into_par_iter().with_min_len(DRAWN_AT_ONCE);
-        let starts: Vec<_> = drawn.filter_map(|k| self.starts.start(k)).collect();
+        let start = |k| {
+            let goes_on = !self.control.is_cancelled();
+            goes_on.then(|| self.starts.start(k)).flatten()
+        };
+        let starts: Vec<_> = drawn.filter_map(start).collect();
         for start in &starts {
             extend(&mut self.ends, start);
         }
@@ -679,6 +683,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
                 },
             )
             .collect();
+        if self.control.is_cancelled() {
+            return;
+        }
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         for (k, end) in watched.into_iter().zip(ends) {
             // What was seen before the work was stopped stands.

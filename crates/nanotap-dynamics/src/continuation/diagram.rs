@@ -221,6 +221,7 @@ impl Diagram {
     ) {
         let branch = match followed {
             Ok(branch) => branch,
+            Err(_) if control.is_cancelled() => return,
             Err(error) => {
                 self.failures.push((parameter, error.to_string()));
                 return;
@@ -265,6 +266,7 @@ impl Diagram {
                         continue;
                     }
                 }
+                Err(_) if control.is_cancelled() => return,
                 Err(error) => {
                     self.failures.push((flip.parameter, error.to_string()));
                     continue;

@@ -132,7 +132,6 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
     let mut step = options.initial_step;
     while branch.points.len() < options.max_points {
         if control.is_cancelled() {
-            branch.end = BranchEnd::Cancelled;
             break;
         }
         if let Some(progress) = control.progress {
@@ -224,6 +223,9 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         }
         let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
         let found = locating.between(solver, nodes, changes, taken, index);
+        if control.is_cancelled() {
+            break;
+        }
         branch.take(found, options.range);
         arclength += taken;
         let reached = point(solver, &next, &next_tests, arclength)?;
@@ -258,6 +260,10 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             branch.end = BranchEnd::Closed;
             break;
         }
+    }
+    // The map may have ended the last step.
+    if control.is_cancelled() {
+        branch.end = BranchEnd::Cancelled;
     }
     Ok(branch)
 }

@@ -333,10 +333,14 @@ class Orbit(_Observed, Result):
         return plot.orbit(self, **options)
 
     def __repr__(self) -> str:
+        # Of chosen observables these two need not be there.
+        low, high = (getattr(self, end, None) for end in ("tip_min", "tip_max"))
+        swing = "" if low is None and high is None else (
+            f", W from {_number(low)} to {_number(high)}"
+        )
         return (
             f"Orbit(period={self.period}, {self.stability}, largest multiplier "
-            f"{_number(self.spectral_radius)}, W from {_number(self.tip_min)} to "
-            f"{_number(self.tip_max)})"
+            f"{_number(self.spectral_radius)}{swing})"
         )
 
     def _repr_html_(self) -> str:

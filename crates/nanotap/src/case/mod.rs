@@ -37,6 +37,7 @@ pub mod units;
 use std::path::Path;
 use std::sync::Arc;
 
+use nanotap_dynamics::{CancelFlag, Control};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
@@ -66,6 +67,8 @@ pub const DEFAULT_MODES: usize = 3;
 pub struct Case {
     title: Arc<str>,
     what: What,
+    /// What ends the motions of its models from outside.
+    cancel: CancelFlag,
 }
 
 /// The kinds of case.
@@ -107,6 +110,7 @@ impl Case {
         Self {
             title: "case".into(),
             what,
+            cancel: CancelFlag::default(),
         }
     }
 
@@ -164,6 +168,32 @@ impl Case {
     pub fn called(mut self, title: &str) -> Self {
         self.title = title.into();
         self
+    }
+
+    /// The same, whose models' motions end with an error once `control` cancels the work; with a
+    /// control that cannot, the same.
+    #[must_use]
+    pub fn cancelled_by(&self, control: &Control<'_>) -> Self {
+        let mut case = self.clone();
+        if let Some(cancel) = control.cancel {
+            case.cancel = cancel.clone();
+        }
+        case
+    }
+
+    /// The same, whose models' motions may go on for a moment after the work was cancelled: for
+    /// reports of what is finished.
+    #[must_use]
+    pub(crate) fn with_grace(&self) -> Self {
+        Self {
+            cancel: self.cancel.with_grace(),
+            ..self.clone()
+        }
+    }
+
+    /// What ends the motions of its models from outside.
+    pub fn cancel(&self) -> &CancelFlag {
+        &self.cancel
     }
 
     /// What it is called in a heading.
@@ -329,6 +359,7 @@ impl Case {
         Self {
             title: Arc::clone(&self.title),
             what,
+            cancel: self.cancel.clone(),
         }
     }
 
@@ -358,7 +389,7 @@ impl Case {
     /// # Errors
     /// When it makes no sense or cannot be solved in closed form.
     pub fn model(&self) -> Result<Model, CaseError> {
-        Ok(match &self.what {
+        let model = match &self.what {
             What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
             What::Oscillator(oscillator) => oscillator.model()?,
             What::Quantities(quantities) => {
@@ -371,7 +402,8 @@ impl Case {
                     ..model
                 }
             }
-        })
+        };
+        Ok(model.cancelled_by(&self.cancel))
     }
 
     /// How its map changes with the value of a key.
@@ -594,8 +626,8 @@ impl Case {
         quantities.stated.remove(Key::GapTip);
         quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
         Self {
-            title: self.title,
             what: What::Quantities(Box::new(quantities.mapped(true))),
+            ..self
         }
     }
 
@@ -628,6 +660,7 @@ impl Case {
         Ok(Self {
             title: Arc::clone(&self.title),
             what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
+            cancel: self.cancel.clone(),
         })
     }
 }

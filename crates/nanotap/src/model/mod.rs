@@ -33,6 +33,7 @@ mod tangent;
 use std::sync::{Arc, OnceLock};
 
 pub use motion_error::MotionError;
+use nanotap_arithmetic::CancelFlag;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
 pub use nanotap_flow::{FlowError, vector_instructions};
@@ -351,6 +352,24 @@ impl Model {
         }
         found.sort_by(|a, b| b.gap.total_cmp(&a.gap));
         found
+    }
+
+    /// The same model, whose motions end with an error once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
+        let system = Arc::unwrap_or_clone(self.system);
+        self.system = Arc::new(system.cancelled_by(cancel.clone()));
+        self.nonlinear = self
+            .nonlinear
+            .map(|nonlinear| Arc::new(Arc::unwrap_or_clone(nonlinear).cancelled_by(cancel)));
+        self
+    }
+
+    /// The same model, whose motions may go on for a moment after the work was cancelled.
+    #[must_use]
+    pub(crate) fn with_grace(&self) -> Self {
+        let cancel = self.system.cancel().with_grace();
+        self.clone().cancelled_by(&cancel)
     }
 
     /// Dimension of the state.

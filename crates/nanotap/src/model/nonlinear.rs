@@ -6,7 +6,7 @@
 //! A whole number does not vary, so that its row and column of the Jacobian are zero and one
 //! multiplier is.
 
-use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -109,6 +109,13 @@ impl Nonlinear {
             clamp_force: beam.clamp_force(),
             remembers: law.remembers(),
         })
+    }
+
+    /// The same, whose motions end with an error once `cancel` is set.
+    pub(crate) fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
+        let system = Arc::unwrap_or_clone(self.system);
+        self.system = Arc::new(system.cancelled_by(cancel.clone()));
+        self
     }
 
     /// The branch of the law in a state of the model at drive phase 0: the one that it
@@ -460,7 +467,7 @@ impl Variation {
             .iter()
             .any(|(p, slope)| of_modes(*p) && *slope != 0.0)
         {
-            return Self::between(case, slopes, law);
+            return Self::between(case, nonlinear.system.cancel(), slopes, law);
         }
         let galerkin = Galerkin::new(case)?;
         let drive = model.system.drive();
@@ -494,6 +501,7 @@ impl Variation {
 
     fn between(
         case: &Cantilever,
+        cancel: &CancelFlag,
         slopes: &[(Parameter, f64)],
         law: &[f64],
     ) -> Result<Self, ModelError> {
@@ -516,7 +524,7 @@ impl Variation {
             if !law.is_empty() {
                 moved.law = moved.law.map(|own| own.moved(law, side * step));
             }
-            Model::cantilever(&moved)
+            Ok(Model::cantilever(&moved)?.cancelled_by(cancel))
         };
         let (low, high, width) = match (at(-1.0), at(1.0)) {
             (Ok(low), Ok(high)) => (low, high, 2.0 * step),

@@ -324,7 +324,7 @@ pub struct TransientChaosReport {
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
-pub const MOST_STARTS: usize = 10_000_000;
+pub const MOST_STARTS: usize = 1_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
 /// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
@@ -360,13 +360,15 @@ pub fn attractors(
         return Err(AttractorsError::Dimension { found, expected });
     }
     let set = match options.starts {
-        Some(count) => StartSet::given(start_box.starts(options.seed, count)),
+        Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
     };
     let averaged = averaged_orbits(model).into_iter();
     let averaged = averaged.map(|orbit| (orbit.period, orbit.states[0].clone()));
     let set = set.with_seeds(averaged.chain(options.seeds.iter().cloned()));
     let map = Strobe::new(model);
+    // Motions that were found are measured, also of work that was cancelled.
+    let model = &model.with_grace();
     let budgets = budgets(model, options, &start_box);
     let found = census_of(&map, &set, &budgets, control);
     let unstable = if options.unstable > 0 {
@@ -689,10 +691,11 @@ impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
     const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
     const COUNTED: &'static str = "starts";
+    const PARTIAL: bool = true;
     type Request = AttractorsRequest;
     type Report = Attractors;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &AttractorsRequest,
         control: &Control<'_>,

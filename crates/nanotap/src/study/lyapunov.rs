@@ -406,8 +406,8 @@ pub enum SectionKind {
     Contact,
 }
 
-/// Most points of a section: 800 MB with three modes.
-pub const MOST_SECTION_POINTS: usize = 10_000_000;
+/// Most points of a section: 300 MB with three modes.
+pub const MOST_SECTION_POINTS: usize = 2_000_000;
 
 /// What the study of Lyapunov exponents is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -473,7 +473,7 @@ impl Study for LyapunovStudy {
     type Request = LyapunovRequest;
     type Report = LyapunovReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &LyapunovRequest,
         control: &Control<'_>,

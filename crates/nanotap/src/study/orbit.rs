@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use nanotap_dynamics::{
     ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingError,
-    ShootingOptions, classify, close_orbit, close_orbit_from_points, find_orbits,
+    ShootingOptions, check_size, classify, close_orbit, close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
@@ -181,6 +181,7 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Orbit
             harmonics: options.harmonics,
         });
     }
+    check_size(model.dimension(), options.period.unwrap_or(1))?;
     let start = starting_state(model, options.state.as_deref())?;
     let mut map = Strobe::new(model);
     let found = match (options.period, &options.state) {
@@ -238,7 +239,11 @@ fn searched(
         shooting: options.shooting.clone(),
         ..OrbitSearch::default()
     };
-    let found = find_orbits(map, &starts, &search, &Control::default());
+    let control = Control {
+        cancel: Some(model.system.cancel()),
+        progress: None,
+    };
+    let found = find_orbits(map, &starts, &search, &control);
     found
         .into_iter()
         .find(|orbit| orbit.period == period)
@@ -553,7 +558,7 @@ impl Study for OrbitStudy {
     type Request = OrbitRequest;
     type Report = InSi<OrbitReport>;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &OrbitRequest,
         _: &Control<'_>,
@@ -596,6 +601,9 @@ impl From<OrbitError> for crate::Error {
             OrbitError::NoPeriod => Self::input(error.to_string(), "give {period} 1 or more"),
             OrbitError::TooManyHarmonics { .. } => {
                 Self::input(error.to_string(), "give fewer {harmonics}")
+            }
+            OrbitError::Newton(ShootingError::TooLarge { .. }) => {
+                Self::input(error.to_string(), "give a shorter {period} or fewer modes")
             }
             OrbitError::Start(error) => error.into(),
             OrbitError::NotFound { .. } => {

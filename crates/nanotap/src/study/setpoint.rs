@@ -253,7 +253,7 @@ pub fn at_setpoint(
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    let report = solve_setpoint(&case, control)?;
+    let report = solve_setpoint(&case.cancelled_by(control), control)?;
     let state = report.solutions.get(report.chosen).map(|s| s.state.clone());
     let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default());
     let there = there.map_err(|error| ApproachError::Model(Box::new(error).into()))?;
@@ -553,6 +553,7 @@ impl From<SetpointError> for crate::Error {
     fn from(error: SetpointError) -> Self {
         match error {
             SetpointError::Approach(error) => error.into(),
+            SetpointError::Cancelled => Self::new(crate::ErrorKind::Stopped, error.to_string()),
             SetpointError::None => Self::input(error.to_string(), "give drive.setpoint"),
             other => Self::numerics(other.to_string()),
         }

@@ -335,7 +335,7 @@ impl DatasetStudy for WindowStudy {
     type Request = WindowRequest;
     type Report = Window;
 
-    fn recipe(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
+    fn plan(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
         Ok(Box::new(request.sweep(case)?))
     }
 

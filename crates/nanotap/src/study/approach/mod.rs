@@ -39,7 +39,7 @@ use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
 use crate::study::branch::{BranchError, BranchOptions, BranchReport};
 use crate::study::kind::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
+use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
 use crate::study::simulate::Classification;
 use crate::study::value::Amount;
 use frequency_modulation::{
@@ -559,7 +559,7 @@ pub struct ApproachRequest {
     #[schemars(extend("x-value" = "DISTANCE"))]
     pub to: Option<Amount>,
     /// Distances each way
-    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
     pub points: usize,
     /// Also continue the branches that coexist, stable and unstable
     #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
@@ -687,10 +687,11 @@ impl Study for ApproachStudy {
                                  sample, both ways, with the branches that coexist";
     const COUNTED: &'static str = "distances";
     const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
     type Request = ApproachRequest;
     type Report = ApproachReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &ApproachRequest,
         control: &Control<'_>,

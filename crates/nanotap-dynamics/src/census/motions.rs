@@ -5,13 +5,13 @@
 //! where that fails, and of chaos and tori, the motion is classified on the map itself from a state
 //! that the coarse one came to. All starts that come to the same motion share the result.
 
-use std::sync::atomic::AtomicBool;
 
 use crate::census::Outcome;
 use crate::classify::{
     Chaos, Classified, ClassifyOptions, Known, MotionKind, Torus, UndecidedReason, classify_on,
     close_exactly,
 };
+use crate::control::CancelFlag;
 use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
 use crate::map::StroboscopicMap;
 use crate::orbit::search::merge;
@@ -35,7 +35,7 @@ pub(super) struct Motions<'a, M> {
     options: &'a ClassifyOptions,
     /// The same for a motion that a coarse one has come to.
     budgets: ClassifyOptions,
-    cancel: Option<&'a AtomicBool>,
+    cancel: Option<&'a CancelFlag>,
     /// Stable orbits of the map itself, each once.
     pub(super) orbits: Vec<PeriodicOrbit>,
     /// Unstable orbits of it to which seeds led.
@@ -69,7 +69,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
     pub(super) fn new(
         map: &M,
         options: &'a ClassifyOptions,
-        cancel: Option<&'a AtomicBool>,
+        cancel: Option<&'a CancelFlag>,
     ) -> Self {
         let coarse = map.coarse();
         let longest = options.lyapunov.max_periods.min(MAX_EXACT_PERIODS);

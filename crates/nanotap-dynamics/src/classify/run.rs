@@ -1,6 +1,6 @@
 //! One start followed until its motion is known.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use crate::control::CancelFlag;
 
 use crate::classify::approach::approaches;
 use crate::classify::birkhoff::birkhoff_digits;
@@ -54,7 +54,7 @@ pub(crate) struct Known<'a> {
     /// before that, looking where a run goes costs more than waiting.
     pub(crate) patience: usize,
     /// A run stops within a period after this becomes true.
-    pub(crate) cancel: Option<&'a AtomicBool>,
+    pub(crate) cancel: Option<&'a CancelFlag>,
 }
 
 /// Where a start arrives when some attractors are known already.
@@ -402,7 +402,7 @@ impl<'a> Run<'a> {
         if norm(&self.state) > self.options.bound {
             return Err(Stop::Unbounded);
         }
-        if self.known.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+        if self.known.cancel.is_some_and(CancelFlag::is_cancelled) {
             return Err(Stop::Cancelled);
         }
         if self.periods < self.next_entry {

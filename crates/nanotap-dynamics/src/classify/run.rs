@@ -619,11 +619,17 @@ impl<'a> Run<'a> {
                 exponents.keep_last_stretch();
             }
             let spectrum = exponents.spectrum();
-            let known = &mut self.known.chaos.iter();
-            let is_known = known.any(|k| k.agrees_with(&spectrum));
+            let known = self.known.chaos.iter();
+            let is_known = known.clone().any(|k| k.agrees_with(&spectrum));
             if is_chaotic(&spectrum) {
-                if budget.is_met_by(&spectrum) || is_known {
-                    break spectrum;
+                let stays = stays_chaotic(&exponents.last_spectrum());
+                let mut tori = known.filter(|k| !is_chaotic(k));
+                let is_on_torus = tori.any(|k| k.strobe.agree_with(&last.strobe));
+                if stays
+                    && !is_on_torus
+                    && (budget.is_met_by(&spectrum) || is_known || measured >= end)
+                {
+                    return Ok(self.chaotic(spectrum));
                 }
             } else if is_known && spectrum.is_telling() {
                 // Perhaps on a torus that is known.
@@ -638,12 +644,6 @@ impl<'a> Run<'a> {
             before = Some(spectrum);
             target = (measured + exponents.periods()).min(end);
         };
-        let last = exponents.last_spectrum();
-        let mut tori = self.known.chaos.iter().filter(|k| !is_chaotic(k));
-        let is_on_torus = tori.any(|k| k.strobe.agree_with(&last.strobe));
-        if is_chaotic(&spectrum) && stays_chaotic(&last) && !is_on_torus {
-            return Ok(self.chaotic(spectrum));
-        }
         self.neither_periodic_nor_chaotic(map, spectrum)
     }
 

@@ -17,7 +17,7 @@ pub struct Harmonic {
     pub tip: f64,
     /// Its phase lag behind sin(order · Ωτ), degrees in (−180, 180].
     pub tip_phase: f64,
-    /// Amplitude of the contact force, impulses of a rigid stop included.
+    /// Amplitude of the contact force.
     pub force: f64,
     /// Its phase lag, as for the tip.
     pub force_phase: f64,

@@ -243,8 +243,7 @@ observables! {
         "indentation", "greatest depth of the tip below the resting surface",
         |m| m.indentation();
     mean_force: f64, Force, common,
-        "mean force",
-        "time mean of the force of the sample on the tip, impulses of a rigid stop included",
+        "mean force", "time mean of the force of the sample on the tip",
         |m| m.mean_force();
     dissipation as "E_dis": f64, Energy, common,
         "dissipation $E_{dis}$", "energy that the sample takes in one drive period",

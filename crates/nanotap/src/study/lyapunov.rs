@@ -100,7 +100,7 @@ pub struct LyapunovReport {
     /// The same from the trace of the equations and the time in each regime, with twice the
     /// logarithm of the restitution at every impact, over the same periods: the check.
     pub sum_by_trace: f64,
-    /// Kaplan–Yorke dimension of the strobe points: 1 of a circle.
+    /// Kaplan–Yorke dimension of the strobe points.
     pub kaplan_yorke_dimension: f64,
     /// Mean strobe state.
     pub mean: Vec<f64>,

@@ -312,8 +312,8 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
     let strongest = 1e-3 * strengths.first().copied().unwrap_or_default();
     let two_tones = |first: &Harmonic| first.order * (period as f64) < 0.75;
     let (least, count) = if spectrum.harmonics.first().is_some_and(two_tones) {
-        let last = strengths.get(2 * SHOWN - 1).copied().unwrap_or_default();
-        (last.max(strongest), 2 * SHOWN)
+        let last = strengths.get(2 * SHOWN - 1).copied();
+        (last.unwrap_or_default(), 2 * SHOWN)
     } else {
         let least = if period == 1 { 0.0 } else { strongest };
         (least, SHOWN.max(2 * period).min(2 * SHOWN))

@@ -308,3 +308,29 @@ fn unstable_orbits_are_told_in_si() {
     );
     assert_eq!(alone["stable"], false);
 }
+
+/// Two tones of 1 and 25/4 mix in a contact: f1 + f2 is shown, far above the first orders, which are
+/// quarters.
+#[test]
+fn the_sidebands_of_two_tones_are_shown() {
+    let folder = Folder::new();
+    let case = include_str!("../../../../docs/cases/dforce-dmt.toml");
+    folder.write("lever.toml", case);
+    let second = [
+        "drive.second_ratio=25/4",
+        "drive.second_free_amplitude=1 nm",
+    ];
+    let mut arguments = vec!["orbit", "lever.toml", "--set", "modes=2"];
+    arguments.extend(second.iter().flat_map(|word| ["--set", word]));
+    let outcome = folder.run(&arguments);
+    assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+    let shown = |order: &str| {
+        outcome
+            .stdout
+            .lines()
+            .any(|l| l.trim_start().starts_with(order))
+    };
+    for order in ["1 ", "6 ", "6.25 ", "7.25 "] {
+        assert!(shown(order), "{order}: {}", outcome.stdout);
+    }
+}

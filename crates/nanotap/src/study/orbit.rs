@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use nanotap_dynamics::{
     ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingError,
-    ShootingOptions, check_size, classify, close_orbit, close_orbit_from_points, find_orbits,
+    ShootingOptions, StroboscopicMap as _, check_size, classify, close_orbit, close_orbit_from_points,
+    find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
@@ -217,7 +218,7 @@ fn settled(
     }
 }
 
-/// Starts in the default box from which Newton is tried.
+/// Starts in the default box from which Newton is tried; a quarter of them where a period is costly.
 const SEARCHED_STARTS: usize = 64;
 /// Periods run from each of them in search of near returns.
 const SEARCHED_PERIODS: usize = 256;
@@ -230,8 +231,9 @@ fn searched(
     period: usize,
     options: &OrbitOptions,
 ) -> Result<PeriodicOrbit, OrbitError> {
+    let count = SEARCHED_STARTS / if map.is_costly() { 4 } else { 1 };
     let starts = default_box(model)
-        .map(|b| b.starts(1, SEARCHED_STARTS))
+        .map(|b| b.starts(1, count))
         .unwrap_or_default();
     let search = OrbitSearch {
         max_period: period,
@@ -262,7 +264,6 @@ fn near_recurrence(
     period: usize,
     shooting: &ShootingOptions,
 ) -> Result<PeriodicOrbit, OrbitError> {
-    use nanotap_dynamics::StroboscopicMap as _;
     let mut states = vec![state.to_vec()];
     for k in 0..RECURRENCE_PERIODS + period {
         let mut next = states[k].clone();

@@ -7,7 +7,7 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 /// all multipliers the modulus e^(−α₃T/2).
 #[test]
 fn all_multipliers_have_one_modulus() {
-    for (modes, q) in [(3, 200.0), (5, 2.0), (10, 200.0), (10, 1e4)] {
+    for (modes, q) in [(3, 200.0), (5, 2.0), (10, 20.0)] {
         let words = [
             &format!("modes={modes}"),
             &format!("cantilever.Q={q}"),

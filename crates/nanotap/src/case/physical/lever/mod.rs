@@ -93,10 +93,11 @@ impl Lever {
         check(data)?;
         let weight = data.weight();
         let modes = data.modes;
+        let bare = exact_beam::frequencies(0.0, 0.0, modes)?;
         let (k, beam_mass, ratio) = match (data.k.or(data.bending()), data.f0, weight) {
             (Some(k), Some(f0), _) => {
-                let ratio = ratio_from_resonance(data.tip_mass, k, f0, modes)?;
-                let time = first_frequency(ratio, modes)? / (TAU * f0);
+                let ratio = ratio_from_resonance(data.tip_mass, k, f0, &bare)?;
+                let time = first_frequency(ratio, &bare) / (TAU * f0);
                 (k, k * time * time / 3.0, ratio)
             }
             (Some(k), None, Some(mass)) => (k, mass, ratio_to_beam(data.tip_mass, mass)?),
@@ -105,7 +106,7 @@ impl Lever {
                     TipMass::SecondMode(f2) => ratio_from_second_mode(f2, f0)?,
                     other => ratio_to_beam(other, mass)?,
                 };
-                let time = first_frequency(ratio, modes)? / (TAU * f0);
+                let time = first_frequency(ratio, &bare) / (TAU * f0);
                 (3.0 * mass / (time * time), mass, ratio)
             }
             (Some(_), None, None) => {
@@ -130,7 +131,7 @@ impl Lever {
             tip_mass_ratio: ratio,
             f0: data
                 .f0
-                .unwrap_or(first_frequency(ratio, modes)? / (TAU * time)),
+                .unwrap_or(first_frequency(ratio, &bare) / (TAU * time)),
             quality_factor: data.quality_factor.unwrap_or(f64::INFINITY),
             length: data.geometry.map(|geometry| geometry.length),
             modes,
@@ -148,9 +149,10 @@ impl Lever {
     /// The same beam with a tip of this mass in kg at its end.
     pub(super) fn with_tip(self, mass: f64) -> Result<Self, PhysicalError> {
         let ratio = bounded(mass / self.beam_mass)?;
+        let bare = exact_beam::frequencies(0.0, 0.0, self.modes)?;
         Ok(Self {
             tip_mass_ratio: ratio,
-            f0: first_frequency(ratio, self.modes)? / (TAU * self.time_unit()),
+            f0: first_frequency(ratio, &bare) / (TAU * self.time_unit()),
             ..self
         })
     }
@@ -296,7 +298,7 @@ fn comparison(what: &str, kind: Kind, used: f64, other: f64) -> Remark {
 
 /// α1 from the tip's mass where k and f₀ are known: α1Ω₁²(α1) = 3Mω₀²/k, which grows from 0
 /// to 3.
-fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64, modes: usize) -> Result<f64, PhysicalError> {
+fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64, bare: &[f64]) -> Result<f64, PhysicalError> {
     let mass = match tip {
         TipMass::Ratio(ratio) => return bounded(ratio),
         TipMass::SecondMode(f2) => return ratio_from_second_mode(f2, f0),
@@ -304,19 +306,18 @@ fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64, modes: usize) -> Result<f
     };
     let heaviest = k / (TAU * f0).powi(2);
     let wanted = 3.0 * mass / heaviest;
-    ratio_where(|ratio| Ok(ratio * first_frequency(ratio, modes)?.powi(2) >= wanted))?.ok_or_else(
-        || {
-            PhysicalError::impossible(
-                Key::TipMass,
-                Kind::Mass.format(mass),
-                format!(
-                    "with this k and f0 it must be below k/(2 pi f0)^2 = {}, which a beam without \
+    let carries = |ratio: f64| Ok(ratio * first_frequency(ratio, bare).powi(2) >= wanted);
+    ratio_where(carries)?.ok_or_else(|| {
+        PhysicalError::impossible(
+            Key::TipMass,
+            Kind::Mass.format(mass),
+            format!(
+                "with this k and f0 it must be below k/(2 pi f0)^2 = {}, which a beam without \
                  mass would carry",
-                    Kind::Mass.format(heaviest)
-                ),
-            )
-        },
-    )
+                Kind::Mass.format(heaviest)
+            ),
+        )
+    })
 }
 
 /// α1 where the beam's mass is known.
@@ -401,19 +402,18 @@ fn ratio_where(
     }
 }
 
-/// Ω₁ of the free beam with the tip in so many modes of the bare beam: the root below ω₁ of
-/// 1 = α1Ω² Σφ_j(1)²/(ω_j² − Ω²), whose right side rises from 0 to infinity.
-fn first_frequency(ratio: f64, modes: usize) -> Result<f64, PhysicalError> {
-    let bare = exact_beam::frequencies(0.0, 0.0, modes)?;
+/// Ω₁ of the free beam with the tip in the modes of the bare beam with these frequencies ω_j: the root
+/// below ω₁ of 1 = α1Ω² Σφ_j(1)²/(ω_j² − Ω²), whose right side rises from 0 to infinity.
+fn first_frequency(ratio: f64, bare: &[f64]) -> f64 {
     if ratio == 0.0 {
-        return Ok(bare[0]);
+        return bare[0];
     }
-    let excess = |omega: f64| ratio * omega * omega * receptances(&bare, omega)[0] >= 1.0;
+    let excess = |omega: f64| ratio * omega * omega * receptances(bare, omega)[0] >= 1.0;
     let (mut low, mut high) = (0.0, bare[0]);
     loop {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {
-            return Ok(middle);
+            return middle;
         }
         if excess(middle) {
             high = middle;

@@ -90,7 +90,10 @@ impl Sweep {
             .par_iter()
             .with_max_len(1)
             .enumerate()
-            .map(|(k, states)| map_at(k).map_or_else(|_| Vec::new(), |map| closed(map, states)))
+            .map(|(k, states)| match map_at(k) {
+                Ok(map) if !control.is_cancelled() => closed(map, states),
+                _ => Vec::new(),
+            })
             .collect();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
         let classify = self.options.classify();

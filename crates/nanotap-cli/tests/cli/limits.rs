@@ -118,6 +118,10 @@ fn what_is_too_much_together_is_refused() {
         "500000 at most",
         "--strobe",
     ]);
+    let section = ["lyapunov", "case.toml", "--points", "2000000"];
+    folder
+        .run(&[&section[..], &many].concat())
+        .refused(&["500000 at most", "--points"]);
     folder
         .run(&["approach", "case.toml", "--points", "1000000"])
         .refused(&["--points", "20000"]);

@@ -22,6 +22,9 @@ const FLIP_OVERSHOOT: f64 = 0.5;
 /// Scaled step at which a flip is taken as it is.
 const SHORTEST_FLIP_STEP: f64 = 1e-6;
 
+/// Most numbers of the states of all points of a branch: 800 MB.
+const MAX_NUMBERS: usize = 100_000_000;
+
 pub(crate) fn solver_for<'a, F: MapFamily>(
     family: &'a F,
     orbit: &PeriodicOrbit,
@@ -130,12 +133,15 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
     let mut before = None;
     let mut node = first;
     let mut step = options.initial_step;
-    while branch.points.len() < options.max_points {
+    let max_points = options
+        .max_points
+        .min(MAX_NUMBERS / start.points.len().max(1));
+    while branch.points.len() < max_points {
         if control.is_cancelled() {
             break;
         }
         if let Some(progress) = control.progress {
-            progress(branch.points.len(), options.max_points);
+            progress(branch.points.len(), max_points);
         }
         if at_range_end(&node, options) {
             branch.end = BranchEnd::RangeEnd;

@@ -663,6 +663,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         };
         let points: Vec<_> = (branch.points.par_iter())
             .with_max_len(1)
+            .filter(|_| !case.cancel().is_cancelled())
             .map(|p| {
                 point(case, options, index, p)
                     .map_err(|error| unmeasured(p.parameter, "point", &error))
@@ -677,6 +678,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         }
         let bifurcations: Vec<_> = (branch.bifurcations.par_iter())
             .with_max_len(1)
+            .filter(|_| !case.cancel().is_cancelled())
             .map(|b| {
                 bifurcation(case, options, index, b)
                     .map_err(|error| unmeasured(b.parameter, kind_name(b.kind), &error))

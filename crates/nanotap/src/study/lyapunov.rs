@@ -21,7 +21,7 @@ use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIODS;
-use crate::study::simulate::{Classification, Named, SimulateError, starting_state};
+use crate::study::simulate::{Classification, Named, SimulateError, check_states, starting_state};
 
 /// How to measure.
 #[derive(Clone, Debug, PartialEq)]
@@ -222,6 +222,7 @@ pub fn lyapunov(
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods);
     }
+    check_states(model, options.points, "points")?;
     let mut map = Stoppable {
         map: Strobe::new(model),
         control: *control,

@@ -174,7 +174,7 @@ pub fn fixed_step_run(
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods.into());
     }
-    check_states(model, options.strobe.min(options.periods))?;
+    check_states(model, options.strobe.min(options.periods), "strobe")?;
     if model.nonlinear.is_some() {
         return Err(FixedStepError::Nonlinear);
     }

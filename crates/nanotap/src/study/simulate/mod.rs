@@ -97,6 +97,8 @@ pub enum SimulateError {
         dimension: usize,
         /// Most that are kept.
         limit: usize,
+        /// The option that says how many.
+        option: &'static str,
     },
     /// The flow failed.
     #[error(transparent)]
@@ -208,7 +210,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods);
     }
-    check_states(model, options.strobe.min(options.periods))?;
+    check_states(model, options.strobe.min(options.periods), "strobe")?;
     let mut map = Strobe::new(model);
     let transient = if let Some(transient) = options.transient {
         map.advance_by(&mut state, transient)?;
@@ -256,7 +258,11 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 ///
 /// # Errors
 /// [`SimulateError::TooManyStates`].
-fn check_states(model: &Model, states: usize) -> Result<(), SimulateError> {
+pub(in crate::study) fn check_states(
+    model: &Model,
+    states: usize,
+    option: &'static str,
+) -> Result<(), SimulateError> {
     let dimension = model.dimension();
     let limit = MOST_STATE_NUMBERS / dimension;
     if states > limit {
@@ -264,6 +270,7 @@ fn check_states(model: &Model, states: usize) -> Result<(), SimulateError> {
             states,
             dimension,
             limit,
+            option,
         });
     }
     Ok(())
@@ -622,8 +629,8 @@ impl From<SimulateError> for crate::Error {
             SimulateError::BehindStop { .. } => {
                 Self::input(error.to_string(), "give a {state} in front of the stop")
             }
-            SimulateError::TooManyStates { .. } => {
-                Self::input(error.to_string(), "keep fewer with {strobe}")
+            SimulateError::TooManyStates { option, .. } => {
+                Self::input(error.to_string(), format!("give fewer {{{option}}}"))
             }
             SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
             SimulateError::Flow(error) => error.into(),

@@ -104,6 +104,9 @@ impl Sweep {
                 let Ok(map) = map_at(k) else {
                     return (0, Vec::new());
                 };
+                if control.is_cancelled() {
+                    return (0, Vec::new());
+                }
                 let own = closed(map.clone(), &met);
                 let all = closed(map, &[met, further].concat());
                 (own.len(), all)

@@ -212,6 +212,7 @@ impl Loop {
         let mut branch = 0;
         let columns = problem.data.columns.len();
         let mut row = |row| -> Option<RowPoint> {
+            problem.finished(())?;
             let at = problem.place(x, curve, row);
             let case = problem.case_at(base, &at);
             let held = self.at(problem, x, &at, &case)?;
@@ -281,6 +282,7 @@ impl Loop {
         let one = |(index, point): (usize, &RowPoint)| {
             let (curve, row) = rows[index];
             let follow = || {
+                problem.finished(())?;
                 let mut guess = point.held.as_ref()?.driven.clone();
                 if !point.lost {
                     for (k, by) in point.states.iter().enumerate() {
@@ -307,6 +309,10 @@ impl Loop {
         let mut known: Option<(usize, Vec<f64>, Option<Arc<Free>>)> = None;
         let mut all = Vec::new();
         for (curve, row) in problem.rows() {
+            if problem.finished(()).is_none() {
+                all.push(None);
+                continue;
+            }
             let at = problem.place(x, curve, row);
             let besides = Self::besides_distance(problem, &at);
             let same = known

@@ -110,7 +110,7 @@ impl Deref for Point {
 impl Problem<'_> {
     /// What was computed of the rows; `None` once the work is cancelled: orbits that were being
     /// looked for meanwhile may be missing.
-    fn finished<T>(&self, computed: T) -> Option<T> {
+    pub(super) fn finished<T>(&self, computed: T) -> Option<T> {
         (!self.case.cancel().is_cancelled()).then_some(computed)
     }
 
@@ -262,6 +262,7 @@ impl Problem<'_> {
         at: &[f64],
         candidate: &Candidate,
     ) -> Option<Vec<f64>> {
+        self.finished(())?;
         let case = self.case_at(&self.cases(x)[curve], at);
         let model = case.model().ok()?;
         let seen = self.seen(
@@ -338,7 +339,10 @@ impl Problem<'_> {
             .map(|(curve, of)| {
                 let rows = of.rows.iter();
                 let places: Vec<_> = rows.map(|row| self.place(x, curve, row)).collect();
-                let at = |at: &[f64]| Some(self.case_at(&bases[curve], at));
+                let at = |at: &[f64]| {
+                    self.finished(())?;
+                    Some(self.case_at(&bases[curve], at))
+                };
                 let measured =
                     |row: usize, model: &Model| self.measured(x, curve, &of.rows[row], model);
                 let along = Along {
@@ -534,8 +538,11 @@ impl Problem<'_> {
         let seen: Vec<Vec<Option<RowPoint>>> = (0..rows.len())
             .into_par_iter()
             .map(|row| {
-                let case = self.case_at(base, &places[row]);
-                let at = case.model().ok().map(|model| Arc::new((case, model)));
+                let at = self.finished(()).and_then(|()| {
+                    let case = self.case_at(base, &places[row]);
+                    let model = case.model().ok()?;
+                    Some(Arc::new((case, model)))
+                });
                 let one = |candidate: &Candidate| {
                     let at = Arc::clone(at.as_ref()?);
                     self.seen(at, candidate.branch, candidate.orbit.clone())
@@ -634,8 +641,9 @@ impl LeastSquares for Problem<'_> {
         }
         let one = |((curve, row), before_point): (&(usize, &Row), &RowPoint)| {
             let lost = || before_point.without_orbit();
-            let case = self.case_at(&bases[*curve], &self.place(x, *curve, row));
-            let follow = move || {
+            let follow = || {
+                self.finished(())?;
+                let case = self.case_at(&bases[*curve], &self.place(x, *curve, row));
                 let mut guess = before_point.orbit.clone()?;
                 // To first order where the orbit goes.
                 if let ([only], false) = (guess.states.as_mut_slice(), before_point.lost) {
@@ -700,7 +708,7 @@ impl LeastSquares for Problem<'_> {
             .zip(point.rows.par_iter_mut())
             .map(|((curve, row), point)| {
                 let mut block = DMatrix::zeros(columns, count);
-                if point.lost {
+                if point.lost || self.finished(()).is_none() {
                     return block;
                 }
                 let by: Option<Vec<_>> = match self.held {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
-use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place};
+use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place, is_same};
 use super::ramp::ramp;
 use super::{
     ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
@@ -154,8 +154,10 @@ struct Written<'a> {
     distances: &'a [f64],
 }
 
-/// Distances of an interval at which the two ways are compared, its ends included.
+/// Distances of an interval at which the two ways are compared, its ends included; fewer where a
+/// motion has no branch and takes longer.
 const COMPARED: usize = 9;
+const COMPARED_ON_GRID: usize = 3;
 
 impl Written<'_> {
     fn row(&self, way: Way, gap: f64, met: Met) -> Result<ApproachPoint, CaseError> {
@@ -235,7 +237,7 @@ impl Written<'_> {
                     let orbit = self.sweep.orbit_at(k, gap).filter(PeriodicOrbit::is_stable);
                     let Some(orbit) = orbit else { continue };
                     let rows = here().filter_map(|p| p.orbit.as_ref());
-                    if !rows.chain(&found).any(|other| other.is_same_as(&orbit)) {
+                    if !rows.chain(&found).any(|other| is_same(other, &orbit)) {
                         found.push(orbit);
                     }
                 }
@@ -310,22 +312,16 @@ impl Written<'_> {
         let [Some(there), Some(back)] = self.ways.each().map(on) else {
             return Ok(None);
         };
-        let on_grid = |piece: &Piece| match &piece.motion {
-            Motion::Periodic(_) => None,
-            Motion::OnGrid(found) => {
-                let inside = found.iter().map(|(gap, _)| *gap);
-                Some(inside.filter(|gap| (near..=far).contains(gap)).collect::<Vec<_>>())
-            }
+        let on_grid = |piece: &Piece| matches!(piece.motion, Motion::OnGrid(_));
+        let compared = match (on_grid(&there), on_grid(&back)) {
+            (true, true) => return Ok(None),
+            (false, false) if there.is_on_stretch_of(&back) => return Ok(None),
+            (false, false) => COMPARED,
+            _ => COMPARED_ON_GRID,
         };
-        let gaps: Vec<f64> = match (on_grid(&there), on_grid(&back)) {
-            (Some(_), Some(_)) => return Ok(None),
-            (Some(gaps), None) | (None, Some(gaps)) => gaps,
-            (None, None) if there.is_on_stretch_of(&back) => return Ok(None),
-            (None, None) => (0..COMPARED)
-                .map(|k| k as f64 / (COMPARED - 1) as f64)
-                .map(|t| near * (1.0 - t) + far * t)
-                .collect(),
-        };
+        let gaps = (0..compared)
+            .map(|k| k as f64 / (compared - 1) as f64)
+            .map(|t| near * (1.0 - t) + far * t);
         let mut largest: Option<f64> = None;
         for gap in gaps {
             let row = |way, piece| self.row(way, gap, self.sweep.motion_at(piece, gap));
@@ -392,7 +388,7 @@ pub fn states_at(
             for (k, stretch) in sweep.stretches.iter().enumerate() {
                 let orbit = stretch.holds(gap).then(|| sweep.orbit_at(k, gap)).flatten();
                 if let Some(orbit) = orbit.filter(PeriodicOrbit::is_stable)
-                    && !found.iter().any(|other| other.is_same_as(&orbit))
+                    && !found.iter().any(|other| is_same(other, &orbit))
                 {
                     found.push(orbit);
                 }

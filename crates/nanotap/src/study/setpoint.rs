@@ -181,7 +181,10 @@ impl SetpointReport {
         let bistable = if also.is_empty() {
             String::new()
         } else {
-            format!("; bistable: the lever may also be at {}", also.join(", or at "))
+            format!(
+                "; bistable: the lever may also be at {}",
+                also.join(", or at ")
+            )
         };
         Remark::note(format!(
             "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}",
@@ -215,8 +218,8 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     };
     let failed = |error: CaseError| SetpointError::Approach(error.into());
     let range = (0.0, FARTHER * free.reach);
-    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)
-        .map_err(failed)?;
+    let mut sweep =
+        DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control).map_err(failed)?;
     let place = sweep.free().map_err(failed)?;
     let (_, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
     if control.is_cancelled() {
@@ -316,6 +319,14 @@ struct Sample<'a> {
     amplitude: f64,
 }
 
+/// Amplitude at the drive's frequency of an orbit at a distance; NaN where it cannot be measured.
+fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
+    let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+    let model = sweep.model(gap).ok();
+    let seen = model.and_then(|m| measure(&m, start, orbit.period, Set::FIRST_HARMONIC).ok());
+    seen.map_or(f64::NAN, |seen| seen.first_harmonic)
+}
+
 impl Search<'_> {
     /// The distance in words.
     fn told(&self, gap: f64) -> String {
@@ -323,14 +334,6 @@ impl Search<'_> {
             || gap.to_string(),
             |view| Kind::Length.format(gap * view.scales.length),
         )
-    }
-
-    fn amplitude(&self, sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
-        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-        let seen = sweep.model(gap).ok().and_then(|model| {
-            measure(&model, start, orbit.period, Set::FIRST_HARMONIC).ok()
-        });
-        seen.map_or(f64::NAN, |seen| seen.first_harmonic)
     }
 
     /// Whether the search ends in a piece of the way.
@@ -352,17 +355,22 @@ impl Search<'_> {
             }
         };
         let points = &sweep.stretches[stretch].points;
-        let inside = points.iter().rev().filter(|p| p.parameter < piece.from && p.parameter > piece.to);
+        let inside = points
+            .iter()
+            .rev()
+            .filter(|p| p.parameter < piece.from && p.parameter > piece.to);
         let mut gaps: Vec<(f64, Option<PeriodicOrbit>)> =
             vec![(piece.from, sweep.orbit_at(stretch, piece.from))];
         gaps.extend(inside.map(|p| (p.parameter, Some(p.orbit.clone()))));
         gaps.push((piece.to, sweep.orbit_at(stretch, piece.to)));
-        let orbits: Vec<(f64, PeriodicOrbit)> =
-            gaps.into_iter().filter_map(|(gap, orbit)| Some((gap, orbit?))).collect();
+        let orbits: Vec<(f64, PeriodicOrbit)> = gaps
+            .into_iter()
+            .filter_map(|(gap, orbit)| Some((gap, orbit?)))
+            .collect();
         let amplitudes: Vec<f64> = orbits
             .par_iter()
             .with_max_len(1)
-            .map(|(gap, orbit)| self.amplitude(sweep, *gap, orbit))
+            .map(|(gap, orbit)| amplitude(sweep, *gap, orbit))
             .collect();
         let mut before: Option<Sample<'_>> = None;
         for ((gap, orbit), amplitude) in orbits.iter().zip(amplitudes) {
@@ -413,7 +421,9 @@ impl Search<'_> {
         let mut solutions: Vec<SetpointSolution> = Vec::new();
         let mut seeds: Vec<(f64, PeriodicOrbit)> = Vec::new();
         for (k, stretch) in sweep.stretches.iter().enumerate() {
-            let orbit = stretch.holds(reached.gap).then(|| sweep.orbit_at(k, reached.gap));
+            let orbit = stretch
+                .holds(reached.gap)
+                .then(|| sweep.orbit_at(k, reached.gap));
             if let Some(orbit) = orbit.flatten().filter(PeriodicOrbit::is_stable)
                 && !seeds.iter().any(|(_, other)| is_same(other, &orbit))
             {
@@ -425,7 +435,9 @@ impl Search<'_> {
                 && orbit.nearest(&reached.state).1 <= 1e-6 * orbit.scale()
         };
         let others = seeds.iter().filter(|(_, orbit)| !is_reached(orbit));
-        let states = others.filter_map(|(gap, orbit)| self.state(*gap, orbit)).collect();
+        let states = others
+            .filter_map(|(gap, orbit)| self.state(*gap, orbit))
+            .collect();
         let options = DiagramOptions {
             continuation: ContinuationOptions {
                 max_multiplier: MAX_MULTIPLIER,
@@ -446,7 +458,7 @@ impl Search<'_> {
             let amplitudes: Vec<f64> = points
                 .par_iter()
                 .with_max_len(1)
-                .map(|p| self.amplitude(sweep, p.parameter, &p.orbit))
+                .map(|p| amplitude(sweep, p.parameter, &p.orbit))
                 .collect();
             for (pair, both) in points.windows(2).zip(amplitudes.windows(2)) {
                 let [a, b] = [0, 1].map(|k| Sample {

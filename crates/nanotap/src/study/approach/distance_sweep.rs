@@ -16,8 +16,8 @@ use std::fmt;
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
     ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
-    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit, close_orbit_from_points, continue_orbit,
-    switch_at_flip,
+    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
+    close_orbit_from_points, continue_orbit, switch_at_flip,
 };
 
 use crate::case::{Case, CaseError, Family};
@@ -330,7 +330,11 @@ impl<'a> DistanceSweep<'a> {
             birkhoff_periods: 1,
             ..self.classify.clone()
         };
-        let mut met = named(&mut map.coarse().unwrap_or_else(|| map.clone()), start, &options);
+        let mut met = named(
+            &mut map.coarse().unwrap_or_else(|| map.clone()),
+            start,
+            &options,
+        );
         if let Some(near) = met.orbit.take() {
             let (points, period) = (near.states.concat(), near.period);
             let closed =
@@ -365,7 +369,9 @@ impl<'a> DistanceSweep<'a> {
         match place {
             Place::On { stretch, gap } => {
                 let orbit = self.orbit_at(*stretch, *gap);
-                orbit.and_then(|o| o.states.first().cloned()).unwrap_or_default()
+                orbit
+                    .and_then(|o| o.states.first().cloned())
+                    .unwrap_or_default()
             }
             Place::Off { met, .. } => met.state.clone(),
         }
@@ -381,7 +387,12 @@ impl<'a> DistanceSweep<'a> {
         }
     }
 
-    fn follow(&self, gap: f64, orbit: &PeriodicOrbit, direction: Direction) -> (Vec<BranchPoint>, (f64, End)) {
+    fn follow(
+        &self,
+        gap: f64,
+        orbit: &PeriodicOrbit,
+        direction: Direction,
+    ) -> (Vec<BranchPoint>, (f64, End)) {
         let options = self.options();
         match continue_orbit(&self.family, gap, orbit, direction, &options, &self.control) {
             Ok(branch) => stable_part(branch),
@@ -431,7 +442,10 @@ impl<'a> DistanceSweep<'a> {
             let t = (gap - a.parameter) / (b.parameter - a.parameter);
             let [from, to] = [a, b].map(|p| p.orbit.states.concat());
             let between: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
-            let chord = from.iter().zip(&to).fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
+            let chord = from
+                .iter()
+                .zip(&to)
+                .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
             let model = self.model(gap).ok()?;
             let options = ShootingOptions::default();
             let mut map = Strobe::new(&model);
@@ -562,10 +576,9 @@ impl<'a> DistanceSweep<'a> {
                 let stuck = (at - gap).abs() <= 1e-9 * self.scale;
                 let next = match next {
                     Place::On { stretch: same, gap } if same == stretch && stuck => {
-                        let met = self.orbit_at(same, gap).map_or_else(
-                            || Met::undecided(end.to_string(), &[]),
-                            Met::on,
-                        );
+                        let met = self
+                            .orbit_at(same, gap)
+                            .map_or_else(|| Met::undecided(end.to_string(), &[]), Met::on);
                         Place::Off { gap, met }
                     }
                     next => next,
@@ -587,7 +600,10 @@ impl<'a> DistanceSweep<'a> {
         };
         let last = last.map(|p| p.orbit.clone());
         let (orbit, unstable, tries) = match end {
-            End::Bifurcation { at: found, unstable } => {
+            End::Bifurcation {
+                at: found,
+                unstable,
+            } => {
                 if found.kind == BifurcationKind::Flip
                     && let Some(stretch) = self.doubled(&found, direction)
                 {
@@ -629,7 +645,10 @@ impl<'a> DistanceSweep<'a> {
             }
         }
         let met = || Met::undecided(NO_ORBIT.to_owned(), &[]);
-        let next = next.unwrap_or_else(|| Place::Off { gap: at, met: met() });
+        let next = next.unwrap_or_else(|| Place::Off {
+            gap: at,
+            met: met(),
+        });
         let jumps = !self.goes_on(&orbit, &next);
         (next, jumps)
     }
@@ -743,7 +762,11 @@ impl<'a> DistanceSweep<'a> {
                 Some(orbit) => self.goes_on(orbit, &place),
                 None => is_continuous(&how),
             };
-            (piece.to, piece.end) = if inside { (begins, how) } else { (next, End::Closes) };
+            (piece.to, piece.end) = if inside {
+                (begins, how)
+            } else {
+                (next, End::Closes)
+            };
             piece.uncertainty = if inside { 0.0 } else { (next - gap).abs() };
             onwards = Some(place);
             break;
@@ -827,7 +850,10 @@ fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
             (*parameter, End::Meeting { period: *period })
         }
         BranchEnd::Grazing { parameter } => {
-            let grazing = branch.bifurcations.iter().rfind(|b| b.parameter == *parameter);
+            let grazing = branch
+                .bifurcations
+                .iter()
+                .rfind(|b| b.parameter == *parameter);
             let end = match grazing {
                 Some(found) => End::Bifurcation {
                     at: Box::new(found.clone()),
@@ -855,7 +881,9 @@ fn pushed(orbit: &PeriodicOrbit, unstable: Option<&PeriodicOrbit>, push: f64) ->
         Some(other) => other.iter().zip(state).map(|(x, y)| x - y).collect(),
         None => state.clone(),
     };
-    let length = away[..continuous].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let length = away[..continuous]
+        .iter()
+        .fold(0.0, |m: f64, x| m.max(x.abs()));
     let factor = if length > 0.0 { push / length } else { 0.0 };
     let moved = |(k, (x, a)): (usize, (&f64, &f64))| {
         if k < continuous { x + factor * a } else { *x }

@@ -125,22 +125,25 @@ fn branches(
     // A doubled branch is followed from its flip, as deep as the options say.
     let is_doubled = |k: &usize| {
         let ends = sweep.stretches[*k].ends.iter();
-        ends.into_iter().any(|(_, end)| matches!(end, End::Meeting { .. }))
+        ends.into_iter()
+            .any(|(_, end)| matches!(end, End::Meeting { .. }))
     };
-    let seeds = (0..sweep.stretches.len()).filter(|k| !is_doubled(k)).filter_map(|k| {
-        let stretch = &sweep.stretches[k];
-        let low = stretch.ends[0].0.max(near);
-        let high = stretch.ends[1].0.min(far);
-        let middle = 0.5 * (low + high);
-        let nearest = stretch.points.iter().min_by(|a, b| {
-            let apart = |gap: f64| (gap - middle).abs();
-            apart(a.parameter).total_cmp(&apart(b.parameter))
-        })?;
-        if (near..=far).contains(&nearest.parameter) {
-            return Some((nearest.parameter, nearest.orbit.clone()));
-        }
-        (low <= high).then(|| Some((middle, sweep.orbit_at(k, middle)?)))?
-    });
+    let seeds = (0..sweep.stretches.len())
+        .filter(|k| !is_doubled(k))
+        .filter_map(|k| {
+            let stretch = &sweep.stretches[k];
+            let low = stretch.ends[0].0.max(near);
+            let high = stretch.ends[1].0.min(far);
+            let middle = 0.5 * (low + high);
+            let nearest = stretch.points.iter().min_by(|a, b| {
+                let apart = |gap: f64| (gap - middle).abs();
+                apart(a.parameter).total_cmp(&apart(b.parameter))
+            })?;
+            if (near..=far).contains(&nearest.parameter) {
+                return Some((nearest.parameter, nearest.orbit.clone()));
+            }
+            (low <= high).then(|| Some((middle, sweep.orbit_at(k, middle)?)))?
+        });
     branches.follow(seeds.collect::<Vec<_>>(), &quiet);
     let any = !branches.is_empty() && !control.is_cancelled();
     Ok(any.then(|| branches.report(&quiet)))
@@ -263,7 +266,11 @@ impl Written<'_> {
                     uncertainty: before.uncertainty,
                     reason: before.end.to_string(),
                     before: self.row(way, before.to, self.sweep.motion_at(before, before.to))?,
-                    after: self.row(way, after.entered, self.sweep.motion_at(after, after.entered))?,
+                    after: self.row(
+                        way,
+                        after.entered,
+                        self.sweep.motion_at(after, after.entered),
+                    )?,
                 });
             }
         }
@@ -280,11 +287,18 @@ impl Written<'_> {
         let intervals: Result<Vec<_>, CaseError> = ends
             .par_windows(2)
             .with_max_len(1)
-            .map(|pair| Ok((pair, self.difference_between(pair[1], pair[0], free_amplitude)?)))
+            .map(|pair| {
+                Ok((
+                    pair,
+                    self.difference_between(pair[1], pair[0], free_amplitude)?,
+                ))
+            })
             .collect();
         let mut found: Vec<Hysteresis> = Vec::new();
         for (pair, difference) in intervals? {
-            let Some(difference) = difference else { continue };
+            let Some(difference) = difference else {
+                continue;
+            };
             match found.last_mut() {
                 Some(last) if last.near == pair[0] => {
                     last.near = pair[1];

@@ -221,7 +221,10 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     }
     text.push_str(&thinned(&table, step, report));
     text.push_str(&jumps(report, &shown));
-    let settles = !report.table.iter().any(|p| p.classification == Classification::Transient);
+    let settles = !report
+        .table
+        .iter()
+        .any(|p| p.classification == Classification::Transient);
     if report.hysteresis.is_empty() && settles && !report.cancelled {
         text.push_str("  both ways show the same motions\n");
     }

@@ -394,11 +394,9 @@ impl Case {
             What::Oscillator(oscillator) => oscillator.model()?,
             What::Quantities(quantities) => {
                 let model = Model::cantilever(&quantities.view()?.cantilever)?;
-                // Another number of modes has other states.
                 let start = quantities.start.as_ref();
-                let start = start.filter(|state| state.len() == model.dimension());
                 Model {
-                    start: start.cloned(),
+                    start: start.map(|state| with_modes(state, &model)),
                     ..model
                 }
             }
@@ -663,6 +661,21 @@ impl Case {
             cancel: self.cancel.clone(),
         })
     }
+}
+
+/// A state with as many modes as a model has: more are at rest, fewer are left out.
+fn with_modes(state: &[f64], model: &Model) -> Vec<f64> {
+    let dimension = model.dimension();
+    let [own, wanted] = [state.len(), dimension].map(|n| n.saturating_sub(model.memory) / 2);
+    let mut resized = vec![0.0; dimension];
+    for k in 0..own.min(wanted) {
+        resized[k] = state[k];
+        resized[wanted + k] = state[own + k];
+    }
+    for (to, from) in resized[2 * wanted..].iter_mut().zip(&state[2 * own..]) {
+        *to = *from;
+    }
+    resized
 }
 
 impl Serialize for Case {

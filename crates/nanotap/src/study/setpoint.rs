@@ -7,8 +7,9 @@
 //! Where the amplitude jumps past A_set instead, or the motion there is not periodic, nothing is
 //! chosen and the reason is given.
 //!
-//! The branch of that orbit is then continued round its folds: other orbits with the amplitude
-//! A_set, and other stable orbits at the chosen distance, are reported too.
+//! Then the lever goes on to the sample's own position and back to the chosen distance: the other
+//! stable orbits there are reported too, and, from the branches of all these continued round
+//! their folds, the other orbits with the amplitude A_set.
 //!
 //! Fails by omission: orbits on other branches.
 
@@ -20,7 +21,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{DistanceSweep, Motion, Piece};
+use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, is_same};
 use super::approach::{ApproachError, MAX_MULTIPLIER, SETPOINT_PERIODS};
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
@@ -180,7 +181,10 @@ impl SetpointReport {
         let bistable = if also.is_empty() {
             String::new()
         } else {
-            format!("; bistable: the lever may also be at {}", also.join(", or at "))
+            format!(
+                "; bistable: the lever may also be at {}",
+                also.join(", or at ")
+            )
         };
         Remark::note(format!(
             "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}",
@@ -214,10 +218,10 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     };
     let failed = |error: CaseError| SetpointError::Approach(error.into());
     let range = (0.0, FARTHER * free.reach);
-    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)
-        .map_err(failed)?;
+    let mut sweep =
+        DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control).map_err(failed)?;
     let place = sweep.free().map_err(failed)?;
-    let (pieces, _) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
+    let (_, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
     if control.is_cancelled() {
         return Err(SetpointError::Cancelled);
     }
@@ -227,8 +231,13 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
             least: search.least / free.amplitude,
         })
     })?;
-    drop(pieces);
+    // What a lever shows at this distance that comes from near.
+    let (_, place) = sweep.way(place, 0.0, |_, _| false);
+    sweep.way(place, reached.gap, |_, _| false);
     let (mut solutions, other_states) = search.others(&sweep, &reached, control);
+    if control.is_cancelled() {
+        return Err(SetpointError::Cancelled);
+    }
     solutions.push(reached);
     solutions.sort_by(|a, b| b.gap.total_cmp(&a.gap));
     let chosen = solutions.iter().position(|s| s.reached).unwrap_or(0);
@@ -310,6 +319,14 @@ struct Sample<'a> {
     amplitude: f64,
 }
 
+/// Amplitude at the drive's frequency of an orbit at a distance; NaN where it cannot be measured.
+fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
+    let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+    let model = sweep.model(gap).ok();
+    let seen = model.and_then(|m| measure(&m, start, orbit.period, Set::FIRST_HARMONIC).ok());
+    seen.map_or(f64::NAN, |seen| seen.first_harmonic)
+}
+
 impl Search<'_> {
     /// The distance in words.
     fn told(&self, gap: f64) -> String {
@@ -319,23 +336,16 @@ impl Search<'_> {
         )
     }
 
-    fn amplitude(&self, sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
-        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-        let seen = sweep.model(gap).ok().and_then(|model| {
-            measure(&model, start, orbit.period, Set::FIRST_HARMONIC).ok()
-        });
-        seen.map_or(f64::NAN, |seen| seen.first_harmonic)
-    }
-
     /// Whether the search ends in a piece of the way.
     fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece) -> bool {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
-            Motion::OnGrid(found) => {
-                let what = found.first().map_or("undecided", |(_, met)| match met.orbit {
+            Motion::OnGrid(_) => {
+                let met = sweep.motion_at(piece, piece.entered);
+                let what = match met.orbit {
                     Some(_) => "of a long period",
                     None => met.classification.name(),
-                });
+                };
                 self.found = Some(Err(SetpointError::NotPeriodic {
                     what,
                     at: self.told(piece.from),
@@ -345,17 +355,22 @@ impl Search<'_> {
             }
         };
         let points = &sweep.stretches[stretch].points;
-        let inside = points.iter().rev().filter(|p| p.parameter < piece.from && p.parameter > piece.to);
+        let inside = points
+            .iter()
+            .rev()
+            .filter(|p| p.parameter < piece.from && p.parameter > piece.to);
         let mut gaps: Vec<(f64, Option<PeriodicOrbit>)> =
             vec![(piece.from, sweep.orbit_at(stretch, piece.from))];
         gaps.extend(inside.map(|p| (p.parameter, Some(p.orbit.clone()))));
         gaps.push((piece.to, sweep.orbit_at(stretch, piece.to)));
-        let orbits: Vec<(f64, PeriodicOrbit)> =
-            gaps.into_iter().filter_map(|(gap, orbit)| Some((gap, orbit?))).collect();
+        let orbits: Vec<(f64, PeriodicOrbit)> = gaps
+            .into_iter()
+            .filter_map(|(gap, orbit)| Some((gap, orbit?)))
+            .collect();
         let amplitudes: Vec<f64> = orbits
             .par_iter()
             .with_max_len(1)
-            .map(|(gap, orbit)| self.amplitude(sweep, *gap, orbit))
+            .map(|(gap, orbit)| amplitude(sweep, *gap, orbit))
             .collect();
         let mut before: Option<Sample<'_>> = None;
         for ((gap, orbit), amplitude) in orbits.iter().zip(amplitudes) {
@@ -404,10 +419,25 @@ impl Search<'_> {
         control: &Control<'_>,
     ) -> (Vec<SetpointSolution>, Vec<SetpointState>) {
         let mut solutions: Vec<SetpointSolution> = Vec::new();
-        let mut states: Vec<SetpointState> = Vec::new();
-        let Some(chosen) = self.closed(reached.gap, &reached.state, reached.period) else {
-            return (solutions, states);
+        let mut seeds: Vec<(f64, PeriodicOrbit)> = Vec::new();
+        for (k, stretch) in sweep.stretches.iter().enumerate() {
+            let orbit = stretch
+                .holds(reached.gap)
+                .then(|| sweep.orbit_at(k, reached.gap));
+            if let Some(orbit) = orbit.flatten().filter(PeriodicOrbit::is_stable)
+                && !seeds.iter().any(|(_, other)| is_same(other, &orbit))
+            {
+                seeds.push((reached.gap, orbit));
+            }
+        }
+        let is_reached = |orbit: &PeriodicOrbit| {
+            orbit.period == reached.period
+                && orbit.nearest(&reached.state).1 <= 1e-6 * orbit.scale()
         };
+        let others = seeds.iter().filter(|(_, orbit)| !is_reached(orbit));
+        let states = others
+            .filter_map(|(gap, orbit)| self.state(*gap, orbit))
+            .collect();
         let options = DiagramOptions {
             continuation: ContinuationOptions {
                 max_multiplier: MAX_MULTIPLIER,
@@ -422,14 +452,13 @@ impl Search<'_> {
             ..*control
         };
         let family = self.case.family(self.case.gap_key());
-        let diagram =
-            assemble_diagram(&family, &[(reached.gap, chosen.clone())], &options, &quiet);
+        let diagram = assemble_diagram(&family, &seeds, &options, &quiet);
         for branch in &diagram.branches {
             let points: &[BranchPoint] = &branch.branch.points;
             let amplitudes: Vec<f64> = points
                 .par_iter()
                 .with_max_len(1)
-                .map(|p| self.amplitude(sweep, p.parameter, &p.orbit))
+                .map(|p| amplitude(sweep, p.parameter, &p.orbit))
                 .collect();
             for (pair, both) in points.windows(2).zip(amplitudes.windows(2)) {
                 let [a, b] = [0, 1].map(|k| Sample {
@@ -450,32 +479,24 @@ impl Search<'_> {
                         solutions.push(solution);
                     }
                 }
-                let share = (reached.gap - a.gap) / (b.gap - a.gap);
-                if (0.0..=1.0).contains(&share)
-                    && a.orbit.is_stable()
-                    && b.orbit.is_stable()
-                    && let Some((_, orbit, observables)) = self.orbit_between(&a, &b, share)
-                    && orbit.is_stable()
-                    && !orbit.is_same_as(&chosen)
-                    && let Some(view) = self.case.physical()
-                {
-                    states.push(SetpointState {
-                        period: orbit.period,
-                        spectral_radius: orbit.spectral_radius(),
-                        state: orbit.states.first().cloned().unwrap_or_default(),
-                        physical: PhysicalMotion::of(&observables, view),
-                        observables,
-                    });
-                }
             }
         }
         (solutions, states)
     }
 
-    fn closed(&self, gap: f64, state: &[f64], period: usize) -> Option<PeriodicOrbit> {
+    /// A stable orbit at the chosen distance, measured.
+    fn state(&self, gap: f64, orbit: &PeriodicOrbit) -> Option<SetpointState> {
+        let view = self.case.physical()?;
         let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
-        let mut map = Strobe::new(&model);
-        nanotap_dynamics::close_orbit(&mut map, state, period, &ShootingOptions::default()).ok()
+        let state = orbit.states.first()?.clone();
+        let observables = measure(&model, &state, orbit.period, Set::COMMON).ok()?;
+        Some(SetpointState {
+            period: orbit.period,
+            spectral_radius: orbit.spectral_radius(),
+            state,
+            physical: PhysicalMotion::of(&observables, view),
+            observables,
+        })
     }
 }
 

@@ -80,10 +80,7 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
     let jumps: Vec<_> = report.jumps.iter().map(|j| (j.way, j.gap)).collect();
     assert_eq!(
         jumps,
-        [
-            (Way::Approach, interval.near),
-            (Way::Retract, interval.far)
-        ]
+        [(Way::Approach, interval.near), (Way::Retract, interval.far)]
     );
     // Every motion that was met lies on a branch that was followed: between two points of it.
     let stable = |gap: f64, amplitude: f64| {
@@ -221,7 +218,10 @@ fn hysteresis_does_not_depend_on_the_distances_that_are_written() {
             ..ApproachOptions::default()
         };
         let report = curve(&case, &options);
-        (report.hysteresis.clone(), report.jumps.iter().map(|j| j.gap).collect::<Vec<_>>())
+        (
+            report.hysteresis.clone(),
+            report.jumps.iter().map(|j| j.gap).collect::<Vec<_>>(),
+        )
     });
     assert_eq!(ends[0], ends[1]);
     let farthest = ends[0].0[0];
@@ -234,8 +234,14 @@ fn hysteresis_does_not_depend_on_the_distances_that_are_written() {
 #[test]
 fn a_curve_under_lennard_jones_is_never_undecided() {
     let text = MICA
-        .replace("material = \"mica\"\nlaw = \"dmt\"", "law = \"lennard-jones\"")
-        .replace("hamaker = \"1e-19 J\"", "attraction = \"1e-19 J\"\nrepulsion = \"1.9e-76 J m^6\"");
+        .replace(
+            "material = \"mica\"\nlaw = \"dmt\"",
+            "law = \"lennard-jones\"",
+        )
+        .replace(
+            "hamaker = \"1e-19 J\"",
+            "attraction = \"1e-19 J\"\nrepulsion = \"1.9e-76 J m^6\"",
+        );
     let case = studied(&text, &["gap.tip=8 nm"]);
     let options = ApproachOptions {
         points: 25,
@@ -245,7 +251,13 @@ fn a_curve_under_lennard_jones_is_never_undecided() {
     let report = curve(&case, &options);
     assert_eq!(report.table.len(), 50);
     for p in &report.table {
-        assert_eq!(p.classification, Classification::Periodic, "{} {:?}", p.gap, p.reason);
+        assert_eq!(
+            p.classification,
+            Classification::Periodic,
+            "{} {:?}",
+            p.gap,
+            p.reason
+        );
     }
 }
 
@@ -274,18 +286,27 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         let amplitude = |p: &ApproachPoint| p.observables.unwrap().first_harmonic;
         let rows = ramp.table.iter().zip(&settled.table).skip(1);
         rows.map(|(a, b)| {
-            assert_eq!((a.way, a.gap, a.classification), (b.way, b.gap, Classification::Transient));
+            assert_eq!(
+                (a.way, a.gap, a.classification),
+                (b.way, b.gap, Classification::Transient)
+            );
             (amplitude(a) - amplitude(b)).abs() / settled.free_amplitude
         })
         .fold(0.0, f64::max)
     });
-    assert!(errors[1] < 2e-3 && errors[1] < 0.5 * errors[0], "{errors:?}");
+    assert!(
+        errors[1] < 2e-3 && errors[1] < 0.5 * errors[0],
+        "{errors:?}"
+    );
     let fast = ApproachOptions {
         speed: Some(settled.from / period),
         ..options.clone()
     };
     let error = approach(&case, &fast, &Control::default()).unwrap_err();
-    assert!(error.to_string().contains("less than a drive period"), "{error}");
+    assert!(
+        error.to_string().contains("less than a drive period"),
+        "{error}"
+    );
 }
 
 /// On the way back a period 3 is met at a few distances and lost again; it attracts all the same

@@ -87,7 +87,11 @@ fn a_distance_and_a_setpoint_are_two_ways_to_say_one_thing() {
 fn the_setpoint_is_reached_in_the_state_that_comes_from_far() {
     let lever = studied(MICA, &["drive.setpoint=0.8"]);
     let report = solve_setpoint(&lever, &Control::default()).unwrap();
-    assert!((report.zc() / 8.177e-9 - 1.0).abs() < 1e-4, "{}", report.zc());
+    assert!(
+        (report.zc() / 8.177e-9 - 1.0).abs() < 1e-4,
+        "{}",
+        report.zc()
+    );
     let chosen = &report.solutions[report.chosen];
     assert!(chosen.stable && chosen.observables.phase > 90.0);
     assert_eq!(chosen.observables.contact_fraction, 0.0);
@@ -98,7 +102,12 @@ fn the_setpoint_is_reached_in_the_state_that_comes_from_far() {
         panic!("{} other states", report.other_states.len())
     };
     assert!(also.observables.phase < 90.0);
-    assert!(report.remark().text.contains("bistable: the lever may also be at A = "));
+    assert!(
+        report
+            .remark()
+            .text
+            .contains("bistable: the lever may also be at A = ")
+    );
 }
 
 /// `findings/sp.toml`: the orbit at the setpoint's distance is that of the setpoint, not the repulsive
@@ -134,7 +143,11 @@ setpoint=0.9
     let scales = &at.physical().unwrap().scales;
     let ratio = found.observables.first_harmonic * scales.length / 20e-9;
     assert!((ratio - 0.9).abs() < 1e-6, "{ratio}");
-    assert!((found.observables.phase - 115.8).abs() < 0.1, "{}", found.observables.phase);
+    assert!(
+        (found.observables.phase - 115.8).abs() < 0.1,
+        "{}",
+        found.observables.phase
+    );
     let run = simulate(&model, &SimulateOptions::default()).unwrap();
     assert!((run.observables.phase - 115.8).abs() < 0.1);
     assert!(!solved.unwrap().other_states.is_empty());

@@ -15,9 +15,9 @@ use std::fmt;
 
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
-    ContinuationOptions, Control, Direction, MotionKind, PeriodicOrbit, ShootingOptions,
-    UndecidedReason, classify, close_orbit, close_orbit_from_points, continue_orbit,
-    switch_at_flip,
+    ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
+    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
+    close_orbit_from_points, continue_orbit, switch_at_flip,
 };
 
 use crate::case::{Case, CaseError, Family};
@@ -38,7 +38,7 @@ const SAME_PLACE: f64 = 1e-7;
 /// Distances beyond a fold, in the scale of distances, at which the jump is followed, and how far
 /// from the orbit at the fold the run starts, as a part of its size, towards the unstable side.
 /// The farther ones are for where the nearer leave the run beside the fold for too long.
-const BEYOND_FOLD: [(f64, f64); 2] = [(1e-5, 0.02), (1e-3, 0.1)];
+const BEYOND_FOLD: [(f64, f64); 2] = [(1e-4, 0.05), (1e-3, 0.1)];
 /// The same beyond other ends, where a disturbance grows in proportion to the distance.
 const BEYOND_END: (f64, f64) = (1e-3, 0.01);
 /// Part of an orbit's size by which a motion may differ and still be its continuation.
@@ -49,8 +49,10 @@ const HALVINGS: usize = 6;
 const MAX_PIECES: usize = 200;
 /// Points after which a branch is not followed further.
 const MAX_POINTS: usize = 2000;
-/// Periods after which a motion that is followed on the grid is measured at the latest.
+/// Periods in which a motion that is followed on the grid may close at each of its distances, and
+/// after which one is measured that starts on the motion of the grid's distance before.
 const GRID_TRANSIENT: usize = 512;
+const ROW_TRANSIENT: usize = 128;
 /// Decay times that a jump is given to settle, and periods at most.
 const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
@@ -113,6 +115,8 @@ pub(in crate::study) struct Met {
     pub(in crate::study) state: Vec<f64>,
     /// Whether the motion from the start could not be computed.
     failed: bool,
+    /// Whether it was only looked for an orbit.
+    glimpsed: bool,
 }
 
 impl Met {
@@ -123,6 +127,7 @@ impl Met {
             state: orbit.states.first().cloned().unwrap_or_default(),
             orbit: Some(orbit),
             failed: false,
+            glimpsed: false,
         }
     }
 
@@ -133,6 +138,7 @@ impl Met {
             orbit: None,
             state: state.to_vec(),
             failed: true,
+            glimpsed: false,
         }
     }
 
@@ -229,6 +235,11 @@ impl<'a> DistanceSweep<'a> {
             classify: ClassifyOptions {
                 first_look: 4,
                 max_transient: decays.max(2048).next_power_of_two(),
+                lyapunov: LyapunovOptions {
+                    max_periods: 1000,
+                    ..sweep.classify().lyapunov
+                },
+                birkhoff_periods: 1024,
                 ..sweep.classify()
             },
             control: Control {
@@ -289,28 +300,52 @@ impl<'a> DistanceSweep<'a> {
 
     /// What a run from a state at a distance goes to.
     fn met(&self, gap: f64, start: &[f64], max_transient: usize) -> Met {
-        let model = match self.model(gap) {
-            Ok(model) => model,
-            Err(error) => return Met::undecided(error.to_string(), start),
-        };
         let options = ClassifyOptions {
             max_transient,
             ..self.classify.clone()
         };
-        let classified = classify(&mut Strobe::new(&model), start, &options);
-        let named = Named::of(&classified.kind);
+        match self.model(gap) {
+            Ok(model) => named(&mut Strobe::new(&model), start, &options),
+            Err(error) => Met::undecided(error.to_string(), start),
+        }
+    }
+
+    /// As [`met`](Self::met), on the approximate map where there is one, and no further than to
+    /// see whether an orbit closes.
+    fn glimpse(&self, gap: f64, start: &[f64]) -> Met {
+        let model = match self.model(gap) {
+            Ok(model) => model,
+            Err(error) => return Met::undecided(error.to_string(), start),
+        };
+        let mut map = Strobe::new(&model);
+        let options = ClassifyOptions {
+            max_transient: GRID_TRANSIENT,
+            long_period: self.classify.max_period,
+            lyapunov: LyapunovOptions {
+                alignment: 0,
+                min_periods: 1,
+                max_periods: 1,
+                ..self.classify.lyapunov.clone()
+            },
+            birkhoff_periods: 1,
+            ..self.classify.clone()
+        };
+        let mut met = named(
+            &mut map.coarse().unwrap_or_else(|| map.clone()),
+            start,
+            &options,
+        );
+        if let Some(near) = met.orbit.take() {
+            let (points, period) = (near.states.concat(), near.period);
+            let closed =
+                close_orbit_from_points(&mut map, &points, period, &ShootingOptions::default());
+            met.orbit = closed.ok().filter(|orbit| {
+                orbit.is_stable() && orbit.distance_to(&near).1 <= CONTINUOUS * near.scale()
+            });
+        }
         Met {
-            classification: named.classification,
-            evidence: named.evidence,
-            orbit: named.orbit,
-            failed: matches!(
-                classified.kind,
-                MotionKind::Undecided {
-                    reason: UndecidedReason::Map { .. } | UndecidedReason::BadStart(_),
-                    ..
-                }
-            ),
-            state: classified.state,
+            glimpsed: true,
+            ..met
         }
     }
 
@@ -334,7 +369,9 @@ impl<'a> DistanceSweep<'a> {
         match place {
             Place::On { stretch, gap } => {
                 let orbit = self.orbit_at(*stretch, *gap);
-                orbit.and_then(|o| o.states.first().cloned()).unwrap_or_default()
+                orbit
+                    .and_then(|o| o.states.first().cloned())
+                    .unwrap_or_default()
             }
             Place::Off { met, .. } => met.state.clone(),
         }
@@ -350,7 +387,12 @@ impl<'a> DistanceSweep<'a> {
         }
     }
 
-    fn follow(&self, gap: f64, orbit: &PeriodicOrbit, direction: Direction) -> (Vec<BranchPoint>, (f64, End)) {
+    fn follow(
+        &self,
+        gap: f64,
+        orbit: &PeriodicOrbit,
+        direction: Direction,
+    ) -> (Vec<BranchPoint>, (f64, End)) {
         let options = self.options();
         match continue_orbit(&self.family, gap, orbit, direction, &options, &self.control) {
             Ok(branch) => stable_part(branch),
@@ -400,7 +442,10 @@ impl<'a> DistanceSweep<'a> {
             let t = (gap - a.parameter) / (b.parameter - a.parameter);
             let [from, to] = [a, b].map(|p| p.orbit.states.concat());
             let between: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
-            let chord = from.iter().zip(&to).fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
+            let chord = from
+                .iter()
+                .zip(&to)
+                .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
             let model = self.model(gap).ok()?;
             let options = ShootingOptions::default();
             let mut map = Strobe::new(&model);
@@ -458,7 +503,8 @@ impl<'a> DistanceSweep<'a> {
                 nearest.and_then(|p| p.orbit.states.first().cloned())
             }
             Motion::OnGrid(found) => {
-                if let Some((_, met)) = found.iter().find(|(at, _)| *at == gap) {
+                let here = |(at, met): &&(f64, Met)| *at == gap && !met.glimpsed;
+                if let Some((_, met)) = found.iter().find(here) {
                     return met.clone();
                 }
                 let passed = |at: f64| (at - piece.from).abs() <= (gap - piece.from).abs();
@@ -466,7 +512,7 @@ impl<'a> DistanceSweep<'a> {
                 last.map(|(_, met)| met.onwards())
             }
         };
-        self.met(gap, &beside.unwrap_or_default(), GRID_TRANSIENT)
+        self.met(gap, &beside.unwrap_or_default(), ROW_TRANSIENT)
     }
 
     /// The pieces of the way from a place to a distance, until one is `enough`.
@@ -530,10 +576,9 @@ impl<'a> DistanceSweep<'a> {
                 let stuck = (at - gap).abs() <= 1e-9 * self.scale;
                 let next = match next {
                     Place::On { stretch: same, gap } if same == stretch && stuck => {
-                        let met = self.orbit_at(same, gap).map_or_else(
-                            || Met::undecided(end.to_string(), &[]),
-                            Met::on,
-                        );
+                        let met = self
+                            .orbit_at(same, gap)
+                            .map_or_else(|| Met::undecided(end.to_string(), &[]), Met::on);
                         Place::Off { gap, met }
                     }
                     next => next,
@@ -555,7 +600,10 @@ impl<'a> DistanceSweep<'a> {
         };
         let last = last.map(|p| p.orbit.clone());
         let (orbit, unstable, tries) = match end {
-            End::Bifurcation { at: found, unstable } => {
+            End::Bifurcation {
+                at: found,
+                unstable,
+            } => {
                 if found.kind == BifurcationKind::Flip
                     && let Some(stretch) = self.doubled(&found, direction)
                 {
@@ -597,7 +645,10 @@ impl<'a> DistanceSweep<'a> {
             }
         }
         let met = || Met::undecided(NO_ORBIT.to_owned(), &[]);
-        let next = next.unwrap_or_else(|| Place::Off { gap: at, met: met() });
+        let next = next.unwrap_or_else(|| Place::Off {
+            gap: at,
+            met: met(),
+        });
         let jumps = !self.goes_on(&orbit, &next);
         (next, jumps)
     }
@@ -688,13 +739,13 @@ impl<'a> DistanceSweep<'a> {
                 next = to;
             }
             let start = before.onwards();
-            let mut met = self.met(next, &start, GRID_TRANSIENT);
+            let mut met = self.glimpse(next, &start);
             for _ in 0..HALVINGS {
                 if !met.failed {
                     break;
                 }
                 next = 0.5 * (gap + next);
-                met = self.met(next, &start, GRID_TRANSIENT);
+                met = self.glimpse(next, &start);
             }
             let Place::On { stretch, .. } = self.place(next, met.clone()) else {
                 found.push((next, met));
@@ -711,7 +762,11 @@ impl<'a> DistanceSweep<'a> {
                 Some(orbit) => self.goes_on(orbit, &place),
                 None => is_continuous(&how),
             };
-            (piece.to, piece.end) = if inside { (begins, how) } else { (next, End::Closes) };
+            (piece.to, piece.end) = if inside {
+                (begins, how)
+            } else {
+                (next, End::Closes)
+            };
             piece.uncertainty = if inside { 0.0 } else { (next - gap).abs() };
             onwards = Some(place);
             break;
@@ -721,13 +776,33 @@ impl<'a> DistanceSweep<'a> {
     }
 }
 
+/// What a run of a map goes to.
+fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
+    let classified = classify(map, start, options);
+    let named = Named::of(&classified.kind);
+    Met {
+        classification: named.classification,
+        evidence: named.evidence,
+        orbit: named.orbit,
+        failed: matches!(
+            classified.kind,
+            MotionKind::Undecided {
+                reason: UndecidedReason::Map { .. } | UndecidedReason::BadStart(_),
+                ..
+            }
+        ),
+        glimpsed: false,
+        state: classified.state,
+    }
+}
+
 /// Why nothing is known beyond an end.
 const NO_ORBIT: &str = "the branch that ends here has no orbit to start from";
 
 /// Part of an orbit's size within which two stable orbits at one distance are one.
 const SAME_ORBIT: f64 = 1e-9;
 
-fn is_same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
+pub(in crate::study) fn is_same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
     a.is_same_as(b) || a.distance_to(b).1 <= SAME_ORBIT * a.scale()
 }
 
@@ -775,7 +850,10 @@ fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
             (*parameter, End::Meeting { period: *period })
         }
         BranchEnd::Grazing { parameter } => {
-            let grazing = branch.bifurcations.iter().rfind(|b| b.parameter == *parameter);
+            let grazing = branch
+                .bifurcations
+                .iter()
+                .rfind(|b| b.parameter == *parameter);
             let end = match grazing {
                 Some(found) => End::Bifurcation {
                     at: Box::new(found.clone()),
@@ -803,7 +881,9 @@ fn pushed(orbit: &PeriodicOrbit, unstable: Option<&PeriodicOrbit>, push: f64) ->
         Some(other) => other.iter().zip(state).map(|(x, y)| x - y).collect(),
         None => state.clone(),
     };
-    let length = away[..continuous].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let length = away[..continuous]
+        .iter()
+        .fold(0.0, |m: f64, x| m.max(x.abs()));
     let factor = if length > 0.0 { push / length } else { 0.0 };
     let moved = |(k, (x, a)): (usize, (&f64, &f64))| {
         if k < continuous { x + factor * a } else { *x }

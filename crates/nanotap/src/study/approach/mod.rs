@@ -32,8 +32,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::case::{Case, CaseError, Key, ParameterUnit};
 use crate::case::physical::Kind;
+use crate::case::{Case, CaseError, Key, ParameterUnit};
 use crate::model::{Model, MotionError};
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
@@ -42,10 +42,10 @@ use crate::study::kind::Study;
 use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
 use crate::study::simulate::Classification;
 use crate::study::value::Amount;
+use distance_sweep::Met;
 use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
 };
-use distance_sweep::Met;
 pub use quasistatic::{states_at, states_near};
 
 /// How to approach. Distances are in the model's unit of length.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
-use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place};
+use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place, is_same};
 use super::ramp::ramp;
 use super::{
     ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
@@ -125,22 +125,25 @@ fn branches(
     // A doubled branch is followed from its flip, as deep as the options say.
     let is_doubled = |k: &usize| {
         let ends = sweep.stretches[*k].ends.iter();
-        ends.into_iter().any(|(_, end)| matches!(end, End::Meeting { .. }))
+        ends.into_iter()
+            .any(|(_, end)| matches!(end, End::Meeting { .. }))
     };
-    let seeds = (0..sweep.stretches.len()).filter(|k| !is_doubled(k)).filter_map(|k| {
-        let stretch = &sweep.stretches[k];
-        let low = stretch.ends[0].0.max(near);
-        let high = stretch.ends[1].0.min(far);
-        let middle = 0.5 * (low + high);
-        let nearest = stretch.points.iter().min_by(|a, b| {
-            let apart = |gap: f64| (gap - middle).abs();
-            apart(a.parameter).total_cmp(&apart(b.parameter))
-        })?;
-        if (near..=far).contains(&nearest.parameter) {
-            return Some((nearest.parameter, nearest.orbit.clone()));
-        }
-        (low <= high).then(|| Some((middle, sweep.orbit_at(k, middle)?)))?
-    });
+    let seeds = (0..sweep.stretches.len())
+        .filter(|k| !is_doubled(k))
+        .filter_map(|k| {
+            let stretch = &sweep.stretches[k];
+            let low = stretch.ends[0].0.max(near);
+            let high = stretch.ends[1].0.min(far);
+            let middle = 0.5 * (low + high);
+            let nearest = stretch.points.iter().min_by(|a, b| {
+                let apart = |gap: f64| (gap - middle).abs();
+                apart(a.parameter).total_cmp(&apart(b.parameter))
+            })?;
+            if (near..=far).contains(&nearest.parameter) {
+                return Some((nearest.parameter, nearest.orbit.clone()));
+            }
+            (low <= high).then(|| Some((middle, sweep.orbit_at(k, middle)?)))?
+        });
     branches.follow(seeds.collect::<Vec<_>>(), &quiet);
     let any = !branches.is_empty() && !control.is_cancelled();
     Ok(any.then(|| branches.report(&quiet)))
@@ -154,8 +157,10 @@ struct Written<'a> {
     distances: &'a [f64],
 }
 
-/// Distances of an interval at which the two ways are compared, its ends included.
+/// Distances of an interval at which the two ways are compared, its ends included; fewer where a
+/// motion has no branch and takes longer.
 const COMPARED: usize = 9;
+const COMPARED_ON_GRID: usize = 3;
 
 impl Written<'_> {
     fn row(&self, way: Way, gap: f64, met: Met) -> Result<ApproachPoint, CaseError> {
@@ -235,7 +240,7 @@ impl Written<'_> {
                     let orbit = self.sweep.orbit_at(k, gap).filter(PeriodicOrbit::is_stable);
                     let Some(orbit) = orbit else { continue };
                     let rows = here().filter_map(|p| p.orbit.as_ref());
-                    if !rows.chain(&found).any(|other| other.is_same_as(&orbit)) {
+                    if !rows.chain(&found).any(|other| is_same(other, &orbit)) {
                         found.push(orbit);
                     }
                 }
@@ -261,7 +266,11 @@ impl Written<'_> {
                     uncertainty: before.uncertainty,
                     reason: before.end.to_string(),
                     before: self.row(way, before.to, self.sweep.motion_at(before, before.to))?,
-                    after: self.row(way, after.entered, self.sweep.motion_at(after, after.entered))?,
+                    after: self.row(
+                        way,
+                        after.entered,
+                        self.sweep.motion_at(after, after.entered),
+                    )?,
                 });
             }
         }
@@ -278,11 +287,18 @@ impl Written<'_> {
         let intervals: Result<Vec<_>, CaseError> = ends
             .par_windows(2)
             .with_max_len(1)
-            .map(|pair| Ok((pair, self.difference_between(pair[1], pair[0], free_amplitude)?)))
+            .map(|pair| {
+                Ok((
+                    pair,
+                    self.difference_between(pair[1], pair[0], free_amplitude)?,
+                ))
+            })
             .collect();
         let mut found: Vec<Hysteresis> = Vec::new();
         for (pair, difference) in intervals? {
-            let Some(difference) = difference else { continue };
+            let Some(difference) = difference else {
+                continue;
+            };
             match found.last_mut() {
                 Some(last) if last.near == pair[0] => {
                     last.near = pair[1];
@@ -310,22 +326,16 @@ impl Written<'_> {
         let [Some(there), Some(back)] = self.ways.each().map(on) else {
             return Ok(None);
         };
-        let on_grid = |piece: &Piece| match &piece.motion {
-            Motion::Periodic(_) => None,
-            Motion::OnGrid(found) => {
-                let inside = found.iter().map(|(gap, _)| *gap);
-                Some(inside.filter(|gap| (near..=far).contains(gap)).collect::<Vec<_>>())
-            }
+        let on_grid = |piece: &Piece| matches!(piece.motion, Motion::OnGrid(_));
+        let compared = match (on_grid(&there), on_grid(&back)) {
+            (true, true) => return Ok(None),
+            (false, false) if there.is_on_stretch_of(&back) => return Ok(None),
+            (false, false) => COMPARED,
+            _ => COMPARED_ON_GRID,
         };
-        let gaps: Vec<f64> = match (on_grid(&there), on_grid(&back)) {
-            (Some(_), Some(_)) => return Ok(None),
-            (Some(gaps), None) | (None, Some(gaps)) => gaps,
-            (None, None) if there.is_on_stretch_of(&back) => return Ok(None),
-            (None, None) => (0..COMPARED)
-                .map(|k| k as f64 / (COMPARED - 1) as f64)
-                .map(|t| near * (1.0 - t) + far * t)
-                .collect(),
-        };
+        let gaps = (0..compared)
+            .map(|k| k as f64 / (compared - 1) as f64)
+            .map(|t| near * (1.0 - t) + far * t);
         let mut largest: Option<f64> = None;
         for gap in gaps {
             let row = |way, piece| self.row(way, gap, self.sweep.motion_at(piece, gap));
@@ -392,7 +402,7 @@ pub fn states_at(
             for (k, stretch) in sweep.stretches.iter().enumerate() {
                 let orbit = stretch.holds(gap).then(|| sweep.orbit_at(k, gap)).flatten();
                 if let Some(orbit) = orbit.filter(PeriodicOrbit::is_stable)
-                    && !found.iter().any(|other| other.is_same_as(&orbit))
+                    && !found.iter().any(|other| is_same(other, &orbit))
                 {
                     found.push(orbit);
                 }

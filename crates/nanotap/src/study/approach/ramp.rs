@@ -6,6 +6,7 @@ use nanotap_dynamics::{Control, StroboscopicMap as _};
 use super::quasistatic::MOVING;
 use super::{ApproachError, ApproachPoint, Curve, Way};
 use crate::model::strobe::Strobe;
+use crate::model::{Model, MotionError};
 use crate::observe::{PhysicalMotion, Set, measure};
 
 /// Most drive periods there and back.
@@ -25,7 +26,7 @@ pub(super) fn ramp(
     let step = speed * model(distances[0])?.system.drive().period();
     let span = distances[0] - distances[distances.len() - 1];
     let needed = 2.0 * span / step;
-    if !(needed <= MAX_PERIODS as f64) {
+    if needed.is_nan() || needed > MAX_PERIODS as f64 {
         return Err(ApproachError::Slow {
             needed,
             most: MAX_PERIODS,
@@ -36,7 +37,10 @@ pub(super) fn ramp(
     let turn = distances.len() - 1;
     // Periods from the first distance to each, there and then back.
     let whole = |gap: f64| ((distances[0] - gap) / step).round() as usize;
-    if distances.windows(2).any(|pair| whole(pair[0]) == whole(pair[1])) {
+    if distances
+        .windows(2)
+        .any(|pair| whole(pair[0]) == whole(pair[1]))
+    {
         return Err(ApproachError::Fast);
     }
     let mut state = start.to_vec();
@@ -48,7 +52,11 @@ pub(super) fn ramp(
         }
         // The last of the periods from the distance before is written.
         let first = row_index == 0 || row_index == turn + 1;
-        let periods = if first { 1 } else { whole(gap).abs_diff(whole(before)) };
+        let periods = if first {
+            1
+        } else {
+            whole(gap).abs_diff(whole(before))
+        };
         for k in 1..=periods {
             let share = k as f64 / periods as f64;
             let at = before * (1.0 - share) + gap * share;
@@ -74,9 +82,9 @@ fn row(
     curve: &Curve<'_>,
     way: Way,
     gap: f64,
-    model: &crate::model::Model,
+    model: &Model,
     state: &[f64],
-) -> Result<ApproachPoint, crate::model::MotionError> {
+) -> Result<ApproachPoint, MotionError> {
     let seen = measure(model, state, 1, Set::COMMON)?;
     let view = curve.case.physical();
     Ok(ApproachPoint {

@@ -201,9 +201,9 @@ impl Sweep {
         let mut states = vec![Vec::new(); columns * rows];
         for (line, orbits) in found {
             for (k, orbits) in line.into_iter().zip(orbits) {
-                let own = orbits.into_iter().filter_map(|orbit| {
-                    Some((orbit.period, orbit.states.into_iter().next()?))
-                });
+                let own = orbits
+                    .into_iter()
+                    .filter_map(|orbit| Some((orbit.period, orbit.states.into_iter().next()?)));
                 states[k].extend(own);
             }
         }

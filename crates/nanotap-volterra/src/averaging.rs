@@ -12,6 +12,7 @@
 //! Higher harmonics of the force enter the state by the modes' response to them. Wrong where the
 //! gap has strong harmonics: whatever is found here is a guess.
 
+use crate::gap_table::GapTable;
 use crate::law::Guard;
 use crate::system::System;
 use crate::{Complex, VolterraError};
@@ -29,6 +30,10 @@ const HARMONICS: usize = 12;
 const MEAN_GAPS: usize = 600;
 /// Newton steps for the mean gap.
 const MAX_ITERATIONS: usize = 12;
+/// What may be left of the drive's amplitude at a root.
+const MAX_RESIDUAL: f64 = 0.5;
+/// How far the force may shift the mean gap, in units of the size of gaps and amplitudes.
+const MAX_SHIFT: f64 = 3.0;
 /// Halvings of an interval that holds a root.
 const BISECTIONS: usize = 30;
 
@@ -54,6 +59,7 @@ struct Averaging<'a> {
     drive: Complex,
     compliance: f64,
     receptance: Complex,
+    table: GapTable,
     /// Phases and weights over one oscillation from the far turning point.
     phases: Vec<Phase>,
 }
@@ -103,6 +109,7 @@ impl<'a> Averaging<'a> {
             drive: *drive,
             compliance: unit(0.0)?.re,
             receptance: unit(tone.frequency)?,
+            table: GapTable::new(system),
             phases: phases.collect(),
         })
         .filter(|averaging| averaging.drive.modulus() > 0.0)
@@ -121,7 +128,11 @@ impl<'a> Averaging<'a> {
             } else {
                 law.branch_at(gap, rate)
             };
-            visit(phase, law.value(branch, gap, rate), branch);
+            visit(
+                phase,
+                self.table.force(self.system, branch, gap, rate),
+                branch,
+            );
         }
     }
 
@@ -161,7 +172,7 @@ impl<'a> Averaging<'a> {
         here
     }
 
-    /// The mean gap at this amplitude, near a guess.
+    /// The mean gap at this amplitude, near a guess; not a number where it runs away.
     fn mean_gap(&self, amplitude: f64, guess: f64, size: f64) -> (f64, Average) {
         let rest = self.system.gap_constant;
         let (mut mean, mut average) = (guess, Average::default());
@@ -174,6 +185,10 @@ impl<'a> Averaging<'a> {
                 break;
             }
             mean += change;
+            if (mean - rest).abs() > MAX_SHIFT * size {
+                mean = f64::NAN;
+                break;
+            }
             if change.abs() < 1e-7 * size {
                 break;
             }
@@ -189,6 +204,10 @@ impl<'a> Averaging<'a> {
     /// The state at phase 0 of the motion with this mean gap and amplitude.
     fn motion(&self, mean: f64, amplitude: f64) -> Option<AveragedMotion> {
         let average = self.average(mean, amplitude);
+        // The residual may also change sign where the force jumps.
+        if self.residual(amplitude, &average).abs() > MAX_RESIDUAL * self.drive.modulus() {
+            return None;
+        }
         let shift = self.drive / (amplitude - self.receptance * average.first);
         let shift = shift / shift.modulus();
         // Harmonics of the force in θ.
@@ -287,7 +306,8 @@ pub fn motions(system: &System, rests: &[f64]) -> Vec<AveragedMotion> {
                 }
                 found.extend(averaging.motion(near, 0.5 * (low + high)));
             }
-            before = residual.is_finite().then_some((amplitude, mean, residual));
+            let known = residual.is_finite() && mean.is_finite();
+            before = known.then_some((amplitude, mean, residual));
         }
     }
     found.sort_by(|a, b| a.amplitude.total_cmp(&b.amplitude));

@@ -15,6 +15,7 @@
 
 use crate::VolterraError;
 use crate::error::Refusal;
+use crate::gap_table::GapTable;
 use crate::law::{Approach, Exit, Guard};
 use crate::modes::Block;
 use crate::step::Statistics;
@@ -29,7 +30,7 @@ const LEVELS: usize = 20;
 const FIRST_LEVEL: usize = 2;
 /// How much a step may change the gap's rate by its estimated error, as a part of the drive's
 /// frequency times the size of the motion.
-pub const TOLERANCE: f64 = 2e-5;
+pub const TOLERANCE: f64 = 3e-5;
 /// A step with less than this part of the allowed error is followed by one twice as long.
 const GROWTH: f64 = 1.0 / 12.0;
 /// Part of the amplitude that counts as the size of the motion where the gap is smaller.
@@ -51,8 +52,6 @@ const MAX_SWITCHES_AT_ONCE: usize = 64;
 const MAX_LOCATED_BRANCHES: usize = 8;
 /// Steps of the bracketed search for a switch.
 const MAX_BISECTIONS: usize = 48;
-/// Relative change of the state, in units of the motion's size, for a Jacobian by differences.
-const DIFFERENCE: f64 = 1e-4;
 
 /// An approximate motion of a [`System`] over drive periods, with its work space. Cloning shares
 /// the tables.
@@ -81,6 +80,7 @@ struct Tables {
     system: Arc<System>,
     period: f64,
     levels: Vec<Level>,
+    table: GapTable,
     /// The gap, its rate and its acceleration from each block's coordinates.
     readout: Vec<[f64; 2]>,
     rate_readout: Vec<[f64; 2]>,
@@ -96,10 +96,10 @@ struct Tables {
     bounds: Vec<[f64; 2]>,
     /// Exits of each branch, none where switches are not located.
     exits: Vec<Vec<CoarseExit>>,
+    /// Whether each branch is left at values of the gap alone.
+    by_gap_alone: Vec<bool>,
     /// Whether the branch is looked up at each evaluation.
     by_lookup: bool,
-    /// Whether the law's derivative is unbounded at a switch.
-    steep: bool,
     max_steps: u64,
 }
 
@@ -169,10 +169,12 @@ fn dot([a, b]: [f64; 2], [x, y]: [f64; 2]) -> f64 {
 /// `∫₀¹ e^{Bhσ} σʲ dσ b` for `j = 0, 1, 2`, given `e^{Bh}`.
 fn moments(block: &Block, h: f64, exp: &[[f64; 2]; 2], b: [f64; 2]) -> [[f64; 2]; 3] {
     let mut out = [[0.0; 2]; 3];
-    if block.rate() * h < 1.0 {
-        // Terms are below 1/18! at the end.
+    let reach = block.rate() * h;
+    if reach < 1.0 {
+        // The last term is below 1e-16 of the first.
+        let terms = if reach < 0.02 { 8 } else { 18 };
         let mut term = b;
-        for k in 0..18 {
+        for k in 0..terms {
             for (j, sum) in out.iter_mut().enumerate() {
                 let factor = 1.0 / (k + j + 1) as f64;
                 sum[0] += factor * term[0];
@@ -333,7 +335,6 @@ impl Tables {
         let branches = if by_lookup { 1 } else { law.branches() };
         let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; branches];
         let mut exits = vec![Vec::new(); branches];
-        let mut steep = false;
         if !by_lookup {
             for branch in 0..branches {
                 for exit in system.exits(branch) {
@@ -352,7 +353,6 @@ impl Tables {
                         let [a, b] = [branch, exit.target].map(|b| law.value(b, level, 0.0));
                         (a - b).abs() <= 1e-9 * a.abs().max(b.abs()) && !law.depends_on_rate()
                     });
-                    steep |= exit.before == Approach::Half || exit.after == Approach::Half;
                     exits[branch].push(CoarseExit {
                         exit: *exit,
                         beyond: BEYOND[usize::from(continuous)],
@@ -378,6 +378,7 @@ impl Tables {
                 .abs(),
             period,
             levels,
+            table: GapTable::new(system),
             readout,
             rate_readout,
             acceleration_readout,
@@ -385,9 +386,15 @@ impl Tables {
             forced,
             frequency,
             bounds,
+            by_gap_alone: exits
+                .iter()
+                .map(|exits: &Vec<CoarseExit>| {
+                    let mut guards = exits.iter().map(|exit| exit.exit.guard);
+                    guards.all(|guard| matches!(guard, Guard::Falls(_) | Guard::Rises(_)))
+                })
+                .collect(),
             exits,
             by_lookup,
-            steep,
             max_steps: MAX_STEPS.saturating_mul(oscillations as u64),
             system: Arc::clone(system),
         })
@@ -408,7 +415,8 @@ impl Tables {
             return law.value(law.branch_at(gap, rate), gap, rate);
         }
         let [low, high] = self.bounds[branch];
-        law.value(branch, gap.clamp(low, high), rate)
+        self.table
+            .force(&self.system, branch, gap.clamp(low, high), rate)
     }
 
     /// Derivatives of [`Self::force`] by gap and rate; at the end of a branch those inside.
@@ -514,10 +522,35 @@ impl Tables {
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
     }
 
-    /// Carries derivatives of the modal coordinates along the step with these stages.
-    fn carry(&self, level: &Level, branch: usize, stages: &Stages, columns: &mut [[f64; 2]]) {
-        let slopes: [[f64; 2]; 4] =
+    /// Carries derivatives of the modal coordinates along the step with these stages to
+    /// `end_gap`. Where the slope by the gap is infinite at an end of the step, its mean over the
+    /// step stands for it at all stages.
+    fn carry(
+        &self,
+        level: &Level,
+        branch: usize,
+        stages: &Stages,
+        mean_slope_to: Option<f64>,
+        columns: &mut [[f64; 2]],
+    ) {
+        let mut slopes: [[f64; 2]; 4] =
             std::array::from_fn(|i| self.slopes(branch, stages.gaps[i], stages.rates[i]));
+        if let Some(end) = mean_slope_to {
+            let [start, rate] = [stages.gaps[0], stages.rates[2]];
+            let rise = self.force(branch, end, rate) - self.force(branch, start, rate);
+            let mean = if end == start {
+                0.0
+            } else {
+                rise / (end - start)
+            };
+            for slope in &mut slopes {
+                slope[0] = mean;
+                // Numbers with derivatives make 0 · ∞ of it where it vanishes.
+                if !slope[1].is_finite() {
+                    slope[1] = 0.0;
+                }
+            }
+        }
         for column in columns.chunks_exact_mut(level.blocks.len()) {
             let (mut start, mut mid, mut end) = ([0.0; 2], [0.0; 2], [0.0; 2]);
             for (k, (y, block)) in column.iter_mut().zip(&level.blocks).enumerate() {
@@ -715,9 +748,8 @@ impl Coarse {
         Ok(work.end(tables, state))
     }
 
-    /// As [`Coarse::run_periods`] over one period, with the Jacobian (`n × n`) by the state:
-    /// from the equations linearised along the steps, or from central differences where the
-    /// law's slope is unbounded at a switch.
+    /// As [`Coarse::run_periods`] over one period, with the Jacobian (`n × n`) by the state, from
+    /// the equations linearised along the steps.
     ///
     /// # Errors
     /// As [`Coarse::run_periods`].
@@ -730,11 +762,7 @@ impl Coarse {
         let Self { tables, work } = self;
         work.columns.clear();
         work.begin(tables, state, branch)?;
-        let by_modal = if tables.steep {
-            work.period_with_differences(tables)?
-        } else {
-            work.period_with_columns(tables)?
-        };
+        let by_modal = work.period_with_columns(tables)?;
         let modes = tables.system.kernel().modes();
         jacobian.copy_from(&(modes.right() * by_modal * modes.left()));
         Ok(work.end(tables, state))
@@ -742,33 +770,6 @@ impl Coarse {
 }
 
 impl Work {
-    /// Runs one period and differentiates it by modal coordinates, by central differences.
-    fn period_with_differences(&mut self, tables: &Tables) -> Result<DMatrix<f64>, VolterraError> {
-        let blocks = tables.system.kernel().modes().blocks();
-        let n = tables.system.dimension();
-        let mut out = DMatrix::zeros(n, n);
-        let start = self.now.clone();
-        for (k, block) in blocks.iter().enumerate() {
-            let reading = dot(tables.readout[k], tables.readout[k]).sqrt();
-            let width = DIFFERENCE * self.size / if reading > 0.0 { reading } else { 1.0 };
-            for j in 0..block.size {
-                for shift in [-width, width] {
-                    self.now.clone_from(&start);
-                    self.now.modal[k][j] += shift;
-                    self.period(tables)?;
-                    for (block_i, y) in blocks.iter().zip(&self.now.modal) {
-                        for i in 0..block_i.size {
-                            out[(block_i.start + i, block.start + j)] += y[i] / (2.0 * shift);
-                        }
-                    }
-                }
-            }
-        }
-        self.now.clone_from(&start);
-        self.period(tables)?;
-        Ok(out)
-    }
-
     /// Runs one period with derivatives by modal coordinates.
     fn period_with_columns(&mut self, tables: &Tables) -> Result<DMatrix<f64>, VolterraError> {
         let blocks = tables.system.kernel().modes().blocks();
@@ -879,6 +880,8 @@ impl Work {
         let allowed = TOLERANCE * tables.frequency * self.size;
         let mut l = FIRST_LEVEL;
         let mut at_once = (0.0, 0);
+        // Whether the slope of the force is infinite where the step begins.
+        let mut steep = false;
         // After a switch the new branch may end at once.
         let mut fresh = true;
         let mut tried = 0;
@@ -931,22 +934,27 @@ impl Work {
                 }
                 if fall.is_none() {
                     if !self.columns.is_empty() {
-                        tables.carry(level, self.now.branch, &self.stages, &mut self.columns);
+                        let to = steep.then_some(self.next.gap);
+                        let branch = self.now.branch;
+                        tables.carry(level, branch, &self.stages, to, &mut self.columns);
                     }
                     std::mem::swap(&mut self.now, &mut self.next);
                     self.now.force = tables.force(self.now.branch, self.now.gap, self.now.rate);
                     self.statistics.evaluations += 1;
                     self.statistics.steps += 1;
-                    if error < GROWTH * allowed && l > 0 {
-                        l -= 1;
+                    steep = false;
+                    if error < GROWTH * allowed {
+                        l = l.saturating_sub(1);
                     }
                     continue;
                 }
             }
             let Some(fall) = fall else { continue };
-            if !self.switch(tables, fall)? {
+            if !self.switch(tables, fall, steep)? {
+                steep = false;
                 continue;
             }
+            steep = fall.exit.exit.after == Approach::Half;
             fresh = true;
             l = (l + 1).min(LEVELS - 1);
             if self.now.time - at_once.0 > 1e-13 * end {
@@ -985,7 +993,7 @@ impl Work {
     /// Goes to where the guard of `fall` has just fallen, on partial steps, and switches.
     /// Returns whether it has switched: where the guard does not fall after all, the motion
     /// only goes on to the end of the search.
-    fn switch(&mut self, tables: &Tables, fall: Fall) -> Result<bool, VolterraError> {
+    fn switch(&mut self, tables: &Tables, fall: Fall, steep: bool) -> Result<bool, VolterraError> {
         let exit = fall.exit.exit;
         let beyond = exit_tolerance(tables, &fall.exit, &self.now, self.size);
         let mut fell = true;
@@ -1034,7 +1042,9 @@ impl Work {
                 });
             }
             if !self.columns.is_empty() {
-                tables.carry(&self.part, self.now.branch, &self.stages, &mut self.columns);
+                let steep = steep || exit.before == Approach::Half;
+                let (to, branch) = (steep.then_some(self.next.gap), self.now.branch);
+                tables.carry(&self.part, branch, &self.stages, to, &mut self.columns);
             }
             std::mem::swap(&mut self.now, &mut self.next);
             self.statistics.steps += 1;
@@ -1087,6 +1097,12 @@ fn search(
     // The middle with the second of its forces.
     let gaps = [from.gap, stages.gaps[2], to.gap];
     let rates = [from.rate, stages.rates[2], to.rate];
+    let [low, high] = tables.bounds[from.branch];
+    let turns = rates[0] * rates[1] <= 0.0 || rates[1] * rates[2] <= 0.0;
+    let inside = gaps[1] > low && gaps[1] < high && gaps[2] > low && gaps[2] < high;
+    if inside && !turns && tables.by_gap_alone[from.branch] && level.unresolved.is_empty() {
+        return Search::None;
+    }
     let mut first: Option<Fall> = None;
     let mut least = gaps[0].min(gaps[1]).min(gaps[2]);
     let stretch = |k: usize, sign: f64, level: f64| Stretch {
@@ -1108,7 +1124,7 @@ fn search(
             + middle * 4.0 * u * (1.0 - u)
             + k4 * u * (2.0 * u - 1.0);
         if level.length * tables.mobility * (force - expected).abs() / 6.0 > 4.0 * allowed
-            && tables.bounds[from.branch][0] < gap
+            && low < gap
         {
             return Search::Refused;
         }
@@ -1153,7 +1169,6 @@ fn search(
         }
     }
     if first.is_none() && !level.unresolved.is_empty() {
-        let [low, high] = tables.bounds[from.branch];
         let margin = tables.unresolved(level, from);
         let most = gaps[0].max(gaps[1]).max(gaps[2]);
         if margin > UNRESOLVED * size && (least - margin < low || most + margin > high) {

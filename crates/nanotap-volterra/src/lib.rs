@@ -119,6 +119,7 @@ pub mod trajectory;
 pub mod variation;
 
 mod bracket;
+mod gap_table;
 mod linear;
 mod quadrature;
 mod step;

@@ -102,7 +102,7 @@ impl Nonlinear {
         let n = self.system.dimension();
         let law = self.system.law();
         let (gap, rate) = self.system.gap(0.0, &state[..n]);
-        let known = state.get(n).map(|s| s.round().max(0.0) as usize);
+        let known = remembered(&state[n..]);
         let possible = |branch: &usize| {
             *branch < law.branches()
                 && self.system.exits(*branch).iter().all(|exit| {
@@ -164,14 +164,8 @@ impl Nonlinear {
 
     /// Puts `flow` at a state of the model at drive phase 0.
     pub(crate) fn start(&self, flow: &mut Flow, state: &[f64]) -> Result<(), MotionError> {
-        let (n, expected) = (self.system.dimension(), self.dimension());
-        if state.len() != expected {
-            return Err(MotionError::Nonlinear(VolterraError::Shape {
-                what: "the state",
-                found: state.len(),
-                expected,
-            }));
-        }
+        self.check_length(state)?;
+        let n = self.system.dimension();
         if state.iter().all(|v| v.is_finite()) {
             flow.start_on(&state[..n], 0.0, self.branch(state))?;
         } else {
@@ -218,6 +212,13 @@ impl Nonlinear {
     }
 }
 
+/// The branch of the law after the lever's part of a state.
+fn remembered(memory: &[f64]) -> Option<usize> {
+    memory
+        .first()
+        .map(|branch| branch.round().max(0.0) as usize)
+}
+
 /// Where the lever can rest without a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Equilibrium {
@@ -247,6 +248,19 @@ impl Nonlinear {
         let (rest, compliance) = (self.system.drive().offset, self.compliance());
         let tip = rest.abs();
         let mut found: Vec<Equilibrium> = Vec::new();
+        // From where contact begins outwards and inwards, ever farther.
+        let contact = self.contact_gap().unwrap_or(0.0);
+        let reach = 10.0 * (tip + contact.abs());
+        let ladder = |k: i32| {
+            reach * nanotap_arithmetic::powf(1e-9, f64::from(k) / f64::from(EQUILIBRIUM_POINTS))
+        };
+        let steps: Vec<f64> = (0..=EQUILIBRIUM_POINTS).map(ladder).collect();
+        let inwards = steps.iter().rev().map(|step| contact - step);
+        let points: Vec<f64> = steps
+            .iter()
+            .map(|step| contact + step)
+            .chain(inwards)
+            .collect();
         for branch in 0..law.branches() {
             let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
             for exit in self.system.exits(branch) {
@@ -257,19 +271,11 @@ impl Nonlinear {
                 }
             }
             let excess = |gap: f64| gap - rest - compliance * law.force(branch, gap, 0.0).value;
-            // From where contact begins outwards and inwards, ever farther.
-            let contact = self.contact_gap().unwrap_or(0.0);
-            let reach = 10.0 * (tip + contact.abs());
-            let ladder = |k: i32| {
-                reach * nanotap_arithmetic::powf(1e-9, f64::from(k) / f64::from(EQUILIBRIUM_POINTS))
-            };
-            let outwards = (0..=EQUILIBRIUM_POINTS).map(|k| contact + ladder(k));
-            let inwards = (0..=EQUILIBRIUM_POINTS).rev().map(|k| contact - ladder(k));
-            let mut gaps: Vec<f64> = outwards
-                .chain(inwards)
-                .filter(|gap| *gap >= low && *gap <= high)
-                .chain([low, high].into_iter().filter(|end| end.is_finite()))
-                .collect();
+            // The points fall.
+            let first = points.partition_point(|gap| *gap > high);
+            let end = points.partition_point(|gap| *gap >= low).max(first);
+            let mut gaps = points[first..end].to_vec();
+            gaps.extend([low, high].into_iter().filter(|end| end.is_finite()));
             gaps.sort_by(|a, b| b.total_cmp(a));
             for pair in gaps.windows(2) {
                 let (mut a, mut b) = (pair[0], pair[1]);
@@ -673,10 +679,10 @@ impl CoarseStrobe {
         state: &mut [f64],
         periods: usize,
     ) -> Result<(), MotionError> {
-        let (state, memory) = self.nonlinear.split(state)?;
-        let branch = memory.as_deref().map(|b| b.round().max(0.0) as usize);
-        let branch = self.coarse.run_periods(state, branch, periods)?;
-        memory.map(|memory| *memory = branch as f64);
+        let (lever, memory) = self.nonlinear.split(state)?;
+        let branch = remembered(memory);
+        let reached = self.coarse.run_periods(lever, branch, periods)?;
+        memory.fill(reached as f64);
         Ok(())
     }
 
@@ -685,12 +691,12 @@ impl CoarseStrobe {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
-        let whole = state.len();
-        let (state, memory) = self.nonlinear.split(state)?;
-        let branch = memory.as_deref().map(|b| b.round().max(0.0) as usize);
-        let mut own = DMatrix::zeros(state.len(), state.len());
-        let branch = self.coarse.run_with_jacobian(state, branch, &mut own)?;
-        memory.map(|memory| *memory = branch as f64);
+        let (n, whole) = (self.nonlinear.system.dimension(), state.len());
+        let (lever, memory) = self.nonlinear.split(state)?;
+        let mut own = DMatrix::zeros(n, n);
+        let branch = remembered(memory);
+        let reached = self.coarse.run_with_jacobian(lever, branch, &mut own)?;
+        memory.fill(reached as f64);
         *jacobian = own.resize(whole, whole, 0.0);
         Ok(())
     }
@@ -702,21 +708,25 @@ impl CoarseStrobe {
 }
 
 impl Nonlinear {
-    /// The lever's part of a state of the model and the branch that it remembers.
+    /// The lever's part of a state of the model, and the rest: the branch, where it is remembered.
     fn split<'a>(
         &self,
         state: &'a mut [f64],
-    ) -> Result<(&'a mut [f64], Option<&'a mut f64>), MotionError> {
-        let (n, expected) = (self.system.dimension(), self.dimension());
-        if state.len() != expected {
-            return Err(MotionError::Nonlinear(VolterraError::Shape {
-                what: "the state",
-                found: state.len(),
-                expected,
-            }));
+    ) -> Result<(&'a mut [f64], &'a mut [f64]), VolterraError> {
+        self.check_length(state)?;
+        Ok(state.split_at_mut(self.system.dimension()))
+    }
+
+    fn check_length(&self, state: &[f64]) -> Result<(), VolterraError> {
+        let (found, expected) = (state.len(), self.dimension());
+        if found == expected {
+            return Ok(());
         }
-        let (own, memory) = state.split_at_mut(n);
-        Ok((own, memory.first_mut()))
+        Err(VolterraError::Shape {
+            what: "the state",
+            found,
+            expected,
+        })
     }
 
     /// log|det DP| of the lever's state where every motion has the same: a force that depends

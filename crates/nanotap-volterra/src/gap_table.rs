@@ -1,0 +1,128 @@
+//! Forces tabulated in the gap, where a law is costly to evaluate and some 1e-9 of the force will
+//! do.
+
+use crate::law::{Approach, Guard};
+use crate::system::System;
+
+/// Intervals of a table.
+const INTERVALS: usize = 2048;
+/// Laws of more branches are not tabulated.
+const MAX_BRANCHES: usize = 64;
+/// How far a table reaches, as a part of the size of gaps and amplitudes.
+const REACH: f64 = 2.0;
+
+/// The force on one branch over `√|level − gap|`, in which it is analytic up to the level at
+/// which the branch ends.
+#[derive(Clone, Debug)]
+struct Curve {
+    level: f64,
+    /// 1 where the branch lies above the level, −1 where it lies below.
+    side: f64,
+    /// Intervals a unit of the root.
+    density: f64,
+    /// At −1, 0, 1 … intervals.
+    values: Vec<f64>,
+    /// The derivative by the rate there; empty where the force is none of the rate.
+    by_rate: Vec<f64>,
+}
+
+/// The force of a law, tabulated on the branches where the law solves an equation for it.
+#[derive(Clone, Debug)]
+pub(crate) struct GapTable {
+    curves: Vec<Option<Curve>>,
+}
+
+impl GapTable {
+    pub(crate) fn new(system: &System) -> Self {
+        let law = system.law();
+        let size = system.drive().offset.abs() + system.gap_sizes[0];
+        let tabulated = law.branches() <= MAX_BRANCHES && size > 0.0;
+        let curve = |branch| Curve::new(system, branch, REACH * size).filter(|_| tabulated);
+        Self {
+            curves: (0..law.branches()).map(curve).collect(),
+        }
+    }
+
+    /// The force on a branch.
+    #[inline]
+    pub(crate) fn force(&self, system: &System, branch: usize, gap: f64, rate: f64) -> f64 {
+        let curve = self.curves.get(branch).and_then(Option::as_ref);
+        let tabulated = curve.and_then(|curve| curve.at(gap, rate));
+        tabulated.unwrap_or_else(|| system.law().value(branch, gap, rate))
+    }
+}
+
+impl Curve {
+    /// Of a branch that ends where its slope is infinite.
+    fn new(system: &System, branch: usize, reach: f64) -> Option<Self> {
+        let mut exits = system.exits(branch).iter();
+        let (level, side) = exits.find_map(|exit| match exit.guard {
+            _ if exit.before != Approach::Half => None,
+            Guard::Falls(level) => Some((level, 1.0)),
+            Guard::Rises(level) => Some((level, -1.0)),
+            Guard::Turns | Guard::Own(_) => None,
+        })?;
+        // No further than another end of the branch.
+        let ends = system.exits(branch).iter();
+        let reach = ends.fold(reach, |reach, exit| match exit.guard {
+            Guard::Falls(other) | Guard::Rises(other) if other != level => {
+                reach.min((other - level).abs())
+            }
+            _ => reach,
+        });
+        let density = INTERVALS as f64 / reach.sqrt();
+        let law = system.law();
+        let at = |k: usize, rate: f64| {
+            let root = k as f64 / density;
+            law.value(branch, level + side * root * root, rate)
+        };
+        // A force in proportion to the rate and one without it; any other is not tabulated.
+        let linear = |k: usize| {
+            let [a, b, c] = [-1.0, 0.0, 2.0].map(|rate| at(k, rate * reach));
+            (c - b - 2.0 * (b - a)).abs() <= 1e-9 * (a.abs() + b.abs() + c.abs())
+        };
+        let rates = law.depends_on_rate();
+        if rates && ![1, INTERVALS / 3, INTERVALS].into_iter().all(linear) {
+            return None;
+        }
+        // Beyond the end the cubic through the first four.
+        let table = |value: &dyn Fn(usize) -> f64| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(value);
+            let before = 4.0 * a - 6.0 * b + 4.0 * c - d;
+            let values = std::iter::once(before).chain((0..=INTERVALS + 1).map(value));
+            values.collect::<Vec<f64>>()
+        };
+        let curve = Self {
+            level,
+            side,
+            density,
+            values: table(&|k| at(k, 0.0)),
+            by_rate: if rates {
+                table(&|k| (at(k, reach) - at(k, -reach)) / (2.0 * reach))
+            } else {
+                Vec::new()
+            },
+        };
+        let mut all = curve.values.iter().chain(&curve.by_rate);
+        all.all(|v| v.is_finite()).then_some(curve)
+    }
+
+    /// The cubics through the four nearest values; `None` outside the table.
+    #[inline]
+    fn at(&self, gap: f64, rate: f64) -> Option<f64> {
+        let x = (self.side * (gap - self.level)).max(0.0).sqrt() * self.density;
+        let k = x as usize;
+        let t = x - k as f64;
+        let (s, u, v) = (1.0 - t, 1.0 + t, 2.0 - t);
+        let weights = [-t * s * v, 3.0 * u * s * v, 3.0 * u * t * v, -u * t * s];
+        let read = |values: &[f64]| {
+            let near = values.get(k..k + 4)?.iter().zip(weights);
+            Some(near.map(|(value, weight)| value * weight).sum::<f64>() / 6.0)
+        };
+        let value = read(&self.values)?;
+        if self.by_rate.is_empty() {
+            return Some(value);
+        }
+        Some(value + rate * read(&self.by_rate)?)
+    }
+}

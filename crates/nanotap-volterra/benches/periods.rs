@@ -8,7 +8,7 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use nanotap_volterra::Flow;
+use nanotap_volterra::{Coarse, Flow};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -51,6 +51,13 @@ fn dmt_period(bencher: divan::Bencher, modes: usize) {
         per(after.evaluations, before.evaluations),
         per(after.factorisations, before.factorisations),
     );
+}
+
+#[divan::bench(args = [1, 3, 5, 10, 20])]
+fn coarse_dmt_period(bencher: divan::Bencher, modes: usize) {
+    let (flow, mut state) = flow(modes, 20);
+    let mut coarse = Coarse::new(flow.system(), TAU).unwrap();
+    bencher.bench_local(|| coarse.run_periods(&mut state, None, 1).unwrap());
 }
 
 #[divan::bench(args = [12, 16, 20, 24, 28])]

@@ -30,6 +30,8 @@ const HARMONICS: usize = 12;
 const MEAN_GAPS: usize = 600;
 /// Newton steps for the mean gap.
 const MAX_ITERATIONS: usize = 12;
+/// What may be left of the drive's amplitude at a root.
+const MAX_RESIDUAL: f64 = 0.5;
 /// How far the force may shift the mean gap, in units of the size of gaps and amplitudes.
 const MAX_SHIFT: f64 = 3.0;
 /// Halvings of an interval that holds a root.
@@ -202,6 +204,10 @@ impl<'a> Averaging<'a> {
     /// The state at phase 0 of the motion with this mean gap and amplitude.
     fn motion(&self, mean: f64, amplitude: f64) -> Option<AveragedMotion> {
         let average = self.average(mean, amplitude);
+        // The residual may also change sign where the force jumps.
+        if self.residual(amplitude, &average).abs() > MAX_RESIDUAL * self.drive.modulus() {
+            return None;
+        }
         let shift = self.drive / (amplitude - self.receptance * average.first);
         let shift = shift / shift.modulus();
         // Harmonics of the force in θ.

@@ -75,9 +75,9 @@ const LEAST_PATIENCE: usize = 64;
 /// Part of the expected entry for which it is, where periods are cheap.
 const COARSE_PATIENCE: f64 = 1.3;
 /// Periods for which it is at most, where periods are cheap.
-const MAX_COARSE_PATIENCE: usize = 16_384;
-/// Periods for which chaotic starts together are watched, where periods are cheap, and the rounds in
-/// which they are: each takes as long as all before it.
+const MAX_COARSE_PATIENCE: usize = 2048;
+/// Periods for which chaotic starts together are watched at most, where periods are cheap, and the
+/// rounds in which they are: each takes as long as all before it.
 const WATCHED_TOGETHER: usize = 400_000;
 const WATCH_ROUNDS: u32 = 4;
 /// Escapes after which a lifetime is known well enough.
@@ -287,49 +287,13 @@ pub fn census_of<M: StroboscopicMap>(
     options: &CensusOptions,
     control: &Control<'_>,
 ) -> Census {
-    let given = starts.given_count();
-    let last = starts
-        .len()
-        .unwrap_or_else(|| given.saturating_add(options.max_starts));
-    let mut work = Work {
-        motions: Motions::new(map, &options.classify, control.cancel),
-        followed_options: options.classify.clone(),
-        starts,
-        options,
-        control,
-        done: AtomicUsize::new(0),
-        last,
-        outcomes: Vec::new(),
-        ends: Vec::new(),
-        neighbourhoods: Vec::new(),
-        searched: 0,
-        patience: 0,
-        periods: 0,
-        row: 0,
-    };
-    if work.motions.is_coarse {
-        work.followed_options = options.classify.on_coarse_map();
-    }
-    work.motions.close_seeds(starts.seeds());
-    if work.motions.count() > 0 {
-        work.know_neighbourhoods(&[]);
-    }
-    let count = if work.motions.is_coarse && !work.neighbourhoods.is_empty() {
-        options.pilots.min(COARSE_PILOTS)
-    } else {
-        options.pilots
-    };
-    // Chaos that the first of the pilots are on need not be measured again by the others.
-    let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
-    pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
-    work.know_neighbourhoods(&pilots);
-    while work.outcomes.len() < last && !work.is_enough() {
-        let classified = work.follow(work.next_batch());
-        work.know_neighbourhoods(&classified);
-    }
-    let mut after = Escapes::after(work.relaxation());
-    work.watch_chaos(&mut after);
-    work.assemble(after)
+    let coarse = map.coarse().and_then(|coarse| {
+        let work = Work::begin(map, Some(coarse), starts, options, control);
+        (!work.fails_mostly()).then_some(work)
+    });
+    // Where the coarse map cannot follow the pilots, the map itself does.
+    let work = coarse.unwrap_or_else(|| Work::begin(map, None, starts, options, control));
+    work.finish()
 }
 
 /// A census under way.
@@ -358,7 +322,73 @@ struct Work<'a, M> {
     row: usize,
 }
 
-impl<M: StroboscopicMap> Work<'_, M> {
+impl<'a, M: StroboscopicMap> Work<'a, M> {
+    /// Closes the seeds and follows the pilots.
+    fn begin(
+        map: &M,
+        coarse: Option<M>,
+        starts: &'a StartSet,
+        options: &'a CensusOptions,
+        control: &'a Control<'a>,
+    ) -> Self {
+        let given = starts.given_count();
+        let last = starts
+            .len()
+            .unwrap_or_else(|| given.saturating_add(options.max_starts));
+        let mut work = Work {
+            motions: Motions::new(map, coarse, &options.classify, control.cancel),
+            followed_options: options.classify.clone(),
+            starts,
+            options,
+            control,
+            done: AtomicUsize::new(0),
+            last,
+            outcomes: Vec::new(),
+            ends: Vec::new(),
+            neighbourhoods: Vec::new(),
+            searched: 0,
+            patience: 0,
+            periods: 0,
+            row: 0,
+        };
+        if work.motions.is_coarse {
+            work.followed_options = options.classify.on_coarse_map();
+        }
+        work.motions.close_seeds(starts.seeds());
+        if work.motions.count() > 0 {
+            work.know_neighbourhoods(&[]);
+        }
+        let count = if work.motions.is_coarse && !work.neighbourhoods.is_empty() {
+            options.pilots.min(COARSE_PILOTS)
+        } else {
+            options.pilots
+        };
+        // Chaos that the first of the pilots are on need not be measured again by the others.
+        let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
+        pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
+        work.know_neighbourhoods(&pilots);
+        work
+    }
+
+    /// Follows starts until enough is known.
+    fn finish(mut self) -> Census {
+        while self.outcomes.len() < self.last && !self.is_enough() {
+            let classified = self.follow(self.next_batch());
+            self.know_neighbourhoods(&classified);
+        }
+        let mut after = Escapes::after(self.relaxation());
+        self.watch_chaos(&mut after);
+        self.assemble(after)
+    }
+
+    /// Whether most starts could not be followed.
+    fn fails_mostly(&self) -> bool {
+        let failed =
+            |outcome: &&Outcome| matches!(outcome, Outcome::Undecided(UndecidedReason::Map { .. }));
+        let failed = self.outcomes.iter().filter(failed).count();
+        2 * failed > self.outcomes.len() && !self.control.is_cancelled()
+    }
+
     /// True if the next batch is not wanted.
     fn is_enough(&self) -> bool {
         if self.control.is_cancelled() || self.starts.len().is_some() {
@@ -642,6 +672,9 @@ impl<M: StroboscopicMap> Work<'_, M> {
         let chaotic = self.outcomes.iter().filter(chaotic).count();
         let together = WATCHED_TOGETHER / chaotic.max(1);
         let mut budget = self.options.max_periods;
+        if self.motions.is_coarse {
+            budget = budget.min(WATCHED_TOGETHER);
+        }
         if self.motions.is_coarse && together > enough {
             for round in (0..WATCH_ROUNDS).rev() {
                 self.watch_for(enough.max(together >> round), after, &mut budget);

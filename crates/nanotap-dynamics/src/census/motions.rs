@@ -17,8 +17,8 @@ use crate::map::StroboscopicMap;
 use crate::orbit::search::merge;
 use crate::orbit::{PeriodicOrbit, close_orbit};
 
-/// Coarse orbits without an exact one near them that are followed further exactly.
-const MAX_UNCONFIRMED: usize = 8;
+/// Runs on the map itself from states that coarse runs came to, at most.
+const MAX_EXACT_RUNS: usize = 8;
 /// States of a motion that does not close from which it is classified exactly, until one shows what
 /// it is.
 const MAX_TRIES: usize = 4;
@@ -44,7 +44,7 @@ pub(super) struct Motions<'a, M> {
     pub(super) followed_orbits: Vec<(PeriodicOrbit, Outcome)>,
     /// Orbits of the map itself that were looked for on the followed one.
     paired: usize,
-    unconfirmed: usize,
+    exact_runs: usize,
     /// Spectra of chaotic motions and tori of the followed map, one of each.
     pub(super) spectra: Vec<LyapunovSpectrum>,
     /// What each of these is.
@@ -68,10 +68,10 @@ enum IrregularKind {
 impl<'a, M: StroboscopicMap> Motions<'a, M> {
     pub(super) fn new(
         map: &M,
+        coarse: Option<M>,
         options: &'a ClassifyOptions,
         cancel: Option<&'a CancelFlag>,
     ) -> Self {
-        let coarse = map.coarse();
         let longest = options.lyapunov.max_periods.min(MAX_EXACT_PERIODS);
         let budgets = ClassifyOptions {
             lyapunov: LyapunovOptions {
@@ -92,7 +92,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             unstable: Vec::new(),
             followed_orbits: Vec::new(),
             paired: 0,
-            unconfirmed: 0,
+            exact_runs: 0,
             spectra: Vec::new(),
             irregular: Vec::new(),
             transient_spectrum: None,
@@ -230,6 +230,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             cancel: self.cancel,
             ..Known::default()
         };
+        self.exact_runs += 1;
         let mut found = classify_on(&mut self.exact, state, known, &self.budgets);
         found.periods += periods;
         if let MotionKind::Chaotic(chaos) = &mut found.kind {
@@ -250,8 +251,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
                 return known;
             }
             Outcome::Orbit { index, periods: 0 }
-        } else if self.unconfirmed < MAX_UNCONFIRMED {
-            self.unconfirmed += 1;
+        } else if self.exact_runs < MAX_EXACT_RUNS {
             let found = self.classify_exactly(&orbit.states[0], 0);
             self.exact_outcome(found)
         } else {
@@ -308,7 +308,8 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         periods: usize,
     ) -> Outcome {
         let known = self.spectrum_index(spectrum);
-        if self.irregular[known].kind.is_none() && self.irregular[known].tries < MAX_TRIES {
+        let may_try = self.irregular[known].tries < MAX_TRIES && self.exact_runs < MAX_EXACT_RUNS;
+        if self.irregular[known].kind.is_none() && may_try {
             self.irregular[known].tries += 1;
             let found = self.classify_exactly(&state, periods);
             self.irregular[known].kind = match &found.kind {

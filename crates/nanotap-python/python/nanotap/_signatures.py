@@ -260,6 +260,7 @@ def attractors(
     case: Case,
     *,
     starts: int | None = None,
+    unseen: float | None = None,
     seed: int = 1,
     box: Box = None,
     max_period: int = 64,
@@ -277,8 +278,14 @@ def attractors(
     starts : int | None
         Starts, spread evenly over one box of states. Without it, starts of every
         size, from the resonant response down to below the gap, go on until the
-        share of starts that may lead to motions not found is below 0.2 % (with 95 %
-        confidence), or 5000 are done (1 to 10000000).
+        share of starts that may lead to motions not found is below `unseen`, or
+        5000 starts or 2,000,000 drive periods (600,000 under a nonlinear law) are
+        done (1 to 10000000).
+    unseen : float | None
+        Share of starts that may lead to motions not found, with 95 % confidence, at
+        which no more are drawn. Without it, 0.01 under a nonlinear law and 0.002
+        under a piecewise-linear one; a smaller one raises the limits of `starts`
+        and drive periods in proportion.
     seed : int
         Seed of the starts: the same seed gives the same answer on any number of
         threads.
@@ -312,6 +319,7 @@ def attractors(
     """
     options = {
         "starts": starts,
+        "unseen": unseen,
         "seed": seed,
         "box": box,
         "max_period": max_period,

@@ -124,7 +124,7 @@ impl Nonlinear {
         let n = self.system.dimension();
         let law = self.system.law();
         let (gap, rate) = self.system.gap(0.0, &state[..n]);
-        let known = state.get(n).map(|s| s.round().max(0.0) as usize);
+        let known = remembered(&state[n..]);
         let possible = |branch: &usize| {
             *branch < law.branches()
                 && self.system.exits(*branch).iter().all(|exit| {
@@ -186,14 +186,8 @@ impl Nonlinear {
 
     /// Puts `flow` at a state of the model at drive phase 0.
     pub(crate) fn start(&self, flow: &mut Flow, state: &[f64]) -> Result<(), MotionError> {
-        let (n, expected) = (self.system.dimension(), self.dimension());
-        if state.len() != expected {
-            return Err(MotionError::Nonlinear(VolterraError::Shape {
-                what: "the state",
-                found: state.len(),
-                expected,
-            }));
-        }
+        self.check_length(state)?;
+        let n = self.system.dimension();
         if state.iter().all(|v| v.is_finite()) {
             flow.start_on(&state[..n], 0.0, self.branch(state))?;
         } else {
@@ -238,6 +232,13 @@ impl Nonlinear {
             force,
         }
     }
+}
+
+/// The branch of the law after the lever's part of a state.
+fn remembered(memory: &[f64]) -> Option<usize> {
+    memory
+        .first()
+        .map(|branch| branch.round().max(0.0) as usize)
 }
 
 /// Where the lever can rest without a drive.
@@ -701,10 +702,10 @@ impl CoarseStrobe {
         state: &mut [f64],
         periods: usize,
     ) -> Result<(), MotionError> {
-        let (state, memory) = self.nonlinear.split(state)?;
-        let branch = memory.as_deref().map(|b| b.round().max(0.0) as usize);
-        let branch = self.coarse.run_periods(state, branch, periods)?;
-        memory.map(|memory| *memory = branch as f64);
+        let (lever, memory) = self.nonlinear.split(state)?;
+        let branch = remembered(memory);
+        let reached = self.coarse.run_periods(lever, branch, periods)?;
+        memory.fill(reached as f64);
         Ok(())
     }
 
@@ -713,12 +714,12 @@ impl CoarseStrobe {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
-        let whole = state.len();
-        let (state, memory) = self.nonlinear.split(state)?;
-        let branch = memory.as_deref().map(|b| b.round().max(0.0) as usize);
-        let mut own = DMatrix::zeros(state.len(), state.len());
-        let branch = self.coarse.run_with_jacobian(state, branch, &mut own)?;
-        memory.map(|memory| *memory = branch as f64);
+        let (n, whole) = (self.nonlinear.system.dimension(), state.len());
+        let (lever, memory) = self.nonlinear.split(state)?;
+        let mut own = DMatrix::zeros(n, n);
+        let branch = remembered(memory);
+        let reached = self.coarse.run_with_jacobian(lever, branch, &mut own)?;
+        memory.fill(reached as f64);
         *jacobian = own.resize(whole, whole, 0.0);
         Ok(())
     }
@@ -730,21 +731,25 @@ impl CoarseStrobe {
 }
 
 impl Nonlinear {
-    /// The lever's part of a state of the model and the branch that it remembers.
+    /// The lever's part of a state of the model, and the rest: the branch, where it is remembered.
     fn split<'a>(
         &self,
         state: &'a mut [f64],
-    ) -> Result<(&'a mut [f64], Option<&'a mut f64>), MotionError> {
-        let (n, expected) = (self.system.dimension(), self.dimension());
-        if state.len() != expected {
-            return Err(MotionError::Nonlinear(VolterraError::Shape {
-                what: "the state",
-                found: state.len(),
-                expected,
-            }));
+    ) -> Result<(&'a mut [f64], &'a mut [f64]), VolterraError> {
+        self.check_length(state)?;
+        Ok(state.split_at_mut(self.system.dimension()))
+    }
+
+    fn check_length(&self, state: &[f64]) -> Result<(), VolterraError> {
+        let (found, expected) = (state.len(), self.dimension());
+        if found == expected {
+            return Ok(());
         }
-        let (own, memory) = state.split_at_mut(n);
-        Ok((own, memory.first_mut()))
+        Err(VolterraError::Shape {
+            what: "the state",
+            found,
+            expected,
+        })
     }
 
     /// log|det DP| of the lever's state where every motion has the same: a force that depends

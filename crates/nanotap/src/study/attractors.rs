@@ -330,6 +330,8 @@ const STARTS_IN_A_BOX: usize = 256;
 /// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
 /// law.
 pub const NONLINEAR_UNSEEN: f64 = 0.01;
+/// Drive periods of all starts together after which no more are drawn under a nonlinear law.
+const NONLINEAR_PERIODS: usize = 600_000;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -395,10 +397,10 @@ pub fn attractors(
 /// How the census is taken. A smaller bound than the default has larger budgets.
 fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> CensusOptions {
     let default = CensusOptions::default();
-    let usual = if model.nonlinear.is_some() {
-        NONLINEAR_UNSEEN
+    let (usual, periods) = if model.nonlinear.is_some() {
+        (NONLINEAR_UNSEEN, NONLINEAR_PERIODS)
     } else {
-        default.unseen
+        (default.unseen, default.max_periods)
     };
     let unseen = options.unseen.unwrap_or(usual);
     let times = (usual / unseen).max(1.0);
@@ -407,7 +409,7 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
         classify: bounded(&options.classify, start_box),
         unseen,
         max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
-        max_periods: (times * default.max_periods as f64) as usize,
+        max_periods: (times * periods as f64) as usize,
     }
 }
 
@@ -618,7 +620,8 @@ fn unstable_orbits(
 pub struct AttractorsRequest {
     /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
     /// resonant response down to below the gap, go on until the share of starts that may lead to
-    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods are done
+    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
+    /// nonlinear law) are done
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: Option<usize>,
     /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are

@@ -45,9 +45,7 @@ fn averaging_finds_every_period_1_orbit() {
     let cases = cases();
     assert_eq!(cases.len(), 11);
     for (name, model, expected) in cases {
-        let start = std::time::Instant::now();
         let orbits = averaged_orbits(&model);
-        println!("{name}: {} orbits in {:?}", orbits.len(), start.elapsed());
         for expected in expected["orbits"].as_array().unwrap() {
             if expected["period"] != 1 {
                 continue;
@@ -72,9 +70,9 @@ fn averaging_finds_every_period_1_orbit() {
     }
 }
 
-/// The approximate map returns to each stable orbit within its error, and knows its multipliers.
+/// The approximate map returns to each orbit within its error.
 #[test]
-fn the_coarse_map_keeps_stable_orbits() {
+fn the_coarse_map_keeps_orbits() {
     for (name, model, expected) in cases() {
         let mut exact = Strobe::new(&model);
         let mut coarse = exact.coarse().unwrap();
@@ -83,31 +81,18 @@ fn the_coarse_map_keeps_stable_orbits() {
             let mut state = numbers(&expected["state"]);
             state.resize(coarse.dimension(), 0.0);
             let scale = state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-            let mut end = state.clone();
-            let before = std::time::Instant::now();
-            for _ in 0..20 {
-                exact.advance(&mut end).unwrap();
-            }
-            let spent = before.elapsed() / 20;
-            end.clone_from(&state);
+            let (mut end, mut near) = (state.clone(), state);
             exact.advance(&mut end).unwrap();
-            let mut near = state.clone();
             coarse.advance(&mut near).unwrap();
             let pairs = near.iter().zip(&end);
             let off = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale;
             assert!(off < 1e-4, "{name}: {off:.1e}");
-            let before = std::time::Instant::now();
-            coarse.advance_by(&mut near, 1000).unwrap();
-            println!(
-                "{name}: exact {spent:?}, coarse {:?}, {off:.1e}",
-                before.elapsed() / 1000
-            );
         }
     }
 }
 
-/// `c01`, whose free amplitude is 20 nm, at a setpoint of 0.9: 18.220, 17.653 and 17.465 nm after
-/// Newton (`shared` note on the census, section "Found").
+/// `c01`, whose free amplitude is 20 nm, at a setpoint of 0.9: Newton's method in the distance, by
+/// the independent program of the cases, gives 18.220, 17.653 and 17.465 nm.
 #[test]
 fn averaging_finds_every_distance_of_a_setpoint() {
     let (_, model, _) = cases().swap_remove(0);

@@ -1,4 +1,4 @@
-"""What every test shares. Run by `cargo xtask test-python` on the installed wheel."""
+"""Fixtures of all tests. Run by `cargo xtask test-python` on the installed wheel."""
 
 import nanotap
 import pytest
@@ -6,7 +6,7 @@ import pytest
 
 @pytest.fixture(scope="session")
 def regular():
-    """A motion that every run settles on: the paper's parameters at Ω = 3."""
+    """A case in which every run leads to the same motion: the paper's parameters at Ω = 3."""
     return nanotap.Case.paper(omega=3)
 
 

@@ -1,4 +1,4 @@
-"""Cases: what they say, how they change, what is refused and in which words."""
+"""Cases: their values, changes to them, and error messages."""
 
 import json
 import os
@@ -71,7 +71,7 @@ def test_a_case_does_not_need_its_file_again(tmp_path):
 
 
 def test_a_physical_case_maps_both_ways(physical):
-    # K₁ and k from the label: α4 = 3 K₁/k (Eq. 7).
+    # K₁ and k as stated: α4 = 3 K₁/k (Eq. 7).
     mapping = physical.mapping
     assert physical.is_physical and not nanotap.Case(**GIVEN).is_physical
     assert mapping.si["alpha4"] == pytest.approx(
@@ -109,7 +109,7 @@ def test_what_makes_no_sense_is_refused_in_the_terminals_words(keys, words):
     said = str(refused.value)
     assert words in said
     assert "--set" not in said
-    # The terminal says the same, but for how it marks where a key came from.
+    # The terminal prints the same, except for the origin of a key.
     typed = []
     for key, value in (GIVEN | keys).items():
         inner = value if isinstance(value, dict) else {None: value}

@@ -1,6 +1,6 @@
-"""Datasets made at the terminal, opened where the data are looked at.
+"""Datasets written by the terminal program, opened in Python.
 
-Run by `cargo xtask test-python`, which installs what they need. The environment
+Run by `cargo xtask test-python`, which installs the requirements. The environment
 variable NANOTAP names the program (otherwise the release build of this checkout).
 """
 
@@ -33,7 +33,7 @@ omega = 2.6
 
 @pytest.fixture
 def nanotap(tmp_path):
-    """Runs the program in a folder of its own; the JSON it prints."""
+    """Runs the program in a temporary folder; returns the JSON that it prints."""
     (tmp_path / "case.toml").write_text(CASE)
 
     def run(*arguments):
@@ -54,7 +54,7 @@ def nanotap(tmp_path):
 
 
 def opened(path):
-    """The dataset, with every warning an error: nothing is to be unusual about it."""
+    """The dataset, opened with every warning as an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return xr.open_zarr(path)
@@ -92,13 +92,13 @@ def test_a_sweep_opens_with_names_units_and_its_case(nanotap):
     assert data.attrs["seed"] == 1
     assert data.attrs["nanotap_version"].count(".") == 2
 
-    # Codes stay whole numbers, and say what they mean.
+    # Codes remain whole numbers, and their meanings are stored.
     meanings = data.classification.attrs["flag_meanings"].split()
     codes = data.classification.values
     assert codes.dtype == np.uint8 and data.period.dtype == np.int32
     for name, count in said["counts"].items():
         assert (codes == meanings.index(name)).sum() == count
-    # The recordings fit the summary of each run.
+    # The recordings agree with the summary of each run.
     np.testing.assert_array_equal(data.period_max.max("drive_period"), data.tip_max)
     np.testing.assert_array_equal(data.period_min.min("drive_period"), data.tip_min)
     # The tip's deflection at drive phase 0 lies between the extremes: W = 2 Σ ±a_j.
@@ -107,7 +107,7 @@ def test_a_sweep_opens_with_names_units_and_its_case(nanotap):
         * xr.DataArray([2, -2, 2], dims="state")
     ).sum("state")
     assert ((tip <= data.tip_max + 1e-9) & (tip >= data.tip_min - 1e-9)).all()
-    # An orbit's multiplier is inside the circle, a chaotic run has none.
+    # The multipliers of an orbit are inside the unit circle; a chaotic run has none.
     periodic = data.classification == meanings.index("periodic")
     assert (data.multiplier.where(periodic, 0) < 1).all()
     assert data.multiplier.where(~periodic).isnull().all()

@@ -1,4 +1,4 @@
-"""The explorer in a real browser: what it shows is what the terminal says."""
+"""The explorer in a real browser, compared with the terminal's results."""
 
 from __future__ import annotations
 
@@ -236,7 +236,7 @@ def test_the_first_values_of_a_form_make_sense(address: str) -> None:
     headers = {"x-nanotap-token": token, "content-type": "application/json"}
     wanted = {"case": {"preset": "soft-sample"}, "tab": "map", "options": options}
     client.request("POST", "/api/study", json.dumps(wanted), headers)
-    # The first stage will do.
+    # The first stage is sufficient.
     first = json.loads(client.getresponse().readline())
     client.close()
     assert "figure" in first, first
@@ -310,8 +310,8 @@ def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(
     address: str,
 ) -> None:
     base, token = address.split("/?token=")
-    # Thousands of chaotic motions. Two are worked on at once, each until it is stopped after 300 s
-    # where nobody notices that its client has gone: twenty minutes in all.
+    # Thousands of chaotic motions, two at a time. If a disconnected client were not noticed, each
+    # would run until the limit of 300 s: twenty minutes in all.
     options = {
         "key1": "omega",
         "from1": "2.55",
@@ -341,7 +341,7 @@ def test_ctrl_c_ends_it_at_once() -> None:
     with started() as server:
         line(server)
         server.send_signal(signal.SIGINT)
-        # At once; a loaded machine may take longer to say so.
+        # At once; a loaded machine may take longer.
         server.wait(10)
 
 
@@ -403,7 +403,7 @@ def page(address: str) -> Iterator[Any]:
 
 
 def opened(page: Any, address: str, fragment: str) -> None:
-    """Goes to a link, and waits for what it shows."""
+    """Opens a link, and waits for its view."""
     page.goto("about:blank")
     page.goto(f"{address}#{fragment}")
     idle(page)
@@ -419,7 +419,7 @@ def value(page: Any, name: str) -> float:
 
 
 def until(page: Any, condition: Callable[[], bool]) -> None:
-    """Waits from here: the page's policy lets no string become code in it."""
+    """Waits here: the page's policy forbids code from strings."""
     for _ in range(300):
         if condition():
             idle(page)
@@ -465,7 +465,7 @@ def test_a_knob_changes_the_numbers_and_the_way_back_restores_them(
     page.go_back()
     changes(page, after)
     assert value(page, "amplitude") == before
-    # By the keyboard alone.
+    # With the keyboard only.
     page.focus("[data-slider=alpha2]")
     page.keyboard.press("ArrowRight")
     changes(page, before)
@@ -478,7 +478,7 @@ def test_a_wrong_value_is_said_beside_its_knob(page: Any, address: str) -> None:
     page.wait_for_selector("#message:not([hidden])")
     assert "omega" in page.inner_text("#message")
     assert page.get_attribute("[data-key=omega]", "aria-invalid") == "true"
-    # The browser reports the refusal itself, as of every answer that is not 200.
+    # The browser reports the refusal itself, like every response other than 200.
     page.complaints[:] = [words for words in page.complaints if "422" not in words]
 
 
@@ -509,7 +509,7 @@ def middle(page: Any, name: str) -> tuple[float, float]:
 
 
 def spot(page: Any, name: str, panel: int, u: float, v: float) -> tuple[float, float]:
-    """Where in the window parts of a panel's axes lie."""
+    """Positions in the window of fractions of a panel's axes."""
     page.locator(f"#{name}").scroll_into_view_if_needed()
     box = page.locator(f"#{name} svg").bounding_box()
     view = page.evaluate(
@@ -578,7 +578,7 @@ def test_a_rectangle_zooms_and_a_double_click_shows_all_again(
         assert after[axis]["to"] == pytest.approx(
             start + high * reach, abs=0.02 * reach
         )
-    # A link restores it.
+    # A link restores the view.
     opened(page, address, page.url.split("#")[1])
     assert panels(page, "portrait")[1] == after
     page.mouse.dblclick(*spot(page, "portrait", 1, 0.5, 0.5))
@@ -619,7 +619,7 @@ def test_a_click_on_a_drawn_motion_shows_that_motion(
     page.click("#study-form button[type=submit]")
     page.wait_for_selector("#study-figure svg", timeout=90_000)
     page.click("#study-form button:has-text('Stop')")
-    # A motion in the midst of what is drawn, from the server's own list.
+    # A motion in the middle of the figure, from the server's list.
     study = studied(address, tab=tab, options={"key": "omega", **options})[0]
     near = study["clicks"]["near"]
     x, heights, _ = near[len(near) // 3]
@@ -641,7 +641,7 @@ def test_a_click_on_a_drawn_motion_shows_that_motion(
 def test_a_click_meets_the_motion_that_a_run_from_rest_does_not(
     page: Any, address: str
 ) -> None:
-    # Ω = 20 without a tip mass: a run from rest comes to period 1, and period 4 is beside it.
+    # Ω = 20 without a tip mass: a run from rest leads to period 1, and period 4 coexists.
     options = {"key": "omega", "from": "19.9", "to": "20.1"}
     fields = "&study.from=19.9&study.to=20.1"
     opened(page, address, f"preset=paper-fast&tab=branches{fields}")
@@ -704,7 +704,7 @@ def test_a_map_of_two_parameters_and_a_click_on_it(
         float(re.findall(rf"set\.{key}=([\d.]+)", page.url)[0])
         for key in ("alpha4", "omega")
     )
-    # Cells reach half a step beyond the ends of the ranges.
+    # Cells extend half a step beyond the ends of the ranges.
     assert alpha4 == pytest.approx(18 + 0.6 * 4, abs=0.15)
     assert omega == pytest.approx(3.05, abs=0.005)
 
@@ -782,7 +782,7 @@ def test_the_keyboard_reaches_everything(page: Any, address: str) -> None:
         "follow",
     ):
         assert wanted in reached
-    # Whoever hears the page is told the name of each knob.
+    # Screen readers read the name of each control.
     unnamed = page.locator("#knobs input, #knobs select").evaluate_all(
         """(all) => all.filter(
             (one) => !one.labels?.length && !one.getAttribute('aria-label')).length"""

@@ -41,7 +41,7 @@ def test_runs_and_orbits_are_drawn(regular):
         drawn(plot.show(run))
     picture = drawn(nanotap.orbit(regular).plot())
     time, _, harmonics, multipliers = picture.axes
-    # The drawn tip is the motion: its extrema are the orbit's.
+    # The extrema of the drawn deflection are those of the orbit.
     tip = next(line for line in time.lines if line.get_label() == "tip")
     orbit = nanotap.orbit(regular)
     assert tip.get_ydata().max() == pytest.approx(orbit.tip_max, abs=1e-4)
@@ -93,7 +93,7 @@ def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
         orbits = (swept.period.values == period) & periodic
         assert len(dots.get_offsets()) == orbits.sum() * min(period, 12)
     assert "Ω" in axes.get_xlabel()
-    # What the user selects is what is drawn.
+    # The selection of the user is drawn.
     some = swept.isel(start=0, omega=slice(0, 9))
     low, high = drawn(plot.sweep(some)).axes[0].get_xlim()
     assert (low, high) == (some.omega[0], some.omega[-1])
@@ -107,7 +107,7 @@ def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
     follow = nanotap.sweep(
         regular, over={"omega": (2.9, 3.0, 4)}, follow="both", periods=3
     )
-    # Both directions lie upon each other, each with its word.
+    # Both directions are drawn in the same panels, each with its label.
     both = [
         {mark.get_label() for mark in (*axes.collections, *axes.lines)}
         for axes in drawn(plot.show(follow)).axes
@@ -147,7 +147,7 @@ def test_figures_are_drawn_into_the_users_own_axes(swept, regular):
 
 
 def test_curves_are_the_terminals(regular, tmp_path):
-    """The description is one: what matplotlib draws is where the terminal's SVG says it is."""
+    """One description: matplotlib draws everything where the terminal's SVG has it."""
     store = tmp_path / "s.zarr"
     ds = nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=store)
     svg = nanotap._nanotap.figure(store, "svg").decode()
@@ -164,7 +164,7 @@ def test_the_approach_goes_both_ways(physical):
     length = physical.physical.length_unit
     np.testing.assert_allclose(ds.zc, ds.alpha5 * length, rtol=1e-12)
     np.testing.assert_allclose(ds.physical_A, ds.first_harmonic * length, rtol=1e-12)
-    # Far away it swings freely: A₀ of the case.
+    # Far away it oscillates freely, with A₀ of the case.
     assert float(ds.physical_A[0, -1]) == pytest.approx(20e-9, rel=1e-6)
     picture = drawn(plot.show(ds))
     assert "nm" in picture.axes[0].get_ylabel()
@@ -174,7 +174,7 @@ def test_the_approach_goes_both_ways(physical):
 
 
 def test_the_shift_is_drawn_against_the_amplitude(physical):
-    """One least distance: the amplitude falls with the distance, and is the axis."""
+    """Constant least distance: the amplitude falls with the distance, and is the axis."""
     ds = nanotap.approach(
         physical, fm=True, closest="-1 nm", from_="19 nm", to="7 nm", points=4
     )
@@ -255,7 +255,7 @@ def test_orbits_are_kept_as_hdf5(regular, swept, tmp_path):
 
 
 def read_gsf(path):
-    """A reader after Gwyddion's description of the format, independent of the writer."""
+    """A reader written from Gwyddion's description of the format, independent of the writer."""
     data = path.read_bytes()
     head, _, _ = data.partition(b"\0")
     lines = head.decode().splitlines()

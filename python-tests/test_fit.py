@@ -1,4 +1,4 @@
-"""Fits from Python: tables of any kind, and what comes back."""
+"""Fits from Python: tables of any kind, and their results."""
 
 import pickle
 

@@ -36,7 +36,7 @@ LAWS = {
 
 
 def lever(law: str) -> nanotap.Case:
-    """A lever of one mode 15 nm above a sample of that law."""
+    """A lever with one mode 15 nm above a sample with that law."""
     tip = {"radius": "5 nm"}
     if law == "cone":
         tip["half_angle"] = "20 deg"
@@ -57,10 +57,10 @@ def lever(law: str) -> nanotap.Case:
 def test_a_law_is_there_in_every_way(law):
     case = lever(law)
     orbit = nanotap.orbit(case)
-    # The drive keeps up what lever and sample lose.
+    # The drive supplies what lever and sample dissipate.
     work = orbit.energy_balance
     assert abs(work.residual) < 1e-7 * abs(work.drive_work)
-    # The amplitude is held back by the sample.
+    # The sample limits the amplitude.
     assert 13e-9 < orbit.physical.amplitude < 19e-9
     # The map returns to it, and its Jacobian has its multipliers.
     step = nanotap.Map(case)
@@ -68,7 +68,7 @@ def test_a_law_is_there_in_every_way(law):
     found = np.linalg.eigvals(step.jacobian(orbit.state))
     for multiplier in orbit.multipliers:
         assert np.min(abs(found - multiplier)) < 1e-8
-    # Arrays give the same as one after the other.
+    # Arrays give the same as single calls.
     distances = np.array([14e-9, 15e-9])
     many = nanotap.orbit(case, **{"gap.tip": distances})
     assert many.amplitude.values[1] == pytest.approx(orbit.amplitude, rel=1e-9)

@@ -1,4 +1,4 @@
-"""The map itself: against orbits and runs, references and finite differences."""
+"""The map, compared with orbits and runs, references and finite differences."""
 
 import json
 import os
@@ -59,7 +59,7 @@ def test_arrays_are_as_their_states_alone(map_, orbit):
     together = map_(z, periods=300)
     assert together.shape == z.shape
     alone = np.array([[map_(one, periods=300) for one in row] for row in z])
-    # Many states go side by side, and a state alone as one: the same to rounding.
+    # Many states at once agree with single ones to rounding.
     assert np.abs(together - alone).max() < 1e-13
     assert np.array_equal(together[2:4], map_(z[2:4], periods=300))
     assert np.array_equal(together, map_(z, periods=300, threads=1))
@@ -123,7 +123,7 @@ def test_a_motion_between_its_strobes(regular, map_, orbit):
     assert np.abs(seen.state - run.states.values).max() < 1e-11
     assert [event.kind for event in seen.events] == list(run.event_kind.values)
     assert np.abs([e.tau for e in seen.events] - run.events.values).max() < 1e-12
-    # A whole period is the map; a part of it and the rest are the whole.
+    # A whole period is the map; a part of it and the rest make the whole.
     end = map_.flow(orbit.state, map_.period)
     assert end.state.shape == (6,)
     assert np.abs(end.state - map_(orbit.state)).max() < 1e-13

@@ -1,4 +1,4 @@
-"""Runs, orbits, censuses: the terminal's numbers, as Python's objects."""
+"""Runs, orbits, censuses: the terminal's numbers as Python objects."""
 
 import json
 import os
@@ -23,7 +23,7 @@ def terminal(tmp_path, case, *arguments):
         command, cwd=tmp_path, capture_output=True, text=True, check=True
     )
     document = json.loads(done.stdout)
-    # What a caller of Python has anyway.
+    # Entries that a Python caller has anyway.
     assert document.pop("version") == nanotap.__version__
     assert document.pop("case") == case.to_dict()
     return document
@@ -58,7 +58,7 @@ def test_a_run_has_the_terminals_numbers(regular, tmp_path):
 
 
 def test_observables_are_those_that_are_named(regular):
-    """One orbit, many and a run: what is asked for is what all together give, and nothing else."""
+    """One orbit, many, and a run: requested observables equal those of a full call; no others."""
     asked = {"observables": ["A", "phase", "gap_range"]}
     every = nanotap.orbit(regular)
     some = nanotap.orbit(regular, **asked)
@@ -66,6 +66,7 @@ def test_observables_are_those_that_are_named(regular):
     assert some.gap_range == every.gap_range
     with pytest.raises(AttributeError, match="there is no `tip_max`"):
         _ = some.tip_max
+    assert "W from" in repr(every) and "W from" not in repr(some)
     many = nanotap.orbit(regular, omega=[3.0, 3.01], **asked)
     assert {"first_harmonic", "phase", "gap_range"} <= set(many)
     assert not {"tip_max", "beam_clearance", "dissipation"} & set(many)
@@ -125,7 +126,7 @@ def test_an_orbit_has_the_terminals_numbers(regular, tmp_path):
     assert orbit.harmonics[0].tip == said["harmonics"][0]["tip"]
     assert orbit.rms_deflection == said["rms_deflection"]
     assert list(orbit.spectrum().columns[:2]) == ["tip", "tip_phase"]
-    # It repeats: the series ends where it begins.
+    # The motion is periodic: the series ends where it begins.
     np.testing.assert_allclose(
         orbit.series.states[0], orbit.series.states[-1], atol=1e-12
     )
@@ -207,7 +208,7 @@ def test_modes_have_the_terminals_numbers(regular, tmp_path):
 def test_exponents_and_section(regular):
     chaos = nanotap.lyapunov(regular.with_(omega=2.6), periods=2000, points=200)
     assert chaos.classification == "chaotic" and chaos.exponents[0] > 0.1
-    # They differ by what is at the ends of the average only.
+    # They differ only by the ends of the average.
     assert chaos.sum == pytest.approx(chaos.sum_by_trace, abs=0.01)
     assert chaos.section.states.shape == (200, 6)
     contact = nanotap.lyapunov(regular, periods=500, points=50, section="contact")
@@ -282,7 +283,7 @@ def test_physical_quantities_vary(physical):
     swept = nanotap.sweep(physical, over={"gap.tip": ("17 nm", "19 nm", 3)}, periods=3)
     middle = nanotap.orbit(physical.with_(**{"gap.tip": "18 nm"}))
     np.testing.assert_allclose(swept["gap.tip"], [17e-9, 18e-9, 19e-9], rtol=1e-9)
-    # Over physical quantities, what is observed is in SI.
+    # Over physical quantities, observables are in SI.
     assert float(swept.tip_max[1, 0]) == pytest.approx(
         middle.physical.tip_max, rel=1e-3
     )
@@ -296,7 +297,7 @@ def test_physical_quantities_vary(physical):
     )
     assert window.condition.shape == (2, 3)
     assert float(window.share.sum()) == pytest.approx(1)
-    # Farther than it swings freely, the tip touches nothing.
+    # Beyond its free amplitude the tip touches nothing.
     assert window.condition.values[1, 2] == "no-contact"
     with pytest.raises(ValueError, match="two are needed"):
         nanotap.window(physical, over="gap.tip=15nm:30nm:3")
@@ -325,7 +326,7 @@ def test_an_orbit_of_a_physical_case_is_seen_in_si():
     assert orbit.series is not None and orbit.physical is not None
     series = orbit.series_in_si
     assert series.tip.attrs["units"] == "m" and series.tau.attrs["units"] == "s"
-    # A period of the drive, and the greatest deflection as the document has them.
+    # A drive period, and the largest deflection, as in the document.
     period = float(series.tau[-1]) / orbit.period
     assert period == pytest.approx(1 / case.physical.drive_frequency, rel=1e-9)
     assert float(series.tip.max()) <= orbit.physical.tip_max * (1 + 1e-9)
@@ -338,7 +339,7 @@ def test_an_orbit_of_a_physical_case_is_seen_in_si():
 
 
 def test_arrays_have_what_single_orbits_have(physical):
-    """Whatever is a number, a word or a vector, under the same name and with the same bits."""
+    """All numbers, texts and vectors, under the same names and with the same bits."""
     keys = {"gap.tip": [17e-9, 18e-9], "drive.free_amplitude": ["20 nm", "21 nm"]}
     many = nanotap.orbit(physical, **keys)
     assert many.amplitude.dims == ("gap.tip", "drive.free_amplitude")

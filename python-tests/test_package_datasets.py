@@ -1,4 +1,4 @@
-"""Sweeps and basins from Python: the terminal's bytes, lazily, in shares, on a cluster."""
+"""Sweeps and basins from Python: the terminal's bytes, lazily, in chunks, on a cluster."""
 
 import filecmp
 import json
@@ -72,7 +72,7 @@ def test_any_values_that_ascend_are_an_axis(regular, tmp_path):
     ds = nanotap.sweep(regular, over={"alpha4": given}, periods=3)
     np.testing.assert_array_equal(ds.alpha4, given)
     assert ds.alpha4.attrs["spacing"] == "listed"
-    # A value has the motion that it has alone.
+    # A value has the same motion as in a separate call.
     alone = nanotap.sweep(regular.with_(alpha4=21.5), over="omega=3:3:1", periods=3)
     np.testing.assert_allclose(ds.tip_max[2], alone.tip_max[0], rtol=1e-9)
     with pytest.raises(ValueError, match="greater than the one before"):
@@ -88,7 +88,7 @@ def test_shares_merge_to_the_same_bytes(regular, tmp_path):
     part = nanotap.merge(shares[:2], tmp_path / "merged.zarr")
     assert part.copied == 6 and part.missing == [2, 5, 8]
     assert nanotap.merge(shares, tmp_path / "merged.zarr").missing == []
-    # Nothing is left to compute but what the values show their neighbours.
+    # Only the continuation to neighbouring values remains to be computed.
     nanotap.sweep(regular, **call, out=tmp_path / "merged.zarr")
     assert_same(tmp_path / "whole.zarr", tmp_path / "merged.zarr")
     with pytest.raises(ValueError, match="made otherwise: .*omega"):
@@ -108,7 +108,7 @@ def test_basins_from_what_was_found(bistable):
     assert sorted(one["period"] for one in known) == [1, 4]
     same = nanotap.basin(bistable, **call, attractors=[one.state for one in found])
     np.testing.assert_array_equal(ds.attractor, same.attractor)
-    # Every start does go where the map says.
+    # Every initial state leads to the attractor in the map.
     for i, j in ((0, 0), (4, 6), (8, 11)):
         state = np.zeros(6)
         state[0], state[3] = ds.a1[j], ds.v1[i]
@@ -152,8 +152,8 @@ def test_ctrl_c_keeps_the_starts_that_were_done(bistable):
     assert 0 < sum(one.count for one in part) < 20_000
 
 
-# Minutes of work that does not look whether it is to stop. It is interrupted once its thread is
-# there, and still is at it when the interrupt has come through.
+# A computation of minutes that does not test for cancellation. It is interrupted once its thread
+# has started, and is still running when the interrupt arrives.
 NOBODY_CAN_STOP = """
 import os, pathlib, signal, threading
 import nanotap
@@ -209,8 +209,8 @@ def test_others_run_meanwhile(regular):
         if thread.ident is None:
             thread.start()
 
-    # Minutes of work, which ends because another thread could count meanwhile. Were the interpreter
-    # held all the time, nobody would interrupt it.
+    # A computation of minutes, which ends because another thread could count in the meantime. If
+    # the interpreter were locked all the time, nothing would interrupt it.
     chaotic = regular.with_(omega=2.6)
     with pytest.raises(nanotap.Interrupted):
         nanotap.attractors(chaotic, starts=20_000, threads=1, progress=progress)

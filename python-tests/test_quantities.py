@@ -8,7 +8,7 @@ from nanotap import _arguments
 
 
 class Nanometres:
-    """As pint has it: a magnitude, and `to` another unit."""
+    """Like a pint quantity: a magnitude, and `to` another unit."""
 
     def __init__(self, magnitude):
         self.magnitude = magnitude

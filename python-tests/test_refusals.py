@@ -1,4 +1,4 @@
-"""Whatever is asked for, the answer is a result or an exception, never the end of Python."""
+"""Every request gives a result or an exception, never a crash of Python."""
 
 import itertools
 import math
@@ -185,7 +185,7 @@ def test_what_is_no_case_is_a_type_error(name):
 
 
 def test_no_combination_of_odd_numbers_ends_python():
-    """Cases at the ends of what numbers can be: a result, or one of the documented errors."""
+    """Cases with extreme numbers: a result, or one of the documented errors."""
     odd = [0.0, -0.0, 1e-9, 1e3, 1e308, -1.0, NAN, INF]
     keys = ["alpha1", "alpha2", "alpha3", "alpha4", "alpha5", "alpha6", "omega"]
     tried = made = 0

@@ -1,4 +1,4 @@
-"""Functions are what the library declares: names, defaults and documentation."""
+"""Functions agree with the library's declarations: names, defaults and documentation."""
 
 import inspect
 import json

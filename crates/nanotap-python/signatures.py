@@ -110,7 +110,8 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "What is observed over `way` (approach, retract) and the distance (by the name of its "
             "parameter, with `zc` in metres for a physical case): `first_harmonic`, `phase`, "
             "`peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`, "
-            "`physical_E_dis` …; the branches over `branch_point`. With `fm=True` also "
+            "`physical_E_dis` …; the branches over `branch_point`; where the lever jumps in the "
+            "attribute `jumps`. With `fm=True` also "
             "`relative_shift`, `drive_ratio`, `sader_jarvis_force` … and in SI "
             "`physical_frequency_shift` …, with what is held in the attribute `modulation`."
         ),

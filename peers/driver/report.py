@@ -26,7 +26,7 @@ def error(value: float | None) -> str:
 
 def table(rows: list[Row], threads: list[int]) -> str:
     """A Markdown table."""
-    head = ["peer", "setting", "error", "20 periods, ms", "periods a second"]
+    head = ["program", "setting", "error", "20 periods, ms", "periods per second"]
     for work in ("sweep", "basin"):
         head += [f"{work}, s" + (f" ({n} threads)" if n > 1 else "") for n in threads]
     lines = [" | ".join(["", *head, ""]).strip()]
@@ -60,14 +60,14 @@ def law_table(rows: list[dict]) -> list[str]:
     lines = [
         "## A nonlinear law",
         "",
-        "A lever of N modes over a DMT sample with van der Waals attraction (the reference case of",
-        "`docs/cases/dforce.md`: 20 nm free amplitude, 18 nm above the sample), from one start. The",
-        "error is the largest in any entry of the state after 5, 10 and 20 periods, in nm,",
-        "against heyoka with the finest setting; for each peer stands the cheapest setting",
-        "with an error of at most 1e-9 nm, or its best. heyoka enters contact a hair inside,",
-        "since the root of the indentation has no series where it begins.",
+        "A lever with N modes over a DMT sample with van der Waals attraction (the reference case of",
+        "`docs/cases/dforce.md`: 20 nm free amplitude, 18 nm above the sample), from one initial state.",
+        "The error is the largest in any entry of the state after 5, 10 and 20 periods, in nm, relative",
+        "to heyoka with the finest setting. Each program is listed with its fastest setting whose error is",
+        "at most 1e-9 nm, or with its most accurate one. heyoka enters contact slightly inside the",
+        "surface, since the root of the indentation has no Taylor series at zero.",
         "",
-        "| modes | peer | tolerance | error | periods a second |",
+        "| modes | program | tolerance | error | periods per second |",
         "|---:|---|---:|---:|---:|",
     ]
     for row in rows:
@@ -88,42 +88,43 @@ def page(result: dict, rows: list[Row], threads: list[int], plot: bool) -> str:
     machine, versions = result["machine"], result["versions"]
     vectors = machine["vector_registers"]
     lines = [
-        "# nanotap beside general solvers",
+        "# Comparison with general solvers",
         "",
         "<!-- Written by `cargo xtask peers`; edit peers/driver/report.py instead. -->",
         "",
-        "The same work by nanotap and by the solvers that one would reach for otherwise,",
-        "measured in one run of `cargo xtask peers` (`peers/README.md` says who takes",
-        "part and how). All of it is the paper's cantilever with three modes, α1 = 0.1:",
+        "nanotap and general-purpose solvers on the same tasks, measured in one run of",
+        "`cargo xtask peers` (`peers/README.md` lists the programs and the rules). Every",
+        "task is the paper's cantilever with three modes, α1 = 0.1:",
         "",
         "- **20 periods**: the first 20 drive periods from rest at Ω = 2.6, 46 switches.",
         "  The error is the largest in any entry of the state after 5, 10 and 20 periods,",
-        "  against a 50-digit reference. The motion is chaotic: errors grow by 240 in 20",
+        "  relative to a 50-digit reference. The motion is chaotic: errors grow by a",
+        "  factor of 240 in 20 periods.",
+        "- **periods per second**: as many of 2000 such periods as fit into the time limit.",
+        "- **sweep**: 400 values of Ω from 2 to 4, 8 initial states each, 500 periods per",
+        "  run, the states of the last 100 recorded: 1.6 million periods.",
+        "- **basin**: 200 by 200 initial states at Ω = 2.6, 300 periods each: 12 million",
         "  periods.",
-        "- **periods a second**: as many of 2000 such periods as fit into the time given.",
-        "- **sweep**: Ω from 2 to 4 in 400 values by 8 starts, 500 periods each, the",
-        "  states of the last 100 kept: 1.6 million periods.",
-        "- **basin**: 200 by 200 starts at Ω = 2.6, 300 periods each: 12 million periods.",
         "",
-        "For each peer stands the cheapest setting with an error of at most 1e-9, or of",
-        "1e-6 where it does not reach that, or else its best. Sweeps and basins are",
-        "evenly spread samples, extrapolated. Times are of the processor on one thread,",
-        "of the wall on several (a dash where other programs kept the machine busy);",
-        "compilation and start-up are not counted.",
+        "Each program is listed with its fastest setting whose error is at most 1e-9; if",
+        "none reaches that, at most 1e-6; otherwise with its most accurate setting. Sweeps",
+        "and basins are extrapolated from evenly spread samples. Times are processor time",
+        "on one thread and wall time on several (a dash where other programs kept the",
+        "machine busy), without compilation and start-up.",
         "",
         table(rows, threads),
         "",
     ]
     if any(row.told_from_long for row in rows):
         lines += [
-            "¹ told from the periods a second: one run alone took longer than its time.",
+            "¹ computed from the periods per second: a single run exceeded the time limit.",
             "",
         ]
     if plot:
         lines += ["![Error against time](peers.svg)", ""]
     lines += law_table(result["laws"])
     lines += [
-        "## Measured with",
+        "## Machine and versions",
         "",
         f"{machine['processor']}, {machine['cores']} cores"
         + (f", {vectors}" if vectors else "")

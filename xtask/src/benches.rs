@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: every bench, and `docs/benches.md` with what came out.
+//! `cargo xtask bench`: runs every bench and writes `docs/benches.md`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,29 +6,29 @@ use std::path::Path;
 use crate::process::shown_and_kept;
 use crate::tools::Workspace;
 
-/// The crates with benches, and what their tables are about.
+/// The crates with benches, and headings for their tables.
 const CRATES: [(&str, &str); 2] = [
     (
         "nanotap-flow",
-        "The floor: exponentials and rotations alone",
+        "Lower bound: exponentials and rotations alone",
     ),
-    ("nanotap", "The exact flow and what is built upon it"),
+    ("nanotap", "The exact flow and the studies that use it"),
 ];
 
-/// Where datasets are in memory, if the system has such a place.
+/// Folder for datasets in memory, if the system has one.
 const MEMORY: &str = "/dev/shm";
 
 /// Runs the benches and writes the tables.
 ///
 /// # Errors
-/// When a bench does not build or fails, or the page cannot be written.
+/// If a bench does not build or fails, or the page cannot be written.
 pub(crate) fn run(workspace: &Workspace) -> Result<(), String> {
     let mut page = String::from(HEAD);
     for (name, about) in CRATES {
         let mut command = workspace.cargo(&["bench", "--quiet", "--package", name]);
         command.args(["--benches", "--", "--color", "never"]);
-        // A disk that has just deleted thousands of files creates new ones more slowly than what
-        // is in them is computed.
+        // A disk that has just deleted thousands of files creates new ones more slowly than their
+        // contents are computed.
         if Path::new(MEMORY).is_dir() {
             command.env("TMPDIR", MEMORY);
         }
@@ -51,10 +51,10 @@ const HEAD: &str = "\
 
 <!-- Written by `cargo xtask bench`. -->
 
-The fastest of the samples of each bench, on one core unless the bench says otherwise: other
-programs only ever add time. Datasets are in memory where the system has a place for them. A `period`
-is 100 drive periods.
-`crates/*/benches` says what each does, `docs/performance.md` what follows from them.
+The fastest sample of each bench, on one core unless the bench says otherwise; other programs on
+the machine can only add time. Datasets are in memory if the system provides a file system in memory.
+`period` benches run 100 drive periods. The code in `crates/*/benches` describes each bench;
+`docs/performance.md` discusses the results.
 ";
 
 fn succeeds_with_results(lines: &[String], succeeded: bool) -> bool {
@@ -64,13 +64,13 @@ fn succeeds_with_results(lines: &[String], succeeded: bool) -> bool {
 /// One bench with one argument.
 #[derive(Debug, PartialEq)]
 struct Measured {
-    /// Its groups, itself, and its argument if it has one.
+    /// Names of its groups, its own name, and its argument if it has one.
     path: Vec<String>,
-    /// The fastest sample.
+    /// Time of the fastest sample.
     fastest: String,
 }
 
-/// What divan's tree says.
+/// Parses divan's output.
 fn measured(lines: &[String]) -> Vec<Measured> {
     let mut groups: Vec<String> = Vec::new();
     let mut found = Vec::new();
@@ -78,7 +78,7 @@ fn measured(lines: &[String]) -> Vec<Measured> {
         let Some(at) = ["├─ ", "╰─ "].iter().find_map(|mark| line.find(mark)) else {
             continue;
         };
-        // Each level of the tree is three letters wide.
+        // Each level of the tree is indented by three characters.
         let depth = line[..at].chars().count() / 3;
         let rest = line[at..].chars().skip(3).collect::<String>();
         let first_column = rest.split('│').next().unwrap_or_default();
@@ -101,7 +101,7 @@ fn measured(lines: &[String]) -> Vec<Measured> {
     found
 }
 
-/// A table for each set of arguments, with a row a bench.
+/// A table for each set of arguments, with one row per bench.
 fn tables(measured: &[Measured]) -> String {
     let mut rows: Vec<(String, Vec<(&str, &str)>)> = Vec::new();
     for Measured { path, fastest } in measured {
@@ -136,7 +136,7 @@ fn tables(measured: &[Measured]) -> String {
 mod tests {
     use super::*;
 
-    /// As divan 0.1.21 prints it.
+    /// Output of divan 0.1.21.
     const TREE: &str = "\
 speed                    fastest       │ slowest       │ median        │ mean          │ samples │ iters
 ├─ period                              │               │               │               │         │

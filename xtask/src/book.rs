@@ -1,17 +1,17 @@
-//! The site of documents: laid out by `nanotap-book`, built by mdBook into `target/book/site`.
+//! The site of the documents: prepared by `nanotap-book`, built by mdBook into `target/book/site`.
 
 use std::fs;
 
 use crate::process::succeeds;
 use crate::tools::Workspace;
 
-/// mdBook, built from source into `.tools` where no program of this version is there yet.
+/// Version of mdBook, which is built from source into `.tools` if it is missing there.
 const MDBOOK: &str = "0.5.4";
 
 /// Builds the site; `options` are those of `nanotap-book`.
 ///
 /// # Errors
-/// A tool is missing or failed; says which.
+/// If a tool is missing or fails; the message names it.
 pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), String> {
     let mut mdbook = workspace.cargo_tool("mdbook", MDBOOK, &["--features", "search"])?;
     let folder = workspace.target().join("book");

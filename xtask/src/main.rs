@@ -1,8 +1,8 @@
-//! The project's own chores, each by name: `cargo xtask test` is all of them.
+//! The project's tasks, each by name; `cargo xtask test` runs all checks.
 //!
-//! Every chore runs the tool a person would run by hand, shows its output as it
-//! comes, and counts what passed. A failed step does not stop the next one: one
-//! run tells everything that is wrong.
+//! Every task runs the tool that a person would run by hand, shows its output as it comes, and
+//! counts what passed. A failed step does not stop the next one, so that one run reports everything
+//! that is wrong.
 
 mod benches;
 mod book;
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// How a chore ended that is no check.
+/// Exit code of a task that is not a check.
 fn finished(outcome: Result<(), String>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -51,21 +51,21 @@ fn finished(outcome: Result<(), String>) -> ExitCode {
     }
 }
 
-/// What the words on the command line ask for.
+/// The tasks requested on the command line.
 enum Selection {
     Help,
     Run(Vec<&'static Step>),
     /// The benches.
     Bench,
-    /// The site of documents, with its own options.
+    /// The site of the documents, with its options.
     Book(Vec<String>),
-    /// The comparison with other solvers, with its own options.
+    /// The comparison with other solvers, with its options.
     Peers(Vec<String>),
 }
 
 fn select(arguments: &[String]) -> Result<Selection, String> {
     if arguments.is_empty() {
-        return Err("name at least one chore".into());
+        return Err("name at least one task".into());
     }
     match (arguments[0].as_str(), &arguments[1..]) {
         ("bench", []) => return Ok(Selection::Bench),
@@ -83,7 +83,7 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
                     .iter()
                     .chain(BESIDE)
                     .find(|step| step.name == name)
-                    .ok_or_else(|| format!("no chore is called `{name}`"))?,
+                    .ok_or_else(|| format!("no task is called `{name}`"))?,
             ),
         }
     }
@@ -92,17 +92,18 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
 
 fn usage() -> String {
     use std::fmt::Write as _;
-    let mut text = String::from("usage: cargo xtask <chore>...\n\n  test         all of these:\n");
+    let mut text =
+        String::from("usage: cargo xtask <task>...\n\n  test         all of these checks:\n");
     for step in STEPS {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
-    text.push_str("\n  beside them:\n");
+    text.push_str("\n  other tasks:\n");
     for step in BESIDE {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
-    text += "  bench        every bench, and docs/benches.md with what came out\n";
-    text += "  book         the documents as a site, in target/book/site (--quick: the paper's report too)\n";
-    text += "  peers        nanotap beside general solvers, into docs/peers.md (--quick, --help)\n";
+    text += "  bench        run every bench and write docs/benches.md\n";
+    text += "  book         build the documents as a site in target/book/site (--quick: a quick report on the paper)\n";
+    text += "  peers        compare nanotap with general solvers and write docs/peers.md (--quick, --help)\n";
     text
 }
 
@@ -110,7 +111,7 @@ fn usage() -> String {
 struct Line {
     name: &'static str,
     tally: Tally,
-    /// The reason, where the step could not be run at all.
+    /// The reason, if the step could not be run.
     trouble: Option<String>,
     time: Duration,
 }
@@ -168,7 +169,7 @@ fn summarise(lines: &[Line]) -> ExitCode {
         );
     }
     println!();
-    // The plain closing line that continuous integration reads.
+    // The last line, which continuous integration reads.
     println!("{} passed, {} failed", total.passed, total.failed);
     if total.failed == 0 {
         ExitCode::SUCCESS

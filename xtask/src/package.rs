@@ -1,5 +1,5 @@
-//! What would be published: every crate and the Python package, each built from its own archive
-//! alone and tried in an empty environment.
+//! The packages to be published: every crate and the Python package, each built from its own
+//! archive alone and tested in an empty environment.
 
 use std::env;
 use std::fs;
@@ -10,17 +10,17 @@ use crate::tally::Tally;
 use crate::tools::{Environment, Workspace};
 use crate::wheel::with_extension;
 
-/// What is asked of the installed Python package.
+/// Test program for the installed Python package.
 const TRIAL: &str = "\
 import nanotap
 found = nanotap.orbit(nanotap.Case.paper(omega=20.0))
 assert found.period == 1 and found.stable, found
 print('nanotap', nanotap.__version__, 'from its source archive:', found)";
 
-/// Packs every crate that is published and compiles what was packed.
+/// Packs every published crate and compiles the archives.
 ///
 /// # Errors
-/// When cargo cannot be started.
+/// If cargo cannot be started.
 pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     let target = workspace.target().join("packed");
     forget(&target);
@@ -29,14 +29,14 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     for own in ["xtask", "nanotap-book", "nanotap-python"] {
         command.args(["--exclude", own]);
     }
-    // Whether it compiles, not how fast it runs; uncommitted work is packed as it stands.
+    // The build tests compilation, not speed; uncommitted changes are packed too.
     command.args(["--allow-dirty", "--config", "profile.dev.opt-level=0"]);
     command.args(["--config", "profile.dev.debug=0"]);
     Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
 }
 
-/// Cargo takes a version for what never changes: what it unpacked and compiled of an earlier state
-/// of the same version would stand in for what is packed now.
+/// Cargo assumes that a version never changes: files unpacked and compiled from an earlier state of
+/// the same version would be used instead of the new ones.
 fn forget(target: &Path) {
     let _ = fs::remove_dir_all(target);
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
@@ -47,7 +47,7 @@ fn forget(target: &Path) {
         return;
     };
     let registries = registries.flatten().filter(|registry| {
-        // One that has no host is a folder, such as cargo makes of what it packs.
+        // A source without a host is a folder, such as cargo makes of packed crates.
         registry.file_name().to_string_lossy().starts_with('-')
     });
     let unpacked = registries.filter_map(|registry| fs::read_dir(registry.path()).ok());
@@ -58,14 +58,14 @@ fn forget(target: &Path) {
     }
 }
 
-/// Packs the Python package's sources, installs that archive into an empty environment, and
-/// computes an orbit there.
+/// Packs the Python package's sources, installs the archive into an empty environment, and computes
+/// an orbit there.
 ///
 /// # Errors
-/// When Python or maturin is missing.
+/// If Python or maturin is missing.
 pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     let folder = workspace.target().join("sdist");
-    // An archive of another version would be installed in its place.
+    // An archive of another version would be installed instead.
     let _ = fs::remove_dir_all(&folder);
     let mut pack = workspace.python_tool("maturin")?;
     pack.args([
@@ -90,8 +90,8 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
         "--quiet",
         "--disable-pip-version-check",
     ]);
-    // Into a folder of its own: files of an archive all have one time, by which cargo would take
-    // what the checkout has built for them.
+    // In a separate folder: all files of an archive have the same time, and cargo would take build
+    // outputs of the checkout for current.
     install
         .arg(archive)
         .env("CARGO_TARGET_DIR", folder.join("build"))
@@ -101,7 +101,7 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
         return Ok(Tally::check(false));
     }
     let mut trial = environment.program("python");
-    // Away from the checkout, whose own package would be found first.
+    // Outside of the checkout, whose own package would be found first.
     let said = output(&folder, trial.args(["-c", TRIAL]));
     println!(
         "{}",

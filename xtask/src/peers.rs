@@ -1,7 +1,7 @@
-//! `cargo xtask peers`: nanotap beside general solvers, time and error in one run.
+//! `cargo xtask peers`: compares time and error of nanotap and general solvers.
 //!
-//! This sets up what the comparison needs and starts `peers/run.py`, which measures and
-//! writes `docs/peers.md`. What a machine lacks is left out there, with the reason.
+//! This prepares the environment and starts `peers/run.py`, which measures and writes
+//! `docs/peers.md`. Programs that a machine cannot run are left out, with the reason.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -12,7 +12,7 @@ use crate::tools::{PYTHON, Workspace};
 /// Runs the comparison; `options` are those of `peers/run.py`.
 ///
 /// # Errors
-/// When there is no Python, nanotap does not build, or the comparison itself fails.
+/// If there is no Python, nanotap does not build, or the comparison fails.
 pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), String> {
     let asks_for_help = options
         .iter()
@@ -48,7 +48,8 @@ pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), Strin
     }
 }
 
-/// The Python of `.venv-peers`, with as much of `peers/requirements.txt` as can be had.
+/// The Python of `.venv-peers`, with those packages of `peers/requirements.txt` that can be
+/// installed.
 fn environment(workspace: &Workspace) -> Result<PathBuf, String> {
     let list = workspace.root.join("peers").join("requirements.txt");
     let wanted = std::fs::read_to_string(&list)
@@ -66,7 +67,7 @@ fn environment(workspace: &Workspace) -> Result<PathBuf, String> {
     if !succeeds(&workspace.root, &mut create)? {
         return Err("python3 -m venv .venv-peers failed".into());
     }
-    // One by one: a package that this machine cannot have does not keep out the others.
+    // One by one: a package that cannot be installed does not prevent the others.
     let packages = wanted
         .lines()
         .map(str::trim)

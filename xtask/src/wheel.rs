@@ -1,4 +1,4 @@
-//! The Python package: built as a wheel, installed where it is tested.
+//! The Python package: built as a wheel, and installed for the tests.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 use crate::process::succeeds;
 use crate::tools::{Environment, Workspace};
 
-/// Builds the wheel and leaves it, alone of its kind, in `target/wheels`.
+/// Builds the wheel and leaves it as the only one in `target/wheels`.
 ///
 /// # Errors
-/// When the tools are missing or the build fails.
+/// If the tools are missing or the build fails.
 pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
     let folder = workspace.root.join("target").join("wheels");
     fs::create_dir_all(&folder)
         .map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
     for old in with_extension(&folder, "whl") {
-        // One that cannot be removed shows itself below.
+        // A wheel that cannot be removed is reported below.
         let _ = fs::remove_file(old);
     }
     let mut command = workspace.python_tool("maturin")?;
@@ -49,11 +49,11 @@ pub(crate) fn with_extension(folder: &Path, extension: &str) -> Vec<PathBuf> {
         .collect()
 }
 
-/// An environment of its own with the wheel of this very checkout, and what the tests need.
-/// It is kept from run to run; only the wheel is installed anew.
+/// An environment with the wheel of this checkout and the packages that the tests need. It is kept
+/// from run to run; only the wheel is installed anew.
 ///
 /// # Errors
-/// When the wheel cannot be built or installed.
+/// If the wheel cannot be built or installed.
 pub(crate) fn installed(workspace: &Workspace) -> Result<Environment, String> {
     let wheel = build(workspace)?;
     let list = workspace.root.join("xtask").join("test-requirements.txt");

@@ -1,16 +1,17 @@
-//! Eigenvalues of a real matrix, also where the QR iteration runs in a circle.
+//! Eigenvalues of a real matrix, including matrices on which the plain QR iteration cycles.
 
 use nalgebra::{Complex, DMatrix, Schur};
 
-/// Steps of the iteration that each row may take; two or three are usual.
+/// Iteration steps allowed per row; two or three are usual.
 const STEPS: usize = 400;
 
-/// The eigenvalues of a finite square matrix; `None` where the iteration does not converge.
+/// The eigenvalues of a finite square matrix; `None` if the iteration does not converge.
 ///
-/// The double shifts of the QR iteration come from the last two rows. Of one random 3 × 3 matrix in
-/// a million they bring the same matrix back for ever, as Francis knew of orthogonal ones; other
-/// programs put in an exceptional shift. Here the transposed matrix is taken then, and a
-/// reflected one, which have the same eigenvalues and another last row.
+/// The double shifts of the QR iteration come from the last two rows. For about one random 3 × 3
+/// matrix in a million they reproduce the same matrix for ever, as Francis noted for orthogonal
+/// ones; other programs then use an exceptional shift. Here the iteration is repeated with the
+/// transposed matrix and with a reflected one, which have the same eigenvalues and another last
+/// row.
 #[must_use]
 pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.is_empty() {
@@ -41,9 +42,9 @@ mod tests {
     use crate::ComplexFunctions as _;
     use nalgebra::linalg::balancing::balance_parlett_reinsch;
 
-    /// Matrices of random tests, for which the iteration ran in a circle once they were
-    /// balanced: the product of three Jacobians, and a contraction. What is found are roots of
-    /// the characteristic polynomial, and all of them.
+    /// Matrices of random tests on which the iteration cycled after balancing: the product of three
+    /// Jacobians, and a contraction. The values found must be the roots of the characteristic
+    /// polynomial, all of them.
     #[test]
     fn a_circle_of_the_iteration_is_left() {
         let jacobians = [
@@ -134,7 +135,8 @@ mod tests {
         assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), Some(Vec::new()));
         let one = eigenvalues(&DMatrix::from_element(1, 1, -3.0)).unwrap();
         assert_eq!(one, [Complex::new(-3.0, 0.0)]);
-        // A turn through a third: the cube roots of one, whose QR steps change nothing at all.
+        // A rotation by 120°: its eigenvalues are the cube roots of one, and QR steps do not change
+        // it.
         let turn = DMatrix::from_row_slice(3, 3, &[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
         are_the_eigenvalues(&turn, &eigenvalues(&turn).unwrap());
     }

@@ -1,20 +1,23 @@
 //! Elementary functions and eigenvalues with the same bits on every machine.
 //!
-//! The standard library takes sines and exponentials from the platform's mathematics library,
-//! which rounds differently from one platform, version and processor to another. These are
-//! libm's, in Rust: additions, multiplications and square roots, which IEEE 754 rounds in one way
-//! only. So a motion, and every file made of it, is the same wherever it is computed.
+//! The standard library takes sines and exponentials from the platform's mathematics library, which
+//! rounds differently from one platform, version and processor to another. The functions here are
+//! libm's, in Rust: additions, multiplications and square roots, whose rounding IEEE 754 defines
+//! uniquely. A motion, and every file computed from it, is therefore the same on every machine.
 //!
-//! [`VERSION`] is part of every dataset: what was computed with another arithmetic is not mixed
-//! with it.
+//! [`VERSION`] is part of every dataset: results of another arithmetic are not mixed with it.
+//!
+//! [`CancelFlag`] is here too, since every crate that computes for long polls it.
 
+mod cancel;
 mod eigenvalues;
 
+pub use cancel::CancelFlag;
 pub use eigenvalues::eigenvalues;
 
 use nalgebra::{Complex, DMatrix};
 
-/// The arithmetic's name in datasets. It changes whenever a result may change its last digits.
+/// Name of the arithmetic in datasets. It changes whenever the last digits of a result may change.
 pub const VERSION: &str = "2";
 
 /// The sine.
@@ -143,8 +146,8 @@ pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
 }
 
-/// The functions of complex numbers, by names of their own: num-complex has others, the
-/// platform's, wherever a crate in the same build asks for them.
+/// Functions of complex numbers. Their names differ from those of num-complex, whose functions are
+/// the platform's wherever a crate in the same build requires them.
 pub trait ComplexFunctions {
     /// `|z|`.
     fn modulus(self) -> f64;
@@ -153,7 +156,7 @@ pub trait ComplexFunctions {
     /// `e^z`.
     #[must_use]
     fn exponential(self) -> Self;
-    /// The root with a real part that is not negative.
+    /// The square root with non-negative real part.
     #[must_use]
     fn square_root(self) -> Self;
     /// The logarithm with an imaginary part in `[−π, π]`.
@@ -181,7 +184,7 @@ impl ComplexFunctions for Complex<f64> {
     fn square_root(self) -> Self {
         let size = self.modulus();
         let larger = (0.5 * (size + self.re.abs())).sqrt();
-        // The difference of the two would cancel.
+        // Subtracting the two would cancel digits.
         let smaller = if larger == 0.0 {
             0.0
         } else {
@@ -201,7 +204,7 @@ impl ComplexFunctions for Complex<f64> {
     }
 }
 
-/// The number of size `r` and angle `theta`.
+/// The complex number with modulus `r` and argument `theta`, in radians.
 #[inline]
 pub fn from_polar(r: f64, theta: f64) -> Complex<f64> {
     let (sin, cos) = sin_cos(theta);
@@ -211,7 +214,7 @@ pub fn from_polar(r: f64, theta: f64) -> Complex<f64> {
 /// `e^A` of a matrix: the Taylor series of `A/2^s`, squared `s` times.
 #[must_use]
 pub fn matrix_exp(a: &DMatrix<f64>) -> DMatrix<f64> {
-    /// With a norm of one half at most the series leaves out `0.5^19/19!`, below 1e-22.
+    /// With a norm of at most one half the remainder of the series is `0.5^19/19!`, below 1e-22.
     const TERMS: u32 = 18;
     let size = a
         .column_iter()
@@ -238,7 +241,7 @@ pub fn matrix_exp(a: &DMatrix<f64>) -> DMatrix<f64> {
 mod tests {
     use super::*;
 
-    /// Bits that are the same on every machine: they may change with [`VERSION`] only.
+    /// The bits of results are the same on every machine and may change only with [`VERSION`].
     #[test]
     fn bits_are_those_of_the_version() {
         let all = [
@@ -270,7 +273,7 @@ mod tests {
         assert_eq!(mixed, BITS, "{mixed:#x}");
     }
 
-    /// As this version was computed first, on x86-64.
+    /// Bits of this version as first computed, on x86-64.
     const BITS: u64 = 0xf5b5_327f_6e6e_b58b;
 
     #[test]

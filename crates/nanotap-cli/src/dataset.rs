@@ -82,7 +82,7 @@ impl DatasetArguments {
         &self,
         path: &Path,
         schema: &Schema,
-        noun: &'static str,
+        [what, noun]: [&'static str; 2],
         output: &Output,
         compute: impl FnOnce(&Store, &Work<'_>) -> Result<(), WorkError>,
     ) -> Result<Store, Failure> {
@@ -96,21 +96,22 @@ impl DatasetArguments {
                 store.chunks()
             ));
         }
-        let done = progress::watched(noun, |control| {
+        let done = progress::watched(what, noun, true, |control| {
             let work = Work {
                 share: self.chunk,
                 threads,
                 control: *control,
             };
             compute(&store, &work)
-        })?;
+        });
         match done {
             Ok(()) => Ok(store),
             Err(stopped @ (WorkError::Cancelled { .. } | WorkError::Neighbours)) => {
-                Err(Failure::numerics(format!(
+                let words = format!(
                     "{stopped} in {}; run the same command again to go on",
                     path.display()
-                )))
+                );
+                Err(Failure::new(nanotap::ErrorKind::Stopped, words))
             }
             Err(error) => Err(error.into()),
         }

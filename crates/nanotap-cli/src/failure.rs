@@ -6,17 +6,22 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use nanotap::ErrorKind;
 use nanotap::error::{ErrorPlace, ErrorProblem, SourceText};
 
-use crate::style;
+use crate::{progress, style};
 
 pub(crate) use nanotap::Error as Failure;
 
-/// Says on standard error what went wrong; returns the exit code: 2 for bad input, else 1.
-pub(crate) fn report(error: Failure) -> ExitCode {
-    let code = if error.kind == ErrorKind::BadInput {
-        2
-    } else {
-        1
+/// Says on standard error what went wrong; returns the exit code: 130 once Ctrl-C stopped the
+/// program, 2 for bad input, else 1.
+pub(crate) fn report(mut error: Failure) -> ExitCode {
+    let code = match error.kind {
+        _ if progress::is_stopped() => progress::INTERRUPTED,
+        ErrorKind::BadInput => 2,
+        _ => 1,
     };
+    // What was stopped did not fail for the reason that it ended with.
+    if progress::is_stopped() && error.kind == ErrorKind::Numerics {
+        error = Failure::stopped();
+    }
     let error = error.written(flag);
     // A snippet of the case file, or a key that was set beside it, is drawn with its help.
     let of_case = |problem: &ErrorProblem| {

@@ -31,9 +31,12 @@ pub(crate) fn at_setpoint(case: Case) -> Result<(Case, Option<SetpointReport>), 
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    Ok(progress::watched("distances", |control| {
-        setpoint::at_setpoint(case, control)
-    })??)
+    Ok(progress::watched(
+        "setpoint",
+        "distances",
+        false,
+        |control| setpoint::at_setpoint(case, control),
+    )?)
 }
 
 impl GivenCase {
@@ -145,5 +148,6 @@ pub(crate) fn catalogue(files: &[PathBuf]) -> Result<Arc<Catalogue>, Failure> {
 pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
     let catalogue = catalogue(&arguments.catalogue)?;
     let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
+    let case = case.cancelled_by(&progress::control());
     Ok(case.called(&title(arguments)))
 }

@@ -1,6 +1,6 @@
 //! The terminal door: parsing, formatting, files. No physics and no numerics here.
 //!
-//! Exit codes: 0 done, 1 failed, 2 bad input.
+//! Exit codes: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM.
 
 mod arguments;
 mod command;
@@ -40,10 +40,17 @@ fn main() -> ExitCode {
     if !output.is_quiet() {
         progress::begin();
     }
-    let result = command::run(&arguments.command, &output);
+    let listening = if arguments.command.listens_itself() {
+        Ok(())
+    } else {
+        progress::listen()
+    };
+    let result = listening.and_then(|()| command::run(&arguments.command, &output));
     progress::end();
     match result {
-        Ok(()) => ExitCode::SUCCESS,
         Err(error) => failure::report(error),
+        // What was finished has been shown.
+        Ok(()) if progress::is_stopped() => ExitCode::from(progress::INTERRUPTED),
+        Ok(()) => ExitCode::SUCCESS,
     }
 }

@@ -9,7 +9,8 @@ use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{
-    Derivative, Observables, OutOfRange, PhysicalMotion, Set, Spectrum, Value, time_series,
+    Derivative, Harmonic, Observables, OutOfRange, PhysicalMotion, Set, Spectrum, Value,
+    time_series,
 };
 use nanotap::study::proof::ProofReport;
 use nanotap::study::simulate::Classification;
@@ -304,14 +305,21 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
         ("force", Align::Point),
         ("lag (°)", Align::Point),
     ]);
-    // Of a subharmonic motion the strongest, otherwise the first.
-    let strongest = spectrum.harmonics.iter().map(|h| h.tip).fold(0.0, f64::max);
-    let shown = spectrum
-        .harmonics
-        .iter()
-        .filter(|h| period == 1 || h.tip >= 1e-3 * strongest)
-        .take(SHOWN.max(2 * period));
-    for h in shown.take(2 * SHOWN) {
+    // Of a subharmonic motion the strong ones, under two tones the strongest (sidebands are far from
+    // the first orders), otherwise the first.
+    let mut strengths: Vec<f64> = spectrum.harmonics.iter().map(|h| h.tip).collect();
+    strengths.sort_by(|a, b| b.total_cmp(a));
+    let strongest = 1e-3 * strengths.first().copied().unwrap_or_default();
+    let two_tones = |first: &Harmonic| first.order * (period as f64) < 0.75;
+    let (least, count) = if spectrum.harmonics.first().is_some_and(two_tones) {
+        let last = strengths.get(2 * SHOWN - 1).copied().unwrap_or_default();
+        (last.max(strongest), 2 * SHOWN)
+    } else {
+        let least = if period == 1 { 0.0 } else { strongest };
+        (least, SHOWN.max(2 * period).min(2 * SHOWN))
+    };
+    let shown = spectrum.harmonics.iter().filter(|h| h.tip >= least);
+    for h in shown.take(count) {
         let si = units
             .si(Kind::Length)
             .map_or_else(String::new, |u| Kind::Length.format(u * h.tip));

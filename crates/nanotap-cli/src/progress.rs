@@ -1,61 +1,93 @@
-//! Long work at the terminal: a line that says how far it is, and Ctrl-C that stops it
-//! and keeps what is done.
+//! Long work at the terminal: what it does and how far it is, and Ctrl-C that stops it and keeps
+//! what is done.
+//!
+//! On a terminal one line is written over itself; where standard error is redirected, a new line
+//! is written after 2 s and then at growing intervals.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
+use nanotap::study::kind::Study;
 
 use crate::failure::Failure;
 
-/// Whether somebody pressed Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
-/// Nothing is said of work shorter than this.
-const PATIENCE: Duration = Duration::from_millis(700);
-/// Time between two lines.
-const INTERVAL: Duration = Duration::from_millis(200);
+/// The exit code of a program that Ctrl-C or SIGTERM ended.
+pub(crate) const INTERRUPTED: u8 = 130;
 
-/// What the line says; one program has one line.
+/// Set by the first Ctrl-C or SIGTERM.
+static STOP: LazyLock<CancelFlag> = LazyLock::new(CancelFlag::new);
+/// Nothing is said on a terminal of work shorter than this.
+const PATIENCE: Duration = Duration::from_millis(700);
+/// Time between two writes of the line on a terminal.
+const INTERVAL: Duration = Duration::from_millis(200);
+/// Time to the first line where standard error is redirected; from then on it doubles.
+const FIRST_LINE: Duration = Duration::from_secs(2);
+/// Longest time between two such lines.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(300);
+/// How long work without anything to keep may take to stop.
+const STOPPING: Duration = Duration::from_millis(900);
+/// The same of work that keeps what is finished.
+const KEEPING: Duration = Duration::from_secs(5);
+
+/// What is said of the work; one program has one line.
 static LINE: Mutex<Line> = Mutex::new(Line {
     work: None,
+    saving: false,
     written: false,
     ended: true,
 });
 
-/// The line on standard error that is written over itself.
+/// The line on standard error.
 struct Line {
     work: Option<Counted>,
-    /// Whether it stands on the terminal now.
+    /// Whether results of work that was stopped are being written.
+    saving: bool,
+    /// Whether it is on the terminal now.
     written: bool,
-    /// Whether the program is done, or nobody watches.
+    /// Whether the program is done, or nothing is to be said.
     ended: bool,
 }
 
 /// Work that counts what it has done.
 #[derive(Clone, Copy)]
 struct Counted {
+    /// What it does.
+    what: &'static str,
+    /// What is counted, in the plural.
     noun: &'static str,
+    /// Whether what is finished is kept when it is stopped.
+    keeps: bool,
     begun: Instant,
     done: usize,
     total: usize,
 }
 
-/// From now on a line says that the program works, and how far it is, until [`end`].
+/// From now on standard error says that the program works, and how far it is, until [`end`].
 pub(crate) fn begin() {
-    if !std::io::stderr().is_terminal() {
-        return;
-    }
     line().ended = false;
     let begun = Instant::now();
-    thread::spawn(move || {
-        thread::sleep(PATIENCE);
-        while line().tick(begun) {
-            thread::sleep(INTERVAL);
-        }
-    });
+    if std::io::stderr().is_terminal() {
+        thread::spawn(move || {
+            thread::sleep(PATIENCE);
+            while line().rewrite(begun) {
+                thread::sleep(INTERVAL);
+            }
+        });
+    } else {
+        thread::spawn(move || {
+            let mut interval = FIRST_LINE;
+            loop {
+                thread::sleep(interval);
+                if !line().append(begun) {
+                    return;
+                }
+                interval = LONGEST_INTERVAL.min(2 * interval);
+            }
+        });
+    }
 }
 
 /// Takes the line away; it may come back.
@@ -70,36 +102,60 @@ pub(crate) fn end() {
     line.ended = true;
 }
 
-/// Does `work` with a control that counts on the line and stops at Ctrl-C; a second Ctrl-C ends
-/// the program at once. `noun` is what is counted.
-pub(crate) fn watched<R>(
-    noun: &'static str,
-    work: impl FnOnce(&Control<'_>) -> R,
+/// Runs a study as [`watched`] does.
+pub(crate) fn study<S: Study, R>(
+    work: impl FnOnce(&Control<'_>) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
-    listen()?;
-    let counted = |done: usize, total: usize, begun: Instant| Counted {
+    watched(S::NAME, S::COUNTED, S::PARTIAL, work)
+}
+
+/// Does `work` with a control that counts on the line and stops at Ctrl-C. `what` is what it does,
+/// `noun` what is counted; `keeps` says whether work that was stopped leaves what is finished.
+pub(crate) fn watched<R>(
+    what: &'static str,
+    noun: &'static str,
+    keeps: bool,
+    work: impl FnOnce(&Control<'_>) -> R,
+) -> R {
+    let begun = Instant::now();
+    let counted = |done: usize, total: usize| Counted {
+        what,
         noun,
+        keeps,
         begun,
         done,
         total,
     };
-    let begun = Instant::now();
-    line().work = Some(counted(0, 0, begun));
+    line().work = Some(counted(0, 0));
     let report = |done: usize, total: usize| {
         // Whoever cannot have the line at once leaves it to the next.
         if let Ok(mut line) = LINE.try_lock() {
-            line.work = Some(counted(done, total, begun));
+            line.work = Some(counted(done, total));
         }
     };
     let control = Control {
-        cancel: Some(&STOP),
         progress: Some(&report),
+        ..control()
     };
     let result = work(&control);
     let mut line = line();
     line.work = None;
+    line.saving |= keeps && is_stopped();
     line.clear();
-    Ok(result)
+    result
+}
+
+/// A control that stops at Ctrl-C.
+pub(crate) fn control() -> Control<'static> {
+    Control {
+        cancel: Some(&STOP),
+        progress: None,
+    }
+}
+
+/// Whether Ctrl-C was pressed or SIGTERM came.
+pub(crate) fn is_stopped() -> bool {
+    STOP.is_cancelled()
 }
 
 /// The line, also after a panic elsewhere.
@@ -107,37 +163,64 @@ fn line() -> MutexGuard<'static, Line> {
     LINE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Hears Ctrl-C from now on.
-fn listen() -> Result<(), Failure> {
-    static LISTENING: AtomicBool = AtomicBool::new(false);
-    if LISTENING.swap(true, Ordering::SeqCst) {
-        return Ok(());
-    }
+/// From now on Ctrl-C and SIGTERM stop the work, and a second one ends the program at once.
+pub(crate) fn listen() -> Result<(), Failure> {
+    LazyLock::force(&STOP);
     ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::SeqCst) {
-            // What the shell says of a program that Ctrl-C ended.
-            std::process::exit(130);
+        if is_stopped() {
+            std::process::exit(INTERRUPTED.into());
         }
+        STOP.cancel();
+        thread::spawn(end_late);
     })
     .map_err(|error| Failure::numerics(format!("cannot listen for Ctrl-C: {error}")))
 }
 
+/// Ends the program where work that was told to stop does not.
+fn end_late() {
+    let begun = Instant::now();
+    thread::sleep(STOPPING);
+    loop {
+        let (keeps, saving) = {
+            let line = line();
+            (line.work.is_some_and(|work| work.keeps), line.saving)
+        };
+        if saving {
+            return;
+        }
+        if !keeps || begun.elapsed() > KEEPING {
+            clear();
+            anstream::eprintln!("{}", crate::style::error("stopped before it was done"));
+            std::process::exit(INTERRUPTED.into());
+        }
+        thread::sleep(INTERVAL);
+    }
+}
+
 impl Line {
-    /// Writes the line anew; whether to go on.
-    fn tick(&mut self, begun: Instant) -> bool {
+    /// Writes the line anew on a terminal; whether to go on.
+    fn rewrite(&mut self, begun: Instant) -> bool {
         if self.ended {
             return false;
         }
-        let words = words(
-            self.work.map(|work| (work, work.begun.elapsed())),
-            begun.elapsed(),
-            STOP.load(Ordering::Relaxed),
-        );
         let mut stream = std::io::stderr().lock();
-        let _ = write!(stream, "\r\x1b[K{words}");
+        let _ = write!(stream, "\r\x1b[K{}", self.words(begun));
         let _ = stream.flush();
         self.written = true;
         true
+    }
+
+    /// Writes a line of its own; whether to go on.
+    fn append(&self, begun: Instant) -> bool {
+        if !self.ended {
+            let _ = writeln!(std::io::stderr(), "{}", self.words(begun));
+        }
+        !self.ended
+    }
+
+    fn words(&self, begun: Instant) -> String {
+        let work = self.work.map(|work| (work, work.begun.elapsed()));
+        words(work, begun.elapsed(), is_stopped())
     }
 
     fn clear(&mut self) {
@@ -156,18 +239,23 @@ fn words(work: Option<(Counted, Duration)>, elapsed: Duration, stopping: bool) -
         Some((work, spent)) if work.done > 0 => {
             let left = work.total.saturating_sub(work.done);
             let left = spent.as_secs_f64() * left as f64 / work.done as f64;
-            let (
-                Counted {
-                    done, total, noun, ..
-                },
-                left,
-            ) = (work, duration(left));
-            format!("{done} of {total} {noun}, about {left} left")
+            let Counted {
+                what,
+                done,
+                total,
+                noun,
+                ..
+            } = work;
+            format!(
+                "{what}: {done} of {total} {noun}, about {} left",
+                duration(left)
+            )
         }
         Some((work, _)) if work.total > 0 => {
-            format!("0 of {} {}, {so_far}", work.total, work.noun)
+            format!("{}: 0 of {} {}, {so_far}", work.what, work.total, work.noun)
         }
-        _ => format!("working, {so_far}"),
+        Some((work, _)) => format!("{}: {so_far}", work.what),
+        None => format!("working, {so_far}"),
     };
     if stopping {
         format!("{words}, stopping")
@@ -203,17 +291,26 @@ mod tests {
     #[test]
     fn the_line_says_how_far_the_work_is() {
         let seconds = Duration::from_secs;
-        let counted = |done| Counted {
+        let counted = |done, total| Counted {
+            what: "attractors",
             noun: "starts",
+            keeps: true,
             begun: Instant::now(),
             done,
-            total: 40,
+            total,
         };
         for (work, said) in [
             (None, "working, 12 s so far"),
-            (Some(counted(0)), "0 of 40 starts, 12 s so far"),
+            (Some(counted(0, 0)), "attractors: 12 s so far"),
+            (
+                Some(counted(0, 40)),
+                "attractors: 0 of 40 starts, 12 s so far",
+            ),
             // 10 of 40 in 4 s: 30 are left, which take 12 s.
-            (Some(counted(10)), "10 of 40 starts, about 12 s left"),
+            (
+                Some(counted(10, 40)),
+                "attractors: 10 of 40 starts, about 12 s left",
+            ),
         ] {
             let work = work.map(|work| (work, seconds(4)));
             assert_eq!(words(work, seconds(12), false), said);

@@ -34,6 +34,17 @@ pub(crate) fn advance<M: StroboscopicMap>(
     finite(state)
 }
 
+/// As [`advance`], over many periods.
+pub(crate) fn advance_by<M: StroboscopicMap>(
+    map: &mut M,
+    state: &mut [f64],
+    periods: usize,
+) -> Result<(), MapFailure> {
+    map.advance_by(state, periods)
+        .map_err(MapFailure::refused)?;
+    finite(state)
+}
+
 /// As [`advance`], of many states, each over periods of its own without looking in between.
 pub(crate) fn advance_each<M: StroboscopicMap>(
     map: &mut M,

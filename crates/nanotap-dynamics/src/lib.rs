@@ -41,19 +41,20 @@ mod vector;
 
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
 pub use census::{
-    Attractor, AttractorKind, Census, CensusOptions, Fraction, Lifetime, SizeCount, StartBox,
-    StartBoxError, StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen, census, census_of,
+    Attractor, AttractorKind, Census, CensusEnd, CensusOptions, Fraction, Lifetime, SizeCount,
+    StartBox, StartBoxError, StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen, census,
+    census_of,
 };
 pub use classify::{
-    Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Outlook, Torus, UndecidedReason,
-    birkhoff_digits, candidate_periods, classify, classify_beside, outlook,
+    Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,
+    birkhoff_digits, candidate_periods, classify, classify_beside,
 };
 pub use continuation::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ContinuationError,
     ContinuationOptions, Diagram, DiagramBranch, DiagramOptions, Direction, OrbitTangency,
     assemble_diagram, continue_orbit, switch_at_flip,
 };
-pub use control::Control;
+pub use control::{CancelFlag, Control};
 pub use curve::{BifurcationCurve, CurveEnd, CurveOptions, CurvePoint, trace_curve};
 pub use failure::MapFailure;
 pub use global::{
@@ -65,5 +66,5 @@ pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
 pub use orbit::{
     DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
-    ShootingOptions, Stability, close_orbit, close_orbit_from_points, find_orbits,
+    ShootingOptions, Stability, check_size, close_orbit, close_orbit_from_points, find_orbits,
 };

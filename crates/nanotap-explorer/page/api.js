@@ -1,5 +1,5 @@
-// Talking to the server. Of each kind of request only the newest lives: a newer one cancels
-// the one before, and the server stops working on it.
+// Requests to the server. Of each kind of request only the newest is active: a new one cancels the
+// previous one, and the server stops working on it.
 
 const token = new URLSearchParams(location.search).get("token") ?? "";
 const running = new Map();
@@ -25,7 +25,7 @@ async function send(kind, path, body) {
   return answer;
 }
 
-/** Whether an error only says that a newer request took over. */
+/** Whether an error only means that a newer request replaced this one. */
 export const superseded = (error) => error?.name === "AbortError";
 
 export async function ask(kind, path, body) {
@@ -49,7 +49,7 @@ export function stop(kind) {
   running.get(kind)?.abort();
 }
 
-/** Hands every line of a streamed answer to `take`, parsed. */
+/** Passes every line of a streamed response to `take`, parsed. */
 export async function stream(kind, path, body, take) {
   const answer = await send(kind, path, body);
   const reader = answer.body.getReader();

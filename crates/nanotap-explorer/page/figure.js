@@ -1,14 +1,14 @@
-// Figures come drawn from the server, the same that the terminal writes, with a map of their axes:
-// here they are put into the page, asked for the values under the pointer, and zoomed.
+// Figures are drawn by the server, the same as the terminal writes, with a map of their axes. Here
+// they are inserted into the page, queried for the values under the pointer, and zoomed.
 
 const SVG = "http://www.w3.org/2000/svg";
 const XLINK = "http://www.w3.org/1999/xlink";
-const DRAG = 6;               // pixels beyond which a press is no click
+const DRAG = 6;               // pixels beyond which a press is not a click
 
-/** Puts a drawn figure into its place. It is written an element a line, and lines that are the same
- *  as before stay: a curve that follows a knob costs that curve, not every letter of the figure. */
+/** Inserts a drawn figure. It has one element per line, and lines that are unchanged stay: a curve that
+ *  follows a control costs that curve, not every letter of the figure. */
 export function put(element, drawn) {
-  // Names in the figure carry a prefix that changes with it.
+  // Identifiers in the figure have a prefix that changes with it.
   const text = drawn.svg.replace(/\bf[0-9a-f]{8}-/g, `${element.id}-`);
   const letters = element.letters ??= new Map();
   const lines = text.split("\n").filter((line) => {
@@ -31,7 +31,7 @@ export function put(element, drawn) {
 
 const closed = (line) => /(\/|<\/\w+)>$/.test(line);
 
-/** The tree of the elements that begin lines. */
+/** The tree of the elements that begin the lines. */
 function grown(lines) {
   const open = [{ children: [] }];
   lines.forEach((line, k) => {
@@ -47,7 +47,7 @@ function grown(lines) {
   return open[0].children[0];
 }
 
-/** Draws one element and what is in it. */
+/** Draws one element with its children. */
 function parsed(tree, letters) {
   const text = tree.text.join("");
   const whole = text.startsWith("<svg") ? text : `<svg xmlns="${SVG}" xmlns:xlink="${XLINK}">${text}</svg>`;
@@ -56,15 +56,15 @@ function parsed(tree, letters) {
   return whole === text ? page : page.firstElementChild;
 }
 
-/** Tells a tree which elements its lines stand for. */
+/** Assigns to the nodes of a tree the elements of their lines. */
 function plant(tree, node) {
   tree.node = node;
   tree.children.forEach((child, k) => plant(child, node.children[k]));
 }
 
-/** Makes the elements of an old tree those of a new one. */
+/** Changes the elements of an old tree into those of a new one. */
 function renew(old, tree, letters) {
-  // A word that only moved is the same word: what stands within its line is compared by itself.
+  // A text that only moved is the same text: the content of its line is compared separately.
   const [, head, within] = /^(<\w+[^>&]*>)(.*)$/.exec(tree.line) ?? [];
   const [, before, had] = /^(<\w+[^>]*>)(.*)$/.exec(old.line) ?? [];
   const alike = within !== undefined && within === had && old.children.length === tree.children.length
@@ -79,15 +79,15 @@ function renew(old, tree, letters) {
   tree.children.forEach((child, k) => renew(old.children[k], child, letters));
 }
 
-/** Gives an element the attributes of a line. */
+/** Sets the attributes of a line on an element. */
 function attributes(node, line) {
   const now = new Map([...line.matchAll(/ ([\w:-]+)="([^"]*)"/g)].map(([, name, value]) => [name, value]));
   for (const { name } of [...node.attributes]) if (!now.has(name)) node.removeAttribute(name);
   for (const [name, value] of now) if (node.getAttribute(name) !== value) node.setAttributeNS(name.startsWith("xlink:") ? XLINK : null, name, value);
 }
 
-/** Makes one path of the letters of each word, which is drawn many times faster. A letter is a
- *  path of relative steps, so that it can begin anywhere. */
+/** Makes one path of the letters of each text, which is drawn many times faster. A letter is a path of
+ *  relative steps, so that it can start anywhere. */
 function join(svg, letters) {
   for (const run of svg.querySelectorAll("g[role=text] > g")) {
     const word = document.createElementNS(SVG, "path");
@@ -98,7 +98,7 @@ function join(svg, letters) {
   }
 }
 
-/** The panel at a point of the window and the values there; `null` outside of all. */
+/** The panel at a point of the window and the values there; `null` outside of all panels. */
 export function under(element, clientX, clientY) {
   const svg = element.querySelector("svg");
   if (!svg || !element.panels) return null;
@@ -123,26 +123,26 @@ function value(axis, part) {
   return axis.from + (axis.to - axis.from) * part;
 }
 
-/** Where a value lies on an axis, as a part of it. */
+/** Position of a value on an axis, as a fraction of the axis. */
 export function part(axis, v) {
   if (logarithmic(axis)) return Math.log(v / axis.from) / Math.log(axis.to / axis.from);
   return (v - axis.from) / (axis.to - axis.from);
 }
 
-/** What the axes say at a place. */
+/** Text with the values of the axes at a place. */
 export function words(place) {
   const said = (axis) => `${place.panel[axis].label.replaceAll("$", "")} ${Number(place[axis].toPrecision(6))} ${place.panel[axis].unit}`.trim();
   return `${said("x")}, ${said("y")}`;
 }
 
-/** The place a hundredth further; from nowhere, the middle of the first panel. */
+/** The place moved by a hundredth; without one, the centre of the first panel. */
 function moved(element, place, [across, up]) {
   if (!element.panels?.length) return null;
   if (!place) return at(element.panels[0], 0.5, 0.5);
   return at(place.panel, within(place.u + 0.01 * across), within(place.v + 0.01 * up));
 }
 
-/** Draws over a figure what belongs to the pointer. */
+/** Draws the marks of the pointer over a figure. */
 function over(element, name, path) {
   const svg = element.querySelector("svg");
   if (!svg) return;
@@ -160,8 +160,8 @@ function cross(element, place) {
   over(element, "cross", `M${panel.left + u * panel.width} ${panel.top}v${panel.height}M${panel.left} ${panel.top + (1 - v) * panel.height}h${panel.width}`);
 }
 
-/** Makes a figure answer pointer and keys. `tell(place)` is called where the cross goes, `go(place)`
- *  for a click or Enter, `zoom(views)` for another part: a list of {panel, x, y}. */
+/** Makes a figure respond to pointer and keys. `tell(place)` is called where the cross goes, `go(place)`
+ *  for a click or Enter, `zoom(views)` for another range: a list of {panel, x, y}. */
 export function alive(element, { views, tell, go, zoom }) {
   let place = null;
   let pressed = null;
@@ -205,7 +205,7 @@ export function alive(element, { views, tell, go, zoom }) {
   element.addEventListener("click", (event) => { if (!swallow) { move(here(event)); if (place) go?.(place); } swallow = false; });
   element.addEventListener("dblclick", () => { if (views().length) zoom([]); });
   element.addEventListener("wheel", (event) => {
-    // Alone, the wheel scrolls the page.
+    // Without Ctrl the wheel scrolls the page.
     if (!(event.ctrlKey || event.altKey) || !here(event)) return;
     event.preventDefault();
     around(here(event), event.deltaY < 0 ? 0.8 : 1.25);
@@ -221,7 +221,7 @@ export function alive(element, { views, tell, go, zoom }) {
     else return;
     event.preventDefault();
   });
-  /** After the figure was drawn anew: the cross stays where it was. */
+  /** After the figure was redrawn: the cross stays at its place. */
   return () => {
     if (!place) return;
     const panel = element.panels?.find((one) => Math.abs(one.left - place.panel.left) < 1e-9 && Math.abs(one.top - place.panel.top) < 1e-9);

@@ -1,13 +1,13 @@
-// The knobs: one for every key of the case, made from the server's table of keys.
+// The controls: one for every key of the case, made from the server's table of keys.
 
 import { state } from "./state.js";
 
 const form = document.getElementById("knobs");
 let changed = () => {};
-let now = "";                 // state at drive phase 0 of the motion that is shown
+let now = "";                 // state at drive phase 0 of the displayed motion
 const opened = new Set();
 
-/** Which motion a turned knob goes on from, where it is to. */
+/** The motion from which a changed value continues, if requested. */
 export function follows(start) { now = start; }
 
 export function onChange(listener) { changed = listener; }
@@ -18,7 +18,7 @@ function element(name, properties = {}, ...children) {
   return made;
 }
 
-/** Builds the knobs for the keys of the present case, keeping the focus where it was. */
+/** Creates the controls for the keys of the present case and keeps the focus. */
 export function build(keys) {
   const focused = document.activeElement?.id;
   form.replaceChildren();
@@ -43,7 +43,7 @@ export function build(keys) {
   if (focused) document.getElementById(focused)?.focus();
 }
 
-/** Puts the newest values into the knobs that are there, but not under the hand. */
+/** Sets the newest values in the existing controls, except in the one being edited. */
 export function update(keys) {
   for (const key of keys) {
     const field = form.querySelector(`[data-key="${key.name}"]`);
@@ -86,7 +86,7 @@ function chooser(key, meaning) {
   return field;
 }
 
-/** One of some words, or a sum of them with +. */
+/** A choice of one option, or a sum of options with +. */
 function summed(key, meaning) {
   const field = typed(key);
   const list = element("datalist", { id: `words-${key.name.replace(/[^a-z0-9]/gi, "-")}` },
@@ -122,7 +122,7 @@ function slider(key, field, words) {
 }
 
 function put(key, text, finished) {
-  // Nothing takes a key away that the preset states.
+  // A key that the preset states cannot be removed.
   state.set[key.name] = text;
   state.start = state.follow === "yes" ? now : "";
   changed(key.name, finished);

@@ -1,5 +1,5 @@
-// The lever in slow motion: the beam's shape from all its modes, the tip, and the sample that is
-// pushed in. Heights are drawn to one scale; the lever's length is not.
+// The lever in slow motion: the beam's shape from all its modes, the tip, and the indented sample.
+// Heights are drawn to scale; the lever's length is not.
 
 const canvas = document.getElementById("lever");
 const pen = canvas.getContext("2d");
@@ -16,9 +16,9 @@ play.addEventListener("click", () => { moving = !moving; label(); });
 function label() { play.textContent = moving ? "Pause" : "Play"; }
 label();
 
-/** Takes a new film: heights of the beam, of the surface and of the rest, sample by sample. */
+/** Takes a new film: heights of the beam, of the surface and of the rest position, sample by sample. */
 export function show(next) {
-  // Heights come as whole numbers of a step.
+  // Heights are whole numbers of a step.
   const full = (row) => row.map((height) => height * next.step);
   film = { ...next, beam: next.beam.map(full), apex: full(next.apex), surface: full(next.surface) };
   if (!moving) draw();
@@ -45,7 +45,7 @@ function draw() {
   const right = 0.86 * width;
   const x = (xi) => left + (right - left) * xi;
   const tip = film.beam[k][film.beam[k].length - 1];
-  // The sample rests at 0; in contact it lies where the tip has pushed it.
+  // The sample rests at 0; in contact its surface is at the tip.
   const touching = film.contact[k] === 1;
   const surface = film.surface[k];
   pen.fillStyle = colour("--sample");
@@ -59,13 +59,13 @@ function draw() {
   pen.beginPath(); pen.moveTo(left, y(film.rest)); pen.lineTo(right, y(film.rest)); pen.stroke(); pen.setLineDash([]);
   pen.fillStyle = colour("--soft");
   if (film.is_beam) pen.fillRect(left - 0.02 * width, y(film.beam[k][0]) - 0.09 * height, 0.02 * width, 0.18 * height);
-  // Beam; of an oscillator its mass.
+  // The beam, or the mass of an oscillator.
   pen.strokeStyle = touching ? colour("--warm") : colour("--accent");
   pen.lineWidth = 3 * ratio; pen.lineJoin = "round";
   pen.beginPath();
   film.beam[k].forEach((v, j) => pen.lineTo(x(j / (film.beam[k].length - 1)), y(v)));
   pen.stroke();
-  // Tip: its apex is what meets the sample.
+  // The tip: its apex meets the sample.
   pen.fillStyle = pen.strokeStyle;
   pen.beginPath(); pen.moveTo(right - 7 * ratio, y(tip)); pen.lineTo(right + 7 * ratio, y(tip)); pen.lineTo(right, y(film.apex[k])); pen.closePath(); pen.fill();
   pen.fillStyle = colour("--ink"); pen.font = `${12 * ratio}px system-ui`;

@@ -1,5 +1,5 @@
-// The page: knobs on the left, the motion in the middle, what coexists on the right, how it
-// changes below.
+// The page: controls on the left, the motion in the middle, coexisting motions on the right,
+// studies below.
 
 import { state, decode, remember, theCase } from "./state.js";
 import { ask, bytes, save, superseded } from "./api.js";
@@ -9,13 +9,13 @@ import * as figure from "./figure.js";
 import * as study from "./study.js";
 
 const $ = (id) => document.getElementById(id);
-const PATIENCE = 300;          // milliseconds before it is said that there is a wait
+const PATIENCE = 300;          // milliseconds before the page shows that it waits
 const OFF = "0: off. Few steps show motions that the equations do not have.";
 let about = null;
-let wanted = false;           // a change that came while a motion was under way
+let wanted = false;           // a change made while a motion was being computed
 let underway = false;
-let shown = "";               // the case whose knobs stand there
-const redrawn = [];            // what is to be done when figures were drawn anew
+let shown = "";               // the case whose controls are shown
+const redrawn = [];            // called when figures were redrawn
 
 export function say(error) {
   const message = $("message");
@@ -24,8 +24,8 @@ export function say(error) {
   knobs.mark(error?.message ?? "");
 }
 
-/** Asks for the motion at the present knobs. While one is under way the next waits, so that a
- *  dragged knob shows every motion that there is time for and ends at the last. */
+/** Requests the motion for the present values. While one is being computed the next one waits, so that a
+ *  dragged slider shows as many motions as there is time for and ends with the last. */
 export async function refresh() {
   if (underway) { wanted = true; return; }
   underway = true;
@@ -41,7 +41,8 @@ export async function refresh() {
       show(motion);
       study.fill(motion.forms);
     } else if (state.follow && state.start && /state/.test(error.message)) {
-      // Another number of modes has other states: the motion is looked for from rest then.
+      // With another number of modes the state has another length: the motion is then computed from
+      // rest.
       state.start = "";
       wanted = true;
     } else if (!superseded(error)) say(error);
@@ -53,14 +54,14 @@ export async function refresh() {
   underway = false;
 }
 
-/** The motion at the present knobs, or why there is none. */
+/** The motion for the present values, or the reason why there is none. */
 function request() {
   wanted = false;
   const wish = { case: theCase(), start: state.start, steps: state.steps, views: motionViews() };
   return ask("motion", "/api/motion", wish).then((motion) => ({ motion }), (error) => ({ error }));
 }
 
-/** The parts of the motion's figures that are seen. */
+/** The visible ranges of the motion's figures. */
 function motionViews() {
   return Object.fromEntries(["contact", "portrait"].filter((name) => state.views[name]?.length).map((name) => [name, state.views[name]]));
 }
@@ -68,7 +69,7 @@ function motionViews() {
 function show(motion) {
   knobs.follows(motion.start);
   $("summary").textContent = `${motion.title}: ${motion.summary}`;
-  // Knobs are made anew where other keys are stated, but not under the hand.
+  // Controls are recreated if the stated keys change, but not while one is being edited.
   const keys = state.preset + motion.keys.map((key) => `${key.name}${key.value === ""}${key.choices ? key.value : ""}`).join();
   if (knobs.dragged() || keys === shown) knobs.update(motion.keys);
   else { knobs.build(motion.keys); shown = keys; }
@@ -85,7 +86,7 @@ function show(motion) {
   $("python").textContent = motion.python;
 }
 
-/** Values change in place; lines are made anew where others are there. */
+/** Values change in place; lines are recreated if the set of observables changes. */
 function table(rows) {
   const body = $("observables").tBodies[0];
   const names = rows.map((row) => row.name).join();
@@ -136,7 +137,7 @@ async function census() {
   }
 }
 
-/** A census is of one case only. */
+/** A census is valid for one case only. */
 function forgetCensus() {
   if (!$("bound").textContent) return;
   $("attractors").replaceChildren();
@@ -171,7 +172,7 @@ async function begin() {
     takeOver();
   });
   knobs.onChange((_, finished) => {
-    // While a slider moves, the address stands still.
+    // While a slider moves, the address is not changed.
     if (finished) remember(true);
     forgetCensus();
     refresh();

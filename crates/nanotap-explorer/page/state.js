@@ -1,22 +1,22 @@
-// What the page shows, and the address that holds all of it: a link reproduces a view.
+// The state of the page, and the address that contains all of it: a link reproduces a view.
 
 const empty = () => ({
-  preset: "",                 // which case the values start from
+  preset: "",                 // the case from which the values start
   set: {},                    // keys of the case that differ from it: key -> text
-  start: "",                  // state at drive phase 0 from which the motion is looked for
+  start: "",                  // state at drive phase 0 from which the motion is computed
   follow: "",                 // "yes": a turned knob goes on from the motion that is shown
   tab: "diagram",
-  steps: 0,                   // Runge-Kutta steps a period of the motion beside; 0: none
+  steps: 0,                   // Runge-Kutta steps per period of the motion for comparison; 0: none
   study: {},                  // fields of the study's form: name -> text
   ran: "",                    // "yes": the study was computed
-  views: {},                  // parts of figures that are seen: name -> list of {panel, x, y}
+  views: {},                  // visible ranges of figures: name -> list of {panel, x, y}
 });
 
 export const state = empty();
 
 const FIELDS = ["preset", "start", "follow", "tab", "steps", "ran"];
 
-/** The fragment of the address that says all of `state`. */
+/** The fragment of the address for `state`. */
 export function encoded() {
   const words = new URLSearchParams();
   for (const name of FIELDS) if (state[name]) words.set(name, state[name]);
@@ -28,7 +28,7 @@ export function encoded() {
   return words.toString();
 }
 
-/** Takes over what the address says. */
+/** Reads the state from the address. */
 export function decode(fragment) {
   Object.assign(state, empty());
   for (const [name, value] of new URLSearchParams(fragment.replace(/^#/, ""))) {
@@ -45,7 +45,7 @@ function view([name, panel], numbers) {
   (state.views[name] ??= []).push({ panel: Number(panel), x: numbers.slice(0, 2), y: numbers.slice(2) });
 }
 
-/** Writes the address: a new entry of the history for a finished change, else in place. */
+/** Writes the address: a new entry of the history for a completed change, otherwise in place. */
 export function remember(finished) {
   const address = `${location.pathname}${location.search}#${encoded()}`;
   if (address === `${location.pathname}${location.search}${location.hash}`) return;
@@ -53,7 +53,7 @@ export function remember(finished) {
   else history.replaceState(null, "", address);
 }
 
-/** The case as the server takes it. */
+/** The case as sent to the server. */
 export function theCase() {
   return { preset: state.preset, set: Object.entries(state.set).map(([key, value]) => `${key}=${value}`) };
 }

@@ -1,5 +1,5 @@
-// How the motion changes: a form for each study, its figure as it grows finer, a click that goes
-// to the motion there.
+// The studies: a form for each, its figure in stages of increasing resolution, and clicks that go
+// to a motion.
 
 import { state, remember, theCase } from "./state.js";
 import { ask, bytes, save, stream, stop, superseded } from "./api.js";
@@ -10,11 +10,11 @@ const TABS = {
   diagram: "Diagram", branches: "Branches", resonance: "Resonance", approach: "Approach",
   basin: "Basins", map: "Two parameters",
 };
-const NEAR = 0.05;            // parts of a panel within which a click means what is drawn there
+const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
 let forms = null;
-let filled = "";              // the form that stands there
-let drawnFor = "";            // what the figure was computed for
-let number = 0;               // under which the server keeps the figure
+let filled = "";              // the form that is shown
+let drawnFor = "";            // the request of the displayed figure
+let number = 0;               // the server's number for the figure
 let clicks = null;
 let gone = () => {};
 let redrawn = () => {};
@@ -22,7 +22,7 @@ let redrawn = () => {};
 const views = () => state.views.study ?? [];
 const asked = () => JSON.stringify([state.preset, state.tab, state.study]);
 
-/** `motionChanged` is called when a click went to another motion. */
+/** `motionChanged` is called when a click selected another motion. */
 export function begin(motionChanged) {
   gone = motionChanged;
   for (const [name, words] of Object.entries(TABS)) {
@@ -64,7 +64,7 @@ export function begin(motionChanged) {
   }
 }
 
-/** Shows the tab of the state. */
+/** Shows the tab given in the state. */
 export function restore() {
   if (!(state.tab in TABS)) state.tab = "diagram";
   for (const tab of $("tabs").children) {
@@ -76,8 +76,8 @@ export function restore() {
   filled = "";
 }
 
-/** Makes the form of the tab, its first values those of the server. A figure that was computed for
- *  this very form stays; one that the address says was computed is computed again. */
+/** Creates the form of the tab with the server's initial values. A figure that was computed for this form
+ *  stays; one that the address contains is computed again. */
 export function fill(next) {
   forms = next;
   const now = asked();
@@ -137,7 +137,7 @@ function draw(drawn) {
   redrawn();
 }
 
-/** Draws the part of the figure that is to be seen. */
+/** Draws the visible range of the figure. */
 async function look() {
   if (!number || !drawnFor) return;
   try {
@@ -147,7 +147,7 @@ async function look() {
   }
 }
 
-/** Sets what the axes say, and shows the motion there. */
+/** Sets the values of the axes at a place, and shows the motion there. */
 function go(place) {
   if (!clicks) return;
   const orbit = nearest(place);
@@ -162,7 +162,7 @@ function go(place) {
   gone();
 }
 
-/** The drawn motion that is nearest to a place, if one is near: [x, heights by panel, start]. */
+/** The drawn motion nearest to a place, if one is near: [x, heights by panel, start]. */
 function nearest(place) {
   const { panel, u, v } = place;
   const index = $("study-figure").panels.indexOf(panel);

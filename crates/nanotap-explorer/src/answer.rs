@@ -1,4 +1,4 @@
-//! What a request is answered that cannot be met.
+//! Responses to requests that fail.
 
 use axum::Json;
 use axum::http::StatusCode;
@@ -6,27 +6,27 @@ use axum::response::{IntoResponse, Response};
 use nanotap::{Error, ErrorKind};
 use serde_json::{Value, json};
 
-/// Why a request was not met, in the words of the terminal.
+/// The reason of a failed request, with the terminal's message.
 #[derive(Clone, Debug)]
 pub(crate) struct Refusal(Error);
 
 impl Refusal {
-    /// Of anything that the library refuses with.
+    /// From any error of the library.
     pub(crate) fn of(error: impl Into<Error>) -> Self {
         Self(error.into())
     }
 
-    /// What was asked for is not right, and what would be.
+    /// The request is wrong; `remedy` says what would be right.
     pub(crate) fn input(message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self(Error::input(message, remedy))
     }
 
-    /// It was right, and the computation did not succeed.
+    /// The request is right, but the computation failed.
     pub(crate) fn failed(message: impl Into<String>) -> Self {
         Self(Error::numerics(message))
     }
 
-    /// As the page reads it.
+    /// The JSON that the page reads.
     pub(crate) fn json(&self) -> Value {
         json!({ "error": self.0.to_string() })
     }

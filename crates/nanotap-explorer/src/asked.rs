@@ -1,4 +1,4 @@
-//! A motion as the page asks for it, and the model that it needs.
+//! A motion as requested by the page, and its model.
 
 use nanotap::case::Case;
 use nanotap::model::Model;
@@ -8,26 +8,26 @@ use crate::answer::Refusal;
 use crate::figures::Views;
 use crate::preset::Wanted;
 
-/// Most modes of a motion that follows a dragged knob.
+/// Largest number of modes of a motion that follows a slider.
 const MOST_MODES: usize = 20;
 
-/// A motion as the page asks for it.
+/// A motion as requested by the page.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Asked {
     pub(crate) case: Wanted,
-    /// Empty: from rest; else a state, or `n:state` for an orbit of period n near it.
+    /// Initial state; empty: rest; `n:state`: an orbit of period n near the state.
     #[serde(default)]
     pub(crate) start: String,
-    /// Runge–Kutta steps a period of the motion beside it; 0: none.
+    /// Runge–Kutta steps per period of the motion for comparison; 0: none.
     #[serde(default)]
     pub(crate) steps: u32,
-    /// Which parts of the figures are to be seen.
+    /// Visible ranges of the figures.
     #[serde(default)]
     pub(crate) views: Views,
 }
 
-/// Where a motion is looked for.
+/// Initial state of a motion, or guess for an orbit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Start {
     pub(crate) period: Option<usize>,
@@ -68,7 +68,7 @@ impl Start {
     }
 }
 
-/// The model of a case that is small enough to follow a dragged knob.
+/// The model of a case that is small enough to follow a slider.
 pub(crate) fn model_of(case: &Case) -> Result<Model, Refusal> {
     if let Some(cantilever) = case.cantilever()
         && cantilever.modes > MOST_MODES

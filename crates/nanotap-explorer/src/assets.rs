@@ -1,4 +1,4 @@
-//! The page and its parts, as they stand in `page/`.
+//! The page and its parts, from `page/`.
 
 use axum::extract::Path;
 use axum::http::{StatusCode, header};

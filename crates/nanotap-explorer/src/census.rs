@@ -1,4 +1,4 @@
-//! Every motion that coexists, each with where it is started.
+//! All coexisting motions, each with a state that starts it.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ use crate::answer::Refusal;
 use crate::asked::{Start, model_of};
 use crate::preset::Wanted;
 
-/// Longest period of the unstable orbits that are looked for.
+/// Longest period of the unstable orbits that are searched for.
 const UNSTABLE: usize = 4;
 
-/// A census as the page asks for it.
+/// A census as requested by the page.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Census {
@@ -61,7 +61,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Re
         }))
     });
     let unstable = found.unstable.iter().flatten();
-    let unstable = unstable.map(|orbit| entry(orbit, Some(orbit.period), "unstable"));
+    let unstable = unstable.map(|o| entry(&o.motion, Some(o.motion.period), "unstable"));
     let motions: Vec<Value> = stable.chain(unstable).collect();
     Ok(json!({ "motions": motions, "bound": bound(&found) }))
 }
@@ -76,7 +76,7 @@ fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str) -> Value {
     })
 }
 
-/// How sure one may be that these are all.
+/// Text on how many motions may be missing.
 fn bound(found: &Attractors) -> String {
     let unseen = found.unseen.as_ref().map(|unseen| {
         format!(

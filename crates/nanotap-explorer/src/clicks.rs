@@ -1,5 +1,5 @@
-//! What a click on the figure of a study means: a key that is set to where it went, and the state
-//! of the motion that is drawn there; and the branches that are drawn over it.
+//! The result of a click on the figure of a study: the value of a key at that place, and the state
+//! of the motion drawn there; and the branches that are drawn over the figure.
 
 use nanotap::case::Key;
 use nanotap::case::quantity::{JOULES_PER_ELECTRONVOLT, Kind};
@@ -19,7 +19,7 @@ use crate::asked::Start;
 #[derive(Clone, Copy)]
 pub(crate) struct Axis {
     pub(crate) key: Key,
-    /// What values of the key, in SI, are multiplied with to be drawn.
+    /// Factor from values of the key in SI to drawn values.
     pub(crate) factor: f64,
 }
 
@@ -49,7 +49,7 @@ impl Axis {
     }
 }
 
-/// An observable as a panel shows it.
+/// An observable as shown in a panel.
 pub(crate) struct Height {
     observable: &'static Observable,
     unit: String,
@@ -69,7 +69,7 @@ impl Height {
             .collect()
     }
 
-    /// A value in SI (`si` is 1) or in a unit that is `si` in SI, as it is drawn.
+    /// The drawn value of a value in SI (`si` is 1) or in a unit of `si` in SI.
     fn drawn(&self, value: f64, si: Option<f64>) -> f64 {
         let dimension = self.observable.dimension;
         if dimension == Dimension::Angle {
@@ -101,7 +101,7 @@ impl Height {
     }
 }
 
-/// The unit of a panel's vertical axis, which may stand in its label.
+/// The unit of a panel's vertical axis, which may be part of its label.
 fn unit_of(panel: &Panel) -> String {
     if !panel.y.unit.is_empty() {
         return panel.y.unit.clone();
@@ -111,7 +111,7 @@ fn unit_of(panel: &Panel) -> String {
     unit.map_or_else(String::new, |(_, unit)| unit.to_owned())
 }
 
-/// What values are multiplied with, whose 1 is `si` in SI, to be shown in `unit`.
+/// Factor from values in a unit of `si` in SI to values in `unit`.
 fn factor(kind: Kind, si: f64, unit: &str) -> f64 {
     let (si, unit) = match unit.strip_suffix("eV") {
         Some(prefix) => (si / JOULES_PER_ELECTRONVOLT, format!("{prefix}J")),
@@ -124,7 +124,7 @@ fn factor(kind: Kind, si: f64, unit: &str) -> f64 {
         .map_or(1.0, |(factor, _)| factor)
 }
 
-/// A motion that is drawn: where along x, its heights in each panel, and what starts it.
+/// A drawn motion: its x, its heights in each panel, and the state that starts it.
 fn place(x: f64, heights: &[Vec<f64>], start: &str) -> Value {
     json!([x, heights, start])
 }
@@ -147,8 +147,8 @@ pub(crate) fn on_branches(
     report.points.iter().map(of).collect()
 }
 
-/// The motions that an approach met, and the orbits of its branches. `factor` is that of
-/// distances in the model's unit.
+/// The motions of an approach curve, and the orbits of its branches. `factor` is that of distances
+/// in the model's unit.
 pub(crate) fn of_approach(
     report: &ApproachReport,
     factor: f64,
@@ -176,9 +176,9 @@ pub(crate) fn of_approach(
         .collect()
 }
 
-/// The motions of a sweep over one parameter, with the state in which each was left. A diagram
-/// shows the maxima of the drive periods (`heights` is one that stands for them), a resonance
-/// curve the observables.
+/// The motions of a sweep over one parameter, with the last state of each. A diagram shows the
+/// maxima of the drive periods (`heights` has one that represents them), a resonance curve the
+/// observables.
 pub(crate) fn in_sweep(
     store: &Store,
     x: Axis,

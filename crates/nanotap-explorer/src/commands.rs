@@ -1,4 +1,4 @@
-//! The same elsewhere: the line at the terminal, the lines of Python.
+//! The equivalent command line and lines of Python.
 
 use std::fmt::Write as _;
 
@@ -9,18 +9,18 @@ use crate::answer::Refusal;
 use crate::asked::{Asked, Start};
 use crate::preset::Wanted;
 
-/// What the saved case is called.
+/// File name of the saved case.
 const CASE_FILE: &str = "case.toml";
 
-/// The case file as it is given elsewhere: the one that was named if nothing differs from it,
-/// else the one to save.
+/// The path of the case file in commands: the given file if nothing was changed, otherwise the
+/// saved one.
 fn case_path(app: &App, case: &Wanted) -> Result<String, Refusal> {
     let preset = case.preset(app)?;
     let unchanged = !preset.path.is_empty() && case.words(preset).is_empty();
     Ok(if unchanged { &preset.path } else { CASE_FILE }.to_owned())
 }
 
-/// The command that gives the same motion.
+/// The command for the same motion.
 pub(crate) fn command(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
     let mut line = format!("nanotap {study} {}", quoted(&case_path(app, &asked.case)?));
     let start = Start::parse(&asked.start)?;
@@ -33,7 +33,7 @@ pub(crate) fn command(app: &App, asked: &Asked, study: &str) -> Result<String, R
     Ok(line)
 }
 
-/// The command of a study, by what it was asked for.
+/// The command of a study with its options.
 pub(crate) fn study_command(
     app: &App,
     case: &Wanted,
@@ -72,7 +72,7 @@ fn text(value: &Value) -> String {
         .map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// A word as a shell takes it as one.
+/// A word quoted for a shell.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "=:,._/+-".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -82,7 +82,7 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// The lines of Python that give the same motion.
+/// The lines of Python for the same motion.
 pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
     let path = case_path(app, &asked.case)?;
     let start = Start::parse(&asked.start)?;
@@ -99,7 +99,7 @@ pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Re
     ))
 }
 
-/// The lines of Python that give the same studies.
+/// The lines of Python for the same studies.
 pub(crate) fn study_python(
     app: &App,
     case: &Wanted,
@@ -110,7 +110,7 @@ pub(crate) fn study_python(
     for (name, request) in studies {
         let _ = write!(text, "{name} = nanotap.{name}(case");
         for (option, value) in *request {
-            // `from` is a word of the language.
+            // `from` is a keyword of Python.
             let option = if option == "from" { "from_" } else { option };
             let value = match value {
                 Value::Bool(true) => "True".to_owned(),

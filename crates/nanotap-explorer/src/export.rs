@@ -1,4 +1,4 @@
-//! Files to save: the case, the motion in time, its figures.
+//! Files to save: the case, the time series of the motion, its figures.
 
 use std::sync::Arc;
 
@@ -17,16 +17,16 @@ use crate::asked::{Asked, Start, model_of};
 use crate::figures::{picture, viewed};
 use crate::motion::Motion;
 
-/// Samples a drive period in the time series, as at the terminal.
+/// Samples per drive period in the time series, as at the terminal.
 const RESOLUTION: usize = 200;
 
-/// What is saved, and in which format.
+/// What is to be saved, and in which format.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
     #[serde(flatten)]
     asked: Asked,
-    /// Which of the motion's figures.
+    /// Name of one of the motion's figures.
     #[serde(default)]
     figure: String,
     format: String,

@@ -1,5 +1,4 @@
-//! Figures as the page gets them: drawn, with the map of their axes, in the part that it zooms to;
-//! and as files.
+//! Figures for the page (drawn in the visible range, with the map of their axes) and as files.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
@@ -16,10 +15,10 @@ use serde_json::{Value, json};
 use crate::App;
 use crate::answer::Refusal;
 
-/// Figures of studies that are kept to be drawn again.
+/// Number of figures of studies that are stored for redrawing.
 const KEPT: usize = 8;
 
-/// The part of a panel that is to be seen, in the units of its axes.
+/// The visible range of a panel, in the units of its axes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct View {
@@ -31,8 +30,8 @@ pub(crate) struct View {
 /// Views of figures by the name of their place on the page.
 pub(crate) type Views = BTreeMap<String, Vec<View>>;
 
-/// The figure with the ranges of its axes as said. Panels that share their horizontal axis are
-/// moved together.
+/// The figure with the given ranges of its axes. Panels that share their horizontal axis are moved
+/// together.
 pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
     for View { panel, x, y } in views {
         let column = panel % figure.cols.max(1);
@@ -49,13 +48,13 @@ pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
     figure
 }
 
-/// A figure as the page takes it.
+/// A figure in the form that the page reads.
 pub(crate) fn drawn(figure: &Figure) -> Result<Value, Refusal> {
     let (svg, map) = figure.to_svg_with_map().map_err(Refusal::of)?;
     Ok(json!({ "svg": svg, "map": map }))
 }
 
-/// A figure in a format by its ending.
+/// A figure in a format, given by its file extension.
 pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Vec<u8>), Refusal> {
     Ok(match format {
         "svg" => (
@@ -74,8 +73,8 @@ pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Ve
     })
 }
 
-/// What is drawn, point by point, in the units of the axes. The axes' names stand in the first
-/// lines; of a map, the last column is what is at the middle of each cell.
+/// The data of a figure, point by point, in the units of the axes. The first lines have the names
+/// of the axes; for a map, the last column is the value at the centre of each cell.
 fn csv(figure: &Figure) -> String {
     let mut text = String::new();
     for (k, panel) in figure.panels.iter().enumerate() {
@@ -150,7 +149,7 @@ fn grid(
     }
 }
 
-/// A word as a field of CSV.
+/// A text as a CSV field.
 fn field(word: &str) -> String {
     let word = word.replace('$', "");
     if word.contains([',', '"', '\n']) {
@@ -160,7 +159,7 @@ fn field(word: &str) -> String {
     }
 }
 
-/// The newest figures of studies.
+/// The most recent figures of studies.
 #[derive(Default)]
 pub(crate) struct Shelf(Mutex<Kept>);
 
@@ -172,7 +171,7 @@ struct Kept {
 }
 
 impl Shelf {
-    /// Keeps a figure; the number under which it is found, while it is among the newest.
+    /// Stores a figure and returns its number, which is valid while it is among the most recent.
     pub(crate) fn put(&self, figure: Figure) -> u64 {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         kept.last += 1;
@@ -193,14 +192,14 @@ impl Shelf {
     }
 }
 
-/// A figure that was drawn before, asked for in another part or as a file.
+/// Request for a stored figure, in another range or as a file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
     number: u64,
     #[serde(default)]
     views: Vec<View>,
-    /// Empty: for the page.
+    /// File format; empty: for the page.
     #[serde(default)]
     format: String,
 }

@@ -9,24 +9,24 @@ use serde::Serialize;
 
 use crate::answer::Refusal;
 
-/// Instants a drive period.
+/// Instants per drive period.
 const INSTANTS: usize = 90;
 /// Points along the beam.
 const ALONG: usize = 33;
-/// Length of the tip as it is drawn, as a part of the range of heights.
+/// Length of the drawn tip, relative to the range of heights.
 const TIP: f64 = 0.18;
-/// Steps in the range of heights, more than a screen has points.
+/// Steps in the range of heights, more than a screen has pixels.
 const STEPS: f64 = 5000.0;
 
-/// What the page draws, instant by instant. Heights are over the undeformed sample, in the
-/// model's unit of length; the beam is lifted by the length of the tip as drawn.
+/// The data that the page draws, instant by instant. Heights are above the undeformed sample, in
+/// the model's unit of length; the beam is lifted by the length of the drawn tip.
 #[derive(Debug, Serialize)]
 pub(crate) struct Film {
-    /// Drive periods shown; then it begins again.
+    /// Number of drive periods before the film repeats.
     periods: usize,
-    /// What the whole numbers below count, in the model's unit of length.
+    /// Step of the whole numbers below, in the model's unit of length.
     step: f64,
-    /// Heights along the beam, clamp to free end; of an oscillator its mass, a constant.
+    /// Heights along the beam, clamp to free end; for an oscillator its mass, a constant.
     beam: Vec<Vec<i32>>,
     apex: Vec<i32>,
     surface: Vec<i32>,
@@ -35,7 +35,7 @@ pub(crate) struct Film {
     range: [f64; 2],
     /// Height of the undeflected beam.
     rest: f64,
-    /// What the height of the picture measures.
+    /// Text on the scale of heights.
     scale: String,
     /// Whether there is a beam.
     is_beam: bool,
@@ -62,7 +62,7 @@ pub(crate) fn film(
         let [_, tip, _, height, _, touching, state @ ..] = row else {
             return;
         };
-        // Where the base is, as the tip's height over the sample shows it.
+        // Height of the base, from the tip's height above the sample.
         let clamp = if is_beam { height - tip } else { *height };
         let heights: Vec<f64> = shapes
             .iter()
@@ -86,7 +86,7 @@ pub(crate) fn film(
         contact.push(u8::from(touching));
     })
     .map_err(Refusal::of)?;
-    // The last instant is the first one again.
+    // The last instant equals the first one.
     beam.truncate(periods * INSTANTS);
     let tip = TIP * (high - low).max(f64::MIN_POSITIVE);
     let height = high - low;
@@ -113,7 +113,7 @@ pub(crate) fn film(
     })
 }
 
-/// φ_1 … φ_N at points along the beam; of an oscillator nothing at each.
+/// φ_1 … φ_N at points along the beam; empty for an oscillator.
 fn shapes(modes: usize) -> Result<Vec<Vec<f64>>, Refusal> {
     if modes == 0 {
         return Ok(vec![Vec::new(); ALONG]);

@@ -1,4 +1,4 @@
-//! The forms of the studies: their fields and first values.
+//! The forms of the studies: their fields and initial values.
 
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::knobs;
 use crate::maps::Shows;
 
-/// The fields of the forms with their first values.
+/// The fields of the forms with their initial values.
 pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
     let keys: Vec<Key> = knobs::keys(case)
         .filter(|key| key.cannot_vary().is_none() && case.get(*key).is_finite())
@@ -57,7 +57,7 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         ]
     };
     let velocity = (names.len() - model.memory) / 2;
-    // A lever of high Q answers in a narrow band.
+    // A lever with high Q responds in a narrow band.
     let band = case.physical().map_or(0.25, |view| {
         (4.0 / view.lever.quality_factor).clamp(1e-3, 0.25)
     });
@@ -83,7 +83,7 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
     })
 }
 
-/// A range around the value of a key, as it is typed.
+/// A range around the value of a key, as text.
 fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {
     let value = base.get(key);
     let value = if value.is_finite() {

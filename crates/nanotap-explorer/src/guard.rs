@@ -1,7 +1,7 @@
-//! Who may ask: the browser of the person who started the explorer, and nobody else.
+//! Access control: only the browser of the user who started the explorer is served.
 //!
 //! A page of another site can make a browser send requests to this machine. It cannot read the
-//! token, cannot set the header that carries it, and names itself in `Origin`; a name that was
+//! token, cannot set the header that carries it, and is named in `Origin`; a host name that was
 //! rebound to this machine shows in `Host`.
 
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::App;
 
 /// The header that carries the token.
 pub(crate) const TOKEN_HEADER: &str = "x-nanotap-token";
-/// Everything comes from this server; nothing is written into the page as code or style.
+/// Everything is loaded from this server; the page has no inline code or style.
 const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
     img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'none'";
@@ -27,7 +27,7 @@ pub(crate) fn new_token() -> Result<String, String> {
     Ok(format!("{:032x}", u128::from_be_bytes(bytes)))
 }
 
-/// Lets a request through, or says why not; adds the headers that keep the page to itself.
+/// Accepts a request or refuses it with a reason; adds the security headers.
 pub(crate) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut response = match refusal(&app, &request) {
         Some((status, words)) => (status, words).into_response(),
@@ -72,7 +72,7 @@ fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
     } else if path == "/" {
         token_of(request.uri().query())
     } else {
-        // The page's own scripts and styles hold no secret.
+        // The page's own scripts and styles are not secret.
         return None;
     };
     if given.is_some_and(|given| same(given, &app.token)) {
@@ -94,7 +94,7 @@ fn token_of(query: Option<&str>) -> Option<&str> {
         .find_map(|part| part.strip_prefix("token="))
 }
 
-/// Compares in a time that does not tell how much agrees.
+/// Compares in a time that does not depend on the length of the common prefix.
 fn same(given: &str, expected: &str) -> bool {
     given.len() == expected.len()
         && given

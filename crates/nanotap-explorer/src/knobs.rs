@@ -1,4 +1,4 @@
-//! The knobs of a case, from the table of its keys.
+//! The controls of a case, from the table of its keys.
 
 use nanotap::case::key::{ModelKind, Section, Takes};
 use nanotap::case::physical::Catalogue;
@@ -8,7 +8,7 @@ use nanotap::model::contact::ContactLaw;
 use nanotap_volterra::laws::TABLE;
 use serde::Serialize;
 
-/// A key of the case as the page shows it.
+/// A key of the case as shown by the page.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Knob {
     name: &'static str,
@@ -16,28 +16,28 @@ pub(crate) struct Knob {
     title: &'static str,
     symbol: &'static str,
     meaning: &'static str,
-    /// The value as it is typed; empty where the case does not state it.
+    /// The value as text; empty if the case does not state it.
     value: String,
-    /// The same as a number in `unit`.
+    /// The value as a number in `unit`.
     number: Option<f64>,
     unit: String,
-    /// What it may be, where it takes one of some words.
+    /// The options, if the key is a choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     choices: Option<Vec<Choice>>,
-    /// Whether it may be a sum of such words.
+    /// Whether a sum of options is allowed.
     sums: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     slider: Option<Slider>,
 }
 
-/// One of some words.
+/// An option of a choice.
 #[derive(Clone, Debug, Serialize)]
 struct Choice {
     word: String,
     meaning: String,
 }
 
-/// The range of a slider, in the knob's unit.
+/// The range of a slider, in the unit of the control.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Slider {
     from: f64,
@@ -45,18 +45,18 @@ struct Slider {
     log: bool,
 }
 
-/// A slider's ends are the value over this and times this.
+/// The ends of a slider are the value divided by and multiplied by this factor.
 const REACH: f64 = 8.0;
-/// Most modes that a slider offers.
+/// Largest number of modes of a slider.
 const MODES: usize = 10;
 
-/// The knobs of `case`: every key that its kind takes. Sliders stay where the values of `base`
-/// put them, so that a dragged one does not move under the hand.
+/// The controls of `case`: every key of its kind. The ranges of sliders follow from the values of
+/// `base`, so that a slider does not jump while it is dragged.
 pub(crate) fn of(case: &Case, base: &Case) -> Vec<Knob> {
     keys(case).map(|key| knob(case, base, key)).collect()
 }
 
-/// The keys that the kind of `case` takes.
+/// The keys of the kind of `case`.
 pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
     let kind = if case.oscillator().is_none() {
         ModelKind::Cantilever
@@ -67,9 +67,9 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
     };
     let physical = case.is_physical();
     Key::all().filter(move |key| {
-        // Another kind of model is another case.
+        // Another kind of model is a separate case.
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
-        // A curve is no knob.
+        // A table has no control.
         let curve = key.entry().takes == Takes::Table;
         let beside = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {
@@ -128,12 +128,12 @@ fn knob(case: &Case, base: &Case, key: Key) -> Knob {
     }
 }
 
-/// Without the last digits, which changes of unit spoil.
+/// The number without its last digits, which conversions of units make inexact.
 fn rounded(number: f64) -> f64 {
     format!("{number:.7e}").parse().unwrap_or(number)
 }
 
-/// The word that a key has.
+/// The value of a key that is a choice.
 fn word(case: &Case, key: Key) -> String {
     let stated = case.stated(key).map(nanotap::case::Value::text);
     let Some(cantilever) = case.cantilever() else {
@@ -150,7 +150,7 @@ fn word(case: &Case, key: Key) -> String {
     }
 }
 
-/// What a key may be, where that is one of some words.
+/// The options of a key, if it is a choice.
 fn choices(key: Key) -> Option<Vec<Choice>> {
     let catalogue = Catalogue::shared();
     let plain = |words: Vec<String>| {
@@ -203,7 +203,7 @@ const fn formula(law: ContactLaw) -> &'static str {
     }
 }
 
-/// Around a value above zero its eighth to its eightfold; else both signs, or up from zero.
+/// From an eighth of a positive value to eight times the value; otherwise both signs, or from zero.
 fn range(key: Key, size: f64) -> Slider {
     let allowed = key.range();
     let size = if size > 0.0 { size } else { 1.0 };

@@ -1,10 +1,10 @@
-//! The browser explorer: a page on this machine where a person turns the knobs of a case and
-//! sees at once what the tip does.
+//! The browser explorer: a page on this machine on which a user changes the parameters of a case
+//! and sees the motion of the tip at once.
 //!
-//! The server is a front end like the terminal: it turns what the page sends into a case and a
-//! study's options, and a report into words and drawn figures. It listens on the loopback
-//! interface only, answers only who knows the token that it was started with, reads nothing
-//! from disk but the case that was named, and ends work whose client has gone.
+//! The server is a front end like the terminal: it translates the page's requests into a case and a
+//! study's options, and a report into text and figures. It listens on the loopback interface only,
+//! accepts only requests with the token that it was started with, reads no file except the given
+//! case, and stops computations whose client has disconnected.
 
 #![cfg_attr(
     test,
@@ -49,36 +49,36 @@ use crate::preset::Preset;
 use crate::scratch::Scratch;
 use crate::work::Workers;
 
-/// Longest request that is read, in bytes; a case file and its options are far shorter.
+/// Largest request, in bytes; a case file and its options are far smaller.
 const LONGEST_REQUEST: usize = 256 << 10;
 
-/// What the explorer shows first, and where it listens.
+/// The initial case of the explorer, and its port.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The case file shown first; without one, the paper's case.
+    /// Path of the initial case file; `None`: the paper's case.
     pub case: Option<PathBuf>,
-    /// Changes to it, as in `omega=20`.
+    /// Changes to the case, such as `omega=20`.
     pub set: Vec<String>,
-    /// The port; 0: any that is free.
+    /// Port; 0: any that is free.
     pub port: u16,
 }
 
-/// What every request shares.
+/// State shared by all requests.
 pub(crate) struct App {
     pub(crate) token: String,
     pub(crate) port: u16,
     pub(crate) presets: Vec<Preset>,
     pub(crate) workers: Workers,
-    /// Figures of studies that may be asked for again.
+    /// Recent figures of studies.
     pub(crate) figures: Shelf,
-    /// Where datasets of studies stand while their figures are drawn.
+    /// Folder of the datasets of studies while their figures are drawn.
     pub(crate) scratch: PathBuf,
 }
 
-/// Serves the explorer until Ctrl-C or the system's wish that it ends; `ready` gets the address to open.
+/// Serves the explorer until Ctrl-C or SIGTERM; `ready` receives the address to open.
 ///
 /// # Errors
-/// When the case cannot be read or the port not be listened on.
+/// If the case cannot be read or the port cannot be opened.
 pub fn serve(options: &Options, ready: impl FnOnce(&str)) -> Result<(), Error> {
     let presets = preset::all(options.case.as_deref(), &options.set)?;
     let failed = |error: std::io::Error| Error::files(format!("the server stopped: {error}"));
@@ -115,7 +115,7 @@ pub fn serve(options: &Options, ready: impl FnOnce(&str)) -> Result<(), Error> {
             () = stopped.notified() => Ok(()),
         }
     });
-    // Work under way is waited for by nobody.
+    // Running computations are not waited for.
     runtime.shutdown_background();
     served
 }

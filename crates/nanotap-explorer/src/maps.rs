@@ -1,5 +1,5 @@
-//! Maps over two parameters: which motions there are, how hard the sample is hit, how many motions
-//! coexist.
+//! Maps over two parameters: the motions, the peak force on the sample, or the number of coexisting
+//! motions.
 
 use nanotap::dataset::{Store, StoreError, Values};
 use nanotap::figure::sweep::figure as sweep_figure;
@@ -10,19 +10,19 @@ use serde_json::Value;
 use nanotap::case::quantity::Kind;
 use nanotap::case::units::prefixed;
 
-/// What a map shows.
+/// Quantity shown by a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Shows {
-    /// Which motions were found.
+    /// The motions that were found.
     #[default]
     Motions,
-    /// The greatest force of any of them on the tip.
+    /// The largest peak force of any of them.
     Force,
-    /// How many there are.
+    /// The number of motions.
     States,
 }
 
-/// What numbers of motions are called and coloured.
+/// Labels and colours of the numbers of motions.
 const COLOURS: [(&str, Colour); 4] = [
     ("one", Colour::rgb(222, 235, 247)),
     ("two", Colour::ORANGE),
@@ -30,7 +30,7 @@ const COLOURS: [(&str, Colour); 4] = [
     ("more", Colour::BLACK),
 ];
 
-/// Amplitudes that differ by less than this part are those of one motion.
+/// Amplitudes with a smaller relative difference belong to the same motion.
 const SAME: f64 = 1e-6;
 
 impl Shows {
@@ -49,7 +49,7 @@ impl Shows {
     }
 }
 
-/// A motion as far as it matters which it is: its class, its period, its amplitude.
+/// Identity of a motion: its class, its period, its amplitude.
 type Met = (u8, i32, f64);
 
 /// The map of a sweep over two parameters.
@@ -72,7 +72,8 @@ pub(crate) fn figure(store: &Store, shows: Shows) -> Result<Figure, StoreError> 
     Ok(figure)
 }
 
-/// Hands over each motion: the index of its place on the map, and its values of the variables.
+/// Calls a function for each motion with the index of its place on the map and its values of the
+/// variables.
 fn each(
     store: &Store,
     variables: &[&str],
@@ -135,8 +136,8 @@ fn force(store: &Store, grid: &CategoryMap) -> Result<Heatmap, StoreError> {
     ))
 }
 
-/// How many different motions were found at each place; those that the orbits of neighbouring
-/// places lead to are among them.
+/// The number of different motions at each place, including those continued from neighbouring
+/// places.
 fn states(store: &Store, grid: &CategoryMap) -> Result<CategoryMap, StoreError> {
     let mut found: Vec<Vec<Met>> = vec![Vec::new(); grid.columns * grid.rows];
     let mut meet = |at: usize, (code, period, amplitude): Met| {
@@ -145,7 +146,7 @@ fn states(store: &Store, grid: &CategoryMap) -> Result<CategoryMap, StoreError> 
         };
         let same = |met: &Met| {
             let near = (met.2 - amplitude).abs() <= SAME * amplitude.abs();
-            // What does not repeat has no amplitude that is always the same.
+            // A motion that does not repeat has no fixed amplitude.
             met.0 == code && met.1 == period && (period == 0 || near)
         };
         if !motions.iter().any(same) {

@@ -1,4 +1,4 @@
-//! One motion: its figures, its film, what is measured of it, and how to get it elsewhere.
+//! One motion: its figures, its film, its observables, and equivalent commands.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use crate::figures::{Views, drawn, viewed};
 use crate::film::film;
 use crate::{App, commands, forms, knobs};
 
-/// Most drive periods that the film and the figures of a motion without a period show.
+/// Largest number of drive periods in the film and the figures of a motion without a period.
 const LONGEST: usize = 16;
 /// Drive periods of a run of fixed steps.
 const FIXED_PERIODS: usize = 64;
@@ -35,7 +35,7 @@ const FIXED_PERIODS: usize = 64;
 /// A motion that was found.
 pub(crate) enum Motion {
     Orbit(Box<OrbitReport>),
-    /// It does not close.
+    /// A motion that does not close.
     Run(Box<Simulation>),
 }
 
@@ -67,7 +67,7 @@ impl Motion {
         }
     }
 
-    /// Time series, phase portrait, harmonics and multipliers: what the terminal writes.
+    /// Time series, phase portrait, harmonics and multipliers, as the terminal draws them.
     pub(crate) fn figure(&self, model: &Model, case: &Case) -> Figure {
         match self {
             Self::Orbit(orbit) => orbit_figure(model, orbit, &case.units()),
@@ -75,7 +75,7 @@ impl Motion {
         }
     }
 
-    /// Height and force in time, force against height.
+    /// Height and force against time, force against height.
     pub(crate) fn contact_figure(&self, model: &Model, case: &Case) -> Figure {
         let trajectory = match self {
             Self::Orbit(orbit) => &orbit.trajectory,
@@ -98,7 +98,7 @@ impl Motion {
         }
     }
 
-    /// The study that gives it at the terminal.
+    /// The study that computes it at the terminal.
     const fn study(&self) -> &'static str {
         match self {
             Self::Orbit(_) => "orbit",
@@ -106,7 +106,7 @@ impl Motion {
         }
     }
 
-    /// What it is, in a sentence.
+    /// A sentence that describes the motion.
     fn words(&self) -> String {
         match self {
             Self::Orbit(orbit) => {
@@ -152,14 +152,14 @@ fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refu
         "figure": unlettered(motion.figure(&model, &case), &asked.views, "portrait")?,
         "contact": unlettered(motion.contact_figure(&model, &case), &asked.views, "contact")?,
         "film": film(&case, &model, motion.state(), motion.periods())?,
-        "fixed_step": fixed_step(&case, &model, asked.steps, start.state)?,
+        "fixed_step": fixed_step(&case, &model, asked.steps, start.state, control)?,
         "forms": forms::forms(&case, &base, &model),
         "command": commands::command(app, asked, motion.study())?,
         "python": commands::python(app, asked, motion.study())?,
     }))
 }
 
-/// The page says what a figure is about; letters are for what is published.
+/// The figure without panel letters, which are for publications; the page has headings.
 fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, Refusal> {
     let figure = figure.letters(false);
     match views.get(name) {
@@ -168,8 +168,7 @@ fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, Refusa
     }
 }
 
-/// Every observable that the motion has and that is one number: as the terminal's `--json` has
-/// it, and in words with its unit.
+/// Every scalar observable of the motion: as in the terminal's `--json`, and as text with its unit.
 fn rows(case: &Case, observables: &Observables) -> Vec<Value> {
     let units = case.units();
     OBSERVABLES
@@ -202,12 +201,13 @@ fn rows(case: &Case, observables: &Observables) -> Vec<Value> {
         .collect()
 }
 
-/// What fixed Runge–Kutta steps make of the case; nothing where nobody asks.
+/// The result of fixed Runge–Kutta steps; empty if not requested.
 fn fixed_step(
     case: &Case,
     model: &Model,
     steps: u32,
     state: Option<Vec<f64>>,
+    control: &Control<'_>,
 ) -> Result<Option<Value>, Refusal> {
     if steps == 0 {
         return Ok(None);
@@ -219,10 +219,10 @@ fn fixed_step(
         state,
         ..SimulateRequest::default()
     };
-    let run = match SimulateStudy::run(case, &request, &Control::default()) {
+    let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,
         Ok(SimulateReport::Exact(_)) => return Ok(None),
-        // Too few steps: the exact motion beside it stands.
+        // With too few steps only the exact motion is shown.
         Err(error) => return Ok(Some(json!({ "words": error.to_string() }))),
     };
     let shown = run.apparent_period.map_or_else(

@@ -1,4 +1,4 @@
-//! The cases that the page offers: the one that was named, the paper's, the worked ones.
+//! The cases that the page offers: the given one, the paper's, the worked ones.
 
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -21,11 +21,11 @@ pub(crate) struct Preset {
     pub(crate) name: String,
     pub(crate) words: String,
     pub(crate) text: String,
-    /// Words put in place of what the text says.
+    /// Changes to the text, `key=value`.
     pub(crate) set: Vec<String>,
-    /// The path to give at the terminal; empty of a built-in case.
+    /// The path for commands; empty for a built-in case.
     pub(crate) path: String,
-    /// The case at its setpoint, once somebody has asked for it.
+    /// The case at its setpoint, once it was requested.
     pub(crate) solved: OnceLock<Case>,
 }
 
@@ -38,7 +38,7 @@ impl Preset {
     }
 }
 
-/// The built-in ones: name, words, text, what is set.
+/// The built-in cases: name, description, text, changes.
 const BUILT_IN: [(&str, &str, &str, &[&str]); 13] = [
     (
         "paper",
@@ -147,7 +147,7 @@ pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, na
     Ok(presets)
 }
 
-/// A case as the page sends it.
+/// A case as requested by the page.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wanted {
@@ -170,7 +170,7 @@ impl Wanted {
             })
     }
 
-    /// The words put in place of what the preset's text says, each key once.
+    /// The changes to the preset's text, each key once.
     pub(crate) fn words(&self, preset: &Preset) -> Vec<String> {
         let key = |word: &String| word.split('=').next().unwrap_or_default().trim().to_owned();
         let mut words: Vec<String> = preset
@@ -183,8 +183,7 @@ impl Wanted {
         words
     }
 
-    /// The case, checked as the terminal does, with the distance left open where a setpoint
-    /// is to tell it.
+    /// The case, checked as at the terminal, without solving for the distance of a setpoint.
     pub(crate) fn any_distance(&self, app: &App) -> Result<Case, Refusal> {
         let preset = self.preset(app)?;
         let case = Case::parse(Some(preset.source()), &self.words(preset)).map_err(Refusal::of)?;
@@ -196,25 +195,29 @@ impl Wanted {
         })
     }
 
-    /// The same, at its setpoint.
+    /// The case at its setpoint; its motions end once `control` cancels the work.
     pub(crate) fn case(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
-        Ok(at_setpoint(self.any_distance(app)?, control)
-            .map_err(Refusal::of)?
-            .0)
+        Ok(self.at_setpoint(app, control)?.cancelled_by(control))
     }
 
-    /// The case as the preset has it.
+    fn at_setpoint(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+        let solved = at_setpoint(self.any_distance(app)?, control);
+        Ok(solved.map_err(Refusal::of)?.0)
+    }
+
+    /// The case of the preset, without changes; its motions end once `control` cancels the work.
     pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
         let solved = &self.preset(app)?.solved;
         if let Some(case) = solved.get() {
-            return Ok(case.clone());
+            return Ok(case.cancelled_by(control));
         }
         let unchanged = Self {
             preset: self.preset.clone(),
             set: Vec::new(),
         };
-        let case = unchanged.case(app, control)?;
-        Ok(solved.get_or_init(|| case).clone())
+        // Other requests share it: it does not carry what cancels this one.
+        let case = unchanged.at_setpoint(app, control)?;
+        Ok(solved.get_or_init(|| case).cancelled_by(control))
     }
 }
 
@@ -227,7 +230,7 @@ fn changed(word: &str) -> String {
     }
 }
 
-/// What the page needs to begin.
+/// The data with which the page starts.
 pub(crate) async fn about(State(app): State<Arc<App>>) -> Json<Value> {
     let presets: Vec<Value> = app
         .presets

@@ -6,20 +6,20 @@ use std::time::Duration;
 
 use nanotap::Error;
 
-/// How often and after which pause a folder is tried to be removed.
+/// Number of attempts to remove a folder, and the pause between them.
 const ATTEMPTS: usize = 20;
 const PAUSE: Duration = Duration::from_millis(25);
 
-/// A folder of this process alone.
+/// A temporary folder of this process.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
-    /// One among the system's temporary files.
+    /// Creates one in the system's folder of temporary files.
     pub(crate) fn new() -> Result<Self, Error> {
         Self::within(&std::env::temp_dir())
     }
 
-    /// One in `folder`.
+    /// Creates one in `folder`.
     pub(crate) fn within(folder: &Path) -> Result<Self, Error> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -36,8 +36,8 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // Work that was stopped may write one last file. What cannot be removed is left to the
-        // system, which empties that folder.
+        // A cancelled computation may write one last file. A folder that cannot be removed is left
+        // to the system, which cleans up its temporary files.
         for _ in 0..ATTEMPTS {
             match std::fs::remove_dir_all(&self.0) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

@@ -1,8 +1,6 @@
-//! How the motion changes: the terminal's own studies, coarse first and finer as long as nobody
-//! stops them.
+//! The terminal's studies, in stages of increasing resolution until they are cancelled.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use axum::Json;
 use axum::extract::State;
@@ -35,26 +33,26 @@ use crate::maps::{self, Shows};
 use crate::preset::Wanted;
 use crate::scratch::Scratch;
 
-/// Values of the parameter in the stages of a diagram.
+/// Numbers of values of the parameter in the stages of a diagram.
 const DIAGRAM: [usize; 3] = [30, 120, 400];
-/// Values each way in the stages of a map.
+/// Numbers of values along each axis in the stages of a map.
 const MAP: [usize; 3] = [8, 20, 48];
-/// Points each way in the stages of a basin.
+/// Numbers of points along each axis in the stages of a basin.
 const BASIN: [usize; 3] = [40, 120, 300];
-/// Distances each way in the stages of an approach.
+/// Numbers of distances in each direction in the stages of an approach curve.
 const APPROACH: [usize; 2] = [40, 150];
-/// Values at which a census is taken in the stages of a diagram of branches.
+/// Numbers of values with a census in the stages of a diagram of branches.
 const BRANCHES: [usize; 2] = [5, 15];
-/// Values at which a census is taken for branches that are drawn over another figure.
+/// Number of values with a census for branches that are drawn over another figure.
 const OVERLAID: usize = 7;
-/// What the panels of an approach show.
+/// Observables in the panels of an approach curve.
 const APPROACH_SHOWS: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
-/// Starts at each value of a diagram, and of a map.
+/// Initial states at each value of a diagram, and of a map.
 const STARTS: (usize, usize) = (6, 3);
 /// Drive periods recorded at each value.
 const RECORDED: usize = 32;
 
-/// A study as the page asks for it: its fields by name.
+/// A study as requested by the page: its fields by name.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Asked {
@@ -65,7 +63,7 @@ pub(crate) struct Asked {
     options: Map<String, Value>,
 }
 
-/// What is studied.
+/// The kind of study.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Tab {
@@ -90,7 +88,7 @@ pub(crate) async fn study(State(app): State<Arc<App>>, Json(asked): Json<Asked>)
     })
 }
 
-/// A study under way.
+/// A running study.
 struct Studied<'a> {
     app: &'a App,
     asked: &'a Asked,
@@ -103,11 +101,11 @@ struct Stage<'a> {
     figure: Figure,
     clicks: &'a Value,
     words: String,
-    /// Names and requests of the studies that it shows.
+    /// Names and requests of the studies in its figure.
     studies: &'a [Asking<'a>],
 }
 
-/// A study by its name, and what it is asked for.
+/// The name of a study, and its request.
 type Asking<'a> = (&'a str, &'a Map<String, Value>);
 
 impl Studied<'_> {
@@ -130,7 +128,7 @@ impl Studied<'_> {
         })
     }
 
-    /// `key=from:to:count` as the terminal takes it, and what was read.
+    /// `key=from:to:count` in the terminal's form, and the parsed range.
     fn over(&self, case: &Case, which: &str, count: usize) -> Result<(String, Over), Refusal> {
         let [key, from, to] =
             ["key", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
@@ -155,7 +153,7 @@ impl Studied<'_> {
         Ok(())
     }
 
-    /// A dataset of a study, in a folder that is removed when the figure is drawn.
+    /// A dataset of a study, in a folder that is removed once the figure is drawn.
     fn dataset<T>(
         &self,
         case: &Case,
@@ -246,7 +244,7 @@ impl Studied<'_> {
         Ok(())
     }
 
-    /// What there is over two parameters.
+    /// The motions over two parameters.
     fn map(&self) -> Result<(), Refusal> {
         let case = self.asked.case.case(self.app, self.control)?;
         model_of(&case)?;
@@ -275,7 +273,7 @@ impl Studied<'_> {
         Ok(())
     }
 
-    /// The branches over a parameter through what censuses at so many values find.
+    /// The branches over a parameter through the attractors of censuses at `values` of its values.
     fn followed(
         &self,
         case: &Case,
@@ -298,8 +296,7 @@ impl Studied<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        let cancel = self.control.cancel;
-        cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+        self.control.is_cancelled()
     }
 
     fn branches(&self) -> Result<(), Refusal> {
@@ -385,7 +382,7 @@ impl Studied<'_> {
             if let Some(state) = &origin {
                 request.insert("state".into(), json!(state));
             }
-            // A click starts a run there: the slice's own state with two entries replaced.
+            // A click starts a run there: the state of the slice with two entries replaced.
             let start: Vec<Value> = names
                 .iter()
                 .enumerate()

@@ -1,30 +1,29 @@
-//! Work for a request: off the threads that serve, few pieces at a time, and ended when its
-//! client has gone.
+//! Computations for requests: on separate threads, few at a time, and cancelled when the client
+//! disconnects.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 
 use crate::answer::Refusal;
 
-/// Motions computed at once.
+/// Number of motions computed at once.
 const MOTIONS: usize = 2;
-/// Studies computed at once; each uses every core by itself.
+/// Number of studies computed at once; each uses all cores.
 const STUDIES: usize = 2;
-/// Longest time that one request is worked on.
+/// Longest time of a computation.
 const LONGEST: Duration = Duration::from_secs(300);
-/// Messages that may wait for a slow client; a study has fewer stages.
+/// Number of messages that may wait for a slow client; a study has fewer stages.
 const WAITING: usize = 64;
 
-/// The places in which requests are worked on: a long study holds up no motion.
+/// Limits of the computations: a long study does not delay motions.
 pub(crate) struct Workers {
     motions: Arc<Semaphore>,
     studies: Arc<Semaphore>,
@@ -39,16 +38,16 @@ impl Default for Workers {
     }
 }
 
-/// Stops the work when dropped, as happens when the client goes away.
-struct StopOnDrop(Arc<AtomicBool>);
+/// Stops the computation when dropped, which happens when the client disconnects.
+struct StopOnDrop(CancelFlag);
 
 impl Drop for StopOnDrop {
     fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.cancel();
     }
 }
 
-fn control(stop: &AtomicBool) -> Control<'_> {
+fn control(stop: &CancelFlag) -> Control<'_> {
     Control {
         cancel: Some(stop),
         progress: None,
@@ -56,7 +55,7 @@ fn control(stop: &AtomicBool) -> Control<'_> {
 }
 
 impl Workers {
-    /// Runs `work` that follows a dragged knob, and waits for what it gives.
+    /// Runs `work` that follows a slider, and waits for its result.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
@@ -64,7 +63,7 @@ impl Workers {
         Self::run_in(&self.motions, work).await
     }
 
-    /// Runs `work` that may take long, beside the studies.
+    /// Runs `work` that may take long, within the limit of the studies.
     pub(crate) async fn run_long<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
@@ -77,8 +76,8 @@ impl Workers {
         work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Refusal> {
         let place = Arc::clone(places).acquire_owned().await;
-        let stop = Arc::new(AtomicBool::new(false));
-        let _guard = StopOnDrop(Arc::clone(&stop));
+        let stop = CancelFlag::new();
+        let _guard = StopOnDrop(stop.clone());
         let task = tokio::task::spawn_blocking(move || {
             let _place = place;
             work(&control(&stop))
@@ -90,7 +89,7 @@ impl Workers {
         }
     }
 
-    /// Runs `work` and sends what it hands over as lines of JSON, as they come.
+    /// Runs `work` and sends its results as lines of JSON as they come.
     pub(crate) fn stream(
         &self,
         work: impl FnOnce(&Control<'_>, &dyn Fn(Value)) -> Result<(), Refusal> + Send + 'static,
@@ -103,14 +102,14 @@ impl Workers {
                 place = places.acquire_owned() => place,
                 () = gone.closed() => return,
             };
-            let stop = Arc::new(AtomicBool::new(false));
-            let guard = StopOnDrop(Arc::clone(&stop));
+            let stop = CancelFlag::new();
+            let guard = StopOnDrop(stop.clone());
             let task = tokio::task::spawn_blocking(move || {
                 let _place = place;
                 let hand_over = |value: Value| {
-                    // A client that went away, or does not read, stops the work.
+                    // A client that disconnects, or does not read, stops the computation.
                     if sender.try_send(Ok(format!("{value}\n"))).is_err() {
-                        stop.store(true, Ordering::Relaxed);
+                        stop.cancel();
                     }
                 };
                 if let Err(refusal) = work(&control(&stop), &hand_over) {

@@ -1,5 +1,5 @@
-//! Draws typical figures in every format and says how long each took and how large it is:
-//! `cargo run --release -p nanotap-figures --example formats FOLDER`.
+//! Draws typical figures in every format and prints the time and the size of each: `cargo run
+//! --release -p nanotap-figures --example formats FOLDER`.
 
 #![allow(
     clippy::disallowed_methods,

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             figure.write(folder.join(format!("{name}.{ending}")))?;
         }
     }
-    // What cannot be drawn is refused with a reason.
+    // A figure that cannot be drawn is refused with a reason.
     if let Err(FigureError::UnknownEnding { path }) = bifurcation().write(folder.join("figure.gif"))
     {
         println!("{} was refused as it should be", path.display());
@@ -121,7 +121,7 @@ fn time_series() -> Figure {
         )
 }
 
-/// 100,000 points of the logistic map, a bifurcation diagram that everyone knows.
+/// 100,000 points of the logistic map, a well-known bifurcation diagram.
 fn bifurcation() -> Figure {
     let mut points = Vec::with_capacity(100_000);
     for i in 0..500 {
@@ -383,7 +383,7 @@ fn stacked() -> Figure {
         )
 }
 
-/// Input that trips plotting programs.
+/// Input that breaks plotting programs.
 fn awkward() -> Figure {
     Figure::new(2, 3)
         .width(DOUBLE_COLUMN)

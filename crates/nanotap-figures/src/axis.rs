@@ -5,12 +5,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::FigureError;
 use crate::ticks::{self, Ticks};
 
-/// Numbers beyond this count as infinite: differences and logarithms stay safe.
+/// Numbers beyond this magnitude count as infinite, so that differences and logarithms do not
+/// overflow.
 const LARGEST: f64 = 1e300;
-/// Share of the range left free on either side of the data.
+/// Fraction of the range left free on either side of the data.
 const PADDING: f64 = 0.04;
 
-/// Data of less than this part of an axis's natural size are rounding.
+/// Data smaller than this fraction of an axis's natural size are rounding errors.
 pub const ROUNDING: f64 = 1e-9;
 
 /// How values are spaced along an axis.
@@ -28,12 +29,12 @@ pub enum Scale {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Range {
-    /// All data with a little room around them.
+    /// All data, with a margin.
     #[default]
     Auto,
-    /// All data, and no more.
+    /// All data, without a margin.
     Tight,
-    /// From the first to the second value, whatever the data; backwards if the first is larger.
+    /// From the first to the second value, whatever the data; reversed if the first is larger.
     Fixed(f64, f64),
 }
 
@@ -46,22 +47,22 @@ pub enum Range {
 #[serde(default)]
 #[must_use]
 pub struct Axis {
-    /// Words and symbol.
+    /// Label, without the unit.
     pub label: String,
-    /// The unit, shown in brackets behind the label; empty where there is none.
+    /// Unit, shown in brackets after the label; empty if there is none.
     pub unit: String,
     /// How values are spaced.
     pub scale: Scale,
-    /// Which part is drawn.
+    /// Which part of the axis is drawn.
     pub range: Range,
-    /// Marked values and their words; none: round numbers.
+    /// Ticks: values with their labels; `None`: round numbers.
     pub marks: Option<Vec<(f64, String)>>,
-    /// What size of a value matters: see [`Axis::natural`].
+    /// Magnitude of a value that matters: see [`Axis::natural`].
     pub natural: Option<f64>,
 }
 
 impl Axis {
-    /// A linear axis that holds all data with a little room around it.
+    /// A linear axis that contains all data, with a margin.
     pub fn linear(label: impl Into<String>) -> Axis {
         Axis {
             label: label.into(),
@@ -69,7 +70,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis that holds all positive data; the rest are gaps.
+    /// A logarithmic axis that contains all positive data; other values are gaps.
     pub fn log(label: impl Into<String>) -> Axis {
         Axis {
             scale: Scale::Log,
@@ -77,8 +78,8 @@ impl Axis {
         }
     }
 
-    /// Runs from `from` to `to` whatever the data; backwards if `from > to`. Both must be finite,
-    /// different, and positive on a logarithmic axis, or the figure is refused.
+    /// Runs from `from` to `to` whatever the data; reversed if `from > to`. Both must be finite,
+    /// distinct, and positive on a logarithmic axis; otherwise drawing the figure fails.
     pub fn range(mut self, from: f64, to: f64) -> Axis {
         self.range = Range::Fixed(from, to);
         self
@@ -90,20 +91,20 @@ impl Axis {
         self
     }
 
-    /// Marks at the given values with the given words, instead of round numbers.
+    /// Sets ticks at the given values with the given labels, instead of round numbers.
     pub fn marks<S: Into<String>>(mut self, marks: impl IntoIterator<Item = (f64, S)>) -> Axis {
         self.marks = Some(marks.into_iter().map(|(v, s)| (v, s.into())).collect());
         self
     }
 
-    /// The unit, which stands in brackets behind the label.
+    /// Sets the unit, which is shown in brackets after the label.
     pub fn unit(mut self, unit: impl Into<String>) -> Axis {
         self.unit = unit.into();
         self
     }
 
-    /// Says what size of a value matters: data that are all smaller than 10⁻⁹ of it, or differ by
-    /// less, are the rounding of a number, and the axis shows them as such.
+    /// Sets the magnitude of a value that matters: data that are all smaller than 10⁻⁹ of it, or
+    /// differ by less, are rounding errors, and the axis shows them as constant.
     pub fn natural(mut self, size: f64) -> Axis {
         self.natural = Some(size);
         self
@@ -118,12 +119,12 @@ impl Axis {
         }
     }
 
-    /// Whether the axis has marks: not if there are no data and it was given no range.
+    /// Whether the axis has ticks: not if there are no data and no range was given.
     pub(crate) fn marked(&self) -> bool {
         matches!(self.range, Range::Fixed(..)) || self.marks.is_some()
     }
 
-    /// Whether a value has a place on such an axis.
+    /// Whether a value can be shown on the axis.
     pub(crate) fn holds(&self, value: f64) -> bool {
         value.is_finite()
             && value.abs() <= LARGEST
@@ -166,19 +167,19 @@ impl Axis {
     }
 }
 
-/// Whether two ends are too near for a scale of floats between them.
+/// Whether two ends are too close for a scale of floating-point numbers between them.
 fn indistinct(low: f64, high: f64) -> bool {
     high - low <= 1e-11 * low.abs().max(high.abs()) || high - low < 1e-290
 }
 
-/// How far the data of an axis reach.
+/// Extent of the data along an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
-    /// Of data that want room around them.
+    /// Extent of data that need a margin.
     soft: (f64, f64),
-    /// Of what the axis may end with: the feet of bars.
+    /// Extent of items that may touch the end of the axis: the feet of bars.
     hard: (f64, f64),
-    /// Of maps: they fill the panel, and what lies beyond them is not shown.
+    /// Extent of maps: they fill the panel, and nothing beyond them is shown.
     whole: (f64, f64),
 }
 
@@ -262,7 +263,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Where a value lies: 0 at the start of the axis, 1 at its end; none if it has no place.
+    /// Position of a value: 0 at the start of the axis, 1 at its end; `None` if it cannot be shown.
     pub(crate) fn share(self, value: f64) -> Option<f64> {
         if !value.is_finite() || (self.log && value <= 0.0) {
             return None;
@@ -272,7 +273,7 @@ impl View {
         } else {
             (value - self.from) / (self.to - self.from)
         };
-        // Far outside is as good as anywhere outside; drawing needs finite places.
+        // The exact position outside does not matter, but drawing needs finite coordinates.
         share.is_finite().then(|| share.clamp(-1e6, 1e6))
     }
 

@@ -13,21 +13,21 @@ pub(crate) struct Cloud {
     pub(crate) clip: Rect,
 }
 
-/// Up to so many dots, vector formats hold each one.
+/// Up to this number of dots, vector formats contain each one.
 const VECTOR_LIMIT: usize = 3000;
-/// Dots are placed to this part of a pixel; where pixels are so small that nobody sees it, to whole
-/// pixels, because equal dots compress better.
+/// Dots are placed to this fraction of a pixel. Where pixels are too small to be seen they are
+/// placed to whole pixels, because equal dots compress better.
 const PARTS: usize = 4;
 
 impl Cloud {
-    /// The dots as a path of round line ends, if there are few.
+    /// The dots as a path of round line ends, if there are few enough.
     pub(crate) fn path(&self) -> Option<Path> {
         if self.points.len() > VECTOR_LIMIT {
             return None;
         }
         let mut segments = Vec::with_capacity(2 * self.points.len());
         for &p in &self.points {
-            // Some viewers leave out lines of no length at all: a thousandth of a millimetre shows.
+            // Some viewers omit lines of zero length; a thousandth of a millimetre is drawn.
             segments.push(Segment::Move(p));
             segments.push(Segment::Line(Point::new(p.x + 0.001, p.y)));
         }
@@ -44,7 +44,7 @@ impl Cloud {
 
     /// The dots as pixels of a grid of `dpi` dots per inch that starts at the page's top left.
     ///
-    /// Opaque dots merge; translucent ones add up as paint does, so that density shows.
+    /// Opaque dots merge; translucent ones add up, so that the density is visible.
     pub(crate) fn raster(&self, dpi: f64) -> Option<Raster> {
         let scale = dpi / 25.4;
         let radius = self.radius * scale;
@@ -113,7 +113,7 @@ impl Cloud {
     }
 }
 
-/// A dot's pixels, for each part of a pixel in which its centre may lie.
+/// The pixels of a dot, for each sub-pixel position of its centre.
 struct Stamps {
     side: usize,
     parts: usize,
@@ -148,7 +148,8 @@ impl Stamps {
     }
 }
 
-/// How much of the pixel with the corner (`column`, `row`) the disc covers, from 8 × 8 samples.
+/// Fraction of the pixel with the corner (`column`, `row`) that the disc covers, from 8 × 8
+/// samples.
 fn disc_share(centre: Point, radius: f64, column: f64, row: f64) -> f32 {
     const SAMPLES: usize = 8;
     let inside = (0..SAMPLES * SAMPLES)

@@ -1,11 +1,11 @@
-//! Colours that every reader can tell apart.
+//! Colours that readers with any colour vision can distinguish.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// A colour with opacity, in sRGB; in JSON `"#rrggbb"`, or `"#rrggbbaa"` where it is translucent.
+/// A colour with opacity, in sRGB; in JSON `"#rrggbb"`, or `"#rrggbbaa"` if it is translucent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 #[must_use]
@@ -25,7 +25,7 @@ impl Colour {
     pub const BLACK: Colour = Colour::rgb(0, 0, 0);
     /// White: the paper.
     pub const WHITE: Colour = Colour::rgb(255, 255, 255);
-    /// Mid grey: what is undecided or secondary.
+    /// Mid grey: undecided or secondary items.
     pub const GREY: Colour = Colour::rgb(128, 128, 128);
     /// Light grey: bands behind data.
     pub const LIGHT_GREY: Colour = Colour::rgb(226, 226, 226);
@@ -68,7 +68,7 @@ impl Colour {
         }
     }
 
-    /// The same colour mixed with white: 0 leaves it, 1 is white.
+    /// The same colour mixed with white: `share` 0 is the colour, 1 is white.
     pub(crate) fn tint(self, share: f64) -> Colour {
         let mix = |c: u8| (f64::from(c) + (255.0 - f64::from(c)) * share).round() as u8;
         Colour {
@@ -165,11 +165,11 @@ const PERIODS: [Colour; 16] = [
     Colour::rgb(0xb4, 0xf0, 0xa8),
 ];
 
-/// What a motion is, as far as its colour goes.
+/// Kind of a motion, as far as its colour is concerned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[allow(missing_docs)]
 pub enum Motion {
-    /// Of so many drive periods.
+    /// Periodic after this number of drive periods.
     Periodic(usize),
     QuasiPeriodic,
     Chaotic,
@@ -190,8 +190,8 @@ impl fmt::Display for Motion {
 }
 
 impl Motion {
-    /// The colours of motions of which several are of one kind, such as two of period 1: the first
-    /// of a kind has its colour, the others have tints of it.
+    /// The colours of motions of which several may be of one kind, such as two of period 1: the
+    /// first of a kind has the colour of the kind, the others have tints of it.
     pub fn colours(motions: impl IntoIterator<Item = Motion>) -> Vec<Colour> {
         let mut before: Vec<Motion> = Vec::new();
         motions
@@ -204,8 +204,9 @@ impl Motion {
             .collect()
     }
 
-    /// The colour of this motion, the same in every figure. Periods from 1 to 16 and the classes are
-    /// distinct to every reader; longer periods repeat the colours of the sixteen, mixed with white.
+    /// The colour of this motion, the same in every figure. Periods from 1 to 16 and the classes
+    /// can be distinguished by every reader; longer periods repeat these sixteen colours, mixed
+    /// with white.
     pub fn colour(self) -> Colour {
         match self {
             Motion::Periodic(period) => {
@@ -314,9 +315,9 @@ mod tests {
         )
     }
 
-    /// What normal eyes and those with protanopia, deuteranopia and tritanopia make of linear
-    /// intensities (Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15, 1291 (2009),
-    /// severity 1).
+    /// Linear intensities as seen with normal vision, protanopia, deuteranopia and tritanopia
+    /// (Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15, 1291 (2009), severity
+    /// 1).
     const EYES: [[[f64; 3]; 3]; 4] = [
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         [

@@ -16,9 +16,9 @@ use crate::style::{EDGE, INK, Style};
 use crate::symbol::{disc, marker, strokes};
 use crate::text::{Across, MM_PER_POINT, Upright, Words};
 
-/// Steps of a colour scale: a palette's worth.
+/// Steps of a colour scale: as many as a palette holds.
 const STEPS: usize = 255;
-/// How far lines are followed beyond the box, so that their joints are not seen, mm.
+/// Distance to which lines are followed beyond the box, so that their joints are not visible, mm.
 const BEYOND: f64 = 1.0;
 
 pub(crate) fn panel(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
@@ -176,7 +176,7 @@ fn draw_line(scene: &mut Scene, frame: &Frame, line: &Line, colour: Colour) {
     }
     let dash = line.dash.lengths(width);
     let stroke = Stroke {
-        // Round ends let points between gaps show; dashes need cut ends to keep their lengths.
+        // Round ends make points between gaps visible; dashes need cut ends to keep their lengths.
         round: dash.is_empty(),
         dash,
         ..Stroke::solid(width, colour)
@@ -231,7 +231,8 @@ fn band_area(frame: &Frame, from: f64, to: f64, along_x: bool) -> Option<Rect> {
     } else {
         (frame.y, rect.bottom, rect.top)
     };
-    // An end without a place (infinite, or below zero on a logarithmic axis) is the panel's edge.
+    // An end that cannot be shown (infinite, or not positive on a logarithmic axis) is the panel's
+    // edge.
     let share = |value: f64| {
         view.share(value).unwrap_or_else(|| {
             let low = value == f64::NEG_INFINITY || value <= 0.0;
@@ -284,7 +285,7 @@ fn draw_categories(scene: &mut Scene, frame: &Frame, map: &CategoryMap) {
     grid(scene, frame, map.columns, &cells, map.x, map.y);
 }
 
-/// Draws cells given from the smallest x and y on.
+/// Draws cells given in order of increasing x and y.
 fn grid(
     scene: &mut Scene,
     frame: &Frame,
@@ -320,7 +321,7 @@ fn grid(
     }));
 }
 
-/// The box, its marks, their words and the labels.
+/// The box, its ticks with their labels, and the axis labels.
 fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
     let rect = spot.rect;
     scene.stroke(rect.outline(), Stroke::solid(style.axis, INK), None);
@@ -346,7 +347,8 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
             if prepared.words_below {
                 let top = rect.bottom + style.mark + style.pad;
                 for (share, words) in marks.major {
-                    // Powers of ten stand taller than plain numbers: baselines agree nevertheless.
+                    // Powers of ten are taller than plain numbers; their baselines agree all the
+                    // same.
                     let base = Point::new(at(share), top + 1.1 * words.cap_height());
                     scene.words(words.place(base, Across::Centre, Upright::Baseline, INK));
                 }
@@ -413,7 +415,7 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
     });
 }
 
-/// The small lines at an axis; `line` gives the ends for a share of the axis and a length.
+/// The tick lines of an axis; `line` gives their ends for a position on the axis and a length.
 fn mark_lines(
     marks: &Marks,
     style: &Style,
@@ -512,7 +514,7 @@ fn headings(scene: &mut Scene, prepared: &Prepared, spot: &Spot, edge: f64, styl
         edge + 2.0 * style.pad,
         style,
     );
-    // Letters and titles of a row stand on one line, however much lies between them and their box.
+    // Letters and titles of a row share a baseline, whatever lies between them and their box.
     let cap = Words::set("H", style.title, true).cap_height();
     let base = rect.top - spot.sides.top + EDGE / 2.0 + cap;
     if !prepared.panel.title.is_empty() {

@@ -4,34 +4,34 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FigureError {
-    /// The path's ending names no format that can be written.
+    /// No format is known for the file extension.
     #[error(
         "cannot tell a picture format from \"{}\": end the path in .svg, .png or .pdf",
         path.display()
     )]
     UnknownEnding {
-        /// The path as given.
+        /// The given path.
         path: PathBuf,
     },
     /// The file could not be written.
     #[error("cannot write \"{}\": {source}", path.display())]
     Write {
-        /// The path as given.
+        /// The given path.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A figure that could not be read from JSON, or not be written as such.
+    /// A figure could not be read from JSON or written as JSON.
     #[error("this is no figure in JSON: {0}")]
     Json(serde_json::Error),
-    /// The figure's width or height is not a sensible length.
+    /// The figure's width or height cannot be drawn.
     #[error(
         "a figure of {width_mm} mm × {height_mm} mm cannot be drawn: both sides must lie between 10 mm and 2000 mm"
     )]
     Size {
-        /// Width as given, mm.
+        /// Given width, mm.
         width_mm: f64,
-        /// Height as given, mm.
+        /// Given height, mm.
         height_mm: f64,
     },
     /// The picture would have no pixels, or too many.
@@ -39,7 +39,7 @@ pub enum FigureError {
         "{dpi} dots per inch cannot be drawn at this size: choose 10 to 2400 with at most 200 million pixels in all"
     )]
     Resolution {
-        /// Resolution as given, dots per inch.
+        /// Given resolution, dots per inch.
         dpi: f64,
     },
     /// More panels than cells, or a grid without cells.
@@ -47,63 +47,63 @@ pub enum FigureError {
         "{panels} panels do not fit a grid of {rows} × {cols}: it must have 1 to 400 cells, one for each panel"
     )]
     Grid {
-        /// Rows as given.
+        /// Given number of rows.
         rows: usize,
-        /// Columns as given.
+        /// Given number of columns.
         cols: usize,
-        /// Number of panels given.
+        /// Given number of panels.
         panels: usize,
     },
-    /// Relative widths or heights that do not describe the grid.
+    /// Relative widths or heights that do not match the grid.
     #[error(
         "{given:?} cannot be the relative {what} of {expected} cells: give one positive number for each"
     )]
     Ratios {
-        /// Widths or heights.
+        /// "widths" or "heights".
         what: &'static str,
-        /// As given.
+        /// The given values.
         given: Vec<f64>,
-        /// How many were expected.
+        /// Expected number of values.
         expected: usize,
     },
-    /// A fixed range that no axis can have.
+    /// An invalid fixed range of an axis.
     #[error("the axis \"{axis}\" cannot run from {from} to {to}: {reason}")]
     Range {
         /// Label of the axis.
         axis: String,
-        /// Start as given.
+        /// Given start.
         from: f64,
-        /// End as given.
+        /// Given end.
         to: f64,
-        /// What would be right.
+        /// What a valid range is.
         reason: &'static str,
     },
-    /// A heatmap whose cells do not fill its grid.
+    /// A heatmap whose number of values does not match its grid.
     #[error(
         "a heatmap of {columns} columns and {rows} rows cannot be filled with {given} values: give one value for each cell, and at least one"
     )]
     Cells {
-        /// Columns as given.
+        /// Given number of columns.
         columns: usize,
-        /// Rows as given.
+        /// Given number of rows.
         rows: usize,
-        /// Number of values given.
+        /// Given number of values.
         given: usize,
     },
-    /// A heatmap cell that belongs to a category that was not named.
+    /// A heatmap cell with the number of an undefined category.
     #[error("a cell belongs to category {category}, but only {named} categories are named")]
     Category {
         /// Number of the category, from 0.
         category: usize,
-        /// How many categories were named.
+        /// Number of defined categories.
         named: usize,
     },
     /// A length in a layer (line width, marker size …) that cannot be drawn.
     #[error("{what} of {given} cannot be drawn: it must be finite and positive")]
     Length {
-        /// What the length is.
+        /// Name of the length.
         what: &'static str,
-        /// As given.
+        /// Given length.
         given: f64,
     },
     /// Labels and legends leave no room for the data.

@@ -14,8 +14,8 @@ pub const DOUBLE_COLUMN: f64 = 178.0;
 
 /// Panels in a grid.
 ///
-/// The same figure always gives the same bytes. Letters are shapes in every format, so that it looks
-/// the same on every machine.
+/// The same figure always gives the same bytes. Letters are shapes in every format, so that the
+/// figure looks the same on every machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[must_use]
@@ -24,23 +24,23 @@ pub struct Figure {
     pub rows: usize,
     /// Columns of the grid.
     pub cols: usize,
-    /// Width in mm, as printed.
+    /// Width in print, mm.
     pub width: f64,
-    /// Height in mm; none: panels are about two thirds as high as wide.
+    /// Height in print, mm; `None`: panels are about two thirds as high as wide.
     pub height: Option<f64>,
-    /// Relative widths of the columns; empty: all alike.
+    /// Relative widths of the columns; empty: equal.
     pub column_widths: Vec<f64>,
-    /// Relative heights of the rows; empty: all alike.
+    /// Relative heights of the rows; empty: equal.
     pub row_heights: Vec<f64>,
-    /// Words above the whole figure, and the title of the file.
+    /// Text above the whole figure, and the title of the file.
     pub title: String,
-    /// Words below the whole figure.
+    /// Text below the whole figure.
     pub caption: String,
     /// Whether panels are lettered.
     pub letters: bool,
     /// Whether the panels of a column share their horizontal range.
     pub share_x: bool,
-    /// How many times larger than usual letters and marks are.
+    /// Factor by which letters and ticks are larger than usual.
     pub text_scale: f64,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
@@ -82,7 +82,7 @@ impl Figure {
         self
     }
 
-    /// Width in mm, as printed ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`], [`DOUBLE_COLUMN`]).
+    /// Width in print, mm ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`], [`DOUBLE_COLUMN`]).
     pub fn width(mut self, mm: f64) -> Figure {
         self.width = mm;
         self
@@ -106,31 +106,32 @@ impl Figure {
         self
     }
 
-    /// Words above the whole figure, and the title of the file.
+    /// Text above the whole figure, and the title of the file.
     pub fn title(mut self, title: impl Into<String>) -> Figure {
         self.title = title.into();
         self
     }
 
-    /// Words below the whole figure, broken into lines.
+    /// Text below the whole figure, broken into lines.
     pub fn caption(mut self, caption: impl Into<String>) -> Figure {
         self.caption = caption.into();
         self
     }
 
-    /// Whether panels are lettered (a), (b) …: by default where there is more than one cell.
+    /// Whether panels are lettered (a), (b) …; the default is yes if there is more than one cell.
     pub fn letters(mut self, letters: bool) -> Figure {
         self.letters = letters;
         self
     }
 
-    /// Gives the panels of each column the same horizontal range, named below the lowest only.
+    /// Gives the panels of each column the same horizontal range, labelled below the lowest one
+    /// only.
     pub fn share_x(mut self) -> Figure {
         self.share_x = true;
         self
     }
 
-    /// Makes letters and marks `factor` times as large, as slides want them.
+    /// Makes letters and ticks `factor` times as large, for example for slides.
     pub fn text_scale(mut self, factor: f64) -> Figure {
         self.text_scale = factor;
         self

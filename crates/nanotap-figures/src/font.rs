@@ -1,4 +1,4 @@
-//! The typeface: Noto Sans, carried inside the program so that no machine needs a font.
+//! The typeface: Noto Sans, included in the program so that no font needs to be installed.
 
 use std::sync::OnceLock;
 
@@ -6,7 +6,7 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 use crate::shape::{Point, Segment};
 
-/// One cut of the typeface.
+/// A variant of the typeface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Cut {
     Regular,
@@ -15,7 +15,7 @@ pub(crate) enum Cut {
 }
 
 impl Cut {
-    /// Letter that names the cut in SVG identifiers.
+    /// Letter that identifies the variant in SVG identifiers.
     pub(crate) fn letter(self) -> char {
         match self {
             Cut::Regular => 'r',
@@ -38,11 +38,11 @@ impl Cut {
     }
 }
 
-/// Height of capitals and of figures, in parts of the type size (Noto Sans: 1462/2048).
+/// Height of capitals and digits relative to the type size (Noto Sans: 1462/2048).
 pub(crate) const CAP_HEIGHT: f64 = 0.714;
-/// Height of small letters, in parts of the type size (Noto Sans: 1096/2048).
+/// Height of small letters relative to the type size (Noto Sans: 1096/2048).
 const X_HEIGHT: f64 = 0.535;
-/// Depth of descenders, in parts of the type size.
+/// Depth of descenders relative to the type size.
 pub(crate) const DESCENT: f64 = 0.24;
 
 /// A letter's shape.
@@ -53,7 +53,8 @@ pub(crate) struct Glyph {
 }
 
 impl Glyph {
-    /// The shape of a character; a character that the typeface lacks becomes its "missing" box.
+    /// The shape of a character; a character that the typeface lacks has the shape of its "missing"
+    /// box.
     pub(crate) fn of(cut: Cut, character: char) -> Glyph {
         let id = cut
             .face()
@@ -62,7 +63,7 @@ impl Glyph {
         Glyph { cut, id }
     }
 
-    /// Distance to the next letter, in parts of the type size.
+    /// Distance to the next letter relative to the type size.
     pub(crate) fn advance(self) -> f64 {
         self.cut.face().map_or(0.6, |face| {
             let units = f64::from(face.units_per_em());
@@ -70,7 +71,7 @@ impl Glyph {
         })
     }
 
-    /// Left, bottom, right and top of the ink, in parts of the type size.
+    /// Left, bottom, right and top of the ink relative to the type size.
     fn ink(self) -> Option<[f64; 4]> {
         let face = self.cut.face()?;
         let units = f64::from(face.units_per_em());

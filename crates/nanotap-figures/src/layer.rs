@@ -1,4 +1,4 @@
-//! What is drawn inside a panel.
+//! The items drawn inside a panel.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use crate::axis::Axis;
 use crate::colour::{Colour, Colourmap};
 use crate::numbers;
 
-/// How a line is broken.
+/// Dash pattern of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Dash {
@@ -17,12 +17,12 @@ pub enum Dash {
     Dashed,
     /// Dots.
     Dotted,
-    /// Dashes and dots in turn.
+    /// Dashes and dots alternately.
     DashDot,
 }
 
 impl Dash {
-    /// Lengths drawn and left out in turn, mm, for a line of the given width in mm.
+    /// Lengths drawn and omitted alternately, mm, for a line of the given width in mm.
     pub(crate) fn lengths(self, width: f64) -> Vec<f64> {
         let unit = width.max(0.2);
         let pattern: &[f64] = match self {
@@ -57,14 +57,14 @@ pub struct Line {
     /// Corners, in the units of the axes.
     #[serde(with = "numbers::points")]
     pub points: Vec<(f64, f64)>,
-    /// How the line is broken.
+    /// Dash pattern of the line.
     #[serde(default)]
     pub dash: Dash,
     /// Width in points (1/72 inch).
     pub width: f64,
-    /// None: the panel's next colour.
+    /// Colour; `None`: the next one of the palette.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
@@ -82,11 +82,11 @@ impl Line {
     }
 }
 
-/// Very many equal dots: a hundred thousand and more stay crisp and small on disk, because vector
-/// formats hold them as pixels of 600 dots per inch (up to 3000 dots as vectors).
+/// Very many equal dots. A hundred thousand or more remain sharp and small on disk, because vector
+/// formats contain them as pixels of 600 dots per inch (up to 3000 dots as vectors).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
-// Every kind of layer calls its points so.
+// The name of the points is the same in every kind of layer.
 #[allow(clippy::struct_field_names)]
 pub struct Points {
     /// Centres, in the units of the axes.
@@ -94,9 +94,9 @@ pub struct Points {
     pub points: Vec<(f64, f64)>,
     /// Diameter in mm.
     pub diameter: f64,
-    /// None: the panel's next colour. Where it is translucent, density shows.
+    /// Colour; `None`: the next one of the palette. A translucent colour makes the density visible.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
@@ -134,12 +134,12 @@ pub struct Markers {
     /// White inside instead of filled.
     #[serde(default)]
     pub open: bool,
-    /// A white edge around each.
+    /// A white edge around each marker.
     #[serde(default)]
     pub edge: bool,
-    /// None: the panel's next colour.
+    /// Colour; `None`: the next one of the palette.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
@@ -158,7 +158,7 @@ impl Markers {
         }
     }
 
-    /// Another shape.
+    /// Sets the shape.
     pub fn shape(mut self, shape: Shape) -> Markers {
         self.shape = shape;
         self
@@ -170,13 +170,13 @@ impl Markers {
         self
     }
 
-    /// White inside instead of filled, as unstable motions are drawn.
+    /// White inside instead of filled; used for unstable motions.
     pub fn open(mut self) -> Markers {
         self.open = true;
         self
     }
 
-    /// A white edge around each, to stand out from a heatmap.
+    /// A white edge around each marker, for contrast on a heatmap.
     pub fn white_edge(mut self) -> Markers {
         self.edge = true;
         self
@@ -187,17 +187,17 @@ impl Markers {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Rule {
-    /// The x of an upright line, the y of a level one.
+    /// The x of a vertical line, the y of a horizontal one.
     pub at: f64,
-    /// Whether the line is upright.
+    /// Whether the line is vertical.
     pub upright: bool,
-    /// How the line is broken.
+    /// Dash pattern of the line.
     pub dash: Dash,
     /// Width in points (1/72 inch).
     pub width: f64,
-    /// None: grey.
+    /// Colour; `None`: grey.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
@@ -214,12 +214,12 @@ impl Rule {
         }
     }
 
-    /// A level line at the height `y`: dashed, grey, 0.6 pt.
+    /// A horizontal line at the height `y`: dashed, grey, 0.6 pt.
     pub fn horizontal(y: f64) -> Rule {
         Rule::new(y, false)
     }
 
-    /// An upright line at `x`: dashed, grey, 0.6 pt.
+    /// A vertical line at `x`: dashed, grey, 0.6 pt.
     pub fn vertical(x: f64) -> Rule {
         Rule::new(x, true)
     }
@@ -229,14 +229,14 @@ impl Rule {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Band {
-    /// Start and end of each interval; without a number, the panel's edge.
+    /// Start and end of each interval; an end that is not a number is the panel's edge.
     #[serde(with = "numbers::intervals")]
     pub intervals: Vec<(f64, f64)>,
     /// Whether the intervals are those of the horizontal axis.
     pub along_x: bool,
-    /// None: light grey.
+    /// Colour; `None`: light grey.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
@@ -267,7 +267,7 @@ impl Band {
 pub enum Place {
     /// In the units of the axes.
     Data(f64, f64),
-    /// In parts of the panel: (0, 0) bottom left, (1, 1) top right.
+    /// Relative to the panel: (0, 0) bottom left, (1, 1) top right.
     Panel(f64, f64),
 }
 
@@ -277,7 +277,7 @@ impl From<(f64, f64)> for Place {
     }
 }
 
-/// Where words lie as seen from their place.
+/// Position of a text relative to its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
@@ -290,25 +290,25 @@ pub enum Side {
     Centre,
 }
 
-/// Words in a panel, with or without an arrow.
+/// Text in a panel, with or without an arrow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Note {
-    /// Where the words are, and where an arrow starts.
+    /// Position of the text, and start of the arrow.
     pub at: Place,
-    /// The words.
+    /// The text.
     pub text: String,
-    /// Where the words lie as seen from their place.
+    /// Side of the place on which the text lies.
     #[serde(default)]
     pub side: Side,
-    /// Where the arrow ends; none: no arrow.
+    /// End of the arrow; `None`: no arrow.
     pub tip: Option<Place>,
-    /// None: black.
+    /// Colour; `None`: black.
     pub colour: Option<Colour>,
 }
 
 impl Note {
-    /// Words at a place, to its right.
+    /// Text at a place, to its right.
     pub fn new(at: impl Into<Place>, text: impl Into<String>) -> Note {
         Note {
             at: at.into(),
@@ -319,7 +319,7 @@ impl Note {
         }
     }
 
-    /// An arrow from a place to another; words go to its start.
+    /// An arrow from one place to another; its text is at the start.
     pub fn arrow(from: impl Into<Place>, to: impl Into<Place>) -> Note {
         Note {
             tip: Some(to.into()),
@@ -327,30 +327,30 @@ impl Note {
         }
     }
 
-    /// The words.
+    /// Sets the text.
     pub fn text(mut self, text: impl Into<String>) -> Note {
         self.text = text.into();
         self
     }
 
-    /// Where the words lie as seen from their place.
+    /// Side of the place on which the text lies.
     pub fn side(mut self, side: Side) -> Note {
         self.side = side;
         self
     }
 }
 
-/// A grid of numbers as colours, with a colour bar. NaN stays white.
+/// A grid of numbers shown as colours, with a colour bar. NaN is white.
 ///
-/// Cells are of equal size as drawn, also on logarithmic axes.
+/// Cells are drawn with equal size, also on logarithmic axes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Heatmap {
-    /// Cells along x.
+    /// Number of cells along x.
     pub columns: usize,
-    /// Cells along y.
+    /// Number of cells along y.
     pub rows: usize,
-    /// Row by row, that of the smallest y first.
+    /// Values, row by row; the row of the smallest y comes first.
     #[serde(with = "numbers::gaps")]
     pub values: Vec<f64>,
     /// Outer edges of the grid along x.
@@ -359,7 +359,7 @@ pub struct Heatmap {
     pub y: (f64, f64),
     /// The axis of the colour bar.
     pub scale: Axis,
-    /// Which colours.
+    /// Colour scale.
     #[serde(default)]
     pub map: Colourmap,
 }
@@ -386,7 +386,7 @@ impl Heatmap {
         }
     }
 
-    /// Another colour scale than viridis.
+    /// Sets the colour scale; the default is viridis.
     pub fn colourmap(mut self, map: Colourmap) -> Heatmap {
         self.map = map;
         self
@@ -396,21 +396,22 @@ impl Heatmap {
 /// A category of a [`CategoryMap`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Category {
-    /// Words in the legend.
+    /// Text in the legend.
     pub label: String,
     /// None: the palette's next colour.
     pub colour: Option<Colour>,
 }
 
-/// A grid of categories as colours, such as basins of attraction, with a legend.
+/// A grid of categories shown as colours, such as basins of attraction, with a legend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct CategoryMap {
-    /// Cells along x.
+    /// Number of cells along x.
     pub columns: usize,
-    /// Cells along y.
+    /// Number of cells along y.
     pub rows: usize,
-    /// Numbers of categories, from 0, row by row, that of the smallest y first; none stays white.
+    /// Numbers of categories, from 0, row by row; the row of the smallest y comes first; `None` is
+    /// white.
     pub cells: Vec<Option<usize>>,
     /// Outer edges of the grid along x.
     pub x: (f64, f64),
@@ -421,9 +422,9 @@ pub struct CategoryMap {
 }
 
 impl CategoryMap {
-    /// `cells` holds `rows` rows of `columns` category numbers (from 0; none stays white), the row
-    /// of the smallest y first; the outer edges of the grid are `x` and `y`. Categories are named
-    /// with [`CategoryMap::category`] in order.
+    /// `cells` has `rows` rows of `columns` category numbers (from 0; `None` is white); the row of
+    /// the smallest y comes first. The outer edges of the grid are `x` and `y`. Name the categories
+    /// in order with [`CategoryMap::category`].
     pub fn new(
         columns: usize,
         rows: usize,
@@ -450,7 +451,7 @@ impl CategoryMap {
         self
     }
 
-    /// Names the next category, in a colour of its own (grey for "undecided", say).
+    /// Names the next category and sets its colour (grey for "undecided", for example).
     pub fn category_in(mut self, label: impl Into<String>, colour: Colour) -> CategoryMap {
         self.categories.push(Category {
             label: label.into(),
@@ -460,24 +461,24 @@ impl CategoryMap {
     }
 }
 
-/// Thin upright lines with a dot on top, as spectra are drawn.
+/// Thin vertical lines with a dot on top, as in spectra.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Stems {
     /// The dots, in the units of the axes.
     #[serde(with = "numbers::points")]
     pub points: Vec<(f64, f64)>,
-    /// The y that the stems stand on; none: 0, or the bottom of a logarithmic axis.
+    /// The y of the feet of the stems; `None`: 0, or the bottom of a logarithmic axis.
     pub foot: Option<f64>,
-    /// None: the panel's next colour.
+    /// Colour; `None`: the next one of the palette.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
 
 impl Stems {
-    /// Stems that stand on 0, or on the bottom of a logarithmic axis.
+    /// Stems with their feet at 0, or at the bottom of a logarithmic axis.
     pub fn new(points: impl IntoIterator<Item = (f64, f64)>) -> Stems {
         Stems {
             points: points.into_iter().collect(),
@@ -487,25 +488,25 @@ impl Stems {
         }
     }
 
-    /// Stands on another value.
+    /// Sets the y of the feet.
     pub fn foot(mut self, y: f64) -> Stems {
         self.foot = Some(y);
         self
     }
 }
 
-/// Upright bars.
+/// Vertical bars.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Bars {
-    /// Middle and end of each bar.
+    /// Middle (x) and end (y) of each bar.
     #[serde(with = "numbers::points")]
     pub points: Vec<(f64, f64)>,
     /// Width in units of the horizontal axis.
     pub width: f64,
-    /// None: the panel's next colour.
+    /// Colour; `None`: the next one of the palette.
     pub colour: Option<Colour>,
-    /// Words in the legend; empty: no entry.
+    /// Text in the legend; empty: no entry.
     #[serde(default)]
     pub label: String,
 }
@@ -523,7 +524,7 @@ impl Bars {
     }
 }
 
-/// Anything that a panel shows. Maps and bands lie behind the rest, notes before it; otherwise later
+/// Any item of a panel. Maps and bands lie behind the rest, notes in front of it; otherwise later
 /// layers lie over earlier ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
@@ -542,11 +543,11 @@ pub enum Layer {
     Bars(Bars),
 }
 
-/// What several kinds of layers have in common.
+/// Methods that several kinds of layers share.
 macro_rules! shared {
     (colour: $($kind:ident)*) => {$(
         impl $kind {
-            /// Another colour.
+            /// Sets the colour.
             pub fn colour(mut self, colour: Colour) -> $kind {
                 self.colour = Some(colour);
                 self
@@ -555,7 +556,7 @@ macro_rules! shared {
     )*};
     (label: $($kind:ident)*) => {$(
         impl $kind {
-            /// Words in the legend.
+            /// Text in the legend.
             pub fn label(mut self, label: impl Into<String>) -> $kind {
                 self.label = label.into();
                 self
@@ -564,7 +565,7 @@ macro_rules! shared {
     )*};
     (line: $($kind:ident)*) => {$(
         impl $kind {
-            /// Breaks the line.
+            /// Sets the dash pattern.
             pub fn dash(mut self, dash: Dash) -> $kind {
                 self.dash = dash;
                 self
@@ -604,7 +605,7 @@ impl Layer {
         }
     }
 
-    /// The layer's own colour, to be given; none for maps.
+    /// The colour of the layer, for setting it; none for maps.
     pub(crate) fn colour_mut(&mut self) -> Option<&mut Option<Colour>> {
         match self {
             Layer::Line(Line { colour, .. })
@@ -619,7 +620,7 @@ impl Layer {
         }
     }
 
-    /// The layer's colour once it is given, and its words in the legend; none for maps and notes.
+    /// The layer's colour, once set, and its text in the legend; none for maps and notes.
     pub(crate) fn look(&self) -> Option<(Colour, &str)> {
         match self {
             Layer::Line(Line { colour, label, .. })
@@ -635,7 +636,7 @@ impl Layer {
         }
     }
 
-    /// Place in the order of drawing, from the back.
+    /// Position in the order of drawing, from the back.
     pub(crate) fn depth(&self) -> u8 {
         match self {
             Layer::Heatmap(_) | Layer::CategoryMap(_) => 0,

@@ -1,5 +1,5 @@
-//! Where each panel's box lies: boxes of a column are equally wide and of a row equally high, and
-//! what stands around them has the room it needs.
+//! The position of each panel's box. Boxes of a column have equal widths and boxes of a row equal
+//! heights; the text around each box has the space that it needs.
 
 use crate::error::FigureError;
 use crate::legend::{self, Stand};
@@ -9,17 +9,18 @@ use crate::shape::Rect;
 use crate::style::{EDGE, Style};
 use crate::text::Words;
 
-/// Smallest side of a box that still shows something, mm.
+/// Smallest useful side of a box, mm.
 const SMALLEST: f64 = 8.0;
-/// The room around a box depends on its marks, and these on its size: so many rounds settle it.
+/// The space around a box depends on its ticks, and these depend on its size. The iteration
+/// converges in this number of rounds.
 const ROUNDS: usize = 4;
 
-/// Room around a box, mm.
+/// Space around a box, mm.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sides {
     pub(crate) top: f64,
     pub(crate) right: f64,
-    /// Marks and their words; then the label beyond them.
+    /// Ticks and their labels, without the axis label beyond them.
     pub(crate) left_marks: f64,
     pub(crate) left_label: f64,
     pub(crate) bottom_marks: f64,
@@ -35,7 +36,7 @@ impl Sides {
         self.bottom_marks + self.bottom_label
     }
 
-    /// The larger room on each side.
+    /// The larger space on each side.
     fn max(self, other: Sides) -> Sides {
         Sides {
             top: self.top.max(other.top),
@@ -48,7 +49,7 @@ impl Sides {
     }
 }
 
-/// A panel's box, with the room of its column and row around it.
+/// A panel's box, with the space of its column and row around it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spot {
     pub(crate) rect: Rect,
@@ -83,7 +84,8 @@ pub(crate) fn spots(
     let mut around = vec![Sides::default(); panels.len()];
     for round in 0..ROUNDS {
         for (index, panel) in panels.iter().enumerate() {
-            // A legend that has once gone outside stays there, or the rounds might not settle.
+            // A legend that was placed outside once stays outside, or the rounds might not
+            // converge.
             let outside = matches!(stands[index], Stand::Above | Stand::Right);
             if round == 0 || !outside {
                 stands[index] = legend::stand(panel, rects[index], style);
@@ -156,12 +158,12 @@ fn joined<'s>(all: impl Iterator<Item = &'s Sides>) -> Sides {
     all.fold(Sides::default(), |a, b| a.max(*b))
 }
 
-/// Height of a line of words, mm.
+/// Height of a line of text, mm.
 fn line_height(words: &Words) -> f64 {
     words.cap_height() + words.descent()
 }
 
-/// The room that a panel needs around a box of the given size.
+/// The space that a panel needs around a box of the given size.
 fn sides(panel: &Prepared, rect: Rect, stand: Stand, style: &Style) -> Sides {
     let mut sides = Sides {
         top: EDGE,
@@ -229,13 +231,13 @@ fn sides(panel: &Prepared, rect: Rect, stand: Stand, style: &Style) -> Sides {
     if !panel.panel.title.is_empty() {
         sides.top += heading;
     } else if !panel.letter.is_empty() {
-        // The letter stands left of the box, beside whatever is above it.
+        // The letter is to the left of the box, next to the text above it.
         sides.top = sides.top.max(heading + EDGE / 2.0);
     }
     sides
 }
 
-/// Room for the letter and title, mm.
+/// Space for the letter and title, mm.
 pub(crate) fn title_height(panel: &Prepared, style: &Style) -> f64 {
     if panel.panel.title.is_empty() && panel.letter.is_empty() {
         return 0.0;
@@ -244,8 +246,8 @@ pub(crate) fn title_height(panel: &Prepared, style: &Style) -> f64 {
     words.cap_height() + words.descent() + style.pad
 }
 
-/// Whether the common factor of the level axis fits into the row of the label, which may move to the
-/// left for it.
+/// Whether the common factor of the horizontal axis fits into the row of the label, which may be
+/// moved to the left for it.
 pub(crate) fn shares_row(panel: &Prepared, width: f64, style: &Style) -> bool {
     let marks = Marks::new(&panel.panel.x, panel.x, width, false, style);
     let label = Words::set(&panel.panel.x.words(), style.label, false);
@@ -253,12 +255,12 @@ pub(crate) fn shares_row(panel: &Prepared, width: f64, style: &Style) -> bool {
     label.width > 0.0 && marks.note.is_none_or(beside)
 }
 
-/// Distance of a colour bar from what stands left of it, and its width, mm.
+/// Distance of a colour bar from the item to its left, and its width, mm.
 pub(crate) fn bar_shape(style: &Style) -> (f64, f64) {
     (2.0 * style.pad, 2.6 * style.mark)
 }
 
-/// All room that a colour bar takes, mm.
+/// Total width of a colour bar with its labels, mm.
 pub(crate) fn bar_width(marks: &Marks, label: &str, style: &Style) -> f64 {
     let (gap, width) = bar_shape(style);
     let note = marks

@@ -1,4 +1,4 @@
-//! The legend: its size, its place, its drawing.
+//! The legend: its size, its position, its drawing.
 
 use crate::colour::Colour;
 use crate::layer::Layer;
@@ -11,17 +11,17 @@ use crate::style::{INK, Style};
 use crate::symbol::{disc, marker};
 use crate::text::{Across, Upright, Words};
 
-/// Where the legend goes once the panel's size is known.
+/// Position of the legend once the panel's size is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Stand {
     Nowhere,
-    /// Inside; shares of the free room to the left and above.
+    /// Inside; fractions of the free space to the left and above.
     Inside(f64, f64),
     Above,
     Right,
 }
 
-/// Places inside, best first.
+/// Positions inside, best first.
 const INSIDE: [(f64, f64); 8] = [
     (1.0, 0.0),
     (0.0, 0.0),
@@ -88,7 +88,7 @@ pub(crate) fn height_above(entries: &[Entry], width: f64, style: &Style) -> f64 
     rows(entries, width, style).len() as f64 * style.line()
 }
 
-/// Chooses the place for a panel that will lie in `rect`.
+/// Chooses the position for a panel in `rect`.
 pub(crate) fn stand(prepared: &Prepared, rect: Rect, style: &Style) -> Stand {
     if prepared.entries.is_empty() {
         return Stand::Nowhere;
@@ -256,7 +256,7 @@ impl Occupancy {
 }
 
 /// Draws the legend of a panel in `rect`; `above` is the bottom of the rows above the panel, and
-/// `beside` the left edge of the column beside it.
+/// `beside` the left edge of the column to the right of it.
 pub(crate) fn draw(
     scene: &mut Scene,
     prepared: &Prepared,

@@ -1,13 +1,13 @@
 //! Publication figures: one data model, written as SVG, PNG, PDF and JSON.
 //!
-//! A [`Figure`] is plain data: it holds [`Panel`]s in a grid; a panel has two [`Axis`] and layers
-//! ([`Line`], [`Points`], [`Markers`], [`Heatmap`] …). Sizes are those of the printed page. Nothing
-//! depends on the machine: the typeface travels with the program, letters are drawn as shapes in
-//! every format, and the same figure gives the same bytes.
+//! A [`Figure`] is plain data: it has [`Panel`]s in a grid; a panel has two axes ([`Axis`]) and
+//! layers ([`Line`], [`Points`], [`Markers`], [`Heatmap`] …). Sizes are those of the printed page.
+//! Nothing depends on the machine: the typeface is part of the program, letters are drawn as shapes
+//! in every format, and the same figure gives the same bytes.
 //!
-//! Whoever draws it otherwise (matplotlib, a browser) takes the same description from
-//! [`Figure::to_json`], with every range, colour and letter decided, or the SVG together with the map
-//! of its axes from [`Figure::to_svg_with_map`]. Colours of motions come from [`Motion::colour`].
+//! Other renderers (matplotlib, a browser) use the same description from [`Figure::to_json`], with
+//! all ranges, colours and letters resolved, or the SVG together with the positions of its axes
+//! from [`Figure::to_svg_with_map`]. Colours of motions come from [`Motion::colour`].
 //!
 //! ```
 //! use nanotap_figures::{Axis, Figure, Line, Panel};
@@ -22,8 +22,8 @@
 //!
 //! The typeface is Noto Sans (SIL Open Font License 1.1), from the notosans crate.
 //!
-//! What is not finite, or not positive on a logarithmic axis, is a gap. A panel without anything to
-//! draw says "no data".
+//! Values that are not finite, or not positive on a logarithmic axis, are gaps. A panel without
+//! data shows "no data".
 
 #![cfg_attr(
     test,
@@ -76,6 +76,6 @@ pub use page::DPI;
 pub use panel::{Legend, Panel};
 pub use text::mathtext;
 
-/// What every picture says it was made by: a comment in SVG, the software of PNG, the producer
-/// of PDF.
+/// Name of the program in every picture: a comment in SVG, the software of PNG, the producer of
+/// PDF.
 pub const MADE_BY: &str = "nanotap";

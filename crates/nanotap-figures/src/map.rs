@@ -1,16 +1,15 @@
-//! Where the axes of a drawn figure lie.
+//! Positions of the axes in a drawn figure.
 
 use serde::Serialize;
 
 use crate::axis::{Axis, Scale, View};
 
-/// A panel as it was drawn: its box, in units of the SVG's `viewBox` (mm from the top left), and its
-/// axes.
+/// A drawn panel: its box, in units of the SVG's `viewBox` (mm from the top left), and its axes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PanelMap {
-    /// Letter such as "(a)"; empty where there is none.
+    /// Letter such as "(a)"; empty if there is none.
     pub letter: String,
-    /// Words above the panel.
+    /// Title above the panel.
     pub title: String,
     /// Left edge of the box.
     pub left: f64,
@@ -26,19 +25,19 @@ pub struct PanelMap {
     pub y: AxisMap,
 }
 
-/// An axis as it was drawn. A value `v` lies at the part (v − from)/(to − from) of it; on a
-/// logarithmic axis, this holds of logarithms.
+/// A drawn axis. A value `v` is at the fraction (v − from)/(to − from) of the axis; on a
+/// logarithmic axis this applies to the logarithms.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxisMap {
-    /// Words and symbol.
+    /// Label, without the unit.
     pub label: String,
-    /// The unit; empty where there is none.
+    /// Unit; empty if there is none.
     pub unit: String,
     /// How values are spaced.
     pub scale: Scale,
-    /// Value at its start.
+    /// Value at the start of the axis.
     pub from: f64,
-    /// Value at its end.
+    /// Value at the end of the axis.
     pub to: f64,
 }
 

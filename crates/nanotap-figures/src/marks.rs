@@ -1,4 +1,4 @@
-//! The marks of an axis with their words set, as many as fit.
+//! The ticks of an axis with their labels, as many as fit.
 
 use crate::axis::{Axis, View};
 use crate::style::Style;
@@ -6,14 +6,15 @@ use crate::text::Words;
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Marks {
-    /// Place along the axis (0 to 1) and words.
+    /// Position along the axis (0 to 1) and label.
     pub(crate) major: Vec<(f64, Words)>,
     pub(crate) minor: Vec<f64>,
     pub(crate) note: Option<Words>,
 }
 
 impl Marks {
-    /// Marks for an axis of `length` mm; `upright` says which way its words stack.
+    /// Ticks for an axis of `length` mm; `upright` tells the direction in which their labels are
+    /// stacked.
     pub(crate) fn new(axis: &Axis, view: View, length: f64, upright: bool, style: &Style) -> Marks {
         if let Some(given) = &axis.marks {
             return Marks {
@@ -30,7 +31,7 @@ impl Marks {
                 note: None,
             };
         }
-        // Fewer marks look calmer; these spacings give four to six on a usual panel.
+        // These spacings give four to six ticks on a usual panel.
         let spacing = if upright { 8.0 } else { 11.0 };
         let most = ((length / spacing) as usize + 1).clamp(2, 8);
         let mut marks = Marks::default();
@@ -69,7 +70,7 @@ impl Marks {
         self.major.iter().map(|(_, w)| w.width).fold(0.0, f64::max)
     }
 
-    /// How far words reach beyond the start and the end of a level axis, mm.
+    /// Length of the labels beyond the start and the end of a horizontal axis, mm.
     pub(crate) fn overhang(&self, length: f64) -> (f64, f64) {
         self.major
             .iter()

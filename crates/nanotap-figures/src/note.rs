@@ -1,4 +1,4 @@
-//! Notes beside the data: their place, their words, their arrow.
+//! Notes in a panel: their position, their text, their arrow.
 
 use crate::colour::Colour;
 use crate::layer::{Note, Place, Side};
@@ -8,7 +8,7 @@ use crate::shape::{Point, Rect, Segment, Stroke};
 use crate::style::Style;
 use crate::text::{Across, MM_PER_POINT, PlacedWords, Upright, Words};
 
-/// A place of a note on the page.
+/// Position of a note on the page.
 pub(crate) fn point(frame: &Frame, place: Place) -> Option<Point> {
     match place {
         Place::Data(x, y) => frame.place((x, y)),
@@ -20,7 +20,7 @@ pub(crate) fn point(frame: &Frame, place: Place) -> Option<Point> {
     }
 }
 
-/// The words of a note where they go: kept inside the panel if they start there.
+/// The text of a note at its position: kept inside the panel if it starts there.
 fn words(frame: &Frame, note: &Note, style: &Style) -> Option<PlacedWords> {
     let at = point(frame, note.at)?;
     let words = Words::set(&note.text, style.legend, false);
@@ -52,7 +52,7 @@ fn words(frame: &Frame, note: &Note, style: &Style) -> Option<PlacedWords> {
     Some(placed)
 }
 
-/// The box that a note's words fill.
+/// The box of a note's text.
 pub(crate) fn area(frame: &Frame, note: &Note, style: &Style) -> Option<Rect> {
     let placed = words(frame, note, style)?;
     (placed.words.width > 0.0).then(|| Rect {
@@ -73,7 +73,7 @@ pub(crate) fn draw(scene: &mut Scene, frame: &Frame, note: &Note, style: &Style)
     }
     if let Some(placed) = words(frame, note, style) {
         if !placed.words.runs.is_empty() {
-            // A white edge keeps the words readable over data.
+            // A white edge keeps the text readable over data.
             let halo = Stroke {
                 round: true,
                 ..Stroke::solid(0.6, Colour::WHITE.alpha(0.8))

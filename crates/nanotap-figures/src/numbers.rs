@@ -1,4 +1,4 @@
-//! Numbers in JSON, which knows neither NaN nor infinity: `null` stands for both.
+//! Numbers in JSON, which has neither NaN nor infinity: both are `null`.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -16,7 +16,7 @@ pub(crate) mod gaps {
     }
 }
 
-/// Points as two columns, `{"x": […], "y": […]}`, with `null` where there is no number.
+/// Points as two columns, `{"x": […], "y": […]}`, with `null` for missing numbers.
 pub(crate) mod points {
     use serde::de::Error;
 
@@ -50,7 +50,7 @@ pub(crate) mod points {
     }
 }
 
-/// Intervals `[start, end]`, with `null` for an end at infinity.
+/// Intervals `[start, end]`, with `null` for an infinite end.
 pub(crate) mod intervals {
     use super::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -1,4 +1,4 @@
-//! A figure laid out on its page, and the doors to every format.
+//! A figure laid out on its page, and its output in every format.
 
 use std::ffi::OsString;
 use std::fs;
@@ -20,15 +20,16 @@ use crate::{pdf, pixels, svg};
 
 /// Resolution of PNG files, dots per inch.
 pub const DPI: f64 = 300.0;
-/// Most pixels of a picture.
+/// Largest number of pixels of a picture.
 const MOST_PIXELS: f64 = 2e8;
 
 impl Figure {
-    /// Writes the figure in the format that the path's ending names: `.svg`, `.png` (300 dots per
-    /// inch) or `.pdf`. The file appears whole or not at all.
+    /// Writes the figure in the format given by the path's extension: `.svg`, `.png` (300 dots per
+    /// inch) or `.pdf`. The file is written completely or not at all.
     ///
     /// # Errors
-    /// If the ending names no format, the figure cannot be drawn, or the file cannot be written.
+    /// If the extension is not supported, the figure cannot be drawn, or the file cannot be
+    /// written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FigureError> {
         let path = path.as_ref();
         let bytes = self.file(path)?;
@@ -38,10 +39,10 @@ impl Figure {
         })
     }
 
-    /// What [`write`](Self::write) puts into the file of that name.
+    /// The bytes that [`write`](Self::write) writes into the file of that name.
     ///
     /// # Errors
-    /// If the ending names no format, or the figure cannot be drawn.
+    /// If the extension is not supported, or the figure cannot be drawn.
     pub fn file(&self, path: &Path) -> Result<Vec<u8>, FigureError> {
         let ending = path
             .extension()
@@ -56,7 +57,7 @@ impl Figure {
         }
     }
 
-    /// The figure as SVG. It may stand in an HTML page beside others.
+    /// The figure as SVG. Several may be embedded in one HTML page.
     ///
     /// # Errors
     /// If the figure cannot be drawn.
@@ -64,8 +65,8 @@ impl Figure {
         Ok(svg::write(&self.scene()?.0))
     }
 
-    /// The figure as SVG, and where its panels and their axes lie in it: what a page needs to say
-    /// which point of the data lies under the pointer, or to ask for another range.
+    /// The figure as SVG, with the positions of its panels and axes. A page needs them to find the
+    /// data under the pointer, or to request another range.
     ///
     /// # Errors
     /// If the figure cannot be drawn.
@@ -74,9 +75,9 @@ impl Figure {
         Ok((svg::write(&scene), map))
     }
 
-    /// The figure as JSON with everything decided that does not depend on its size: the range of
-    /// each axis, the colour of each layer, the letter of each panel. Another program that draws
-    /// this draws the same figure; it can be read back as a [`Figure`].
+    /// The figure as JSON, with everything resolved that does not depend on its size: the range of
+    /// each axis, the colour of each layer, the letter of each panel. Another program that draws it
+    /// draws the same figure. It can be read back as a [`Figure`].
     ///
     /// # Errors
     /// If the figure cannot be drawn.
@@ -85,10 +86,11 @@ impl Figure {
         serde_json::to_string(&resolve::figure(self)).map_err(FigureError::Json)
     }
 
-    /// A figure from JSON: that of [`Figure::to_json`], or shorter, since most keys may be left out.
+    /// A figure from JSON: that of [`Figure::to_json`], or a shorter one, since most keys are
+    /// optional.
     ///
     /// # Errors
-    /// If it is no JSON, or describes no figure.
+    /// If the text is not JSON, or does not describe a figure.
     pub fn from_json(text: &str) -> Result<Figure, FigureError> {
         serde_json::from_str(text).map_err(FigureError::Json)
     }
@@ -186,7 +188,7 @@ impl Figure {
     }
 }
 
-/// Breaks words into lines of at most `width` mm.
+/// Breaks a text into lines of at most `width` mm.
 fn wrapped(text: &str, width: f64, style: &Style) -> Vec<Words> {
     let set = |line: &str| Words::set(line, style.legend, false);
     let mut lines: Vec<String> = Vec::new();
@@ -210,14 +212,14 @@ fn wrapped(text: &str, width: f64, style: &Style) -> Vec<Words> {
 fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
-    // Two runs, on two machines even, may write the same picture: the hasher starts anywhere.
+    // Two runs, even on two machines, may write the same picture; the hasher has a random seed.
     let unique = RandomState::new().hash_one(std::process::id());
     name.push(format!(".{unique:016x}.tmp"));
     let temporary: PathBuf = path.with_file_name(name);
     fs::write(&temporary, bytes)
         .and_then(|()| fs::rename(&temporary, path))
         .inspect_err(|_| {
-            // What is half written is of no use; that it may not be there is fine.
+            // A partly written file is useless, and it may not exist.
             let _ = fs::remove_file(&temporary);
         })
 }

@@ -6,11 +6,11 @@ use crate::axis::Axis;
 use crate::error::FigureError;
 use crate::layer::Layer;
 
-/// Where the legend stands.
+/// Position of the legend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Legend {
-    /// In a corner or at an edge where it hides no data, else above the panel.
+    /// In a corner or at an edge where it hides no data, otherwise above the panel.
     #[default]
     Auto,
     /// Inside, top left.
@@ -23,28 +23,28 @@ pub enum Legend {
     BottomRight,
     /// Outside, in rows above the panel.
     Above,
-    /// Outside, in a column right of the panel.
+    /// Outside, in a column to the right of the panel.
     Right,
     /// No legend.
     Hidden,
 }
 
-/// Two axes and what is drawn between them.
+/// Two axes and the layers between them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 #[must_use]
 pub struct Panel {
-    /// Words above the panel.
+    /// Title above the panel.
     pub title: String,
-    /// The panel's letter, such as "(a)"; none: the one that the figure gives.
+    /// The panel's letter, such as "(a)"; `None`: the one given by the figure.
     pub letter: Option<String>,
     /// The horizontal axis.
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// What is drawn, from the back.
+    /// The layers, from back to front.
     pub layers: Vec<Layer>,
-    /// Where the legend stands.
+    /// Position of the legend.
     pub legend: Legend,
 }
 
@@ -58,19 +58,19 @@ impl Panel {
         }
     }
 
-    /// Words above the panel.
+    /// Title above the panel.
     pub fn title(mut self, title: impl Into<String>) -> Panel {
         self.title = title.into();
         self
     }
 
-    /// The panel's letter, such as "(a)", instead of the one that the figure gives.
+    /// The panel's letter, such as "(a)", instead of the one given by the figure.
     pub fn letter(mut self, letter: impl Into<String>) -> Panel {
         self.letter = Some(letter.into());
         self
     }
 
-    /// Where the legend stands.
+    /// Position of the legend.
     pub fn legend(mut self, legend: Legend) -> Panel {
         self.legend = legend;
         self
@@ -120,7 +120,7 @@ impl Panel {
         }
     }
 
-    /// The edges of a grid must make an axis.
+    /// Checks that the edges of a grid make a valid axis.
     fn check_edges(&self, x: (f64, f64), y: (f64, f64)) -> Result<(), FigureError> {
         self.x.clone().range(x.0, x.1).check()?;
         self.y.clone().range(y.0, y.1).check()

@@ -1,5 +1,5 @@
-//! The page as PDF: one page of its own size, letters as shapes, no date, so that the same figure is
-//! the same file.
+//! The page as PDF: one page of the figure's size, letters as shapes, no date, so that the same
+//! figure gives the same file.
 
 use std::collections::BTreeSet;
 
@@ -22,7 +22,7 @@ const CONTENT: i32 = 4;
 const INFO: i32 = 5;
 const FIRST_FREE: i32 = 6;
 
-/// Strong and still quick.
+/// Strong compression that is still fast.
 const COMPRESSION: u8 = 9;
 
 pub(crate) fn write(scene: &Scene) -> Vec<u8> {
@@ -191,7 +191,7 @@ impl Page {
     }
 
     fn segments(&mut self, segments: &[Segment]) {
-        // To the micrometre: shorter files.
+        // To the micrometre, for shorter files.
         let f = |p: Point| {
             (
                 ((p.x * 1000.0).round() / 1000.0) as f32,
@@ -210,7 +210,7 @@ impl Page {
                     at = p;
                 }
                 Segment::Quad(q, p) => {
-                    // PDF knows cubic curves only.
+                    // PDF has cubic curves only.
                     let third = |from: Point| {
                         Point::new(
                             from.x + (q.x - from.x) * 2.0 / 3.0,

@@ -10,11 +10,11 @@ use crate::raster::{self, Raster};
 use crate::scene::{Item, Scene};
 use crate::shape::{Path, Point, Rect, Segment};
 
-/// Lines of more corners are drawn piece by piece on a layer of their own: the time to draw one grows
-/// with the square of its corners.
+/// Lines with more corners are drawn piece by piece on a separate layer: the time to draw one grows
+/// with the square of the number of corners.
 const LONG_STROKE: usize = 500;
 
-/// The page as a PNG file of `dpi` dots per inch; none if it would have no pixels, or too many.
+/// The page as a PNG file of `dpi` dots per inch; `None` if it would have no pixels, or too many.
 pub(crate) fn write(scene: &Scene, dpi: f64) -> Option<Vec<u8>> {
     let scale = dpi / 25.4;
     let (columns, rows) = (
@@ -86,9 +86,9 @@ struct Canvas {
     pixmap: Pixmap,
     /// Page coordinates of the canvas's corner, mm.
     corner: Point,
-    /// Pixels in a millimetre.
+    /// Pixels per millimetre.
     scale: f64,
-    /// The last clip and its mask: neighbouring items mostly share theirs.
+    /// The last clip and its mask: neighbouring items usually have the same.
     mask: Option<(Rect, Mask)>,
 }
 
@@ -193,8 +193,8 @@ impl Canvas {
         });
     }
 
-    /// Draws pixels on pixels: each of ours takes the colour at its middle, so that cells keep their
-    /// sharp edges, and a picture of our own resolution is copied.
+    /// Draws pixels on pixels. Each target pixel takes the colour at its centre, so that cells keep
+    /// sharp edges and a picture of the same resolution is copied.
     fn raster(&mut self, raster: &Raster) {
         self.prepare_mask(raster.clip);
         let mask = self.mask.as_ref().map(|(_, mask)| mask.data());
@@ -225,7 +225,7 @@ impl Canvas {
     }
 }
 
-/// Lays a colour, as far as it is visible, over a pixel.
+/// Blends a colour over a pixel.
 fn over(
     top: Colour,
     visible: f64,
@@ -340,7 +340,7 @@ mod tests {
             .zip(&whole)
             .filter(|(a, b)| a.a.abs_diff(b.a) > 40)
             .count();
-        // Only where edges of two pieces share a pixel may the smoothing differ.
+        // Smoothing may differ only where edges of two pieces share a pixel.
         assert!(off < pieces.len() / 100, "{off}");
         assert!(pieces.iter().all(|c| c.a <= 128));
     }

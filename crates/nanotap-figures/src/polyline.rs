@@ -1,16 +1,16 @@
-//! Lines of very many corners made short without a visible change.
+//! Reduces lines with very many corners without a visible change.
 
 use crate::shape::{Point, Rect, Segment};
 
-/// Corners closer than this to a straight line are left out, mm: a third of a dot at 1200 dpi.
+/// Corners closer than this to a straight line are removed, mm: a third of a dot at 1200 dpi.
 const TOLERANCE: f64 = 0.007;
 /// Corners within a column of this width are replaced by its first, lowest, highest and last, mm:
 /// a dot at 1200 dpi.
 const COLUMN: f64 = 0.02;
 
-/// The visible parts of a line through `points` (none: a gap), cut at `bounds` and thinned.
+/// The visible parts of a line through `points` (`None`: a gap), cut at `bounds` and thinned.
 ///
-/// A part of a single point means a point between gaps.
+/// A part with a single point is a point between gaps.
 pub(crate) fn visible(
     points: impl IntoIterator<Item = Option<Point>>,
     bounds: Rect,
@@ -88,7 +88,7 @@ fn thinned(points: &[Point]) -> Vec<Point> {
     straightened(&column_extremes(points))
 }
 
-/// Replaces runs within one narrow column by what can be seen of them.
+/// Replaces runs of points within one narrow column by their visible extremes.
 fn column_extremes(points: &[Point]) -> Vec<Point> {
     let column = |p: &Point| (p.x / COLUMN).floor() as i64;
     let mut kept = Vec::new();
@@ -119,9 +119,9 @@ fn column_extremes(points: &[Point]) -> Vec<Point> {
     kept
 }
 
-/// Leaves out corners that lie on the way: from each kept corner a cone of directions is carried
-/// along that passes every later corner within the tolerance; where the next corner leaves the
-/// cone, or turns back, the one before it is kept.
+/// Removes corners that lie on a straight line. From each kept corner a cone of directions is
+/// propagated that passes every later corner within the tolerance. Where the next corner leaves the
+/// cone, or turns back, the previous one is kept.
 fn straightened(points: &[Point]) -> Vec<Point> {
     let Some(&first) = points.first() else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! A panel with everything decided that does not depend on its size.
+//! A panel with everything resolved that does not depend on its size.
 
 use crate::axis::{Axis, Extent, Scale, View};
 use crate::colour::{self, Colour};
@@ -8,7 +8,7 @@ use crate::resolve;
 use crate::shape::{Point, Rect};
 use crate::text::MM_PER_POINT;
 
-/// What a legend shows beside a label.
+/// The sample that a legend shows next to a label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Sample {
     Line { width: f64, dash: Dash },
@@ -32,7 +32,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) y: View,
     /// Whether nothing can be drawn.
     pub(crate) empty: bool,
-    /// Whether the horizontal axis shows its words.
+    /// Whether the labels of the horizontal axis are shown.
     pub(crate) words_below: bool,
     pub(crate) entries: Vec<Entry>,
     pub(crate) bars: Vec<ColourBar<'a>>,
@@ -45,7 +45,7 @@ pub(crate) struct ColourBar<'a> {
     pub(crate) map: colour::Colourmap,
 }
 
-/// A panel's place on the page.
+/// A panel's position on the page.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
     pub(crate) rect: Rect,
@@ -72,7 +72,7 @@ impl Frame {
 }
 
 impl<'a> Prepared<'a> {
-    /// Of a resolved panel.
+    /// Prepares a resolved panel.
     pub(crate) fn new(panel: &'a Panel, words_below: bool) -> Prepared<'a> {
         let bars = panel
             .layers
@@ -106,7 +106,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Where stems and bars of a layer stand.
+    /// The y of the feet of stems and bars of a layer.
     pub(crate) fn foot(&self, layer: &Layer) -> f64 {
         let bottom = self.y.from;
         match layer {
@@ -121,7 +121,7 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The legend's entries; layers of the same label and look share one.
+/// The legend's entries; layers with the same label and look share one.
 fn entries(layers: &[Layer]) -> Vec<Entry> {
     let mut all: Vec<Entry> = Vec::new();
     let mut add = |label: &str, colour: Colour, sample: Sample| {
@@ -163,7 +163,7 @@ fn entries(layers: &[Layer]) -> Vec<Entry> {
         };
         if let Some((mut colour, label)) = layer.look() {
             if matches!(layer, Layer::Points(_)) {
-                // A legend's dot must be seen, however faint one dot of the cloud.
+                // A legend's dot must be visible, however faint a single dot of the cloud is.
                 colour.a = 255;
             }
             add(label, colour, sample);

@@ -6,8 +6,8 @@ use crate::MADE_BY;
 use crate::colour::Colour;
 use crate::shape::Rect;
 
-/// Resolution of pixels embedded in vector formats, dots per inch: what journals ask of line art
-/// combined with halftones.
+/// Resolution of pixels embedded in vector formats, dots per inch: the value that journals require
+/// for line art combined with halftones.
 pub(crate) const EMBEDDED_DPI: f64 = 600.0;
 
 /// Steps of opacity at edges: enough to look smooth, few enough to compress well.
@@ -21,7 +21,7 @@ pub(crate) fn shaded(colour: Colour, opacity: f64) -> Colour {
 /// A picture of pixels stretched over a box.
 #[derive(Debug, Clone)]
 pub(crate) struct Raster {
-    /// Where the picture lies, mm.
+    /// Position of the picture, mm.
     pub(crate) rect: Rect,
     /// Box outside which nothing is drawn.
     pub(crate) clip: Rect,
@@ -32,8 +32,8 @@ pub(crate) struct Raster {
 }
 
 impl Raster {
-    /// The same picture with each pixel repeated until there are enough of them for print, because
-    /// many viewers blur the edges of large pixels.
+    /// The same picture with each pixel repeated to the resolution of print, because many viewers
+    /// blur the edges of large pixels.
     pub(crate) fn magnified(&self) -> Raster {
         let times = |cells: usize, length: f64| {
             let wanted = length / 25.4 * EMBEDDED_DPI;
@@ -65,14 +65,14 @@ impl Raster {
     }
 }
 
-/// Encodes pixels as PNG, with a palette where at most 256 colours occur, else as RGBA or, where
-/// all is opaque, RGB. `dpi` is noted in the file.
+/// Encodes pixels as PNG: with a palette if at most 256 colours occur, otherwise as RGBA or, if all
+/// are opaque, as RGB. The file states `dpi`.
 pub(crate) fn encode(pixels: &[Colour], columns: usize, rows: usize, dpi: Option<f64>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, columns as u32, rows as u32);
     encoder.set_compression(png::Compression::Balanced);
     if let Some(dpi) = dpi {
-        // Latin letters and a known keyword: it cannot be refused.
+        // The keyword is known and in Latin letters, so it cannot be refused.
         let _ = encoder.add_text_chunk("Software".into(), MADE_BY.into());
         let per_metre = (dpi / 0.0254).round() as u32;
         encoder.set_pixel_dims(Some(png::PixelDimensions {
@@ -95,7 +95,7 @@ pub(crate) fn encode(pixels: &[Colour], columns: usize, rows: usize, dpi: Option
             4 => png::BitDepth::Four,
             _ => png::BitDepth::Eight,
         });
-        // Neighbouring palette numbers mean nothing: differences between them do not compress.
+        // Neighbouring palette numbers are unrelated: differences between them do not compress.
         encoder.set_filter(png::Filter::NoFilter);
         encoder.set_palette(
             palette
@@ -126,12 +126,13 @@ pub(crate) fn encode(pixels: &[Colour], columns: usize, rows: usize, dpi: Option
         writer.write_image_data(&data)?;
         writer.finish()
     });
-    // A Vec takes every byte, and sizes and depths agree by construction.
+    // Writing to a Vec cannot fail, and sizes and depths agree by construction.
     debug_assert!(written.is_ok(), "{written:?}");
     bytes
 }
 
-/// The distinct colours in rising order, and each pixel's number among them; none if over 256.
+/// The distinct colours in ascending order, and each pixel's index among them; `None` if there are
+/// more than 256.
 fn palette(pixels: &[Colour]) -> Option<(Vec<Colour>, Vec<u8>)> {
     let mut numbers: BTreeMap<Colour, u8> = BTreeMap::new();
     let mut last = None;

@@ -1,4 +1,4 @@
-//! Everything decided that does not depend on a figure's size: ranges, colours, letters.
+//! Resolves everything that does not depend on a figure's size: ranges, colours, letters.
 
 use crate::axis::{Axis, Extent, Range, View};
 use crate::colour::{self, Colour};
@@ -64,7 +64,7 @@ fn fix(axis: &mut Axis, extent: Extent) {
     axis.range = Range::Fixed(from, to);
 }
 
-/// A category with a colour of its own does not use one up.
+/// A category with an explicit colour does not use one of the palette.
 fn colour_categories(map: &mut CategoryMap) {
     let mut free = (0..).map(colour::category);
     for category in &mut map.categories {
@@ -74,7 +74,7 @@ fn colour_categories(map: &mut CategoryMap) {
     }
 }
 
-/// How far a panel's layers reach along its axes, and whether there is anything to see.
+/// Extents of a panel's layers along its axes, and whether there is anything to draw.
 pub(crate) fn extents(panel: &Panel) -> (Extent, Extent, bool) {
     let (mut x, mut y) = (Extent::EMPTY, Extent::EMPTY);
     let mut any = false;

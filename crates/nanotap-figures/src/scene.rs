@@ -1,4 +1,4 @@
-//! What is on the page, in millimetres from its top left: the one thing that all formats draw.
+//! The items on the page, in millimetres from its top left. All formats draw these.
 
 use crate::cloud::Cloud;
 use crate::colour::Colour;
@@ -8,7 +8,7 @@ use crate::text::PlacedWords;
 
 #[derive(Debug, Clone)]
 pub(crate) enum Item {
-    /// What follows up to its `Close` belongs together: a class, and words for it.
+    /// Groups the items up to its `Close`: a class, and a text that describes it.
     Open {
         class: &'static str,
         label: String,

@@ -18,7 +18,7 @@ impl Point {
     }
 }
 
-/// A box with its edges, `left <= right` and `top <= bottom`.
+/// A box given by its edges, `left <= right` and `top <= bottom`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Rect {
     pub(crate) left: f64,
@@ -82,14 +82,14 @@ impl Segment {
     }
 }
 
-/// How a line is drawn. Lengths in mm.
+/// Style of a line. Lengths in mm.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Stroke {
     pub(crate) width: f64,
     pub(crate) colour: Colour,
-    /// Lengths drawn and left out in turn; empty: unbroken.
+    /// Lengths drawn and omitted alternately; empty: solid.
     pub(crate) dash: Vec<f64>,
-    /// Ends rounded instead of cut.
+    /// Whether the ends are rounded instead of cut.
     pub(crate) round: bool,
 }
 
@@ -114,8 +114,8 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// Whether vector formats should rather hold the path as pixels: long lines that no thinning
-    /// shortened are scribble that fills the panel.
+    /// Whether vector formats should contain the path as pixels: long lines that thinning could not
+    /// shorten fill the panel.
     pub(crate) fn is_heavy(&self) -> bool {
         self.segments.len() > 30_000 && self.fill.is_none() && self.clip.is_some()
     }

@@ -1,12 +1,12 @@
-//! Sizes that every figure shares: what journals ask of lettering and lines at final size.
+//! Sizes common to all figures, as journals require for lettering and lines at final size.
 
 use crate::colour::Colour;
 use crate::text::MM_PER_POINT;
 
-/// Sizes of letters, pt, and of everything that grows with them, mm.
+/// Sizes of letters, pt, and of the lengths that scale with them, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Style {
-    /// Numbers at the axes.
+    /// Tick labels.
     pub(crate) marks: f64,
     /// Labels of the axes.
     pub(crate) label: f64,
@@ -14,7 +14,7 @@ pub(crate) struct Style {
     pub(crate) legend: f64,
     /// Panel letters and titles.
     pub(crate) title: f64,
-    /// Length of marks at the axes, mm.
+    /// Length of ticks, mm.
     pub(crate) mark: f64,
     pub(crate) minor_mark: f64,
     /// Small and large distance between neighbours, mm.
@@ -24,9 +24,9 @@ pub(crate) struct Style {
     pub(crate) axis: f64,
 }
 
-/// Colour of axes and their words.
+/// Colour of axes and their labels.
 pub(crate) const INK: Colour = Colour::BLACK;
-/// Free edge of the page, mm.
+/// Margin of the page, mm.
 pub(crate) const EDGE: f64 = 0.8;
 
 impl Style {
@@ -45,7 +45,7 @@ impl Style {
         }
     }
 
-    /// Distance from line to line of a legend or caption, mm.
+    /// Line spacing of a legend or caption, mm.
     pub(crate) fn line(&self) -> f64 {
         1.3 * self.legend * MM_PER_POINT
     }

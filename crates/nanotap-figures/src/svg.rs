@@ -1,8 +1,8 @@
 //! The page as SVG.
 //!
 //! Letters are drawn as shapes, not as text, so that the picture looks the same on every machine,
-//! whatever fonts it has; each word's characters stand in an `aria-label` beside it, for search and
-//! for screen readers.
+//! whatever fonts it has. The characters of each text are in an `aria-label`, for search and for
+//! screen readers.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -18,7 +18,7 @@ use crate::scene::{Item, Scene};
 use crate::shape::{Path, Point, Rect, Segment};
 use crate::text::PlacedWords;
 
-/// Stands for the page's own prefix of identifiers until the whole page is known.
+/// Placeholder for the page's own prefix of identifiers until the whole page is known.
 const PREFIX: char = '\u{1}';
 
 pub(crate) fn write(scene: &Scene) -> String {
@@ -52,7 +52,7 @@ pub(crate) fn write(scene: &Scene) -> String {
 }
 
 /// FNV-1a, 32 bits: the same on every machine and in every version, which std's hasher does not
-/// promise.
+/// guarantee.
 fn fingerprint(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0x811c_9dc5, |hash, &byte| {
         (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
@@ -221,7 +221,7 @@ impl Page {
     fn raster(&mut self, raster: &Raster) {
         let clip = self.clip(raster.clip);
         let data = base64::engine::general_purpose::STANDARD.encode(raster.png());
-        // The clip stands on a group because some viewers ignore it on images.
+        // The clip is on a group because some viewers ignore it on images.
         let _ = writeln!(
             self.body,
             "<g{clip}><image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" \
@@ -243,7 +243,7 @@ fn number(value: f64) -> String {
     decimal((value * 1000.0).round() as i64, 3)
 }
 
-/// A whole number of 10^−`places`, without needless digits.
+/// A whole number of 10^−`places`, without unnecessary digits.
 fn decimal(units: i64, places: u32) -> String {
     let one = 10u64.pow(places);
     let size = units.unsigned_abs();
@@ -262,8 +262,8 @@ fn decimal(units: i64, places: u32) -> String {
     text
 }
 
-/// Path data with steps relative to the point before, which is shortest, and rounding that does not
-/// add up.
+/// Path data with steps relative to the previous point, which is shortest; rounding errors do not
+/// accumulate.
 fn path_data(segments: &[Segment], places: u32) -> String {
     let scale = 10f64.powi(places as i32);
     let whole = |p: Point| ((p.x * scale).round() as i64, (p.y * scale).round() as i64);
@@ -316,7 +316,7 @@ fn escaped(text: &str) -> String {
             '<' => safe.push_str("&lt;"),
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
-            // XML has no place for control characters.
+            // XML does not allow control characters.
             c if c.is_control() => safe.push(' '),
             c => safe.push(c),
         }

@@ -1,4 +1,4 @@
-//! Markers and the strokes that they are made of.
+//! Markers and their strokes.
 
 use crate::colour::Colour;
 use crate::layer::Shape;

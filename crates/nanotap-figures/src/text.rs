@@ -1,4 +1,4 @@
-//! Words set as letter shapes: measuring, sub- and superscripts, italics.
+//! Text set as letter shapes: measuring, sub- and superscripts, italics.
 
 use crate::colour::Colour;
 use crate::font::{CAP_HEIGHT, Cut, DESCENT, Glyph};
@@ -8,7 +8,7 @@ use crate::shape::{Point, Segment};
 pub(crate) const MM_PER_POINT: f64 = 25.4 / 72.0;
 /// Size of sub- and superscripts relative to their letter.
 const SCRIPT_SIZE: f64 = 0.7;
-/// How far superscripts are raised, and subscripts lowered, in parts of the type size.
+/// Shift of superscripts (up) and subscripts (down) relative to the type size.
 const RAISE: f64 = 0.34;
 const LOWER: f64 = 0.16;
 
@@ -26,26 +26,26 @@ struct Letter {
     italic: bool,
 }
 
-/// Letters of the same size on the same line, ready to draw.
+/// Letters of the same size on the same baseline, ready to draw.
 #[derive(Debug, Clone)]
 pub(crate) struct Run {
     /// Type size, mm.
     pub(crate) size: f64,
-    /// Letters with the place of their origins, mm from the word's origin, y upwards.
+    /// Letters with the positions of their origins, mm from the text's origin, y upwards.
     pub(crate) glyphs: Vec<(Glyph, f64, f64)>,
 }
 
-/// A line of words, set but not yet placed. Lengths in mm.
+/// A line of text, set but not yet placed. Lengths in mm.
 #[derive(Debug, Clone)]
 pub(crate) struct Words {
     pub(crate) runs: Vec<Run>,
     pub(crate) width: f64,
     pub(crate) size: f64,
-    /// The words as plain text, for readers that cannot see shapes.
+    /// The text in plain characters, for readers that cannot see shapes.
     pub(crate) plain: String,
 }
 
-/// Which point of the words goes to the given place, across.
+/// Horizontal anchor of the text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Across {
     Left,
@@ -53,7 +53,7 @@ pub(crate) enum Across {
     Right,
 }
 
-/// Which point of the words goes to the given place, upright. Heights are those of capitals.
+/// Vertical anchor of the text. Heights are those of capitals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Upright {
     Top,
@@ -63,13 +63,13 @@ pub(crate) enum Upright {
     Bottom,
 }
 
-/// Words on the page.
+/// Text on the page.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedWords {
     pub(crate) words: Words,
     /// Origin (left end of the baseline), mm from the top left of the page.
     pub(crate) origin: Point,
-    /// Turned a quarter to the left, to be read from below.
+    /// Rotated by 90° to the left, to be read from below.
     pub(crate) upwards: bool,
     pub(crate) colour: Colour,
 }
@@ -77,8 +77,8 @@ pub(crate) struct PlacedWords {
 impl Words {
     /// Sets `source` at `points` (pt) in the given weight.
     ///
-    /// Markup: `_{…}` lowers, `^{…}` raises; between dollar signs Latin and small Greek letters are
-    /// italic and `_x`, `^x` need no braces; a backslash takes the next character as it is. The
+    /// Markup: `_{…}` lowers and `^{…}` raises. Between dollar signs Latin and small Greek letters
+    /// are italic, and `_x`, `^x` need no braces. A backslash makes the next character literal. The
     /// Unicode sub- and superscripts (₁, ⁻³) are set like the markup.
     pub(crate) fn set(source: &str, points: f64, bold: bool) -> Words {
         let size = points * MM_PER_POINT;
@@ -140,7 +140,7 @@ impl Words {
         DESCENT * self.size
     }
 
-    /// Puts the words level at `at`.
+    /// Places the text horizontally at `at`.
     pub(crate) fn place(
         self,
         at: Point,
@@ -157,7 +157,7 @@ impl Words {
         }
     }
 
-    /// Puts the words at `at`, turned to be read from below: "across" then runs up the page.
+    /// Places the text at `at`, rotated to be read from below: "across" then runs up the page.
     pub(crate) fn place_upwards(
         self,
         at: Point,
@@ -214,8 +214,8 @@ impl PlacedWords {
     }
 }
 
-/// A label as matplotlib's mathtext writes it: formulas between dollar signs, with letters that are
-/// not variables upright.
+/// A label in matplotlib's mathtext: formulas between dollar signs, with letters that are not
+/// variables upright.
 pub fn mathtext(source: &str) -> String {
     let mut text = String::new();
     let mut maths = false;
@@ -239,7 +239,7 @@ pub fn mathtext(source: &str) -> String {
         before = letter.script;
         match letter.character {
             '$' => text.push_str("\\$"),
-            // A mark stands before its letter in formulas.
+            // In formulas an accent comes before its letter.
             mark @ '\u{300}'..='\u{36f}' => {
                 let command = match mark {
                     '\u{302}' => "\\hat ",
@@ -420,7 +420,7 @@ mod tests {
     fn widths_add_up() {
         let width = |s: &str| Words::set(s, 8.0, false).width;
         assert!((width("ab") - width("a") - width("b")).abs() < 1e-12);
-        // A dot over a letter takes no room.
+        // A dot over a letter has no width.
         assert_eq!(width("$V\u{307}$"), width("$V$"));
         assert!(width("10^{3}") < width("103"));
         assert_eq!(width(""), 0.0);

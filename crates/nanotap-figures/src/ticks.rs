@@ -1,15 +1,15 @@
-//! Where an axis is marked, and with which words.
+//! Positions and labels of an axis's ticks.
 
-/// The marks of one axis.
+/// The ticks of one axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ticks {
-    /// Positions of the labelled marks, in data units, rising.
+    /// Positions of the labelled ticks, in data units, ascending.
     pub positions: Vec<f64>,
-    /// Their labels, with markup for powers (see [`crate::Axis`]).
+    /// Labels of the ticks, with markup for powers (see [`crate::Axis`]).
     pub labels: Vec<String>,
-    /// Positions of the unlabelled small marks.
+    /// Positions of the unlabelled minor ticks.
     pub minor: Vec<f64>,
-    /// What every label has to be multiplied by and added to ("×10⁻⁴ + 2.6"), if anything.
+    /// Common factor and offset of all labels ("×10⁻⁴ + 2.6"), if any.
     pub note: Option<String>,
 }
 
@@ -69,7 +69,7 @@ impl Decimal {
 /// Numbers of the first and the last multiple of `step` in a range, ends included.
 fn multiples(low: f64, high: f64, step: Decimal) -> (i64, i64) {
     let (low, high) = (low / step.value(), high / step.value());
-    // A mark at the very end counts, also where the quotient carries the rounding of large numbers.
+    // A tick at the very end counts, also where the quotient has the rounding of large numbers.
     let slack = |end: f64| 1e-9 + 4.0 * f64::EPSILON * end.abs();
     (
         (low - slack(low)).ceil() as i64,
@@ -96,11 +96,11 @@ fn nice_step(low: f64, high: f64, most: usize) -> Decimal {
     }
 }
 
-/// Marks of a linear axis from `low` to `high` (finite, `low < high`), at most `most` and at steps
-/// of 1, 2, 2.5 or 5 times a power of ten.
+/// Ticks of a linear axis from `low` to `high` (finite, `low < high`), at most `most`, at steps of
+/// 1, 2, 2.5 or 5 times a power of ten.
 ///
-/// Labels longer than six digits are shortened by a common factor, a common offset, or both, which
-/// [`Ticks::note`] names.
+/// Labels longer than six digits are shortened by a common factor, a common offset, or both, given
+/// in [`Ticks::note`].
 pub fn linear(low: f64, high: f64, most: usize) -> Ticks {
     let span = high - low;
     if !span.is_finite() || span <= 0.0 {
@@ -164,7 +164,8 @@ pub fn linear(low: f64, high: f64, most: usize) -> Ticks {
         positions: marks.iter().map(|m| m.value().clamp(low, high)).collect(),
         labels: marks
             .iter()
-            // A mark at the offset, alone, needs no decimals: they line up with none.
+            // A single tick at the offset needs no decimals, since no other labels have to align
+            // with it.
             .map(|m| match rest(m) {
                 _ if largest == 0.0 => "0".into(),
                 rest => rest.text(shift),
@@ -184,7 +185,7 @@ fn signed(number: i32) -> String {
     }
 }
 
-/// A positive number, written out or, where that is long, with a power of ten.
+/// A positive number, written out or, if that is long, with a power of ten.
 fn power_text(number: Decimal) -> String {
     let figures = number.digits.to_string().len() as i32;
     let leading = figures - 1 + number.exponent;
@@ -200,8 +201,8 @@ fn power_text(number: Decimal) -> String {
     }
 }
 
-/// Marks of a logarithmic axis from `low` to `high` (finite, `0 < low < high`), at most `most`
-/// labelled ones: decades, or the parts of a decade where the axis spans no more than about one.
+/// Ticks of a logarithmic axis from `low` to `high` (finite, `0 < low < high`), at most `most`
+/// labelled ones: decades, or fractions of a decade if the axis spans no more than about one.
 pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Ticks::default();
@@ -218,7 +219,7 @@ pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
         return part_of_decade(low, high, most, &fine, within);
     }
     let stride = decades.div_ceil(most.max(2)) as i32;
-    // Marks at multiples of the stride, so that two figures of the same quantity agree.
+    // Ticks are at multiples of the stride, so that two figures of the same quantity agree.
     let labelled: Vec<i32> = (first..=last)
         .filter(|e| e.rem_euclid(stride) == 0)
         .collect();
@@ -246,7 +247,7 @@ pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     }
 }
 
-/// Marks of a logarithmic axis that holds fewer than two decades.
+/// Ticks of a logarithmic axis that spans fewer than two decades.
 fn part_of_decade(
     low: f64,
     high: f64,
@@ -284,7 +285,7 @@ fn part_of_decade(
                 .collect(),
             note: None,
         },
-        // Less than a factor of about two: the axis is as good as linear.
+        // Over less than a factor of about two the axis is almost linear.
         _ => linear(low, high, most),
     }
 }
@@ -379,7 +380,8 @@ mod tests {
             let (low, high) = (centre, centre + span);
             let ticks = linear(low, high, most);
             prop_assert!(!ticks.positions.is_empty() && ticks.positions.len() <= most);
-            // With room for four marks there are at least two, else the axis would have no scale.
+            // With space for four ticks there are at least two; otherwise the axis would have no
+            // scale.
             prop_assert!(most < 4 || ticks.positions.len() >= 2, "{:?}", ticks);
             prop_assert!(ticks.positions.iter().all(|p| (low..=high).contains(p)));
             let gaps: Vec<f64> = ticks.positions.windows(2).map(|w| w[1] - w[0]).collect();

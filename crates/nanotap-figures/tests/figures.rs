@@ -1,4 +1,4 @@
-//! Figures as their readers get them: files of every format.
+//! Figures in every output format.
 
 #![allow(
     clippy::disallowed_methods,
@@ -185,7 +185,7 @@ fn nan_and_infinity_leave_gaps() {
     points[60].0 = f64::INFINITY;
     let svg = Figure::single(plain(Line::new(points))).to_svg().unwrap();
     assert_eq!(path_data(group(&svg, "line")).matches('m').count(), 3);
-    // On a logarithmic axis, half of the wave has no place.
+    // On a logarithmic axis half of the wave cannot be shown.
     let panel = Panel::new(Axis::linear("x"), Axis::log("y")).with(Line::new(wave(100)));
     let svg = Figure::single(panel).to_svg().unwrap();
     assert_eq!(path_data(group(&svg, "line")).matches('m').count(), 1);
@@ -258,7 +258,7 @@ fn a_hundred_thousand_points_stay_small() {
 
 #[test]
 fn scattered_points_stay_small_too() {
-    // Without any structure nothing compresses: the hardest case.
+    // Data without structure do not compress: the hardest case.
     let mut random = pseudo_random(7);
     let points: Vec<(f64, f64)> = (0..100_000).map(|_| (random(), random())).collect();
     let figure = Figure::single(plain(Points::new(points).diameter(0.1)));
@@ -393,14 +393,14 @@ fn panels_without_data_say_so() {
 
 #[test]
 fn a_legend_never_hides_data() {
-    // Noise fills the panel: the legend must go above it, and the panel makes room.
+    // Noise fills the panel: the legend must go above it, and the panel makes space.
     let mut random = pseudo_random(3);
     let noise: Vec<(f64, f64)> = (0..5000).map(|_| (random(), random())).collect();
     let legend = |points: &[(f64, f64)]| {
         let svg = Figure::single(plain(Points::new(points.to_vec()).label("noise")))
             .to_svg()
             .unwrap();
-        // Only a legend inside has a white ground.
+        // Only a legend inside has a white background.
         group(&svg, "legend").contains("fill=\"#ffffff\"")
     };
     assert!(!legend(&noise));
@@ -439,7 +439,7 @@ fn json_describes_the_whole_figure() {
     let json = figure.to_json().unwrap();
     let read = Figure::from_json(&json).unwrap();
     assert_eq!(read.to_svg().unwrap(), figure.to_svg().unwrap());
-    // What a figure decides by itself is decided, so that no other program has to.
+    // All defaults of a figure are resolved, so that no other program has to do it.
     let value: serde_json::Value = serde_json::from_str(&json).unwrap();
     for panel in value["panels"].as_array().unwrap() {
         assert!(panel["letter"].as_str().unwrap().starts_with('('));
@@ -449,7 +449,7 @@ fn json_describes_the_whole_figure() {
             assert!(map || layer["colour"].as_str().unwrap().starts_with('#'));
         }
     }
-    // Gaps and open ends survive.
+    // Gaps and open ends are preserved.
     let gaps = plain(Line::new([
         (0.0, 1.0),
         (f64::NAN, 2.0),
@@ -460,7 +460,7 @@ fn json_describes_the_whole_figure() {
     let figure = Figure::single(gaps);
     let read = Figure::from_json(&figure.to_json().unwrap()).unwrap();
     assert_eq!(read.to_svg().unwrap(), figure.to_svg().unwrap());
-    // Little needs to be said.
+    // A minimal description is enough.
     let short = r#"{"panels": [{"x": {"label": "t", "unit": "s"}, "layers":
         [{"kind": "line", "points": {"x": [0, 1], "y": [1, null]}, "width": 1}]}]}"#;
     let svg = Figure::from_json(short).unwrap().to_svg().unwrap();
@@ -520,19 +520,19 @@ fn rounding_is_not_magnified() {
         let svg = Figure::single(panel).to_svg().unwrap();
         group(&svg, "axis-y").to_owned()
     };
-    // 3e-24 of an energy of 1 is nothing: the axis is that of 1.
+    // 3e-24 is rounding for an energy of natural size 1; the axis is that of 1.
     let zero = labels(Axis::linear("E").natural(1.0), [0.0, 3e-24, -1e-24]);
     assert!(
         zero.contains("\"0.5\"") && zero.contains("\"−0.5\""),
         "{zero}"
     );
     assert!(!zero.contains("×10"), "{zero}");
-    // Without a natural size nothing can be said of small numbers.
+    // Without a natural size small numbers cannot be called rounding.
     assert!(labels(Axis::linear("E"), [0.0, 3e-24, -1e-24]).contains("×10"));
-    // What is constant but for rounding is drawn as constant.
+    // Data that are constant to rounding are drawn as constant.
     let flat = labels(Axis::linear("E"), [2.5, 2.5 + 4e-14, 2.5 - 4e-14]);
     assert!(flat.contains("\"2.50\"") && !flat.contains("×10"), "{flat}");
-    // What matters is drawn as it is.
+    // Data that are not rounding are drawn as they are.
     assert!(labels(Axis::linear("E").natural(1.0), [0.0, 2e-6, 1e-6]).contains("×10−6"));
 }
 
@@ -562,7 +562,7 @@ fn files_appear_whole_or_not_at_all() {
     }
     let error = figure.write(folder.join("nowhere/a.svg")).unwrap_err();
     assert!(matches!(error, FigureError::Write { .. }), "{error}");
-    // A folder of that name cannot be replaced; nothing half-written may stay.
+    // A folder of that name cannot be replaced; no partly written file may remain.
     std::fs::create_dir(folder.join("folder.svg")).unwrap();
     assert!(figure.write(folder.join("folder.svg")).is_err());
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 4);
@@ -638,7 +638,7 @@ fn impossible_figures_are_refused_with_a_reason() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever numbers come in, a figure comes out, and all its coordinates are numbers.
+    /// For any numbers a figure is drawn, and all its coordinates are numbers.
     #[test]
     fn no_numbers_break_a_figure(
         points in prop::collection::vec((any::<f64>(), any::<f64>()), 0..20),

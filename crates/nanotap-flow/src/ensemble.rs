@@ -284,6 +284,10 @@ impl Ensemble {
             lengths.max_by_key(|(_, length)| *length)
         };
         while let Some((regime, 1..)) = fullest(&self.waiting) {
+            if system.check_cancel().is_err() {
+                self.cancel();
+                return;
+            }
             let waiting = &mut self.waiting[regime];
             let count = waiting.len().min(LANES);
             // Lanes that are left over do what the first does.
@@ -299,6 +303,17 @@ impl Ensemble {
                     self.waiting[regime].push_back(member);
                 }
             }
+        }
+    }
+
+    /// Ends all motions that are under way.
+    fn cancel(&mut self) {
+        for member in self
+            .waiting
+            .iter_mut()
+            .flat_map(|waiting| waiting.drain(..))
+        {
+            self.members[member].failure = Some(FlowError::Cancelled);
         }
     }
 

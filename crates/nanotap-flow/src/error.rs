@@ -70,6 +70,9 @@ pub enum FlowError {
         "the starting state lies in no regime: every regime's transition is already passed there"
     )]
     NoRegime,
+    /// The work was cancelled from outside.
+    #[error("stopped from outside")]
+    Cancelled,
     /// The motion left the range of double precision.
     #[error("the motion grew beyond the range of double precision at time {time}")]
     Diverged {

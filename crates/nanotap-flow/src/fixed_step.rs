@@ -173,13 +173,13 @@ impl<'a> FixedStep<'a> {
     }
 
     /// One drive period; returns how many switches were noticed. `watch` sees each
-    /// step's phase and state.
+    /// step's phase and state. It ends early once the system's motions are cancelled.
     pub fn run_period(&mut self, mut watch: impl FnMut(f64, &[f64])) -> u32 {
         let period = self.system.drive().period();
         let mut phase = 0.0;
         let mut switches = 0;
         self.phasors.fill(Complex::new(1.0, 0.0));
-        while phase < period * (1.0 - ROUNDING) {
+        while phase < period * (1.0 - ROUNDING) && self.system.check_cancel().is_ok() {
             let step = period / f64::from(self.steps[self.regime]);
             let left = period - phase;
             // What is left of the period is a step but for the rounding of their sum.

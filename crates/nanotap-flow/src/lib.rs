@@ -67,6 +67,7 @@ pub use flow::{Flow, Observer};
 pub use harmonic::{HarmonicVector, Output};
 pub use prepared_basis::PreparedBasis;
 pub use regime::Regime;
+pub use simd::vector_instructions;
 pub use spectral::SpectralBasis;
 pub use system::{Onset, Reset, Sticking, System, Transition};
 pub use trajectory::{Event, Trajectory};

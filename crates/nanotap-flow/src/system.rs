@@ -9,7 +9,7 @@ use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, layout};
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector};
-use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 
 /// A jump of the state at a switch: `x⁺ = matrix · x⁻ + offset(t)`.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,6 +135,8 @@ pub struct System {
     rates: Vec<Vec<ComplexVector>>,
     /// The largest `|λ|` of any regime or tone.
     fastest: f64,
+    /// What ends its motions from outside.
+    cancel: CancelFlag,
 }
 
 /// What a transition needs at run time.
@@ -336,6 +338,7 @@ impl System {
             reaches: Vec::new(),
             rates: Vec::new(),
             fastest: 0.0,
+            cancel: CancelFlag::default(),
         };
         system.switches = (0..system.regimes.len())
             .map(|r| {
@@ -383,6 +386,28 @@ impl System {
         Ok(system)
     }
 
+    /// The same system, whose motions end with [`FlowError::Cancelled`] once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// What ends its motions from outside.
+    pub fn cancel(&self) -> &CancelFlag {
+        &self.cancel
+    }
+
+    /// An error once its motions are to end.
+    #[inline]
+    pub(crate) fn check_cancel(&self) -> Result<(), FlowError> {
+        if self.cancel.is_cancelled() {
+            Err(FlowError::Cancelled)
+        } else {
+            Ok(())
+        }
+    }
+
     /// Dimension of the state.
     pub fn dimension(&self) -> usize {
         self.dimension
@@ -420,6 +445,20 @@ impl System {
     /// How far the tables of a regime's guards reach.
     pub(crate) fn table_reach(&self, regime: usize) -> f64 {
         self.reaches[regime]
+    }
+
+    /// The transition of a rigid stop, with the regime that it leaves, that ends in sticking in
+    /// `regime`; `None` where `regime` is not one in which the motion sticks.
+    pub(crate) fn stop_of(&self, regime: usize) -> Option<(usize, usize)> {
+        let sticks = |e: &Transition| e.sticking.as_ref().is_some_and(|s| s.regime == regime);
+        let mut out = self.transitions.iter().enumerate();
+        out.find_map(|(from, out)| Some((from, out.iter().position(sticks)?)))
+    }
+
+    /// Whether the motion sticks to a rigid stop in `regime`: whatever it was before, its state is
+    /// then that of the stop.
+    pub fn sticks(&self, regime: usize) -> bool {
+        self.stop_of(regime).is_some()
     }
 
     /// The switch of a transition.

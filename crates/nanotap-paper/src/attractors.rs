@@ -1,5 +1,4 @@
-//! The census behind the verdicts on Figs. 6–17: every case of the paper with one to
-//! five modes.
+//! The census for the verdicts on Figs. 6–17: every case of the paper with one to five modes.
 
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
@@ -8,18 +7,18 @@ use super::section::{Section, Table};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
-/// Most modes of the census.
+/// Largest number of modes of the census.
 const MOST_MODES: usize = 5;
 
-/// What the paper says coexists in one case.
+/// The coexisting motions that the paper states for one case.
 struct Coexistence {
     id: &'static str,
     omega: f64,
     alpha1: f64,
     paper: &'static str,
-    /// Stable motions by (period, how many).
+    /// Stable motions as (period, number).
     periodic: &'static [(usize, usize)],
-    /// Whether a nonperiodic one is among them.
+    /// Whether one of them is not periodic.
     nonperiodic: bool,
 }
 
@@ -60,7 +59,7 @@ const CLAIMS: [Coexistence; 4] = [
 ];
 
 impl Coexistence {
-    /// Whether a census found all that.
+    /// Whether a census found all of them.
     fn holds(&self, counted: &Counted) -> bool {
         self.periodic
             .iter()
@@ -69,7 +68,7 @@ impl Coexistence {
     }
 }
 
-/// Every attractor of the cases of Figs. 6–17.
+/// Every attractor in the cases of Figs. 6–17.
 pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, PaperError> {
     let mut table = Table::new(
         "Every attractor found, from seeded starts in a box that fits the case",

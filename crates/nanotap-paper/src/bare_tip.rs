@@ -1,4 +1,4 @@
-//! Figs. 15–17: no tip mass. Captions say Ω = 20, the text says Ω = 2.6: both are computed.
+//! Figs. 15–17: no tip mass. The captions have Ω = 20, the text Ω = 2.6; both are computed.
 
 use std::rc::Rc;
 
@@ -13,7 +13,7 @@ use super::section::{Picture, Section};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
-/// Longest period of the orbits looked for.
+/// Longest period of the orbits that are searched for.
 const LONGEST: usize = 4;
 
 /// Both readings, with their censuses and orbits.
@@ -45,7 +45,7 @@ impl Reading {
             .collect()
     }
 
-    /// What there is of a period: "one attracts (W from … to …), one repels".
+    /// The motions of a period in words: "one attracts (W from … to …), one repels".
     fn describe(&self, period: usize) -> Result<String, PaperError> {
         let mut parts = Vec::new();
         for (orbit, _) in self.counted.stable(period) {
@@ -72,7 +72,7 @@ impl Reading {
         })
     }
 
-    /// An orbit of this period, a stable one first.
+    /// An orbit of this period; a stable one is preferred.
     fn best(&self, period: usize) -> Option<&PeriodicOrbit> {
         let stable = self.counted.stable(period).first().map(|(orbit, _)| *orbit);
         stable.or_else(|| self.unstable(period).first().copied())
@@ -132,9 +132,9 @@ impl Bare {
     }
 }
 
-/// So many motions were `claimed`; two readings have so many `stable` ones and so many in
-/// `all`, unstable ones included. Reproduced if a reading has them all stable; ambiguous
-/// if only part of them attracts in the better reading; differs if none does.
+/// The verdict on `claimed` motions, given the numbers of `stable` motions and of `all` motions,
+/// unstable ones included, in two readings. Reproduced if a reading has all of them stable;
+/// ambiguous if only some are stable in the better reading; differs if none is.
 fn verdict(claimed: usize, stable: [usize; 2], all: [usize; 2]) -> Verdict {
     let most = |counts: [usize; 2]| counts[0].max(counts[1]);
     if most(stable) >= claimed {
@@ -177,7 +177,7 @@ fn picture(
 pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let bare = Bare::new(runs)?;
     let kinds = |r: &Reading| r.counted.kinds().join(", ");
-    // The captions' reading is the better one if only there a subharmonic attracts.
+    // The captions' reading is the better one if only it has a stable subharmonic.
     let subharmonic = |r: &Reading| {
         r.counted
             .all_stable()
@@ -350,7 +350,7 @@ mod tests {
     #[test]
     fn two_claimed_motions_need_two_that_attract() {
         assert_eq!(verdict(2, [2, 0], [2, 0]), Verdict::Reproduced);
-        // One attracts, its saddle partner repels: the paper may have seen either.
+        // One is stable, its saddle partner is not: the paper may show either.
         assert_eq!(verdict(2, [1, 0], [2, 0]), Verdict::Ambiguous);
         assert_eq!(verdict(2, [1, 1], [1, 1]), Verdict::Differs);
         assert_eq!(verdict(1, [0, 0], [3, 0]), Verdict::Differs);

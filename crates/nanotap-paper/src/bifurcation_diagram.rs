@@ -1,5 +1,5 @@
-//! Fig. 5: what attracts at each drive frequency, and the period-1 branch through all of
-//! it, stable or not.
+//! Fig. 5: the attractors at each drive frequency, and the period-1 branch through all of it,
+//! stable or not.
 
 use nanotap_figures::{
     Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel, Rule, Shape,
@@ -15,18 +15,18 @@ use nanotap::case::Case;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
-/// Range of Ω drawn. The paper's axis cannot be read from its text, which names 2.0 to
-/// 2.15, 2.6, and what happens at higher frequencies.
+/// Range of Ω that is drawn. The paper's axis cannot be inferred from its text, which names 2.0 to
+/// 2.15, 2.6, and higher frequencies.
 const RANGE: (f64, f64) = (1.5, 7.5);
-/// Range drawn larger: around Ω = 2.6.
+/// Range of the enlarged panel: around Ω = 2.6.
 const CLOSE: (f64, f64) = (2.4, 3.3);
-/// Where the paper has nonperiodic motions evolving from period 2.
+/// Range in which the paper has nonperiodic motions evolving from period 2.
 const WINDOW: (f64, f64) = (2.0, 2.15);
-/// Deflections marked at the axis of the whole diagram.
+/// Deflections with ticks on the axis of the whole diagram.
 const MARKS: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 2.0];
-/// Where the period-1 branch is entered: it is stable there.
+/// Start of the period-1 branch, which is stable there.
 const ENTRY: f64 = 3.5;
-/// Where the period-2 branch around Ω = 2.6 is entered.
+/// Start of the period-2 branch around Ω = 2.6.
 const ENTRY_TWO: f64 = 2.75;
 
 /// Fig. 5.
@@ -182,8 +182,8 @@ fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check
     .rerun(again)
 }
 
-/// Frequencies a little beyond the Neimark–Sacker points above the paper's window, on the side
-/// where the period-1 orbit repels.
+/// Frequencies slightly beyond the Neimark–Sacker points above the paper's window, on the side
+/// where the period-1 orbit is unstable.
 fn inside_the_tori(branch: &FollowedBranch) -> Vec<f64> {
     const BEYOND: f64 = 0.15;
     let tori: Vec<f64> = branch
@@ -206,7 +206,7 @@ fn further(wide: &[Column], beyond: &[Column], branch: &FollowedBranch, again: &
         .into_iter()
         .filter(|omega| *omega > WINDOW.1)
         .collect();
-    // A coarse sweep can step over the short stretches where the torus attracts.
+    // A coarse sweep can miss the short intervals in which the torus is stable.
     let mut columns: Vec<Column> = wide.iter().chain(beyond).cloned().collect();
     columns.sort_by(|a, b| a.at.total_cmp(&b.at));
     let seen = columns
@@ -301,7 +301,7 @@ fn picture(
     )
 }
 
-/// Adds a branch where it repels, and where it bifurcates.
+/// Adds the unstable parts of a branch, and its bifurcations.
 fn with_branch(
     mut panel: Panel,
     branch: &FollowedBranch,

@@ -1,16 +1,16 @@
-//! One statement of the paper beside what was computed here.
+//! A statement of the paper and the corresponding result of this program.
 
 use serde::Serialize;
 
-/// What became of a statement.
+/// Verdict on a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// It holds here.
+    /// The statement holds.
     Reproduced,
-    /// It does not.
+    /// The statement does not hold.
     Differs,
-    /// The paper says too little, or contradicts itself.
+    /// The paper's information is insufficient or contradictory.
     Ambiguous,
 }
 
@@ -18,7 +18,8 @@ impl Verdict {
     /// Every verdict.
     pub const ALL: [Self; 3] = [Self::Reproduced, Self::Differs, Self::Ambiguous];
 
-    /// Reproduced where the statement `holds`, else differs.
+    /// [`Reproduced`](Self::Reproduced) if the statement `holds`, otherwise
+    /// [`Differs`](Self::Differs).
     pub const fn of(holds: bool) -> Self {
         if holds {
             Self::Reproduced
@@ -27,7 +28,7 @@ impl Verdict {
         }
     }
 
-    /// The word for it.
+    /// Name of the verdict.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reproduced => "reproduced",
@@ -37,37 +38,37 @@ impl Verdict {
     }
 }
 
-/// What a statement is about.
+/// Subject of a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum About {
-    /// A formula, a number or a caption as it is printed.
+    /// A formula, a number or a caption as printed.
     Print,
-    /// How the system moves.
+    /// A motion of the system.
     Motion,
 }
 
-/// A statement of the paper, what holds here, and how anyone can see for themselves.
+/// A statement of the paper, the result of this program, and how to reproduce it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
-    /// Its name, such as `eq25` or `fig8-amplitude`.
+    /// Identifier, such as `eq25` or `fig8-amplitude`.
     pub id: String,
-    /// What the paper says, and where.
+    /// The paper's statement, with its location.
     pub paper: String,
-    /// What holds here.
+    /// The result of this program.
     pub here: String,
-    /// Whether it is about what is printed or about the motion.
+    /// Whether the statement is about the printed text or about the motion.
     pub about: About,
-    /// Whether the two agree.
+    /// Whether statement and result agree.
     pub verdict: Verdict,
-    /// Why the verdict can be believed.
+    /// Evidence for the verdict.
     pub evidence: String,
-    /// A command line that computes it again.
+    /// A command line that reproduces the result.
     pub rerun: String,
 }
 
 impl Check {
-    /// A statement with the verdict on it; evidence and command are added.
+    /// A statement with its verdict, without evidence and command.
     pub fn new(
         id: impl Into<String>,
         paper: impl Into<String>,
@@ -92,7 +93,7 @@ impl Check {
         self
     }
 
-    /// Says that the statement is about a formula, a number or a caption as printed.
+    /// Marks the statement as one about a formula, a number or a caption as printed.
     #[must_use]
     pub fn in_print(mut self) -> Self {
         self.about = About::Print;
@@ -107,13 +108,13 @@ impl Check {
     }
 }
 
-/// Whether `value`, rounded to `decimals` decimals, is the number that was `printed`.
+/// Whether `value`, rounded to `decimals` decimals, equals the `printed` number.
 pub(super) fn rounds_to(value: f64, printed: f64, decimals: i32) -> bool {
-    // A thousandth of a unit forgives the binary form of the printed number.
+    // A thousandth of a unit allows for the binary form of the printed number.
     (value - printed).abs() <= 0.501 * 10f64.powi(-decimals)
 }
 
-/// `value` with `digits` significant digits, without an exponent where it is short.
+/// `value` with `digits` significant digits, without an exponent if it is short.
 pub(super) fn digits(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();

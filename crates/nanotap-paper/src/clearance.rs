@@ -1,5 +1,5 @@
-//! Fig. 2f: does another part of the beam than its tip touch the sample? The paper
-//! assumes that it does not and says that its cases were chosen so.
+//! Fig. 2f: does another part of the beam than its tip touch the sample? The paper assumes that it
+//! does not and states that its cases were chosen accordingly.
 
 use super::check::{Check, Verdict, digits};
 use super::damped_limit::response;
@@ -11,7 +11,7 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::Clearance;
 
-/// Drive periods of a motion that never repeats.
+/// Drive periods over which a motion that does not repeat is observed.
 const WATCHED: usize = 400;
 
 struct Row {

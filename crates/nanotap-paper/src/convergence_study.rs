@@ -1,5 +1,5 @@
-//! Fig. 4: the tip's motion at Ω = 4.1 without damping, with N = 1 … 4 modes, and how it
-//! goes on to N = 20.
+//! Fig. 4: the tip's motion at Ω = 4.1 without damping, with N = 1 … 4 modes, and the continuation
+//! to N = 20.
 
 use nanotap_figures::{Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::orbit::OrbitReport;
 
-/// Modes up to which the study goes on.
+/// Largest number of modes of the study.
 const MOST: usize = 20;
 /// Modes in the paper's figure.
 const PAPER_MODES: usize = 4;
@@ -22,7 +22,7 @@ const PAPER_MODES: usize = 4;
 const INSTANTS: usize = 1000;
 /// Drive periods of the run from rest.
 const RUN: usize = 30;
-/// A difference that the eye sees in a figure of this size, part of the amplitude.
+/// Difference visible in a figure of this size, relative to the amplitude.
 const VISIBLE: f64 = 0.05;
 
 struct Response {

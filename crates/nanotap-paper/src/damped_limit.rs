@@ -1,5 +1,5 @@
-//! The periodic response of an undamped case: there is no attractor to wait for, so the
-//! damped one of Eq. (26) is followed by Newton while all damping is taken away.
+//! The periodic response of an undamped case. It has no attractor, so the attractor of the damped
+//! case of Eq. (26) is followed by Newton's method while all damping is removed.
 
 use nanotap_dynamics::{ClassifyOptions, MotionKind, ShootingOptions, classify, close_orbit};
 
@@ -10,13 +10,12 @@ use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::orbit::{OrbitReport, report};
 
-/// Halvings of the damping before it is left out.
+/// Halvings of the damping before it is set to zero.
 const HALVINGS: i32 = 12;
-/// Damping of the beam and of the contact that the way begins with, Eq. (26).
+/// Initial damping of the beam and of the contact, Eq. (26).
 const START: (f64, f64) = (0.1, 0.2);
 
-/// The orbit that the steady state of the damped case becomes without damping, and its
-/// model.
+/// The limit of the damped steady state without damping, and its model.
 pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), PaperError> {
     let failed = |why: String| PaperError::Failed {
         what: format!(
@@ -62,8 +61,8 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
 mod tests {
     use super::*;
 
-    /// Without damping the flow keeps volume: multipliers come in pairs μ, 1/μ, and
-    /// energy is neither fed nor drained over a period.
+    /// Without damping the flow preserves volume: multipliers come in pairs μ, 1/μ, and energy is
+    /// neither added nor removed over a period.
     #[test]
     fn the_response_is_on_the_unit_circle_and_does_no_work() {
         let (_, orbit) = response(&Cantilever::paper_eq24()).unwrap();

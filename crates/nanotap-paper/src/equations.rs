@@ -10,7 +10,7 @@ use nanotap::model::exact_beam;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::ModeTable;
 
-/// Eq. (7): α3 and α6 as printed are not pure numbers.
+/// Eq. (7): α3 and α6 as printed are not dimensionless.
 #[allow(clippy::unnecessary_wraps)] // One signature for every section.
 pub(super) fn damping_units(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let lever = DampedLever {
@@ -45,7 +45,7 @@ pub(super) fn damping_units(_: &Runs<'_>, section: Section) -> Result<Section, P
         ))
 }
 
-/// A lever as far as Eq. (7) needs it.
+/// The properties of a lever that Eq. (7) uses.
 #[derive(Clone, Copy)]
 struct DampedLever {
     length: f64,
@@ -55,8 +55,8 @@ struct DampedLever {
 }
 
 impl DampedLever {
-    /// The unit of mass a thousand times smaller: m (kg/m), EI (kg m³/s²) and C
-    /// (kg/(m s)) are each proportional to it.
+    /// Converts to a unit of mass a thousand times smaller: m (kg/m), EI (kg m³/s²) and C (kg/(m
+    /// s)) are each proportional to it.
     fn in_grams(self) -> Self {
         Self {
             mass: 1e3 * self.mass,
@@ -150,9 +150,9 @@ pub(super) fn bare_frequencies(_: &Runs<'_>, section: Section) -> Result<Section
     ))
 }
 
-/// Most modes that Eq. (25) is computed with.
+/// Largest number of modes with which Eq. (25) is computed.
 const MOST_MODES: usize = 10;
-/// Eq. (25), with its decimals.
+/// Numbers of Eq. (25) with their decimals.
 const EQ25: [(f64, i32); 3] = [(7.79, 2), (20.33, 2), (55.81, 2)];
 
 /// Eq. (25).
@@ -296,7 +296,7 @@ const SAMPLES: [(&str, f64, f64, f64); 4] = [
     ("graphite", 5e9, 23.4, 0.05),
     ("stiffest", 50e9, 233.5, 0.05),
 ];
-/// The tip, as section 4 describes it.
+/// The tip as described in section 4.
 const SILICON: Elastic = Elastic {
     modulus: 130e9,
     poisson: 0.27,
@@ -307,7 +307,7 @@ const SILICON: Elastic = Elastic {
 pub(super) fn samples(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let (low, high) = slopes(|modulus| modulus);
     let rigid = low <= high;
-    // With the tip's own compliance there must be one Poisson ratio for all.
+    // If the tip's own compliance counts, there must be one Poisson ratio for all samples.
     let ratios: Vec<f64> = (0..=50).map(|k| 0.01 * f64::from(k)).collect();
     let compliant = |poisson: f64| {
         slopes(|modulus| reduced_modulus(Elastic { modulus, poisson }, Some(SILICON)))
@@ -379,8 +379,8 @@ pub(super) fn samples(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         .table(table))
 }
 
-/// The range of factors between α4 and `modulus_of` that the printed digits of all
-/// samples leave; empty (low > high) if there is none.
+/// The range of factors between α4 and `modulus_of` that agree with the printed digits of all
+/// samples; empty (low > high) if there are none.
 fn slopes(modulus_of: impl Fn(f64) -> f64) -> (f64, f64) {
     SAMPLES.iter().fold(
         (0.0, f64::INFINITY),
@@ -394,7 +394,7 @@ fn slopes(modulus_of: impl Fn(f64) -> f64) -> (f64, f64) {
     )
 }
 
-/// Section 3: with α5 = 0 nothing depends on the size of the motion.
+/// Section 3: with α5 = 0 nothing depends on the amplitude of the motion.
 pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     use nanotap_dynamics::StroboscopicMap as _;
     let map_of = |alpha2: f64| -> Result<_, PaperError> {
@@ -448,7 +448,7 @@ mod tests {
             bending: 5.0,
             damping: 0.7,
         };
-        // C and EI scale as the unit of mass: the printed factor as its square root.
+        // C and EI are proportional to the unit of mass, the printed factor to its square root.
         assert!(
             (lever.in_grams().alpha3_printed() / lever.alpha3_printed() - 1e3f64.sqrt()).abs()
                 < 1e-12
@@ -460,7 +460,7 @@ mod tests {
 
     #[test]
     fn printed_lists_are_compared_number_by_number() {
-        // Eq. (25) and the exact beam of the same case, from its transcendental equation.
+        // Eq. (25), and the exact beam of the same case from its transcendental equation.
         assert!(!agree(&[7.790952, 20.324970, 55.718523], &EQ25));
         assert!(agree(&[7.7931, 20.3312, 55.8098], &EQ25));
         assert!(!agree(&[7.7931, 20.3312], &EQ25));
@@ -468,7 +468,7 @@ mod tests {
 
     #[test]
     fn slopes_are_those_that_every_digit_allows() {
-        // α4 = 4.67 E₂/GPa is within the digits of all four; E₂² is not.
+        // α4 = 4.67 E₂/GPa agrees with the digits of all four; E₂² does not.
         let (low, high) = slopes(|modulus| modulus);
         assert!(low <= 4.67e-9 && 4.67e-9 <= high);
         let (low, high) = slopes(|modulus| modulus * modulus);

@@ -1,5 +1,5 @@
-//! Figs. 8–14: the motions at Ω = 20 with a tip mass. One exists; beside it stands what
-//! the paper's own method makes of it.
+//! Figs. 8–14: the motions at Ω = 20 with a tip mass. One exists; it is compared with the motions
+//! that the paper's own method produces.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::rc::Rc;
@@ -18,12 +18,12 @@ use nanotap::model::cantilever::{Cantilever, CantileverError};
 use nanotap::model::exact_beam;
 use nanotap::model::{Model, ModelError};
 
-/// Colour of what fixed steps make.
+/// Colour of motions computed with fixed steps.
 const GRID: Colour = Colour::PURPLE;
-/// Drive periods of a nonperiodic motion drawn.
+/// Number of drive periods of a nonperiodic motion that are drawn.
 const SHOWN: usize = 40;
 
-/// The case of these figures, three modes, with its one attractor.
+/// The case of these figures, three modes, with its only attractor.
 struct Fast {
     counted: Rc<Counted>,
     attractor: PeriodicOrbit,
@@ -50,7 +50,7 @@ impl Fast {
         })
     }
 
-    /// The exact motion above, a motion of a grid below.
+    /// The exact motion above, the motion of a grid below.
     fn figure(&self, periods: usize, grid: Option<&GridMotion>) -> Result<Figure, PaperError> {
         let view = View::new(&self.counted.model, &self.attractor.states[0], periods)?;
         let loop_view = View::new(
@@ -77,7 +77,7 @@ impl Fast {
         })
     }
 
-    /// What the census says against a claim.
+    /// The evidence of the census against a claim.
     fn evidence(&self) -> String {
         format!(
             "N = 3, {}; {}",
@@ -99,7 +99,7 @@ impl Fast {
     }
 }
 
-/// Time series and phase portrait of what a grid shows.
+/// Time series and phase portrait of the motion of a grid.
 fn grid_panels(motion: &GridMotion, model: &Model, periods: usize) -> [Panel; 2] {
     let curve = motion.curve(model, periods);
     let time = Panel::new(
@@ -129,7 +129,7 @@ fn grid_panels(motion: &GridMotion, model: &Model, periods: usize) -> [Panel; 2]
     [time, portrait]
 }
 
-/// Words on a grid's motion for a caption.
+/// Text on a grid's motion for a caption.
 fn below(motion: Option<&GridMotion>) -> String {
     motion.map_or_else(String::new, |m| {
         format!(
@@ -314,7 +314,7 @@ struct LongPeriod {
     id: &'static str,
     number: usize,
     period: usize,
-    /// How many motions of this period the paper needs up to this figure.
+    /// Number of motions of this period that the paper has up to this figure.
     claimed: usize,
     amplitude: f64,
 }

@@ -1,5 +1,5 @@
-//! A branch of periodic orbits in the drive frequency, stable or not, with what the
-//! sections ask of it: its extrema, its bifurcations, where it attracts.
+//! A branch of periodic orbits in the drive frequency, stable or not, with the data that the
+//! sections need: its extrema, its bifurcations, and where it is stable.
 
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationError, ContinuationOptions,
@@ -16,25 +16,25 @@ use nanotap::model::strobe::Strobe;
 /// The key of the drive frequency.
 pub(super) const OMEGA: Key = Key::Omega;
 
-/// A branch in Ω, followed both ways from one orbit.
+/// A branch in Ω, followed in both directions from one orbit.
 pub(super) struct FollowedBranch {
     /// Points in order along the branch.
     points: Vec<Point>,
-    /// In order along the branch.
+    /// Bifurcations in order along the branch.
     bifurcations: Vec<Bifurcation>,
 }
 
 struct Point {
     omega: f64,
-    /// Greatest tip deflection in each of its drive periods.
+    /// Largest tip deflection in each of its drive periods.
     maxima: Vec<f64>,
     stable: bool,
-    /// The bifurcation, if any, between the point before and this one that changes stability.
+    /// The bifurcation, if any, between the previous point and this one that changes stability.
     since: Option<f64>,
 }
 
 impl FollowedBranch {
-    /// Follows the orbit of `period` on which a run from rest settles at Ω = `entry`.
+    /// Follows the orbit of `period` to which a run from rest leads at Ω = `entry`.
     pub(super) fn from_rest(
         runs: &Runs<'_>,
         case: &Case,
@@ -88,7 +88,7 @@ impl FollowedBranch {
         let (down, up) = (down.map_err(failed)?, up.map_err(failed)?);
         let mut points = points_of(&down, case)?;
         points.reverse();
-        // Reversed, a bifurcation lies before the point that it lay after.
+        // In reversed order a bifurcation precedes the point that it followed.
         for k in (1..points.len()).rev() {
             points[k].since = points[k - 1].since;
         }
@@ -113,17 +113,17 @@ impl FollowedBranch {
             .collect()
     }
 
-    /// Where it doubles its period.
+    /// Values of Ω at which the period doubles.
     pub(super) fn flips(&self) -> Vec<f64> {
         self.of_kind(|k| matches!(k, BifurcationKind::Flip))
     }
 
-    /// Where tori are born.
+    /// Values of Ω at which tori are born.
     pub(super) fn tori(&self) -> Vec<f64> {
         self.of_kind(|k| matches!(k, BifurcationKind::NeimarkSacker { .. }))
     }
 
-    /// Least and greatest Ω that it reaches.
+    /// Smallest and largest Ω of the branch.
     pub(super) fn extent(&self) -> (f64, f64) {
         self.points
             .iter()
@@ -132,12 +132,13 @@ impl FollowedBranch {
             })
     }
 
-    /// Stretches of Ω over which it attracts, lower end first, in order along the branch.
+    /// Intervals of Ω in which the branch is stable, lower end first, in order along the branch.
     pub(super) fn attracting(&self) -> Vec<(f64, f64)> {
         stable_stretches(self.points.iter().map(|p| (p.omega, p.stable, p.since)))
     }
 
-    /// (Ω, greatest W) of each of its drive periods where it repels, stretches parted by gaps.
+    /// (Ω, largest W) of each drive period where the branch is unstable, intervals separated by
+    /// gaps.
     pub(super) fn repelling(&self, range: (f64, f64)) -> Vec<Vec<(f64, f64)>> {
         let count = self.points.first().map_or(0, |p| p.maxima.len());
         (0..count)
@@ -151,7 +152,7 @@ impl FollowedBranch {
             .collect()
     }
 
-    /// Greatest W on it at the point nearest to Ω.
+    /// Largest W at the point nearest to Ω.
     pub(super) fn height(&self, omega: f64) -> Option<f64> {
         let near = |p: &&Point| (p.omega - omega).abs();
         let point = self
@@ -161,7 +162,7 @@ impl FollowedBranch {
         point.maxima.iter().copied().max_by(f64::total_cmp)
     }
 
-    /// Its bifurcations by Ω.
+    /// Table of its bifurcations, by Ω.
     pub(super) fn table(&self, caption: &str) -> Table {
         let mut table = Table::new(caption, ["Ω", "what happens", "known to"]);
         let mut sorted: Vec<&Bifurcation> = self.bifurcations.iter().collect();
@@ -184,7 +185,7 @@ impl FollowedBranch {
     }
 }
 
-/// The points of one way; `since` is the bifurcation between the point before and this one.
+/// The points of one direction; `since` is the bifurcation between the previous point and this one.
 fn points_of(branch: &Branch, case: &Case) -> Result<Vec<Point>, PaperError> {
     let changes_stability = |b: &&Bifurcation| !matches!(b.kind, BifurcationKind::Grazing { .. });
     branch
@@ -208,7 +209,7 @@ fn points_of(branch: &Branch, case: &Case) -> Result<Vec<Point>, PaperError> {
         .collect()
 }
 
-/// Stretches of stable points, ended by the located bifurcations where there are any.
+/// Intervals of stable points, ending at located bifurcations if there are any.
 fn stable_stretches(points: impl Iterator<Item = (f64, bool, Option<f64>)>) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     let mut open: Option<(f64, f64)> = None;
@@ -230,7 +231,7 @@ fn stable_stretches(points: impl Iterator<Item = (f64, bool, Option<f64>)>) -> V
         .collect()
 }
 
-/// Stretches in words, those that overlap joined: "2.6076–2.6133, 2.6401–2.6512".
+/// Intervals as text, overlapping ones joined: "2.6076–2.6133, 2.6401–2.6512".
 pub(super) fn in_words(stretches: &[(f64, f64)]) -> String {
     let mut sorted = stretches.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -60,11 +60,11 @@ pub(super) fn mode_shapes(_: &Runs<'_>, section: Section) -> Result<Section, Pap
         ))
 }
 
-/// Tip masses drawn.
+/// Tip masses that are drawn.
 const MASSES: [f64; 5] = [0.0, 0.1, 0.2, 0.5, 1.0];
-/// Range of α4 drawn: beyond the samples of section 4 (4.7e-3 to 233.5) on both sides.
+/// Range of α4 that is drawn: beyond the samples of section 4 (4.7e-3 to 233.5) on both sides.
 const STIFFNESSES: (f64, f64) = (1e-2, 1e3);
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 241;
 
 /// Fig. 3.

@@ -1,5 +1,5 @@
-//! What attracts at each drive frequency, from several starts: the columns of a
-//! bifurcation diagram, of the cantilever or of an oscillator.
+//! The attractors at each drive frequency from several initial states: the columns of a bifurcation
+//! diagram, of the cantilever or of an oscillator.
 
 use nanotap_dynamics::{
     AttractorKind, CensusOptions, ClassifyOptions, Control, LyapunovOptions, StroboscopicMap as _,
@@ -17,14 +17,14 @@ use nanotap::model::Model;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
-/// Drive periods of a motion that does not repeat of which maxima are drawn.
+/// Drive periods for which maxima of a motion that does not repeat are drawn.
 const SHOWN: usize = 48;
-/// Longest period looked for.
+/// Longest period that is searched for.
 const LONGEST: usize = 32;
-/// Starts of a column that are followed before its attractors are known.
+/// Initial states of a column that are followed before its attractors are known.
 const PILOTS: usize = 2;
 
-/// What a motion is.
+/// Kind of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     Periodic(usize),
@@ -48,16 +48,16 @@ impl Kind {
     }
 }
 
-/// A motion that some starts come to.
+/// A motion to which some initial states lead.
 #[derive(Clone, Debug)]
 pub(super) struct Seen {
     pub(super) kind: Kind,
-    /// Greatest value of what is drawn in each of its drive periods: the deflection W of
-    /// the cantilever's tip, the distance of an oscillator from its stop.
+    /// Largest value of the drawn quantity in each of its drive periods: the deflection W of the
+    /// cantilever's tip, or the distance of an oscillator from its stop.
     maxima: Vec<f64>,
 }
 
-/// Everything seen at one value of the parameter.
+/// All motions at one value of the parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub(super) at: f64,
@@ -78,14 +78,14 @@ impl Column {
     }
 }
 
-/// `count` equally spaced values, both ends among them.
+/// `count` equally spaced values, including both ends.
 pub(super) fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..count)
         .map(|k| from + (to - from) * k as f64 / (count.max(2) - 1) as f64)
         .collect()
 }
 
-/// The columns at `values` of a parameter, from `starts` starts each.
+/// The columns at `values` of a parameter, from `starts` initial states each.
 pub(super) fn sweep(
     runs: &Runs<'_>,
     subject: &Case,
@@ -112,7 +112,7 @@ pub(super) fn sweep(
     })
 }
 
-/// Budgets small enough for thousands of starts: exponents to a hundredth, tori to six digits.
+/// Budgets small enough for thousands of runs: exponents to a hundredth, tori to six digits.
 fn budgets() -> ClassifyOptions {
     ClassifyOptions {
         max_period: LONGEST,
@@ -176,8 +176,8 @@ fn not_drawn(error: &impl ToString) -> PaperError {
     }
 }
 
-/// Greatest deflection of the tip away from the sample (of an oscillator: distance from its
-/// stop) in each of `periods` drive periods from `state`.
+/// Largest deflection of the tip away from the sample (for an oscillator: distance from its stop)
+/// in each of `periods` drive periods from `state`.
 pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec<f64>, PaperError> {
     let trajectory =
         Trajectory::record(&model.system, state, periods).map_err(|error| not_drawn(&error))?;
@@ -200,7 +200,7 @@ pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec
         .collect())
 }
 
-/// How kinds are drawn.
+/// Labels and colours of the kinds.
 const LOOKS: [(&str, Colour); 8] = [
     ("period 1", Colour::BLUE),
     ("period 2", Colour::VERMILLION),
@@ -248,8 +248,7 @@ pub(super) fn draw(mut panel: Panel, columns: &[Column], diameter: f64) -> Panel
     panel
 }
 
-/// Stretches of the parameter over which the same kinds of motion are seen:
-/// (from, to, kinds).
+/// Intervals of the parameter with the same kinds of motion: (from, to, kinds).
 pub(super) fn stretches(columns: &[Column]) -> Vec<(f64, f64, Vec<Kind>)> {
     columns
         .chunk_by(|a, b| a.kinds() == b.kinds())
@@ -257,7 +256,7 @@ pub(super) fn stretches(columns: &[Column]) -> Vec<(f64, f64, Vec<Kind>)> {
         .collect()
 }
 
-/// Values of the parameter where `kind` is seen, as words: "2.65–2.91, 7.00–7.50".
+/// Values of the parameter at which `kind` occurs, as text: "2.65–2.91, 7.00–7.50".
 pub(super) fn where_seen(columns: &[Column], kind: impl Fn(&Column) -> bool) -> String {
     let parts: Vec<String> = columns
         .chunk_by(|a, b| kind(a) == kind(b))
@@ -318,7 +317,7 @@ mod tests {
         assert_eq!(spaced(2.0, 3.0, 1), [2.0]);
     }
 
-    /// A period-2 orbit has two maxima, one a drive period, the same again later.
+    /// A period-2 orbit has two maxima, one per drive period, and repeats them.
     #[test]
     fn maxima_are_one_a_drive_period() {
         let model = Model::cantilever(

@@ -1,4 +1,4 @@
-//! The report as one HTML page that needs nothing else: pictures are drawn in it.
+//! The report as a self-contained HTML page: pictures are embedded.
 
 use std::fmt::Write as _;
 
@@ -96,7 +96,7 @@ fn part(section: &Section) -> Result<String, PaperError> {
                 name: picture.name.clone(),
                 source,
             })?;
-        // An XML declaration has no place inside a page.
+        // An XML declaration is not allowed inside a page.
         let svg = svg.find("<svg").map_or(svg.as_str(), |start| &svg[start..]);
         let _ = writeln!(
             html,
@@ -130,7 +130,7 @@ fn statement(check: &Check) -> String {
     )
 }
 
-/// Rows beyond which a table is folded away.
+/// Tables with more rows than this are collapsed.
 const FOLDED: usize = 24;
 
 fn tabulated(table: &Table) -> String {

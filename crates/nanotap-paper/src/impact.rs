@@ -1,6 +1,6 @@
-//! The paper's claim that soft contact behaves unlike an impact oscillator, followed
-//! numerically: the oscillators of Fig. 1 with a rigid stop (coefficient of restitution)
-//! and with a soft one, and the way from one to the other as the stop stiffens.
+//! The paper's claim that soft contact behaves differently from an impact oscillator, tested
+//! numerically: the oscillators of Fig. 1 with a rigid stop (coefficient of restitution) and with a
+//! soft one, and the transition from one to the other as the stop becomes stiffer.
 
 use nanotap_dynamics::{
     BifurcationKind, ClassifyOptions, ContinuationOptions, Direction, MotionKind as Settled,
@@ -25,15 +25,16 @@ use nanotap::study::start_box::default_box;
 const RESTITUTION: f64 = 0.8;
 /// Range of the drive frequency; at 1 the undamped oscillator itself resonates.
 const RANGE: (f64, f64) = (1.05, 5.0);
-/// Where the period-1 branch of one impact is entered: between its flips for every stop.
+/// Frequency at which the period-1 branch with one impact is started: between its flips for every
+/// stop.
 const ENTRY: f64 = 2.0;
-/// Where the distance of the soft stop's orbit from the rigid one's is measured: above the
-/// resonances of all stops (2ω₁ω₂/(ω₁ + ω₂) < 2).
+/// Frequency at which the distance between the orbits of the soft and the rigid stop is measured:
+/// above the resonances of all stops (2ω₁ω₂/(ω₁ + ω₂) < 2).
 const MEASURED_AT: f64 = 2.3;
-/// Stiffness of the soft stop that stands for the paper's soft sample: in the paper
-/// α₄/3 = K₁/K_c is 6.7.
+/// Stiffness of the soft stop that represents the paper's soft sample: in the paper α₄/3 = K₁/K_c
+/// is 6.7.
 const SOFT: f64 = 20.0 / 3.0;
-/// Stiffnesses on the way to the rigid stop.
+/// Range of stiffnesses between the soft and the rigid stop.
 const STIFFNESSES: (f64, f64) = (1.0, 1e8);
 /// The key of the drive frequency.
 const OMEGA: Key = Key::OscillatorOmega;
@@ -51,8 +52,8 @@ const fn oscillator(stop: Stop) -> Oscillator {
     }
 }
 
-/// A soft stop of this stiffness that gives back the same part of the speed: an impact on
-/// a spring κ and a damper 2ζ√κ alone ends with −exp(−πζ/√(1 − ζ²)) of its speed.
+/// A soft stop of this stiffness with the same coefficient of restitution: an impact on a spring κ
+/// and a damper 2ζ√κ alone ends with −exp(−πζ/√(1 − ζ²)) times its speed.
 fn soft(stiffness: f64) -> Oscillator {
     let loss = -nanotap_arithmetic::ln(RESTITUTION);
     let ratio = loss / nanotap_arithmetic::hypot(std::f64::consts::PI, loss);
@@ -68,11 +69,11 @@ const fn rigid() -> Oscillator {
     })
 }
 
-/// Flips of the rigid oscillator's period-1 branch, known to the digits given
-/// (ẍ + x = cos ωt, gap 0, r = 0.8).
+/// Flips of the rigid oscillator's period-1 branch, accurate to the digits given (ẍ + x = cos ωt,
+/// gap 0, r = 0.8).
 const KNOWN_FLIPS: [f64; 2] = [1.260_676_6, 2.653_347_7];
 
-/// The impact oscillator beside the soft sample.
+/// The impact oscillator compared with the soft sample.
 pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let (count, starts) = (runs.either(400, 30), runs.either(8, 2));
     let values = spaced(RANGE.0, RANGE.1, count);
@@ -164,7 +165,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
         ))
 }
 
-/// At how many frequencies there is chaos.
+/// Number of frequencies with chaos.
 fn chaotic(columns: &[Column]) -> usize {
     columns.iter().filter(|c| c.has(Kind::Chaos)).count()
 }
@@ -191,17 +192,17 @@ fn nearest(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The period-1 orbit of one impact at [`ENTRY`].
+/// The period-1 orbit with one impact at [`ENTRY`].
 struct Orbit {
     oscillator: Oscillator,
     closed: PeriodicOrbit,
-    /// Greatest distance from the stop.
+    /// Largest distance from the stop.
     reach: f64,
     contact: f64,
 }
 
 impl Orbit {
-    /// From where starts settle.
+    /// The orbit to which runs lead.
     fn find(oscillator: Oscillator) -> Result<Self, PaperError> {
         let failed = |why: String| PaperError::Failed {
             what: format!("a period-1 orbit at ω = {ENTRY}"),
@@ -223,7 +224,7 @@ impl Orbit {
         )
     }
 
-    /// By Newton, near the orbit of a neighbour.
+    /// The orbit found by Newton's method from that of a similar oscillator.
     fn near(oscillator: Oscillator, guess: &Self) -> Result<Self, PaperError> {
         let model = oscillator.model()?;
         let orbit = close_orbit(
@@ -258,7 +259,7 @@ impl Orbit {
         })
     }
 
-    /// Flips of the branch through it, over [`RANGE`].
+    /// Flips of the branch through the orbit, over [`RANGE`].
     fn flips(&self, control: &nanotap_dynamics::Control<'_>) -> Result<Vec<f64>, PaperError> {
         let family = Case::from(self.oscillator).family(OMEGA);
         let options = ContinuationOptions::over(RANGE.0, RANGE.1);
@@ -283,17 +284,17 @@ impl Orbit {
     }
 }
 
-/// One soft stop on the way.
+/// One soft stop of the series.
 struct Waypoint {
     stiffness: f64,
-    /// Distance of its period-1 orbit's reach from the rigid one's, in parts of it.
+    /// Relative distance of the reach of its period-1 orbit from that of the rigid stop.
     distance: f64,
     contact: f64,
     flips: Vec<f64>,
 }
 
-/// Orbits of ever softer stops at one frequency, from the rigid one's down, each by Newton
-/// near the last.
+/// Orbits of increasingly soft stops at one frequency, starting from the rigid one, each by
+/// Newton's method from the previous one.
 fn softened(limit: &Orbit, omega: f64, stiffnesses: &[f64]) -> Result<Vec<Orbit>, PaperError> {
     let at = |o: Oscillator| o.with(OscillatorParameter::Omega, omega);
     let mut orbits = vec![Orbit::near(at(limit.oscillator), limit)?];
@@ -306,7 +307,7 @@ fn softened(limit: &Orbit, omega: f64, stiffnesses: &[f64]) -> Result<Vec<Orbit>
     Ok(orbits)
 }
 
-/// Every stop on the way, softest first.
+/// All stops of the series, softest first.
 fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperError> {
     let per_decade = runs.either(2, 1);
     let decades = nanotap_arithmetic::log10(STIFFNESSES.1 / STIFFNESSES.0).round() as usize;
@@ -336,7 +337,7 @@ fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperEr
     Ok(way)
 }
 
-/// The power of κ by which the distance falls over the last decade.
+/// The power of κ with which the distance falls over the last decade.
 fn convergence_rate(way: &[Waypoint]) -> f64 {
     let Some(last) = way.last() else {
         return f64::NAN;
@@ -459,8 +460,8 @@ fn limit_picture(way: &[Waypoint], flips: &[f64]) -> Picture {
 mod tests {
     use super::*;
 
-    /// A free impact on the soft stop (no spring of its own, no drive) gives back the
-    /// coefficient of restitution.
+    /// A free impact on the soft stop (no spring of the oscillator, no drive) has the coefficient
+    /// of restitution of the rigid one.
     #[test]
     fn the_soft_stop_gives_back_what_the_rigid_one_does() {
         let Stop::Soft { stiffness, damping } = soft(50.0).stop else {

@@ -1,9 +1,10 @@
-//! The paper once more: every figure 2e–17 and every number in its text, what it says,
-//! what holds here, whether the two agree, the evidence, and a command to see for oneself.
+//! Reproduction of the paper: every figure 2e–17 and every number in its text, with the paper's
+//! statement, the result of this program, a verdict, the evidence, and a command that reproduces
+//! it.
 //!
-//! "Multi-modal analysis on the intermittent contact dynamics of atomic force microscope",
-//! J. Sound Vib. (2011). No parameter is tuned to agree: each case is the printed one, and
-//! where the print contradicts itself every reading is computed.
+//! "Multi-modal analysis on the intermittent contact dynamics of atomic force microscope", J. Sound
+//! Vib. (2011). No parameter is adjusted to improve the agreement: each case is the printed one,
+//! and where the paper contradicts itself every reading is computed.
 
 #![cfg_attr(
     test,
@@ -50,61 +51,61 @@ pub use write::{Document, Written};
 /// What to compute.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Names of the sections wanted; none: all.
+    /// Names of the requested sections; empty: all.
     pub only: Vec<String>,
-    /// Fewer starts and parameter values: seconds instead of minutes, with wider bounds.
+    /// Fewer initial states and parameter values: seconds instead of minutes, with wider bounds.
     pub quick: bool,
 }
 
-/// Why there is no report.
+/// Why the report could not be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
-    /// A section was asked for that there is not.
+    /// An unknown section was requested.
     #[error("no section `{given}`{hint}; there are {known}")]
     UnknownSection {
-        /// What was asked for.
+        /// The requested name.
         given: String,
-        /// The nearest one, as a question.
+        /// The most similar name, as a question.
         hint: String,
-        /// What there is.
+        /// The known names.
         known: String,
     },
-    /// The work was stopped.
+    /// The computation was cancelled.
     #[error("stopped before the report was done")]
     Cancelled,
-    /// A case has no model.
+    /// A case is invalid.
     #[error(transparent)]
     Model(#[from] CaseError),
     /// An orbit was not found.
     #[error("{what}: {source}")]
     Orbit {
-        /// What was looked for.
+        /// Description of the orbit.
         what: String,
-        /// Why it was not found.
+        /// Reason of the failure.
         source: OrbitError,
     },
-    /// Something else that should have worked did not.
+    /// A computation that should succeed failed.
     #[error("{what}: {why}")]
     Failed {
-        /// What was being done.
+        /// Description of the computation.
         what: String,
-        /// Why it failed.
+        /// Reason of the failure.
         why: String,
     },
     /// A picture could not be drawn.
     #[error("{name}: {source}")]
     Figure {
-        /// The picture.
+        /// Name of the picture.
         name: String,
-        /// Why.
+        /// Reason of the failure.
         source: nanotap_figures::FigureError,
     },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: std::path::PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
@@ -120,7 +121,7 @@ impl From<nanotap::model::ModelError> for PaperError {
 pub struct Report {
     /// Its sections, in the order of the paper.
     pub sections: Vec<Section>,
-    /// Whether it was made in a hurry.
+    /// Whether it was computed with [`Options::quick`].
     pub quick: bool,
 }
 
@@ -130,14 +131,14 @@ impl Report {
         self.sections.iter().flat_map(|section| &section.checks)
     }
 
-    /// How many statements about `about` differ.
+    /// Number of statements about `about` that differ.
     pub fn differing(&self, about: About) -> usize {
         self.checks()
             .filter(|c| c.verdict == Verdict::Differs && c.about == about)
             .count()
     }
 
-    /// The counts in words, slips of the print apart from differences in the motion.
+    /// The counts as text; misprints and differences in the motion are counted separately.
     pub fn counts(&self) -> String {
         format!(
             "{} reproduced, {} ambiguous, {} differ ({} in print, {} in the motion)",
@@ -149,22 +150,22 @@ impl Report {
         )
     }
 
-    /// How many checks came to `verdict`.
+    /// Number of checks with the verdict `verdict`.
     pub fn count(&self, verdict: Verdict) -> usize {
         self.checks().filter(|c| c.verdict == verdict).count()
     }
 }
 
-/// A section's name, its heading, and how it is made.
+/// A section's name, its heading, and the function that computes it.
 struct Topic {
     id: &'static str,
     title: &'static str,
-    /// About how many seconds it takes, of two cores.
+    /// Approximate time in seconds on two cores.
     weight: u32,
     make: fn(&Runs<'_>, Section) -> Result<Section, PaperError>,
 }
 
-/// Every section, in the order of the paper; evidence that serves several comes last.
+/// All sections, in the order of the paper; evidence for several sections comes last.
 const TOPICS: &[Topic] = &[
     Topic {
         id: "eq7",
@@ -324,11 +325,11 @@ const TOPICS: &[Topic] = &[
     },
 ];
 
-/// Makes the report. Progress is told in percent of the whole.
+/// Computes the report. Progress is reported in percent of the whole.
 ///
 /// # Errors
-/// When a section is asked for that there is not, the work is stopped, or a computation
-/// that should work does not.
+/// If an unknown section is requested, the computation is cancelled, or a computation fails that
+/// should not.
 pub fn report(options: &Options, control: &Control<'_>) -> Result<Report, PaperError> {
     match report_so_far(options, control)? {
         (report, true) => Ok(report),
@@ -336,11 +337,11 @@ pub fn report(options: &Options, control: &Control<'_>) -> Result<Report, PaperE
     }
 }
 
-/// The report of the sections that were done before the work was stopped, and whether they are
-/// all.
+/// The report of the sections that were finished before the computation was cancelled, and whether
+/// they are all.
 ///
 /// # Errors
-/// As [`report`], less that of being stopped.
+/// As [`report`], except for the cancellation.
 pub fn report_so_far(
     options: &Options,
     control: &Control<'_>,
@@ -355,7 +356,7 @@ pub fn report_so_far(
         let share = |weight: u32| f64::from(weight) / f64::from(whole);
         runs.begin(share(begun), share(topic.weight));
         let made = (topic.make)(&runs, Section::new(topic.id, topic.title));
-        // What was made while the work was stopped is not whole.
+        // A section that was cancelled is incomplete.
         if control.is_cancelled() {
             all = false;
             break;
@@ -372,7 +373,7 @@ pub fn section_names() -> impl Iterator<Item = &'static str> {
     TOPICS.iter().map(|topic| topic.id)
 }
 
-/// Whether `given` names this topic, or one of its checks (`fig8-amplitude` is of `fig8`).
+/// Whether `given` names this topic or one of its checks (`fig8-amplitude` belongs to `fig8`).
 fn names(given: &str, topic: &Topic) -> bool {
     let given = given.to_lowercase();
     given
@@ -380,7 +381,7 @@ fn names(given: &str, topic: &Topic) -> bool {
         .is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }
 
-/// The topics that `only` names, in the order of the paper; all, if it is empty.
+/// The topics named in `only`, in the order of the paper; all if it is empty.
 fn chosen(only: &[String]) -> Result<Vec<&'static Topic>, PaperError> {
     if only.is_empty() {
         return Ok(TOPICS.iter().collect());
@@ -441,7 +442,7 @@ mod tests {
         assert_eq!(of_check.iter().map(|t| t.id).collect::<Vec<_>>(), ["fig8"]);
     }
 
-    /// What is known beforehand of the paper, from the equations themselves.
+    /// Results for the paper that follow from the equations themselves.
     #[test]
     fn quick_sections_say_what_is_known() {
         let only = ["eq7", "eq23", "eq25", "alpha4", "fig2e", "fig3", "fig17"];
@@ -454,10 +455,10 @@ mod tests {
         let verdict = |id: &str| report.checks().find(|c| c.id == id).unwrap().verdict;
         assert_eq!(verdict("eq7"), Verdict::Differs);
         assert_eq!(verdict("eq23"), Verdict::Reproduced);
-        // 7.79, 20.33, 55.81 are the digits of five modes.
+        // 7.79, 20.33, 55.81 are the values for five modes.
         assert_eq!(verdict("eq25"), Verdict::Reproduced);
         assert_eq!(verdict("alpha4-samples"), Verdict::Differs);
-        // One period-4 orbit attracts at Ω = 20, α1 = 0, and its saddle partner does not.
+        // One period-4 orbit is stable at Ω = 20, α1 = 0; its saddle partner is not.
         assert_eq!(verdict("fig17"), Verdict::Ambiguous);
         for check in report.checks() {
             assert!(!check.evidence.is_empty(), "{}", check.id);
@@ -470,7 +471,7 @@ mod tests {
         }
     }
 
-    /// The topic of the section that holds a check.
+    /// The topic of the section that contains a check.
     fn section_of(report: &Report, id: &str) -> &'static Topic {
         let section = report
             .sections
@@ -482,7 +483,8 @@ mod tests {
 
     #[test]
     fn work_that_was_stopped_gives_no_report() {
-        let stop = std::sync::atomic::AtomicBool::new(true);
+        let stop = nanotap::control::CancelFlag::new();
+        stop.cancel();
         let control = Control {
             cancel: Some(&stop),
             progress: None,

@@ -21,7 +21,7 @@ pub(super) fn document(report: &Report) -> String {
             cell(&check.here),
             check.verdict.name(),
             cell(&check.evidence),
-            // Within a code span a vertical bar still ends a cell.
+            // A vertical bar ends a cell even within a code span.
             check.rerun.replace('|', "\\|"),
         );
     }
@@ -35,7 +35,7 @@ pub(super) fn document(report: &Report) -> String {
     text
 }
 
-/// Words that stay in their cell.
+/// Text escaped for a table cell.
 fn cell(text: &str) -> String {
     text.replace('\\', "\\\\")
         .replace('|', "\\|")

@@ -1,5 +1,5 @@
-//! How a motion is drawn: tip deflection against time with the contact shaded, and the
-//! phase portrait (W, dW/dτ) with the contact in a colour of its own.
+//! Drawing of a motion: tip deflection against time with the contact shaded, and the phase portrait
+//! (W, dW/dτ) with the contact in a separate colour.
 
 use nanotap_figures::{Axis, Band, Colour, Dash, Legend, Line, Markers, Panel, Points};
 use nanotap_flow::{Output, Trajectory};
@@ -7,9 +7,9 @@ use nanotap_flow::{Output, Trajectory};
 use super::PaperError;
 use nanotap::model::Model;
 
-/// Points drawn of a drive period.
+/// Number of points drawn per drive period.
 const POINTS_PER_PERIOD: f64 = 500.0;
-/// Fewest points of a stretch of flight or contact.
+/// Minimum number of points per stretch of flight or contact.
 const FEWEST_POINTS: f64 = 6.0;
 
 /// Colour of flight.
@@ -41,7 +41,7 @@ impl<'a> View<'a> {
         Ok(Self { model, trajectory })
     }
 
-    /// An output against another, stretch by stretch.
+    /// One output against another, stretch by stretch.
     fn stretches(&self, x: Option<&Output>, y: &Output) -> Vec<Stretch> {
         let y = self.trajectory.signal(y);
         let x = x.map(|x| self.trajectory.signal(x));
@@ -71,7 +71,7 @@ impl<'a> View<'a> {
         stretches
     }
 
-    /// When the tip is in contact, in drive periods.
+    /// Intervals in which the tip is in contact, in drive periods.
     pub(super) fn contacts(&self) -> Vec<(f64, f64)> {
         self.stretches(None, &self.model.tip)
             .iter()
@@ -80,7 +80,7 @@ impl<'a> View<'a> {
             .collect()
     }
 
-    /// The tip against time.
+    /// Tip deflection against time.
     pub(super) fn tip_line(&self) -> Line {
         Line::new(
             self.stretches(None, &self.model.tip)
@@ -89,7 +89,7 @@ impl<'a> View<'a> {
         )
     }
 
-    /// A panel with the tip against time, contacts shaded.
+    /// A panel with the tip deflection against time, contacts shaded.
     pub(super) fn time_panel(&self, title: impl Into<String>) -> Panel {
         let surface = self
             .stretches(None, &self.model.surface())
@@ -122,7 +122,7 @@ impl<'a> View<'a> {
         panel.with(Markers::new(self.strobes()).colour(Colour::BLACK).size(1.1))
     }
 
-    /// The phase portrait of a motion that fills an area, as one thin line a regime.
+    /// The phase portrait of a motion that fills an area, as one thin line per regime.
     pub(super) fn tangle_into(&self, panel: Panel, colour: Colour) -> Panel {
         let rate = self.model.tip_rate();
         let points = self
@@ -151,7 +151,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// A phase portrait without a motion yet.
+/// An empty phase portrait.
 pub(super) fn empty_portrait(title: impl Into<String>) -> Panel {
     Panel::new(
         Axis::linear("tip deflection $W$"),
@@ -161,6 +161,6 @@ pub(super) fn empty_portrait(title: impl Into<String>) -> Panel {
     .legend(Legend::Hidden)
 }
 
-/// What shading and colours mean, for captions.
+/// Meaning of shading and colours, for captions.
 pub(super) const KEY: &str = "Grey bands: tip in contact; dashed line: the sample's surface as the moving base \
     sees it. Phase portraits: flight blue, contact orange-red, dots at drive phase 0.";

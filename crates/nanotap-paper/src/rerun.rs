@@ -1,5 +1,5 @@
-//! Command lines that compute something again. Each says its whole case, so that it can
-//! be run anywhere.
+//! Command lines that reproduce a result. Each contains its whole case, so that it can be run
+//! anywhere.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 
-/// `nanotap` with `command` on `case`, with `options` behind it.
+/// `nanotap command` on `case`, followed by `options`.
 pub(super) fn on_case(command: &str, case: &Cantilever, options: &str) -> String {
     let mut line = format!("nanotap {command} --set modes={}", case.modes);
     for parameter in case.parameters() {
@@ -44,12 +44,12 @@ pub(super) fn on_oscillator(command: &str, oscillator: &Oscillator, options: &st
     finish(line, options)
 }
 
-/// The part of this report called `id` once more.
+/// The command line that recomputes the section `id` of this report.
 pub(super) fn section(id: &str) -> String {
     format!("nanotap paper --only {id}")
 }
 
-/// A state as `--state` takes it.
+/// A state in the form of `--state`.
 pub(super) fn state(state: &[f64]) -> String {
     let numbers: Vec<String> = state.iter().map(|v| format!("{v}")).collect();
     format!("--state {}", numbers.join(","))
@@ -69,7 +69,7 @@ mod tests {
     use nanotap::case::Case;
     use nanotap::model::parameter::Parameter;
 
-    /// The words behind `--set`, as the terminal hands them on.
+    /// The arguments after `--set`, as the shell passes them.
     fn overrides(line: &str) -> Vec<String> {
         let mut words = line.split(' ');
         let mut set = Vec::new();

@@ -1,4 +1,4 @@
-//! What several sections need: censuses, each taken once, orbits, and a word on progress.
+//! Results that several sections need: censuses, each computed once, orbits, and progress.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -21,20 +21,20 @@ use nanotap::study::orbit::{OrbitReport, report};
 use nanotap::study::proof::Prover;
 use nanotap::study::start_box::default_box;
 
-/// The seed of every set of starts.
+/// The seed of every set of initial states.
 pub(super) const SEED: u64 = 1;
-/// Harmonics of an orbit; only its extrema and contacts are looked at.
+/// Number of harmonics of an orbit; only its extrema and contacts are used.
 const HARMONICS: usize = 1;
 /// Drive periods over which a motion that never repeats is observed.
 const WATCHED: usize = 400;
 
-/// What the sections share: every census and scan of grids is computed once.
+/// Results that the sections share: every census and scan of grids is computed once.
 pub(super) struct Runs<'a> {
     quick: bool,
     control: &'a Control<'a>,
-    /// Part of the whole work done before this section, and this section's own part.
+    /// Fraction of the whole computation before this section, and the fraction of this section.
     share: Cell<(f64, f64)>,
-    /// Percent reported so far: progress never goes back.
+    /// Reported progress in percent; it never decreases.
     reported: AtomicUsize,
     counts: RefCell<Vec<Rc<Counted>>>,
     found: RefCell<Vec<Found>>,
@@ -61,7 +61,7 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// A section begins: what is done before it and its own part of the whole.
+    /// Begins a section: `before` is the fraction finished, `own` that of the section.
     pub(super) fn begin(&self, before: f64, own: f64) {
         self.share.set((before, own));
         report_percent(self.control, &self.reported, before);
@@ -71,12 +71,12 @@ impl<'a> Runs<'a> {
         self.quick
     }
 
-    /// `full`, or `quick` in a hurry.
+    /// `quick` with [`crate::Options::quick`], otherwise `full`.
     pub(super) fn either<T>(&self, full: T, quick: T) -> T {
         if self.quick { quick } else { full }
     }
 
-    /// Runs `work` with a control that tells how far the whole is.
+    /// Runs `work` with a control that reports the progress of the whole.
     pub(super) fn controlled<T>(&self, work: impl FnOnce(&Control<'_>) -> T) -> T {
         let (before, own) = self.share.get();
         let (control, reported) = (self.control, &self.reported);
@@ -93,7 +93,7 @@ impl<'a> Runs<'a> {
         })
     }
 
-    /// The census of `case`, taken when it is first asked for.
+    /// The census of `case`, computed when first requested.
     pub(super) fn count(&self, case: &Cantilever) -> Result<Rc<Counted>, PaperError> {
         if let Some(known) = self.counts.borrow().iter().find(|c| c.case == *case) {
             return Ok(Rc::clone(known));
@@ -128,9 +128,9 @@ impl<'a> Runs<'a> {
         Ok(counted)
     }
 
-    /// Every periodic orbit up to `longest`, stable or not, that Newton reaches from
-    /// starts in the box and from near returns of runs of `run` periods, looked for when it
-    /// is first asked for.
+    /// Every periodic orbit up to `longest`, stable or not, that Newton's method reaches from
+    /// states in the box and from near returns of runs of `run` periods; searched for when first
+    /// requested.
     pub(super) fn orbits(
         &self,
         counted: &Counted,
@@ -160,13 +160,13 @@ impl<'a> Runs<'a> {
         Ok(orbits)
     }
 
-    /// `count` starts in the box of a case.
+    /// `count` initial states in the box of a case.
     pub(super) fn starts(counted: &Counted, count: usize) -> Result<Vec<Vec<f64>>, PaperError> {
         let starts = start_box(&counted.model)?;
         Ok(starts.starts(SEED, count))
     }
 
-    /// What several sections need, made once; there is one of each type.
+    /// A result that several sections need, computed once; there is one of each type.
     pub(super) fn shared<T: 'static>(
         &self,
         make: impl FnOnce(&Self) -> Result<T, PaperError>,
@@ -182,7 +182,7 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// Tells what part of the whole is done, unless more was reported before: a section may have
+/// Reports the finished fraction of the whole, unless more was reported before: a section may have
 /// several tasks.
 fn report_percent(control: &Control<'_>, reported: &AtomicUsize, part: f64) {
     let percent = (100.0 * part) as usize;
@@ -193,7 +193,7 @@ fn report_percent(control: &Control<'_>, reported: &AtomicUsize, part: f64) {
     }
 }
 
-/// The box that starts are taken from.
+/// The box of the initial states.
 fn start_box(model: &Model) -> Result<StartBox, PaperError> {
     default_box(model).map_err(|error| PaperError::Failed {
         what: "the box of starts".into(),
@@ -201,7 +201,7 @@ fn start_box(model: &Model) -> Result<StartBox, PaperError> {
     })
 }
 
-/// Chaos that nothing was seen to leave.
+/// Chaos from which no escape was observed.
 pub(super) struct Chaos<'a> {
     pub(super) spectrum: &'a LyapunovSpectrum,
     pub(super) lifetime: Lifetime,
@@ -215,7 +215,7 @@ pub(super) struct Counted {
     pub(super) case: Cantilever,
     pub(super) model: Model,
     pub(super) census: Census,
-    /// Starts it was taken from.
+    /// Number of initial states of the census.
     pub(super) starts: usize,
 }
 
@@ -257,7 +257,7 @@ impl Counted {
             .collect()
     }
 
-    /// What a motion that never repeats looks like over [`WATCHED`] periods from `state`.
+    /// Observables of a motion that does not repeat, over [`WATCHED`] periods from `state`.
     pub(super) fn watch(&self, state: &[f64]) -> Result<Observables, PaperError> {
         let failed = |why: String| PaperError::Failed {
             what: "a run to observe".into(),
@@ -266,7 +266,7 @@ impl Counted {
         measure(&self.model, state, WATCHED, Set::ALL).map_err(|e| failed(e.to_string()))
     }
 
-    /// What a closed orbit of this case looks like.
+    /// Observables of a closed orbit of this case.
     pub(super) fn look(&self, orbit: &PeriodicOrbit) -> Result<OrbitReport, PaperError> {
         report(&self.model, orbit, HARMONICS).map_err(|source| PaperError::Orbit {
             what: format!("a period-{} orbit", orbit.period),
@@ -274,7 +274,8 @@ impl Counted {
         })
     }
 
-    /// What is proved of an orbit, as the end of what is said of it; nothing where nothing is.
+    /// The result of a proof for an orbit, to be appended to its description; empty if nothing was
+    /// proved.
     pub(super) fn proved(&self, orbit: &PeriodicOrbit) -> String {
         let prover = Prover::new(&Case::from(self.case.clone()));
         let theorem = self
@@ -287,7 +288,7 @@ impl Counted {
         })
     }
 
-    /// What kinds of motion attract, most frequent first.
+    /// The kinds of the attractors, most frequent first.
     pub(super) fn kinds(&self) -> Vec<String> {
         self.census
             .attractors
@@ -306,7 +307,7 @@ impl Counted {
             .collect()
     }
 
-    /// All attractors in words.
+    /// All attractors as text.
     pub(super) fn summary(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
         for attractor in &self.census.attractors {
@@ -341,7 +342,7 @@ impl Counted {
         format!("of {} starts: {}", self.starts, parts.join("; "))
     }
 
-    /// How much of the box an attractor can have that no start found.
+    /// Upper bound of the share of the box of attractors that were not found.
     pub(super) fn missed(&self) -> String {
         format!(
             "an attractor that none of {} starts found has less than {:.1} % of the box (95 %)",
@@ -350,7 +351,7 @@ impl Counted {
         )
     }
 
-    /// The command line that takes this census.
+    /// The command line that computes this census.
     pub(super) fn rerun(&self) -> String {
         rerun::on_case(
             "attractors",
@@ -360,7 +361,7 @@ impl Counted {
     }
 }
 
-/// A number of things of one kind, in words: "no stable period-2 orbit".
+/// A number of motions of one kind, as text: "no stable period-2 orbit".
 pub(super) fn how_many(count: usize, kind: &str) -> String {
     match count {
         0 => format!("no {kind}"),

@@ -1,4 +1,4 @@
-//! What one figure or equation of the paper comes to: text, tables, pictures, checks.
+//! The result for one figure or equation of the paper: text, tables, pictures, checks.
 
 use nanotap_figures::{DOUBLE_COLUMN, Figure};
 
@@ -7,7 +7,7 @@ use super::check::Check;
 /// A part of the report.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Its name, such as `fig4`.
+    /// Identifier, such as `fig4`.
     pub id: &'static str,
     /// Its heading.
     pub title: &'static str,
@@ -22,7 +22,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// A section without anything in it yet.
+    /// An empty section.
     pub fn new(id: &'static str, title: &'static str) -> Self {
         Self {
             id,
@@ -66,16 +66,16 @@ impl Section {
 /// A table of text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
-    /// What it shows.
+    /// Caption of the table.
     pub caption: String,
     /// Heads of the columns.
     pub columns: Vec<String>,
-    /// Rows, an entry a column.
+    /// Rows, with one entry per column.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table without rows yet.
+    /// A table without rows.
     pub fn new<'a>(caption: impl Into<String>, columns: impl IntoIterator<Item = &'a str>) -> Self {
         Self {
             caption: caption.into(),
@@ -92,14 +92,14 @@ impl Table {
     }
 }
 
-/// A picture with its words.
+/// A picture with title and caption.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// The name of its files, without ending.
+    /// Name of its files, without extension.
     pub name: String,
-    /// What it is about.
+    /// Title.
     pub title: String,
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// The panels, without title and caption.
     figure: Figure,
@@ -107,7 +107,7 @@ pub struct Picture {
     height: f64,
 }
 
-/// Letters of a caption to the millimetre of its width.
+/// Letters of a caption per millimetre of its width.
 const LETTERS_PER_MM: f64 = 0.92;
 /// Height of a line of the caption, mm.
 const LINE: f64 = 3.3;
@@ -115,7 +115,7 @@ const LINE: f64 = 3.3;
 const TITLE: f64 = 5.0;
 
 impl Picture {
-    /// A picture of two columns' width whose panels take `height` mm.
+    /// A picture with the width of two columns whose panels have the height `height`, mm.
     pub fn new(
         name: impl Into<String>,
         title: impl Into<String>,
@@ -133,12 +133,12 @@ impl Picture {
         }
     }
 
-    /// The panels alone, for a page that sets title and caption itself.
+    /// The panels alone, for a page that shows title and caption itself.
     pub fn bare(&self) -> Figure {
         self.figure.clone().height(self.height)
     }
 
-    /// The picture as it stands alone, with title and caption.
+    /// The complete picture, with title and caption.
     pub fn whole(&self) -> Figure {
         let letters = self.caption.chars().count() as f64;
         let lines = (letters / (LETTERS_PER_MM * self.width)).ceil();

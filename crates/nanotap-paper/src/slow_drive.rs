@@ -22,13 +22,13 @@ use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
-/// Longest period of the unstable orbits looked for.
+/// Longest period of the unstable orbits that are searched for.
 const LONGEST: usize = 3;
 /// Range of Ω over which the orbits are followed.
 const BRANCH_RANGE: (f64, f64) = (2.3, 3.6);
 /// Frequencies that are printed as Ω = 2.6.
 const PRINTED_ALIKE: (f64, f64) = (2.55, 2.65);
-/// Drive periods of chaos drawn against time, and in the phase portrait.
+/// Numbers of drive periods of chaos that are drawn against time and in the phase portrait.
 const SHOWN: (usize, usize) = (16, 200);
 
 /// The case of both figures with its census and its orbits, stable or not.
@@ -52,7 +52,7 @@ impl Slow {
         self.orbits.iter().filter(|o| o.period == period).collect()
     }
 
-    /// Orbits of a period in words: "one period-1 orbit, W from … to …, unstable (μ = −1.392)".
+    /// Orbits of a period as text: "one period-1 orbit, W from … to …, unstable (μ = −1.392)".
     fn describe(&self, period: usize) -> Result<String, PaperError> {
         let orbits = self.of_period(period);
         let mut parts = Vec::new();
@@ -107,7 +107,7 @@ impl Slow {
         }
     }
 
-    /// Where the first orbit of a period attracts, followed over [`BRANCH_RANGE`].
+    /// Intervals in which the first orbit of a period is stable, followed over [`BRANCH_RANGE`].
     fn attracting(&self, runs: &Runs<'_>, period: usize) -> Result<Vec<(f64, f64)>, PaperError> {
         match self.of_period(period).first() {
             Some(orbit) => Ok(self
@@ -117,7 +117,7 @@ impl Slow {
         }
     }
 
-    /// The check of "so many motions of this period". One that attracts only at another
+    /// The check of a number of motions of this period. A motion that is stable only at another
     /// frequency that is printed alike leaves the statement open.
     fn check(
         &self,
@@ -156,7 +156,7 @@ impl Slow {
     }
 }
 
-/// The parts of these stretches whose frequencies round to the printed Ω = 2.6.
+/// The parts of these intervals whose frequencies round to the printed Ω = 2.6.
 fn printed_alike(stretches: &[(f64, f64)]) -> Vec<(f64, f64)> {
     stretches
         .iter()
@@ -165,7 +165,7 @@ fn printed_alike(stretches: &[(f64, f64)]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The largest multiplier in words.
+/// The largest multiplier as text.
 fn multiplier(orbit: &PeriodicOrbit) -> String {
     orbit.multipliers.first().map_or_else(String::new, |m| {
         if m.im == 0.0 {
@@ -316,7 +316,7 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         .check(three))
 }
 
-/// Where the period-2 orbit attracts, with one to five modes: how near Ω = 2.6 comes to it.
+/// Intervals in which the period-2 orbit is stable, with one to five modes, compared with Ω = 2.6.
 fn doubled_by_modes(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let mut table = Table::new(
         format!(
@@ -339,7 +339,7 @@ fn doubled_by_modes(runs: &Runs<'_>) -> Result<Table, PaperError> {
     Ok(table)
 }
 
-/// What attracts at Ω = 2.6 where the sample presses the tip a little at rest.
+/// The attractors at Ω = 2.6 if the tip indents the sample slightly at rest.
 fn pressed_at_rest(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let mut table = Table::new(
         "What attracts at Ω = 2.6, α₁ = 0.1, N = 3 with a small negative gap: the kinds of motion in Figs. 6 and 7, \
@@ -358,10 +358,10 @@ fn pressed_at_rest(runs: &Runs<'_>) -> Result<Table, PaperError> {
     Ok(table)
 }
 
-/// Steps a drive period of the grids tried at Ω = 2.6, and starts of each.
+/// Steps per drive period of the grids tried at Ω = 2.6, and initial states of each.
 const SLOW_GRIDS: ([u32; 2], usize) = ([34, 40], 48);
 
-/// What fixed steps settle on at Ω = 2.6 with two modes.
+/// The motions to which fixed steps lead at Ω = 2.6 with two modes.
 fn slow_grids(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let counted = runs.count(&Cantilever::paper().with_modes(2))?;
     let (steps, most) = SLOW_GRIDS;
@@ -412,12 +412,12 @@ fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperErr
     Ok(found.map(|orbit| (omega, orbit)))
 }
 
-/// Longest return looked at.
+/// Longest return that is examined.
 const LONGEST_RETURN: usize = 12;
 
-/// How near a motion comes back.
+/// Distances of the nearest returns of a motion.
 struct Returns {
-    /// Nearest return after 1, 2, … drive periods, in parts of the motion's size.
+    /// Nearest return after 1, 2, … drive periods, relative to the motion's size.
     nearest: Vec<f64>,
     states: Vec<Vec<f64>>,
     watched: usize,
@@ -462,7 +462,7 @@ impl Returns {
         })
     }
 
-    /// Nearest returns after odd numbers of periods (`parity` 1) or even ones (0).
+    /// Nearest return after odd numbers of periods (`parity` 1) or even ones (0).
     fn best(&self, parity: usize) -> f64 {
         self.nearest
             .iter()
@@ -510,7 +510,7 @@ impl Returns {
         )
     }
 
-    /// The strobe states, those of even and of odd periods apart.
+    /// The strobe states, those of even and of odd periods separately.
     fn pieces(&self, model: &Model) -> Panel {
         let (drive, rate) = (model.system.drive(), model.tip_rate());
         let of = |parity: usize| {

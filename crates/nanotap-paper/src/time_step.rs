@@ -1,6 +1,6 @@
-//! What the paper's own method makes of a motion: fourth-order Runge–Kutta with fixed
-//! steps that switch on their grid. At Ω = 20 it shows coexisting subharmonics of long
-//! periods, others at every step; under the exact flow all of them go to one period-1 orbit.
+//! The paper's own method: fourth-order Runge–Kutta with fixed steps that switch on their grid. At
+//! Ω = 20 it shows coexisting subharmonics of long periods, different ones for every step; the
+//! exact flow leads from all of them to one period-1 orbit.
 
 use nanotap_dynamics::{ClassifyOptions, MotionKind, ShootingOptions, classify, close_orbit};
 use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Rule, Shape};
@@ -16,55 +16,55 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
 
-/// Longest period looked for.
+/// Longest period that is searched for.
 pub(super) const LONGEST: usize = 64;
-/// A grid motion has period n if each of its last strobe states comes back after n
-/// periods to this part of the motion's size.
+/// A grid motion has period n if each of its last strobe states recurs after n periods to within
+/// this fraction of the motion's size.
 const CLOSURE: f64 = 1e-9;
-/// Two motions of one period whose extrema agree so nearly are one.
+/// Two motions of the same period are identical if their extrema agree to this relative difference.
 const SAME: f64 = 1e-5;
 /// Periods that the paper reports at Ω = 20, α1 = 0.1.
 pub(super) const CLAIMED: [usize; 3] = [11, 21, 28];
 
-/// How a fixed-step run is made.
+/// Parameters of a fixed-step run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
     pub(super) modes: usize,
-    /// Steps a drive period in flight and in contact.
+    /// Steps per drive period in flight and in contact.
     pub(super) steps: [u32; 2],
     pub(super) switching: Switching,
-    /// Periods thrown away: enough for the true orbit's decay to fall below [`CLOSURE`].
+    /// Discarded periods: enough for the decay to the true orbit to fall below [`CLOSURE`].
     transient: usize,
     starts: usize,
 }
 
-/// A motion that fixed steps settle on.
+/// A motion to which fixed steps lead.
 #[derive(Clone, Debug)]
 pub(super) struct GridMotion {
     pub(super) grid: Grid,
-    /// `None`: no period up to [`LONGEST`].
+    /// Apparent period; `None`: no period up to [`LONGEST`].
     pub(super) period: Option<usize>,
     pub(super) amplitude: f64,
     tip_range: (f64, f64),
-    /// Its state at drive phase 0.
+    /// State at drive phase 0.
     pub(super) state: Vec<f64>,
-    /// Its strobe states, one period of it (or [`LONGEST`] drive periods).
+    /// Strobe states of one repetition (or of [`LONGEST`] drive periods).
     strobes: Vec<Vec<f64>>,
-    /// Starts that came to it.
+    /// Number of initial states that lead to it.
     pub(super) count: usize,
 }
 
-/// Everything that the grids make of the case, and what the exact flow makes of that.
+/// All motions that the grids show, and the motions to which the exact flow leads from them.
 pub(super) struct Scan {
     pub(super) motions: Vec<GridMotion>,
     grids: usize,
-    /// Amplitude of the one attractor of the exact flow, by number of modes.
+    /// Amplitude of the only attractor of the exact flow, by number of modes.
     pub(super) exact: Vec<(usize, f64)>,
-    /// Motions that are not period 1.
+    /// Number of motions that are not of period 1.
     subharmonics: usize,
-    /// Of these, how many the exact flow takes to its period-1 attractor.
+    /// Of these, the number from which the exact flow leads to its period-1 attractor.
     vanished: usize,
-    /// Of these, how many have an exact orbit of their period nearby.
+    /// Of these, the number with an exact orbit of their period nearby.
     closed: usize,
 }
 
@@ -75,9 +75,8 @@ pub(super) fn fast_case(modes: usize) -> Cantilever {
         .with(Parameter::Omega, 20.0)
 }
 
-/// The grids that are tried. The paper takes different steps in flight and in contact and
-/// says no numbers, so equal steps and half the step in contact are tried, at every
-/// coarseness from barely stable to fine.
+/// The grids that are tried. The paper uses different steps in flight and in contact and states no
+/// numbers. Equal steps and half the step in contact are tried, from barely stable to fine.
 fn grids(quick: bool) -> Vec<Grid> {
     let grid = |modes, free: u32, ratio: u32, switching, transient, starts| Grid {
         modes,
@@ -111,7 +110,7 @@ fn grids(quick: bool) -> Vec<Grid> {
             grids.push(grid(1, n, 1, stage, 700, starts));
         }
     }
-    // The larger systems decay more slowly.
+    // The decay in larger systems is slower.
     for modes in [2, 3] {
         grids.extend(
             (8..=32)
@@ -175,8 +174,8 @@ impl Scan {
         })
     }
 
-    /// The motion of `period` whose amplitude is nearest to `amplitude`, or the one after
-    /// `skipped` nearer ones, as far as there are so many.
+    /// The motion of `period` whose amplitude is nearest to `amplitude`, or the one after `skipped`
+    /// nearer ones, if there are enough.
     pub(super) fn nearest(
         &self,
         period: Option<usize>,
@@ -191,7 +190,7 @@ impl Scan {
         found.get(skipped.min(last)).copied()
     }
 
-    /// Different motions of `period`.
+    /// Number of different motions of `period`.
     pub(super) fn of_period(&self, period: usize) -> usize {
         self.motions
             .iter()
@@ -199,7 +198,7 @@ impl Scan {
             .count()
     }
 
-    /// Amplitudes of the motions of `period`, in words.
+    /// Amplitudes of the motions of `period`, as text.
     pub(super) fn amplitudes(&self, period: usize) -> String {
         let of = |m: &GridMotion| format!("{} with N = {}", digits(m.amplitude, 3), m.grid.modes);
         let all: Vec<String> = self
@@ -240,7 +239,7 @@ impl Grid {
         }
     }
 
-    /// The different motions that starts come to.
+    /// The different motions to which initial states lead.
     pub(super) fn motions(&self, model: &Model, starts: &[Vec<f64>]) -> Vec<GridMotion> {
         let mut found: Vec<GridMotion> = Vec::new();
         for start in starts.iter().take(self.starts) {
@@ -262,7 +261,8 @@ impl Grid {
         found
     }
 
-    /// Where one start settles; `None` where the numbers overflow or no regime holds it.
+    /// The motion to which one initial state leads; `None` if the numbers overflow or no regime
+    /// contains it.
     fn classify(&self, model: &Model, start: &[f64]) -> Option<GridMotion> {
         let mut run = FixedStep::new(&model.system, start, &self.steps, self.switching).ok()?;
         for _ in 0..self.transient {
@@ -300,7 +300,7 @@ impl Grid {
         })
     }
 
-    /// What the grid is, in few words, for a title.
+    /// Short description of the grid, for a title.
     pub(super) fn short(&self) -> String {
         let [free, contact] = self.steps;
         if free == contact {
@@ -310,7 +310,7 @@ impl Grid {
         }
     }
 
-    /// What the grid is, in words.
+    /// Description of the grid.
     pub(super) fn words(&self) -> String {
         let [free, contact] = self.steps;
         let steps = if free == contact {
@@ -327,7 +327,7 @@ impl Grid {
     }
 }
 
-/// The smallest n for which every one of the first half of the states comes back after n.
+/// The smallest n for which every one of the first half of the states recurs after n.
 fn apparent_period(strobes: &[Vec<f64>], tolerance: f64) -> Option<usize> {
     let half = strobes.len() / 2;
     let distance = |a: &[f64], b: &[f64]| {
@@ -340,8 +340,8 @@ fn apparent_period(strobes: &[Vec<f64>], tolerance: f64) -> Option<usize> {
 }
 
 impl GridMotion {
-    /// Whether the exact flow takes it to a period-1 orbit, and whether Newton finds an
-    /// exact orbit of its own period from its strobe states.
+    /// Whether the exact flow leads to a period-1 orbit, and whether Newton's method finds an exact
+    /// orbit of the same period from the strobe states.
     fn exactly(&self, model: &Model) -> (bool, bool) {
         let mut map = Strobe::new(model);
         let classified = classify(&mut map, &self.state, &ClassifyOptions::default());
@@ -358,7 +358,7 @@ impl GridMotion {
         (vanishes, closes)
     }
 
-    /// (τ/T, W, dW/dτ) of `periods` drive periods, from its own state.
+    /// (τ/T, W, dW/dτ) over `periods` drive periods, from its own state.
     pub(super) fn curve(&self, model: &Model, periods: usize) -> Vec<[f64; 3]> {
         let (drive, rate) = (model.system.drive(), model.tip_rate());
         let at = |tau: f64, phase: f64, x: &[f64]| {
@@ -381,12 +381,12 @@ impl GridMotion {
         curve
     }
 
-    /// A command line that runs it again at Ω = 20.
+    /// A command line that repeats the run at Ω = 20.
     pub(super) fn rerun(&self) -> String {
         self.rerun_on(&fast_case(self.grid.modes))
     }
 
-    /// A command line that runs it again on the `case` that it is of.
+    /// A command line that repeats the run on its `case`.
     pub(super) fn rerun_on(&self, case: &Cantilever) -> String {
         let [free, contact] = self.grid.steps;
         let switching = match self.grid.switching {
@@ -400,7 +400,7 @@ impl GridMotion {
         rerun::on_case("simulate", case, &options)
     }
 
-    /// What it is, in words.
+    /// Description of the motion.
     pub(super) fn words(&self) -> String {
         match self.period {
             Some(period) => format!("period {period}"),
@@ -594,14 +594,14 @@ mod tests {
     fn the_apparent_period_is_the_smallest_that_repeats_throughout() {
         let period_three: Vec<f64> = (0..13).map(|k| f64::from(k % 3)).collect();
         assert_eq!(apparent_period(&states(&period_three), 1e-9), Some(3));
-        // A slow decay is not a period, however slow, until it has come to rest.
+        // A slow decay is not a period before it has ended.
         let decay: Vec<f64> = (0..13).map(|k| 1.0 + 1e-6 * 0.99f64.powi(k)).collect();
         assert_eq!(apparent_period(&states(&decay), 1e-9), None);
         assert_eq!(apparent_period(&states(&[1.0; 13]), 1e-9), Some(1));
     }
 
-    /// The exact flow at Ω = 20 with one mode has a period-1 attractor and nothing else
-    /// ((W_max − W_min)/2 = 0.1447, closed by Newton); 20 steps a period show a period 4 beside it.
+    /// The exact flow at Ω = 20 with one mode has a period-1 attractor and no other ((W_max −
+    /// W_min)/2 = 0.1447, closed by Newton's method); 20 steps per period also show a period 4.
     #[test]
     fn a_coarse_grid_shows_a_subharmonic_that_the_exact_flow_does_not_have() {
         let model = Model::cantilever(&fast_case(1)).unwrap();

@@ -11,20 +11,20 @@ use serde::Serialize;
 use super::section::Picture;
 use super::{About, Check, PaperError, Report, Verdict, html, markdown};
 
-/// What was written.
+/// Paths of the written files.
 #[derive(Clone, Debug)]
 pub struct Written {
-    /// The page with everything in it.
+    /// The page with the whole report.
     pub html: PathBuf,
     /// The Markdown table.
     pub markdown: PathBuf,
     /// The checks as JSON.
     pub checks: PathBuf,
-    /// Pictures, SVG and PNG in turn.
+    /// Pictures, SVG and PNG alternately.
     pub pictures: Vec<PathBuf>,
 }
 
-/// What a report came to and where it is, as the terminal's JSON has it.
+/// Counts of the report and paths of its files, for the terminal's JSON.
 #[derive(Debug, Serialize)]
 pub struct Document<'a> {
     out: &'a Path,
@@ -35,15 +35,15 @@ pub struct Document<'a> {
     reproduced: usize,
     differs: usize,
     ambiguous: usize,
-    /// Of those that differ: formulas, numbers and captions as printed.
+    /// Number of differing formulas, numbers and captions as printed.
     differs_in_print: usize,
-    /// Of those that differ: how the system moves.
+    /// Number of differing statements about motions.
     differs_in_motion: usize,
     checks: Vec<&'a Check>,
 }
 
 impl Report {
-    /// What it came to, `written` into the folder `out`.
+    /// The JSON document of the report, `written` into the folder `out`.
     pub fn document<'a>(&'a self, out: &'a Path, written: &'a Written) -> Document<'a> {
         Document {
             out,
@@ -60,11 +60,11 @@ impl Report {
         }
     }
 
-    /// Writes the report into `folder`, which is made if it is not there. Files of other
-    /// names in it stay as they are.
+    /// Writes the report into `folder`, which is created if necessary. Other files in it are not
+    /// changed.
     ///
     /// # Errors
-    /// When a picture cannot be drawn or a file cannot be written.
+    /// If a picture cannot be drawn or a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Written, PaperError> {
         fs::create_dir_all(folder).map_err(|source| PaperError::Write {
             path: folder.to_path_buf(),
@@ -101,7 +101,7 @@ fn draw(picture: &Picture, folder: &Path, ending: &str) -> Result<PathBuf, Paper
     Ok(path)
 }
 
-/// Writes a file, whole or not at all.
+/// Writes a file completely or not at all.
 fn put(path: PathBuf, text: &str) -> Result<PathBuf, PaperError> {
     files::write(&path, text.as_bytes()).map_err(|source| PaperError::Write {
         path: path.clone(),

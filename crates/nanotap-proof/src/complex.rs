@@ -6,7 +6,7 @@ use nalgebra::Complex;
 
 use crate::interval::Interval;
 
-/// All numbers whose real and imaginary part lie in two intervals.
+/// The complex numbers whose real and imaginary parts lie in two intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectangle {
     /// Real parts.
@@ -21,39 +21,39 @@ impl Rectangle {
     /// One.
     pub const ONE: Self = Self::real(Interval::ONE);
 
-    /// From real and imaginary parts.
+    /// The rectangle with the given real and imaginary parts.
     pub const fn new(re: Interval, im: Interval) -> Self {
         Self { re, im }
     }
 
-    /// Real numbers.
+    /// The rectangle of real numbers `re`.
     pub const fn real(re: Interval) -> Self {
         Self::new(re, Interval::ZERO)
     }
 
-    /// The number itself.
+    /// The rectangle that contains `z` only.
     pub fn point(z: Complex<f64>) -> Self {
         Self::new(Interval::point(z.re), Interval::point(z.im))
     }
 
-    /// i times real numbers.
+    /// The rectangle of imaginary numbers `i · im`.
     pub const fn imaginary(im: Interval) -> Self {
         Self::new(Interval::ZERO, im)
     }
 
-    /// Complex conjugates.
+    /// The complex conjugates.
     #[must_use]
     pub fn conj(self) -> Self {
         Self::new(self.re, -self.im)
     }
 
-    /// Times real numbers.
+    /// The product with real numbers.
     #[must_use]
     pub fn scale(self, factor: Interval) -> Self {
         Self::new(self.re * factor, self.im * factor)
     }
 
-    /// e to these powers.
+    /// The exponential function.
     #[must_use]
     pub fn exp(self) -> Self {
         let size = self.re.exp();
@@ -64,7 +64,7 @@ impl Rectangle {
         Self::new(size * cos, size * sin)
     }
 
-    /// A number near the middle.
+    /// A number near the centre.
     pub fn middle(self) -> Complex<f64> {
         Complex::new(self.re.middle(), self.im.middle())
     }
@@ -79,7 +79,7 @@ impl Rectangle {
         self.modulus().hi()
     }
 
-    /// Whether no number is in both.
+    /// Whether the rectangles have no number in common.
     pub fn is_disjoint(self, other: Self) -> bool {
         self.re.is_disjoint(other.re) || self.im.is_disjoint(other.im)
     }
@@ -135,7 +135,7 @@ impl Mul for Rectangle {
 
 impl Div for Rectangle {
     type Output = Self;
-    /// Every number where the divisor may be zero.
+    /// The quotient; the whole plane if the divisor may be zero.
     fn div(self, other: Self) -> Self {
         let size = other.re.square() + other.im.square();
         let up = self * other.conj();

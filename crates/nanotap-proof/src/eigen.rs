@@ -1,10 +1,9 @@
 //! Eigenvalues and eigenvectors of a real matrix, enclosed.
 //!
-//! To an approximate pair (λ, v) belongs the system of equations (A − λ − δλ)(v + δv) = 0,
-//! δv_p = 0 where |v_p| is largest, in d unknowns: the entries of δv, and δλ in the place of
-//! δv_p. Krawczyk's operator has a fixed point in a box that it maps into its inside (Rump,
-//! Acta Numerica 19, 2010, Sec. 13.4). Boxes of eigenvalues that are pairwise disjoint hold all of
-//! them, once each.
+//! For an approximate pair (λ, v), the unknowns are the d entries of δv, with δλ in place of δv_p,
+//! and the equations are (A − λ − δλ)(v + δv) = 0, δv_p = 0 where |v_p| is largest. Krawczyk's
+//! operator has a fixed point in a box that it maps into its interior (Rump, Acta Numerica 19,
+//! 2010, Sec. 13.4). Pairwise disjoint boxes contain all eigenvalues, one each.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -13,25 +12,25 @@ use crate::complex::Rectangle;
 use crate::interval::Interval;
 use crate::matrix::Matrix;
 
-/// What diagonalises a real matrix A: A = V diag(λ) V⁻¹. One of each pair of conjugate
-/// eigenvalues is kept, the one with positive imaginary part, and its vectors have the factor
-/// 2, so that real vectors are x = Re(R L x).
+/// Diagonalisation of a real matrix A: A = V diag(λ) V⁻¹. Of each pair of conjugate eigenvalues
+/// only the one with positive imaginary part is stored, and its vectors have the factor 2, so that
+/// real vectors are x = Re(R L x).
 #[derive(Clone, Debug)]
 pub struct Eigenbasis {
-    /// λ_k.
+    /// Eigenvalues λ_k.
     pub values: Vec<Rectangle>,
-    /// R, its columns right eigenvectors.
+    /// R, whose columns are right eigenvectors.
     pub right: Matrix<Rectangle>,
-    /// L, its rows left eigenvectors.
+    /// L, whose rows are left eigenvectors.
     pub left: Matrix<Rectangle>,
 }
 
 impl Eigenbasis {
-    /// Of every matrix in `matrix`; `None` where eigenvalues are too near to each other to be
-    /// told apart.
+    /// The eigenbases of all matrices in `matrix`; `None` if eigenvalues are too close to be
+    /// separated.
     pub fn of(matrix: &Matrix<Interval>) -> Option<Self> {
         let n = matrix.rows();
-        // Balanced by powers of two, which is exact but for the last place.
+        // Balanced by powers of two, exact except for the last place.
         let mut balanced = matrix.middle();
         let scale = balance_parlett_reinsch(&mut balanced);
         let scaled = Matrix::from_fn(n, n, |i, j| {
@@ -78,7 +77,7 @@ impl Eigenbasis {
         let left = Matrix::from_fn(kept.len(), n, |k, i| {
             let z = inverse[(kept[k], i)];
             let by = Interval::ONE / Interval::point(scale[i]);
-            // Of a real eigenvalue the row is real.
+            // The row of a real eigenvalue is real.
             if paired(k) {
                 z.scale(by)
             } else {
@@ -144,7 +143,8 @@ pub(crate) fn approximate_pairs(matrix: &DMatrix<f64>) -> Option<Vec<Pair>> {
     Some(pairs)
 }
 
-/// Boxes around an approximate eigenvalue and its vector that hold one, for every matrix.
+/// Boxes around an approximate eigenvalue and its vector that contain an exact pair of every
+/// matrix.
 fn enclosed_pair(
     matrix: &Matrix<Interval>,
     value: Complex<f64>,
@@ -212,7 +212,8 @@ fn enclosed_pair(
 mod tests {
     use super::*;
 
-    /// An eigenvalue and its vector, the largest entry 1, of a matrix that has them by a closed form.
+    /// An eigenvalue and its vector, the largest entry 1, of a matrix for which they have a closed
+    /// form.
     struct Known {
         matrix: [[f64; 3]; 3],
         value: Complex<f64>,
@@ -251,8 +252,7 @@ mod tests {
         ]
     }
 
-    /// From a pair that is off by so much that the square of it counts, what is enclosed is the
-    /// true one, or nothing is.
+    /// From a pair with an error whose square is not negligible, the true pair is enclosed or none.
     #[test]
     fn a_coarse_pair_is_enclosed_or_refused() {
         let (mut enclosed, mut refused) = (0, 0);
@@ -268,7 +268,7 @@ mod tests {
                 .unwrap();
             for k in 0..240_usize {
                 let size = nanotap_arithmetic::powf(10.0, -0.025 * k as f64);
-                // Irregular directions; of a real pair they are real.
+                // Irregular directions; those of a real pair are real.
                 let mut turn = 0.37 * k as f64;
                 let mut off = || {
                     turn += 2.4;

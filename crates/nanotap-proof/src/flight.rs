@@ -1,4 +1,4 @@
-//! That guards keep their sign between two switches.
+//! Proof that guards keep their sign between two switches.
 
 use crate::complex::Rectangle;
 use crate::interval::Interval;
@@ -6,34 +6,34 @@ use crate::system::{ModalOutput, Regime, System};
 
 /// One output along one flight: g(s) = Re Σ c_k e^{λ_k s} + Re Σ z_k e^{iω_k s} + constant.
 struct Signal {
-    /// c_k and λ_k of the motion's own terms and of the tones.
+    /// c_k and λ_k of the terms of the motion and of the tones.
     terms: Vec<(Rectangle, Rectangle)>,
     constant: Interval,
 }
 
-/// What is known of a guard at the ends of its flight.
+/// Known zeros of a guard at the ends of its flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ends {
-    /// How many derivatives, the guard itself counted, are zero at the start.
+    /// Number of derivatives, including the guard itself, that are zero at the start.
     pub(crate) zeros_at_start: usize,
-    /// Whether it is zero at the end.
+    /// Whether the guard is zero at the end.
     pub(crate) zero_at_end: bool,
 }
 
-/// Pieces into which a flight may be cut.
+/// Largest number of pieces into which a flight is divided.
 const MOST_PIECES: usize = 100_000;
-/// A piece is not cut below this part of the flight.
+/// Smallest length of a piece, relative to the flight.
 const SHORTEST: f64 = 1e-12;
 
-/// Where a guard's sign stayed open.
+/// Location at which a guard's sign remained undecided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Undecided {
     /// Time since the start of the flight.
     pub(crate) at: f64,
 }
 
-/// Proves that a guard is positive strictly between the ends of a flight: after a start with
-/// modal coordinates `modal` at time `start`, for `duration` at the most.
+/// Proves that a guard is positive strictly between the ends of a flight that starts with the modal
+/// coordinates `modal` at time `start` and lasts at most `duration`.
 pub(crate) fn stays_positive(
     system: &System,
     regime: &Regime,
@@ -64,7 +64,8 @@ pub(crate) fn stays_positive(
         }
         pieces += 1;
         let middle = 0.5 * (from + to);
-        if pieces > MOST_PIECES || to - from <= SHORTEST * whole {
+        let is_over = pieces > MOST_PIECES || to - from <= SHORTEST * whole;
+        if is_over || system.check_cancel().is_err() {
             return Err(Undecided { at: middle });
         }
         open.push((middle, to));
@@ -93,8 +94,8 @@ impl Signal {
         }
     }
 
-    /// The range of the derivative of this order (0: the signal) from one time to another, by
-    /// Taylor's formula in the middle with a bound of its second derivative.
+    /// The range of the derivative of this order (0: the signal) over an interval of time, by
+    /// Taylor's formula at the centre with a bound of its second derivative.
     fn range(&self, order: usize, from: f64, to: f64) -> Interval {
         let middle = 0.5 * (from + to);
         let radius = (to - middle).max(middle - from).next_up();

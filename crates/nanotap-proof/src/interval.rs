@@ -1,10 +1,10 @@
-//! Intervals of real numbers: the result of an operation contains every result of exact
-//! numbers from its operands.
+//! Intervals of real numbers: the result of an operation contains the results for all exact numbers
+//! in its operands.
 //!
-//! IEEE arithmetic rounds to nearest, so the exact result lies within the neighbours of the
-//! computed one; bounds are moved there after each operation, unless a zero makes it exact.
-//! No rounding mode is switched and nothing is asked of the platform, so that bounds are the
-//! same bits on every machine.
+//! IEEE arithmetic rounds to nearest, so the exact result lies between the neighbours of the
+//! computed one. After each operation the bounds are moved to these neighbours, unless a zero makes
+//! the result exact. No rounding mode is changed and no function of the platform is used, so that
+//! bounds are the same bits on every machine.
 
 use std::f64::consts::FRAC_2_PI;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -16,20 +16,20 @@ pub struct Interval {
     hi: f64,
 }
 
-/// The largest number of quarter turns that the reduction of an angle takes exactly.
+/// The largest number of quarter turns for which the reduction of an angle is exact.
 const MOST_QUARTERS: f64 = 1_048_576.0;
-/// π/2 in parts of 33 bits, with which [`MOST_QUARTERS`] multiply exactly, and a rest
-/// (fdlibm, `e_rem_pio2.c`).
+/// π/2 in parts of 33 bits, whose products with numbers up to [`MOST_QUARTERS`] are exact, and a
+/// remainder (fdlibm, `e_rem_pio2.c`).
 const QUARTER: [f64; 3] = [
     1.5707963267341256,
     6.077100506303966e-11,
     2.0222662487959506e-21,
 ];
-/// ln 2 in a part with 21 zero bits at its end and a rest (fdlibm, `e_exp.c`).
+/// ln 2 as a part with 21 zero bits at its end and a remainder (fdlibm, `e_exp.c`).
 const LN_2: [f64; 2] = [0.6931471803691238, 1.9082149292705877e-10];
-/// What the Taylor series below leave out is smaller: of the cosine to the 20th power and
-/// the sine to the 21st, of arguments up to 0.8, at most 0.8²²/22! = 6.6e-24; of the exponential
-/// function to the 18th, of up to 0.36, e^0.36·0.36¹⁹/19! = 4.4e-26.
+/// Bound of the remainder of the Taylor series below: for the cosine to the 20th power and the sine
+/// to the 21st, with arguments up to 0.8, at most 0.8²²/22! = 6.6e-24; for the exponential function
+/// to the 18th, with arguments up to 0.36, e^0.36·0.36¹⁹/19! = 4.4e-26.
 const LEFT_OUT: f64 = 1e-23;
 
 impl Interval {
@@ -43,7 +43,7 @@ impl Interval {
         hi: f64::INFINITY,
     };
 
-    /// The number itself; every number if it is none.
+    /// The interval of `x` only; all numbers if `x` is NaN.
     pub const fn point(x: f64) -> Self {
         if x.is_nan() {
             Self::ENTIRE
@@ -52,7 +52,7 @@ impl Interval {
         }
     }
 
-    /// `[lo, hi]`; every number where that is none.
+    /// The interval `[lo, hi]`; all numbers if that is not an interval.
     pub fn new(lo: f64, hi: f64) -> Self {
         if lo <= hi {
             Self { lo, hi }
@@ -61,8 +61,8 @@ impl Interval {
         }
     }
 
-    /// Every decimal number that is read as `x`: it rounds to `x`, so that it lies between the
-    /// neighbours of `x`. Zero is taken for exactly zero.
+    /// All decimal numbers that are read as `x`: they round to `x` and lie between its neighbours.
+    /// Zero is exactly zero.
     pub fn typed(x: f64) -> Self {
         if x == 0.0 {
             return Self::ZERO;
@@ -90,7 +90,7 @@ impl Interval {
         self.hi
     }
 
-    /// A number near the middle, in the interval.
+    /// A number of the interval near its centre.
     pub fn middle(self) -> f64 {
         let middle = 0.5 * self.lo + 0.5 * self.hi;
         if middle.is_finite() {
@@ -100,7 +100,7 @@ impl Interval {
         }
     }
 
-    /// A bound of the distance of any of its numbers from [`middle`](Self::middle).
+    /// A bound of the distance of all its numbers from [`middle`](Self::middle).
     pub fn radius(self) -> f64 {
         let middle = self.middle();
         (self.hi - middle).max(middle - self.lo).next_up()
@@ -120,17 +120,17 @@ impl Interval {
         }
     }
 
-    /// Whether `x` is one of its numbers.
+    /// Whether the interval contains `x`.
     pub fn contains(self, x: f64) -> bool {
         self.lo <= x && x <= self.hi
     }
 
-    /// Whether every number of `other` is one of its own.
+    /// Whether the interval contains `other`.
     pub fn encloses(self, other: Self) -> bool {
         self.lo <= other.lo && other.hi <= self.hi
     }
 
-    /// Whether all its numbers are above zero.
+    /// Whether all numbers are above zero.
     pub fn is_positive(self) -> bool {
         self.lo > 0.0
     }
@@ -140,26 +140,26 @@ impl Interval {
         self.lo.is_finite() && self.hi.is_finite()
     }
 
-    /// Whether no number is in both.
+    /// Whether the intervals have no number in common.
     pub fn is_disjoint(self, other: Self) -> bool {
         self.hi < other.lo || other.hi < self.lo
     }
 
-    /// The smallest interval that holds both.
+    /// The smallest interval that contains both.
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self::new(self.lo.min(other.lo), self.hi.max(other.hi))
     }
 
-    /// What is in both; `self` if there is nothing, which true enclosures of one number never
-    /// give.
+    /// The intersection; `self` if it is empty, which cannot happen for true enclosures of one
+    /// number.
     #[must_use]
     pub fn meet(self, other: Self) -> Self {
         let (lo, hi) = (self.lo.max(other.lo), self.hi.min(other.hi));
         if lo <= hi { Self { lo, hi } } else { self }
     }
 
-    /// Its square, never negative.
+    /// The square, never negative.
     #[must_use]
     pub fn square(self) -> Self {
         let (small, large) = (self.mignitude(), self.magnitude());
@@ -172,7 +172,7 @@ impl Interval {
         Self::new(lo, hi)
     }
 
-    /// Its square root; of negative numbers there is none, and they are passed over.
+    /// The square root; negative numbers are ignored.
     #[must_use]
     pub fn sqrt(self) -> Self {
         let lo = if self.lo <= 0.0 {
@@ -188,18 +188,18 @@ impl Interval {
         Self::new(lo, hi)
     }
 
-    /// π.
+    /// An enclosure of π.
     pub fn pi() -> Self {
         quarter_turn() * Self::point(2.0)
     }
 
-    /// e to this power.
+    /// The exponential function.
     #[must_use]
     pub fn exp(self) -> Self {
         Self::new(exp_of(self.lo).lo, exp_of(self.hi).hi)
     }
 
-    /// Sine and cosine: their values in the middle with the bound of Taylor's second term,
+    /// Sine and cosine: their values at the centre with the bound of Taylor's second term,
     /// |f(m + d) − f(m) − f′(m) d| ≤ d²/2.
     pub fn sin_cos(self) -> (Self, Self) {
         let all = Self::new(-1.0, 1.0);
@@ -238,13 +238,13 @@ fn up(x: f64) -> f64 {
     x.next_up()
 }
 
-/// π/2.
+/// An enclosure of π/2.
 fn quarter_turn() -> Interval {
     Interval::point(QUARTER[0]) + Interval::point(QUARTER[1]) + Interval::typed(QUARTER[2])
 }
 
-/// Sine and cosine of one number: what is left of it after whole quarter turns is put into
-/// their Taylor series.
+/// Sine and cosine of one number: the remainder after whole quarter turns is put into their Taylor
+/// series.
 fn sin_cos_of(x: f64) -> (Interval, Interval) {
     let all = Interval::new(-1.0, 1.0);
     let quarters = (x * FRAC_2_PI).round();
@@ -276,7 +276,7 @@ fn sin_cos_of(x: f64) -> (Interval, Interval) {
     };
     let left_out = Interval::around_zero(LEFT_OUT);
     let cos = (series(0) + left_out).meet(all);
-    // The sine keeps its relative accuracy: what is left out has the factor x too.
+    // The sine keeps its relative accuracy: the remainder has the factor x too.
     let sin = (rest * (series(1) + left_out)).meet(all);
     match quarters.rem_euclid(4.0) as u8 {
         0 => (sin, cos),
@@ -286,7 +286,7 @@ fn sin_cos_of(x: f64) -> (Interval, Interval) {
     }
 }
 
-/// e to the power of one number: x = k ln 2 + r, and the Taylor series of eʳ.
+/// The exponential function of one number: x = k ln 2 + r, and the Taylor series of eʳ.
 fn exp_of(x: f64) -> Interval {
     const LARGEST: f64 = 700.0;
     if x == 0.0 {
@@ -382,7 +382,7 @@ impl Mul for Interval {
 
 impl Div for Interval {
     type Output = Self;
-    /// Every number where the divisor may be zero.
+    /// The quotient; all numbers if the divisor may be zero.
     fn div(self, other: Self) -> Self {
         if other.contains(0.0) {
             return Self::ENTIRE;
@@ -421,8 +421,8 @@ impl std::iter::Sum for Interval {
 mod tests {
     use super::*;
 
-    /// 32 bits each of the hexadecimal digits of π after the point, and of ln 2 (π as in the
-    /// tables of the cipher Blowfish; both are Machin-like sums to 400 bits).
+    /// Fractional digits of π, and digits of ln 2, in hexadecimal, 32 bits each (π as in the tables
+    /// of the cipher Blowfish; both are Machin-like sums to 400 bits).
     const PI: [u32; 6] = [
         0x243f_6a88,
         0x85a3_08d3,
@@ -440,8 +440,8 @@ mod tests {
         0x7298_b62d,
     ];
 
-    /// The number with the binary digits from `from` up to `to` of these, of which the first
-    /// counts 2^`top`, rounded to nearest once.
+    /// The number with the binary digits from `from` up to `to`, the first of which has the value
+    /// 2^`top`, rounded to nearest once.
     fn part(digits: &[bool], from: usize, to: usize, top: i32) -> f64 {
         let bits = digits[from..to]
             .iter()
@@ -455,8 +455,8 @@ mod tests {
             .flat_map(|word| (0..32).rev().map(move |k| word >> k & 1 == 1))
     }
 
-    /// Two parts of π/2 are 33 of its binary digits each, the third is the rest rounded; the first
-    /// part of ln 2 is its first 32, the second the rest rounded.
+    /// Two parts of π/2 have 33 of its binary digits each, the third is the rounded remainder; the
+    /// first part of ln 2 has its first 32, the second is the rounded remainder.
     #[test]
     fn the_parts_of_a_quarter_turn_and_of_the_logarithm_of_two_are_their_digits() {
         // 3 = 11 in binary, and π/2 begins with 1.

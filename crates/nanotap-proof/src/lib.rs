@@ -1,15 +1,15 @@
 //! Computer-assisted proofs of periodic orbits of harmonically forced piecewise-linear systems.
 //!
-//! Between switches such a system moves in closed form. With numbers replaced by intervals
-//! that are rounded outwards, an approximate orbit becomes a theorem: an orbit exists near it,
-//! it is the only one within a stated distance, it switches at enclosed times and nowhere
-//! else, and its multipliers lie in stated discs.
+//! Between switches the motion of such a system has a closed form. With intervals, rounded
+//! outwards, in place of numbers, an approximate orbit becomes a theorem: an orbit exists near it,
+//! it is the only one within a stated distance, it switches at enclosed times and nowhere else, and
+//! its multipliers lie in stated discs.
 //!
-//! In [`interval`] are intervals of real numbers and their elementary functions, in [`system`] the
-//! system and its flow, in [`orbit`] existence and uniqueness from Krawczyk's operator, and in
-//! [`multipliers`] stability.
+//! [`interval`] has intervals of real numbers and their elementary functions, [`system`] the system
+//! and its flow, [`orbit`] existence and uniqueness by Krawczyk's operator, and [`multipliers`]
+//! stability.
 
-// Where a number is none, nothing is proved: `!(a < b)` says so and `a >= b` does not.
+// With NaN nothing may be proved: `!(a < b)` is true then, and `a >= b` is not.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 pub mod complex;
@@ -28,51 +28,54 @@ pub use multipliers::{Disc, Multipliers, Stability};
 pub use orbit::{Alone, Candidate, EnclosedSwitch, Switch, Theorem, prove};
 pub use system::{HarmonicVector, Output, RegimeParts, Reset, System, Transition};
 
-/// Why an orbit is not proved. It may exist nevertheless.
+/// Why an orbit could not be proved. It may exist nevertheless.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProofError {
-    /// Eigenvalues of a regime meet, as at critical damping.
+    /// Eigenvalues of a regime coincide, as at critical damping.
     #[error("two eigenvalues of regime {regime} are too near to each other to be told apart")]
     Eigenvalues {
-        /// The regime.
+        /// Index of the regime.
         regime: usize,
     },
     /// A regime is driven at a resonance without damping.
     #[error("regime {regime} is driven at an undamped resonance")]
     Resonance {
-        /// The regime.
+        /// Index of the regime.
         regime: usize,
     },
-    /// The test of existence does not contract: no orbit is near, or it is not isolated (at a
-    /// fold), or it is too sensitive to rounding.
+    /// The test of existence does not contract: no orbit is near, it is not isolated (at a fold),
+    /// or it is too sensitive to rounding.
     #[error("no orbit was isolated near the computed one: none is there, or a fold is near")]
     NoIsolatedOrbit,
     /// A guard could not be shown to keep its sign.
     #[error("flight {flight} may graze {at} after its start: its sign could not be decided there")]
     Grazing {
-        /// The number of the flight, from 0.
+        /// Index of the flight, from 0.
         flight: usize,
-        /// Time since its start.
+        /// Time since the start of the flight.
         at: f64,
     },
-    /// It may be a shorter orbit, several times over.
+    /// The orbit may be several repetitions of a shorter one.
     #[error("its period may be {period} already")]
     ShorterPeriod {
-        /// The shorter period.
+        /// The shorter period, in drive periods.
         period: usize,
     },
-    /// More equations than are solved.
+    /// The number of equations exceeds the limit.
     #[error("its switches make {unknowns} equations; at most {limit} are solved")]
     TooLarge {
-        /// How many.
+        /// Number of equations.
         unknowns: usize,
-        /// How many at most.
+        /// Largest number of equations.
         limit: usize,
     },
-    /// The approximate orbit is no orbit of this system.
+    /// The work was cancelled from outside.
+    #[error("stopped from outside")]
+    Cancelled,
+    /// The approximate orbit is not an orbit of this system.
     #[error("what was given is no orbit: {what}")]
     Candidate {
-        /// What is wrong.
+        /// Reason.
         what: &'static str,
     },
 }

@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::complex::Rectangle;
 use crate::interval::Interval;
 
-/// A matrix; its entries stand row after row.
+/// A matrix, stored row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrix<T> {
     rows: usize,
@@ -15,7 +15,7 @@ pub struct Matrix<T> {
     entries: Vec<T>,
 }
 
-/// What matrices are made of.
+/// An entry of a matrix.
 pub trait Entry: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Zero.
     const ZERO: Self;
@@ -34,7 +34,7 @@ impl Entry for Rectangle {
 }
 
 impl<T: Entry> Matrix<T> {
-    /// By entries.
+    /// The matrix with the entries `entry(row, column)`.
     pub fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> T) -> Self {
         let entries = (0..rows * columns)
             .map(|k| entry(k / columns, k % columns))
@@ -46,7 +46,7 @@ impl<T: Entry> Matrix<T> {
         }
     }
 
-    /// All zero.
+    /// The zero matrix.
     pub fn zeros(rows: usize, columns: usize) -> Self {
         Self::from_fn(rows, columns, |_, _| T::ZERO)
     }
@@ -56,32 +56,32 @@ impl<T: Entry> Matrix<T> {
         Self::from_fn(size, size, |i, j| if i == j { T::ONE } else { T::ZERO })
     }
 
-    /// Its number of rows.
+    /// Number of rows.
     pub const fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Its number of columns.
+    /// Number of columns.
     pub const fn columns(&self) -> usize {
         self.columns
     }
 
-    /// One of its rows.
+    /// Row `i`.
     pub fn row(&self, i: usize) -> &[T] {
         &self.entries[i * self.columns..(i + 1) * self.columns]
     }
 
-    /// One of its columns.
+    /// Column `j`.
     pub fn column(&self, j: usize) -> Vec<T> {
         (0..self.rows).map(|i| self[(i, j)]).collect()
     }
 
-    /// Times a vector.
+    /// The product with a vector.
     pub fn apply(&self, vector: &[T]) -> Vec<T> {
         (0..self.rows).map(|i| dot(self.row(i), vector)).collect()
     }
 
-    /// Another matrix of the same shape, entry by entry.
+    /// The matrix with `of` applied to each entry.
     pub fn map<U: Entry>(&self, mut of: impl FnMut(T) -> U) -> Matrix<U> {
         Matrix {
             rows: self.rows,
@@ -90,7 +90,7 @@ impl<T: Entry> Matrix<T> {
         }
     }
 
-    /// All entries.
+    /// All entries, row by row.
     pub fn iter(&self) -> impl Iterator<Item = &T> {
         self.entries.iter()
     }
@@ -138,19 +138,19 @@ impl<T: Entry> Sub for &Matrix<T> {
 }
 
 impl Matrix<Interval> {
-    /// The middles of its entries.
+    /// The centres of the entries.
     pub fn middle(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.rows, self.columns, |i, j| self[(i, j)].middle())
     }
 }
 
 impl Matrix<Rectangle> {
-    /// The middles of its entries.
+    /// The centres of the entries.
     pub fn middle(&self) -> DMatrix<Complex<f64>> {
         DMatrix::from_fn(self.rows, self.columns, |i, j| self[(i, j)].middle())
     }
 
-    /// An approximate matrix as one of intervals.
+    /// An approximate matrix as one of rectangles.
     pub fn points(of: &DMatrix<Complex<f64>>) -> Self {
         Self::from_fn(of.nrows(), of.ncols(), |i, j| Rectangle::point(of[(i, j)]))
     }
@@ -168,11 +168,11 @@ impl Matrix<Rectangle> {
             .fold(0.0, f64::max)
     }
 
-    /// The inverses of all its matrices, `None` where some may have none.
+    /// The inverses of all matrices in it; `None` if some may be singular.
     ///
-    /// With W an approximate inverse and E = 1 − W V, ‖E‖ < 1, the inverse is
-    /// (1 − E)⁻¹ W = W + E W + …, and what comes after W is at most ‖E‖ ‖W‖_j / (1 − ‖E‖),
-    /// where ‖W‖_j is the largest entry of column j.
+    /// With an approximate inverse W and E = 1 − W V, ‖E‖ < 1, the inverse is
+    /// (1 − E)⁻¹ W = W + E W + …, and the terms after W are at most ‖E‖ ‖W‖_j / (1 − ‖E‖), where
+    /// ‖W‖_j is the largest entry of column j.
     pub fn inverse(&self) -> Option<Self> {
         let approximate = Self::points(&self.middle().try_inverse()?);
         if !approximate.iter().all(|z| z.is_finite()) {

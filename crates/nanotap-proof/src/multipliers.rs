@@ -1,11 +1,11 @@
 //! Floquet multipliers: eigenvalues of the product of the derivatives of all flights.
 //!
-//! A plain product of matrices of intervals swells with each factor. In frames V_s that move
-//! with the orbit, V_{s+1}⁻¹ B_s V_s is nearly diagonal with positive entries, for the frames
-//! are the eigenvectors of the whole product, carried along; products of such matrices widen
-//! by their own rounding only. Any frames give true bounds, good ones give narrow ones.
-//! Gershgorin's discs of the product, once more in the frame of its eigenvectors, hold
-//! the multipliers: as many in each connected part of their union as it has discs.
+//! A direct product of interval matrices widens with each factor. In frames V_s that move with the
+//! orbit, V_{s+1}⁻¹ B_s V_s is nearly diagonal with positive entries, because the frames are the
+//! propagated eigenvectors of the whole product. Products of such matrices widen by their own
+//! rounding only. Any frames give valid bounds; good ones give narrow bounds. Gershgorin's discs of
+//! the product, in the frame of its eigenvectors, contain the multipliers: each connected part of
+//! their union contains as many as it has discs.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -15,26 +15,26 @@ use crate::interval::Interval;
 use crate::matrix::Matrix;
 use crate::system::Regime;
 
-/// Where the multipliers are.
+/// Enclosures of the multipliers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Multipliers {
-    /// Discs that hold them all, pairwise disjoint, the largest multipliers first; empty where
-    /// nothing could be said.
+    /// Pairwise disjoint discs that contain all multipliers, the largest multipliers first; empty
+    /// if none could be enclosed.
     pub discs: Vec<Disc>,
 }
 
-/// A disc of complex numbers that holds `count` multipliers and is apart from the others.
+/// A disc of complex numbers that contains `count` multipliers and is disjoint from the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// Its centre.
     pub center: Complex<f64>,
     /// Its radius.
     pub radius: f64,
-    /// How many multipliers it holds.
+    /// Number of multipliers in the disc.
     pub count: usize,
 }
 
-/// What is proved of an orbit's stability.
+/// Proved stability of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stability {
     /// Every multiplier is inside the unit circle.
@@ -57,7 +57,7 @@ impl Disc {
         !(apart.lo() > sum.hi())
     }
 
-    /// A disc that holds both.
+    /// A disc that contains both.
     fn joined(&self, other: &Self) -> Self {
         let center = (self.center + other.center) * 0.5;
         let reach = |disc: &Self| {
@@ -73,7 +73,7 @@ impl Disc {
 }
 
 impl Multipliers {
-    /// What the discs prove.
+    /// The stability that the discs prove.
     pub fn stability(&self) -> Stability {
         let mut sizes = self.discs.iter().map(Disc::modulus);
         if self.discs.is_empty() {
@@ -87,7 +87,7 @@ impl Multipliers {
         }
     }
 
-    /// Of multipliers that are enclosed one by one.
+    /// From multipliers that are enclosed individually.
     pub(crate) fn of_each(values: &[Rectangle]) -> Self {
         let disc = |z: &Rectangle| {
             let center = z.middle();
@@ -122,7 +122,8 @@ impl Multipliers {
                 .total_cmp(&size(a))
                 .then(b.center.im.total_cmp(&a.center.im))
         });
-        // Of two that may be conjugates the upper one first, whatever rounding made of their sizes.
+        // Of two that may be conjugates the upper one comes first, however their moduli are
+        // rounded.
         for k in 1..discs.len() {
             let (a, b) = (discs[k - 1], discs[k]);
             let mirrored = Disc {
@@ -150,11 +151,11 @@ pub(crate) fn of_flow(regime: &Regime, period: Interval) -> Vec<Rectangle> {
         .collect()
 }
 
-/// A column that has less than this of its length outside the span of those before is put
-/// at right angles to them.
+/// A column with less than this fraction of its length outside the span of the previous ones is
+/// replaced by an orthogonal one.
 const NEARLY_DEPENDENT: f64 = 1e-6;
 
-/// The multipliers of the product of `factors`, the last one leftmost; `weights` are the sizes
+/// The multipliers of the product of `factors`, the last one leftmost; `weights` are the magnitudes
 /// of the entries of states.
 pub(crate) fn enclosed(factors: &[Matrix<Interval>], weights: &[f64]) -> Multipliers {
     product_in_frames(factors, weights)
@@ -165,7 +166,7 @@ pub(crate) fn enclosed(factors: &[Matrix<Interval>], weights: &[f64]) -> Multipl
 
 fn product_in_frames(factors: &[Matrix<Interval>], weights: &[f64]) -> Option<Matrix<Rectangle>> {
     let n = weights.len();
-    // In units of the weights; they are no powers of two, so the division is enclosed too.
+    // In units of the weights; these are not powers of two, so the division is enclosed too.
     let factors: Vec<Matrix<Interval>> = factors
         .iter()
         .map(|b| {
@@ -212,7 +213,7 @@ fn eigenvectors(matrix: &DMatrix<f64>) -> Option<DMatrix<Complex<f64>>> {
     normalised(&DMatrix::from_columns(&columns))
 }
 
-/// Columns of length 1 that are far from dependent.
+/// Columns of length 1 that are clearly independent.
 fn normalised(columns: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
     let n = columns.nrows();
     let mut orthogonal: Vec<DVector<Complex<f64>>> = Vec::with_capacity(n);
@@ -234,7 +235,7 @@ fn normalised(columns: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> 
         let (column, rest) = if rest.norm() > NEARLY_DEPENDENT * length {
             (column / Complex::new(length, 0.0), rest)
         } else {
-            // The unit vector that is farthest from the span of those before.
+            // The unit vector farthest from the span of the previous columns.
             let far = (0..n)
                 .map(|i| {
                     beside(&DVector::from_fn(n, |k, _| {
@@ -286,8 +287,8 @@ fn discs(product: &Matrix<Rectangle>) -> Vec<Disc> {
         .collect()
 }
 
-/// Discs that may hold real numbers, around real ones: multipliers come in conjugate pairs, and
-/// one that is alone is real.
+/// Discs that may contain real numbers are centred on the real axis: multipliers come in conjugate
+/// pairs, and a single one is real.
 fn around_real(disc: Disc) -> Disc {
     if disc.center.im.abs() > disc.radius {
         return disc;
@@ -300,7 +301,7 @@ fn around_real(disc: Disc) -> Disc {
     }
 }
 
-/// Eigenvectors of a matrix that is nearly diagonal, to first order of what is beside it.
+/// Eigenvectors of a nearly diagonal matrix, to first order in the off-diagonal entries.
 fn complex_eigenvectors(matrix: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
     let n = matrix.nrows();
     let mut vectors = DMatrix::identity(n, n);

@@ -1,16 +1,16 @@
 //! Existence and uniqueness of a periodic orbit.
 //!
-//! An orbit of n drive periods with m switches is a zero of m(d + 1) equations in the states
-//! x_s after its switches and their times t_s: each flight from a switch ends in the state
-//! with which the next one begins, and there the guard that was left is zero. With J the
-//! Jacobian of these equations over a box X around an approximate zero z, and C an approximate
-//! inverse of J, Krawczyk's operator
+//! An orbit of n drive periods with m switches is a zero of m(d + 1) equations in the states x_s
+//! after its switches and their times t_s: each flight from a switch ends in the state with which
+//! the next one begins, and there the guard of the transition is zero. With the Jacobian J of these
+//! equations over a box X around an approximate zero z, and an approximate inverse C of J,
+//! Krawczyk's operator
 //!
 //! K(X) = z − C F(z) + (1 − C J(X)) (X − z)
 //!
-//! maps X into its inside only if X holds exactly one zero, which then lies in K(X) (Krawczyk
+//! maps X into its interior only if X contains exactly one zero, which then lies in K(X) (Krawczyk
 //! 1969; Moore 1977; Rump, Acta Numerica 19, 2010, Sec. 13). Since the states at all switches are
-//! unknowns, no enclosure is carried through more than one flight, and none swells.
+//! unknowns, no enclosure is propagated through more than one flight, and none grows.
 
 use nalgebra::DMatrix;
 
@@ -24,71 +24,72 @@ use crate::system::{HarmonicVector, Reset, System, Transition};
 /// An approximate periodic orbit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Its period n in drive periods.
+    /// Period n in drive periods.
     pub period: usize,
-    /// The regime in which it stays if it has no switch.
+    /// The regime in which the orbit stays if it has no switch.
     pub regime: usize,
-    /// Its switches in order of time.
+    /// Switches in order of time.
     pub switches: Vec<Switch>,
 }
 
 /// A switch of an approximate orbit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
-    /// When, from phase 0 of the first period on.
+    /// Time from phase 0 of the first period.
     pub time: f64,
-    /// The regime left.
+    /// Index of the regime before the switch.
     pub from: usize,
-    /// By which of its transitions.
+    /// Index of its transition.
     pub transition: usize,
-    /// The state just after it.
+    /// The state just after the switch.
     pub state: Vec<f64>,
 }
 
-/// An orbit that was proved to exist.
+/// A proof that an orbit exists.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Theorem {
-    /// Its minimal period in drive periods.
+    /// Minimal period in drive periods.
     pub period: usize,
-    /// The state at drive phase 0 of each of its periods.
+    /// Enclosures of the states at drive phase 0 of each of its periods.
     pub states: Vec<Vec<Interval>>,
-    /// Its switches.
+    /// Enclosures of its switches.
     pub switches: Vec<EnclosedSwitch>,
-    /// How far around it there is no other; `None` without switches, where there is no other
-    /// that stays in its regime.
+    /// The neighbourhood in which there is no other orbit; `None` without switches, where no other
+    /// orbit stays in the regime.
     pub alone: Option<Alone>,
-    /// Its multipliers.
+    /// Enclosures of its multipliers.
     pub multipliers: Multipliers,
 }
 
-/// A switch of an orbit that exists.
+/// A switch of a proved orbit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnclosedSwitch {
-    /// When, from phase 0 of the first period on.
+    /// Time from phase 0 of the first period.
     pub time: Interval,
-    /// The regime left.
+    /// Index of the regime before the switch.
     pub from: usize,
-    /// The regime entered.
+    /// Index of the regime after the switch.
     pub to: usize,
-    /// The state just after it.
+    /// The state just after the switch.
     pub state: Vec<Interval>,
 }
 
-/// No other orbit of the same period and sequence of regimes has all its switches this near.
+/// No other orbit with the same period and sequence of regimes has all its switches within these
+/// distances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alone {
-    /// Largest difference of the time of any switch.
+    /// Largest difference in the time of any switch.
     pub time: f64,
-    /// Largest difference of each entry of the state after any switch.
+    /// Largest difference in each entry of the state after any switch.
     pub state: Vec<f64>,
 }
 
 /// The flight from one switch to the next.
 struct Leg {
     regime: usize,
-    /// The transition with which it ends.
+    /// Index of the transition at its end.
     exit: usize,
-    /// Drive periods from that of its first switch to that of its last.
+    /// Drive periods between that of its first switch and that of its last.
     periods: f64,
 }
 
@@ -98,36 +99,40 @@ struct Equations<'a> {
     legs: Vec<Leg>,
 }
 
-/// A box around numbers.
+/// A box of the unknowns.
 #[derive(Clone)]
 struct Unknowns {
     states: Vec<Vec<Interval>>,
     phases: Vec<Interval>,
 }
 
-/// Most equations that are solved; their matrix grows with the square.
+/// Largest number of equations; their matrix grows with the square.
 pub const MOST_UNKNOWNS: usize = 3000;
-/// Part of the way of an entry of the state in a radian of the drive that it is measured by at
-/// least.
+/// Minimum weight of an entry of the state, as a fraction of its change over a radian of the drive.
 const MOVED: f64 = 0.1;
-/// And by this part of the largest entry at least.
+/// Minimum weight, as a fraction of the largest entry.
 const LEAST: f64 = 1e-9;
-/// Newton steps in plain numbers before the test.
+/// Newton steps in floating-point numbers before the test.
 const NEWTON_STEPS: usize = 4;
-/// Boxes tried: the first has this part of the size of the unknowns, each next one is larger
-/// by [`WIDER`].
+/// Relative size of the first box that is tried; each following one is larger by the factor
+/// [`WIDER`].
 const FIRST_BOX: f64 = 1e-14;
 const WIDER: f64 = 10.0;
 const LARGEST_BOX: f64 = 0.1;
-/// How often the enclosure is put into the operator again.
+/// Number of further applications of the operator to the enclosure.
 const TIGHTENING: usize = 3;
 
-/// Proves that there is a periodic orbit near an approximate one: so near that it is the only
-/// one there.
+/// Proves that a periodic orbit exists near an approximate one, close enough to be unique.
 ///
 /// # Errors
 /// [`ProofError`] says what could not be proved.
 pub fn prove(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
+    let proved = proved(system, candidate);
+    // What was cancelled did not fail for the reason that it ended with.
+    proved.or_else(|error| system.check_cancel().and(Err(error)))
+}
+
+fn proved(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
     if candidate.period == 0 {
         return Err(ProofError::Candidate {
             what: "its period is 0",
@@ -188,8 +193,8 @@ pub fn prove(system: &System, candidate: &Candidate) -> Result<Theorem, ProofErr
 }
 
 impl<'a> Equations<'a> {
-    /// The equations of an orbit with the switches of `candidate`, and the drive period in
-    /// which each of them is.
+    /// The equations of an orbit with the switches of `candidate`, and the drive period of each
+    /// switch.
     fn of(system: &'a System, candidate: &Candidate) -> Result<(Self, Vec<f64>), ProofError> {
         let wrong = |what| Err(ProofError::Candidate { what });
         let period = system.period.middle();
@@ -262,8 +267,8 @@ impl<'a> Equations<'a> {
         whole + (phases[self.next(leg)] - phases[leg])
     }
 
-    /// What a change of each unknown is measured by: a radian of the drive, and the largest
-    /// entry of each kind at any switch, or a part of how far it moves in that time.
+    /// Weights of the unknowns: a radian of the drive, and the largest entry of each kind at any
+    /// switch, or a fraction of its change over that time.
     fn weights(&self, center: &[f64], period: f64) -> Vec<f64> {
         let (d, radian) = (self.system.dimension, period / std::f64::consts::TAU);
         let mut weights = vec![f64::MIN_POSITIVE; d];
@@ -284,7 +289,7 @@ impl<'a> Equations<'a> {
         weights
     }
 
-    /// F.
+    /// The residual F.
     fn residual(&self, at: &Unknowns) -> Vec<Interval> {
         let mut all = Vec::with_capacity(self.size());
         for s in 0..self.legs.len() {
@@ -303,7 +308,7 @@ impl<'a> Equations<'a> {
         all
     }
 
-    /// One flight, for all unknowns of the box.
+    /// One flight, for all unknowns in the box.
     fn flown(&self, leg: usize, at: &Unknowns) -> Flown {
         let regime = &self.system.regimes[self.legs[leg].regime];
         let start = self.system.phasors(at.phases[leg]);
@@ -321,7 +326,7 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// The columns of J, each as its rows that are not zero.
+    /// The columns of J, each as its nonzero rows.
     fn jacobian(&self, at: &Unknowns) -> Vec<Vec<(usize, Interval)>> {
         let d = self.system.dimension;
         let mut columns = vec![Vec::new(); self.size()];
@@ -377,8 +382,9 @@ impl<'a> Equations<'a> {
         columns
     }
 
-    /// Newton steps in plain numbers, then boxes around what they lead to: how large a box,
-    /// relative to the weights, holds no other zero, and the smallest enclosure found.
+    /// Newton steps in floating-point numbers, then boxes around the result. Returns the size of
+    /// the largest box, relative to the weights, that contains no other zero, and the smallest
+    /// enclosure found.
     fn solved(&self, start: &[f64], weights: &[f64]) -> Result<(f64, Vec<Interval>), ProofError> {
         let size = self.size();
         let weight = |k: usize| weights[k % weights.len()];
@@ -389,6 +395,7 @@ impl<'a> Equations<'a> {
         let mut inverse = DMatrix::zeros(0, 0);
         let mut residual = Vec::new();
         for step in 0..=NEWTON_STEPS {
+            self.system.check_cancel()?;
             let at = self.unknowns(&points(&center));
             // C in units of the weights, so that its rows are comparable.
             if step < 2 {
@@ -399,7 +406,7 @@ impl<'a> Equations<'a> {
                     }
                 }
                 inverse = matrix.try_inverse().ok_or(ProofError::NoIsolatedOrbit)?;
-                // Its rows become columns, which is how it is read.
+                // Transposed, because its rows are read as columns.
                 inverse.transpose_mut();
             }
             residual = self.residual(&at);
@@ -441,7 +448,7 @@ impl<'a> Equations<'a> {
         let mut found: Option<(f64, Vec<f64>)> = None;
         while radius < LARGEST_BOX {
             let columns = self.jacobian(&self.unknowns(&boxed(&|_| radius)));
-            // |1 − C J(X)| in units of the weights, a row each.
+            // |1 − C J(X)| in units of the weights, row by row.
             let defects = |k: usize| -> Vec<f64> {
                 let row = inverse.column(k);
                 (0..size)
@@ -465,7 +472,8 @@ impl<'a> Equations<'a> {
                     .sum();
                 (moved + Interval::point(offsets[k])).hi()
             };
-            let rows: Vec<Vec<f64>> = (0..size).map(defects).collect();
+            let row = |k| self.system.check_cancel().map(|()| defects(k));
+            let rows = (0..size).map(row).collect::<Result<Vec<_>, _>>()?;
             let radii: Vec<f64> = (0..size)
                 .map(|k| mapped(&rows[k], &|_| radius, k))
                 .collect();
@@ -491,12 +499,13 @@ impl<'a> Equations<'a> {
             radius *= WIDER;
         }
         let (alone, radii) = found.ok_or(ProofError::NoIsolatedOrbit)?;
-        // The theorem is of the orbit that was given, not of one that Newton went to.
+        // The theorem must be about the given orbit, not about another one to which Newton's method
+        // converged.
         let near = |(k, &x): (usize, &f64)| (start[k] - x).abs() <= alone * weight(k);
         if !center.iter().enumerate().all(near) {
             return Err(ProofError::NoIsolatedOrbit);
         }
-        // From any point of the enclosure, not only from its middle.
+        // From any point of the enclosure, not only from its centre.
         let widest = radii.iter().copied().fold(0.0, f64::max);
         let alone = (Interval::point(alone) - Interval::point(widest)).lo();
         Ok((alone.max(0.0), boxed(&|k| radii[k])))
@@ -535,8 +544,8 @@ impl<'a> Equations<'a> {
         Ok(())
     }
 
-    /// The states at phase 0 of each period. Where a switch may be at phase 0, what both
-    /// flights say.
+    /// The states at phase 0 of each period. If a switch may be at phase 0, the hull of both
+    /// flights.
     fn states_at_phase_zero(
         &self,
         at: &Unknowns,
@@ -548,7 +557,8 @@ impl<'a> Equations<'a> {
         for period in 0..periods {
             let mut state: Option<Vec<Interval>> = None;
             for (s, leg) in self.legs.iter().enumerate() {
-                // A flight is met in its own period and, around the orbit's end, one later.
+                // A flight occurs in its own period and, around the end of the orbit, one period
+                // later.
                 for around in [0.0, periods as f64] {
                     let whole = period as f64 + around - offsets[s];
                     let since = Interval::point(whole) * self.system.period - at.phases[s];
@@ -617,11 +627,11 @@ impl<'a> Equations<'a> {
     }
 }
 
-/// What comes of a flight.
+/// Result of a flight.
 struct Flown {
     /// The state at its end.
     end: Vec<Interval>,
-    /// The derivative of that by the state at its start, at fixed times.
+    /// The derivative of the end by the state at its start, at fixed times.
     propagator: Matrix<Interval>,
     /// ẋ at its start.
     departure: Vec<Interval>,
@@ -650,7 +660,7 @@ fn reset_rate(
     })
 }
 
-/// R x + o, with what the reset's offset contributes; x itself where nothing jumps.
+/// R x + o, including the contribution of the reset's offset; x itself if there is no reset.
 fn jumped(
     exit: &Transition,
     x: &[Interval],
@@ -682,8 +692,8 @@ fn minimal(states: &[Vec<Interval>]) -> Result<(), ProofError> {
     Ok(())
 }
 
-/// An orbit that stays in one regime is its forced response, where that is the only motion
-/// that repeats.
+/// Proves that an orbit that stays in one regime is its forced response, if that is the only
+/// periodic motion.
 fn without_switches(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
     let Some(regime) = system.regimes.get(candidate.regime) else {
         return Err(ProofError::Candidate {

@@ -1,10 +1,11 @@
-//! A harmonically forced piecewise-linear system whose numbers are intervals, and its flow in
+//! A harmonically forced piecewise-linear system with intervals as coefficients, and its flow in
 //! closed form.
 //!
-//! In a regime ẋ = A x + f(t) with f(t) = f₀ + Σ Re(F_k e^{iω_k t}). With the forced response
-//! p(t) = p₀ + Σ Re(P_k e^{iω_k t}), p₀ = −A⁻¹f₀ and P_k = (iω_k − A)⁻¹F_k, and with L, R and λ
-//! from an [`Eigenbasis`], the motion from x at time t is
-//! x(t + s) = p(t + s) + Re(R e^{λs} L (x − p(t))).
+//! In a regime ẋ = A x + f(t) with f(t) = f₀ + Σ Re(F_k e^{iω_k t}). With the forced response p(t)
+//! = p₀ + Σ Re(P_k e^{iω_k t}), p₀ = −A⁻¹f₀ and P_k = (iω_k − A)⁻¹F_k, and with L, R and λ from an
+//! [`Eigenbasis`], the motion from x at time t is x(t + s) = p(t + s) + Re(R e^{λs} L (x − p(t))).
+
+use nanotap_arithmetic::CancelFlag;
 
 use crate::ProofError;
 use crate::complex::Rectangle;
@@ -24,7 +25,7 @@ pub struct HarmonicVector {
 /// A scalar `row · x + constant + Σ_k Re(tones_k e^{iω_k t})`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// What multiplies the state.
+    /// Coefficients of the state.
     pub row: Vec<Interval>,
     /// The constant part.
     pub constant: Interval,
@@ -35,34 +36,34 @@ pub struct Output {
 /// A jump of the state, `x⁺ = matrix · x⁻ + offset(t)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reset {
-    /// d × d.
+    /// Matrix of the jump, d × d.
     pub matrix: Matrix<Interval>,
-    /// Of length d.
+    /// Offset of the jump, length d.
     pub offset: HarmonicVector,
 }
 
-/// A way out of a regime, taken when its guard falls to zero.
+/// An exit from a regime, taken when its guard falls to zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
-    /// Positive inside the regime.
+    /// The guard, positive inside the regime.
     pub guard: Output,
-    /// The next regime.
+    /// Index of the next regime.
     pub target: usize,
-    /// The jump of the state, if there is one.
+    /// Jump of the state, if any.
     pub reset: Option<Reset>,
-    /// Guards of the next regime that start at exactly zero, by transition, with how many
-    /// derivatives vanish with them, the guard itself counted.
+    /// Guards of the next regime that start at exactly zero, by transition, with the number of
+    /// derivatives that vanish, including the guard itself.
     pub starts_at_zero: Vec<(usize, usize)>,
 }
 
-/// What a regime is made of.
+/// Definition of a regime.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegimeParts {
     /// A, d × d.
     pub matrix: Matrix<Interval>,
-    /// f(t).
+    /// The forcing f(t).
     pub forcing: HarmonicVector,
-    /// The ways out of it.
+    /// The exits from the regime.
     pub transitions: Vec<Transition>,
 }
 
@@ -76,7 +77,7 @@ pub struct Regime {
     pub(crate) guards: Vec<ModalOutput>,
 }
 
-/// An output along a motion of a regime: Re Σ_k w_k q_k e^{λ_k s} and what is forced.
+/// An output along a motion of a regime: Re Σ_k w_k q_k e^{λ_k s} plus the forced part.
 #[derive(Clone, Debug)]
 pub(crate) struct ModalOutput {
     pub(crate) weights: Vec<Rectangle>,
@@ -84,17 +85,18 @@ pub(crate) struct ModalOutput {
     pub(crate) tones: Vec<Rectangle>,
 }
 
-/// A system.
+/// A piecewise-linear system.
 #[derive(Clone, Debug)]
 pub struct System {
     pub(crate) dimension: usize,
     pub(crate) period: Interval,
     pub(crate) frequencies: Vec<Interval>,
     pub(crate) regimes: Vec<Regime>,
+    cancel: CancelFlag,
 }
 
 impl HarmonicVector {
-    /// Its value where the tones have these phasors.
+    /// The value for the given phasors of the tones.
     pub(crate) fn at(&self, phasors: &[Rectangle]) -> Vec<Interval> {
         (0..self.constant.len())
             .map(|i| {
@@ -104,7 +106,7 @@ impl HarmonicVector {
             .collect()
     }
 
-    /// Its rate, at the phasors' time.
+    /// The time derivative for the given phasors.
     pub(crate) fn rate(&self, frequencies: &[Interval], phasors: &[Rectangle]) -> Vec<Interval> {
         (0..self.constant.len())
             .map(|i| {
@@ -118,13 +120,13 @@ impl HarmonicVector {
 }
 
 impl Output {
-    /// Its value at a state.
+    /// The value at a state.
     pub(crate) fn at(&self, state: &[Interval], phasors: &[Rectangle]) -> Interval {
         let tones = self.tones.iter().zip(phasors);
         dot(&self.row, state) + self.constant + tones.map(|(&z, &e)| (z * e).re).sum()
     }
 
-    /// How fast it changes at a fixed state.
+    /// The time derivative at a fixed state.
     pub(crate) fn explicit_rate(
         &self,
         frequencies: &[Interval],
@@ -138,14 +140,15 @@ impl Output {
 }
 
 impl System {
-    /// Joins regimes. `frequencies` are those of the tones, all multiples of 2π over `period`.
+    /// Builds a system from its regimes. `frequencies` are those of the tones, all multiples of 2π
+    /// over `period`.
     ///
     /// # Errors
-    /// [`ProofError::Eigenvalues`] or [`ProofError::Resonance`] where the flow of a regime has
-    /// no closed form that can be enclosed.
+    /// [`ProofError::Eigenvalues`] or [`ProofError::Resonance`] if the flow of a regime has no
+    /// closed form that can be enclosed.
     ///
     /// # Panics
-    /// When sizes do not fit.
+    /// If sizes do not match.
     pub fn new(
         period: Interval,
         frequencies: Vec<Interval>,
@@ -162,7 +165,24 @@ impl System {
             period,
             frequencies,
             regimes,
+            cancel: CancelFlag::default(),
         })
+    }
+
+    /// The same system, proofs about which end with [`ProofError::Cancelled`] once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// An error once proofs are to end.
+    pub(crate) fn check_cancel(&self) -> Result<(), ProofError> {
+        if self.cancel.is_cancelled() {
+            Err(ProofError::Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Dimension d of the state.
@@ -180,12 +200,12 @@ impl System {
         &self.frequencies
     }
 
-    /// What the regimes are made of.
+    /// The definitions of the regimes.
     pub fn regimes(&self) -> impl ExactSizeIterator<Item = &RegimeParts> {
         self.regimes.iter().map(|regime| &regime.parts)
     }
 
-    /// e^{iω_k t}.
+    /// The phasors e^{iω_k t}.
     pub(crate) fn phasors(&self, time: Interval) -> Vec<Rectangle> {
         let turn = |&w: &Interval| Rectangle::imaginary(w * time).exp();
         self.frequencies.iter().map(turn).collect()
@@ -225,14 +245,14 @@ impl Regime {
         }
     }
 
-    /// ẋ.
+    /// The time derivative ẋ of the state.
     pub(crate) fn field(&self, state: &[Interval], phasors: &[Rectangle]) -> Vec<Interval> {
         let forcing = self.parts.forcing.at(phasors);
         let linear = self.parts.matrix.apply(state);
         linear.iter().zip(forcing).map(|(&a, f)| a + f).collect()
     }
 
-    /// Modal coordinates of what a motion has beside the forced response.
+    /// Modal coordinates of the difference of a state from the forced response.
     pub(crate) fn modal(&self, state: &[Interval], phasors: &[Rectangle]) -> Vec<Rectangle> {
         let forced = self.response.at(phasors);
         let beside: Vec<Rectangle> = state
@@ -243,13 +263,13 @@ impl Regime {
         self.basis.left.apply(&beside)
     }
 
-    /// e^{λ_k s}.
+    /// The factors e^{λ_k s}.
     pub(crate) fn factors(&self, duration: Interval) -> Vec<Rectangle> {
         let values = self.basis.values.iter();
         values.map(|&z| z.scale(duration).exp()).collect()
     }
 
-    /// The state that has these modal coordinates at the phasors' time.
+    /// The state with these modal coordinates at the time of the phasors.
     pub(crate) fn state(&self, modal: &[Rectangle], phasors: &[Rectangle]) -> Vec<Interval> {
         let forced = self.response.at(phasors);
         (0..forced.len())
@@ -257,7 +277,7 @@ impl Regime {
             .collect()
     }
 
-    /// The derivative of the state after a time by the state before, Re(R e^{λs} L).
+    /// The derivative of the state after a time by the initial state, Re(R e^{λs} L).
     pub(crate) fn propagator(&self, factors: &[Rectangle]) -> Matrix<Interval> {
         let (n, m) = (self.basis.right.rows(), factors.len());
         let turned = Matrix::from_fn(n, m, |i, k| self.basis.right[(i, k)] * factors[k]);
@@ -280,7 +300,7 @@ fn forced(
 ) -> Option<HarmonicVector> {
     let n = forcing.constant.len();
     let paired = |k: usize| basis.values[k].im != Interval::ZERO;
-    // Columns of pairs have the factor 2, which the sum over both members undoes.
+    // Columns of pairs have the factor 2, which the sum over both members cancels.
     let half = |k: usize| Interval::point(if paired(k) { 0.5 } else { 1.0 });
     let solve = |rate: Rectangle, by: &[Rectangle]| -> Option<Vec<Rectangle>> {
         if by.iter().all(|z| *z == Rectangle::ZERO) {

@@ -52,8 +52,9 @@ fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> S
     System::new(period, vec![omega], vec![parts]).unwrap()
 }
 
-/// Impact time, velocity after it, and the state at phase 0 (nearest double and the rest) at
-/// ω = 2.2, g = 0: Newton on the closed form of one flight of a period, mpmath 1.3, 60 digits.
+/// Impact time, velocity after the impact, and the state at phase 0 (nearest double and remainder)
+/// at ω = 2.2, g = 0: Newton's method on the closed form of one flight per period, mpmath 1.3, 60
+/// digits.
 const TIME: (f64, f64) = (1.1721536488849031, 3.263e-17);
 const SPEED: (f64, f64) = (-1.3941119032963243, -6.706e-17);
 const STATE: [(f64, f64); 2] = [
@@ -82,7 +83,7 @@ fn holds(interval: Interval, (near, rest): (f64, f64)) -> bool {
 #[test]
 fn the_orbit_exists_is_held_and_is_stable() {
     let system = oscillator(2.2, 0.0, DAMPING);
-    // From six digits on.
+    // With initial values of six digits.
     let theorem = prove(&system, &near(1.172154, -1.394112)).unwrap();
     assert_eq!(theorem.period, 1);
     assert!(holds(theorem.switches[0].time, TIME));
@@ -93,7 +94,7 @@ fn the_orbit_exists_is_held_and_is_stable() {
     }
     let alone = theorem.alone.as_ref().unwrap();
     assert!(alone.time > 1e-6);
-    // Every impact takes the factor r² off areas, and damping e^{−cT} a period.
+    // Every impact multiplies areas by r², and damping by e^{−cT} per period.
     let decay = -(Interval::typed(DAMPING) * system.period());
     let area = RESTITUTION.powi(2) * decay.exp().middle();
     let discs = &theorem.multipliers.discs;
@@ -107,11 +108,11 @@ fn the_orbit_exists_is_held_and_is_stable() {
     assert_eq!(theorem.multipliers.stability(), Stability::Stable);
 }
 
-/// Claims that are not true are not proved.
+/// Claims that are false are not proved.
 #[test]
 fn what_is_no_orbit_is_not_proved() {
     let system = oscillator(2.2, 0.0, DAMPING);
-    // Motions that do not close, far from the orbit and near it: what Newton makes of them is
+    // Motions that do not close, far from the orbit and near it: Newton's method converges to
     // another motion.
     for (time, speed) in [
         (0.3, -0.4),
@@ -121,7 +122,7 @@ fn what_is_no_orbit_is_not_proved() {
         let open = prove(&system, &near(time, speed));
         assert_eq!(open, Err(ProofError::NoIsolatedOrbit), "{time} {speed}");
     }
-    // The same orbit twice is no orbit of period 2.
+    // The same orbit twice is not an orbit of period 2.
     let mut twice = near(TIME.0, SPEED.0);
     twice.period = 2;
     let again = Switch {
@@ -133,7 +134,7 @@ fn what_is_no_orbit_is_not_proved() {
         prove(&system, &twice),
         Err(ProofError::ShorterPeriod { period: 1 })
     );
-    // Without impacts there is the forced response, which goes through the wall.
+    // The forced response without impacts would pass through the wall.
     let none = Candidate {
         switches: Vec::new(),
         ..near(0.0, 0.0)
@@ -142,8 +143,8 @@ fn what_is_no_orbit_is_not_proved() {
         prove(&system, &none),
         Err(ProofError::Grazing { .. })
     ));
-    // A zero of the equations that flies through the wall in between: at ω = 2.8 the impacts
-    // would have to pull (the same closed form, its speed after an impact positive).
+    // A zero of the equations that passes through the wall in between: at ω = 2.8 the impacts would
+    // have to pull (the same closed form, with a positive speed after an impact).
     let through = prove(
         &oscillator(2.8, 0.0, DAMPING),
         &near(2.188262944678328, 0.2675857055208428),
@@ -152,7 +153,7 @@ fn what_is_no_orbit_is_not_proved() {
         matches!(through, Err(ProofError::Grazing { .. })),
         "{through:?}"
     );
-    // Things that fit nothing.
+    // Candidates whose sizes do not match.
     let mut odd = near(TIME.0, SPEED.0);
     odd.switches[0].from = 3;
     assert!(matches!(
@@ -171,17 +172,17 @@ fn what_is_no_orbit_is_not_proved() {
     ));
 }
 
-/// Without drive, damping and loss every bounce lasts π, whatever its height: at ω = 2 all motions
-/// repeat, so that none is alone, and Newton stays where it is put.
+/// Without drive, damping and loss every bounce lasts π, whatever its height. At ω = 2 all motions
+/// are periodic, so that none is isolated, and Newton's method stays where it starts.
 #[test]
 fn an_orbit_among_others_is_not_proved() {
     for speed in [-0.1, -1.0, -7.0] {
         let bounce = prove(&driven(2.0, 0.0, 0.0, 1.0, 0.0), &near(0.5, speed));
         assert_eq!(bounce, Err(ProofError::NoIsolatedOrbit));
     }
-    // At a fold two zeros of the equations are one, and no box around it has just one inside:
-    // mpmath 1.3, F = 0 and det J = 0 in time, speed and gap. (The motion goes through the wall
-    // before; what is tested comes first.) A little before the fold they are told apart.
+    // At a fold two zeros of the equations coincide, and no box around them contains just one:
+    // mpmath 1.3, F = 0 and det J = 0 in time, speed and gap. (The motion passes through the wall
+    // before; the test of existence comes first.) Slightly before the fold the two are separated.
     let fold = 0.536_776_629_144_550_9;
     let mut folded = near(1.88615197924622, 2.518131442071377);
     folded.switches[0].state[0] = fold;
@@ -191,13 +192,13 @@ fn an_orbit_among_others_is_not_proved() {
     let mut folded = near(1.3457006, -0.35548603);
     folded.switches[0].state[0] = before;
     assert!(prove(&driven(2.2, before, DAMPING, RESTITUTION, 1.0), &folded).is_ok());
-    // With the least loss there is rest alone, which is no motion with impacts.
+    // With the smallest loss only rest remains, which is not a motion with impacts.
     let lossy = prove(&driven(2.0, 0.0, 1e-6, 1.0, 0.0), &near(0.5, -1.0));
     assert!(lossy.is_err());
 }
 
-/// A drive whose last digits differ moves the orbit by more than the enclosures are wide: they
-/// tell rounding errors apart.
+/// A drive that differs in its last digits moves the orbit by more than the width of the
+/// enclosures, which are therefore disjoint.
 #[test]
 fn enclosures_of_neighbouring_systems_are_apart() {
     let [one, other] = [2.2, 2.2 * (1.0 + 1e-12)].map(|omega| {
@@ -208,9 +209,9 @@ fn enclosures_of_neighbouring_systems_are_apart() {
     assert!(!holds(other, TIME));
 }
 
-/// A wall out of reach is never met: the forced response is the orbit, at an amplitude of
-/// 1/√((1 − ω²)² + (0.1 ω)²), and its multipliers are e^{λT}. A wall just at that amplitude is
-/// grazed, within rounding: nothing is proved.
+/// If the wall is out of reach, the forced response is the orbit, with amplitude 1/√((1 − ω²)² +
+/// (0.1 ω)²) and multipliers e^{λT}. A wall exactly at that amplitude is grazed, within rounding:
+/// nothing is proved.
 #[test]
 fn without_impacts_the_forced_response_is_the_orbit() {
     let omega: f64 = 2.2;
@@ -232,7 +233,7 @@ fn without_impacts_the_forced_response_is_the_orbit() {
         matches!(grazing, Err(ProofError::Grazing { .. })),
         "{grazing:?}"
     );
-    // Below resonance the wall that is met at phase 0 is farthest half a period later.
+    // Below resonance the wall that is reached at phase 0 is farthest half a period later.
     let slow: f64 = 0.5;
     let amplitude = ((1.0 - slow * slow).powi(2) + (DAMPING * slow).powi(2))
         .sqrt()
@@ -241,12 +242,12 @@ fn without_impacts_the_forced_response_is_the_orbit() {
         let proof = prove(&oscillator(slow, part * amplitude, DAMPING), &none);
         assert_eq!(proof.is_err(), met, "{part}: {proof:?}");
     }
-    // Without damping stability is on the unit circle, which no disc decides.
+    // Without damping the multipliers are on the unit circle, and no disc decides stability.
     let undamped = prove(&oscillator(omega, 1.001, 0.0), &none).unwrap();
     assert_eq!(undamped.multipliers.stability(), Stability::Undecided);
 }
 
-/// Critical damping has one eigenvector where two are needed.
+/// At critical damping there is one eigenvector where two are needed.
 #[test]
 fn critical_damping_is_beyond_reach_and_said_so() {
     let (zero, one) = (Interval::ZERO, Interval::ONE);

@@ -1,14 +1,14 @@
-//! Intervals contain what they should, and are no wider than they need be.
+//! Intervals contain the exact results, and are not wider than necessary.
 
 use nalgebra::Complex;
 use nanotap_proof::{Interval, Rectangle};
 use proptest::prelude::*;
 
-/// A number to twice double precision: the nearest double, and what is left.
+/// A number to twice double precision: the nearest double and the remainder.
 type Long = (f64, f64);
 
-/// Argument; sine, cosine, exponential function there (none beyond its range).
-/// mpmath 1.3, 80 digits.
+/// Argument; sine, cosine and exponential function of it (none beyond the range). mpmath 1.3, 80
+/// digits.
 #[allow(clippy::approx_constant)]
 const FUNCTIONS: [(f64, Long, Long, Long); 24] = [
     (
@@ -187,7 +187,8 @@ fn functions_hold_their_values_to_80_digits_and_little_else() {
     assert!(holds(Interval::pi(), PI) && width(Interval::pi()) < 4e-15);
 }
 
-/// The bounds are not computed values with a margin: one place further in, some value is lost.
+/// The bounds are not computed values with a margin: if they are moved inwards by one place, a
+/// value is lost.
 #[test]
 fn a_bound_moved_inwards_by_its_width_loses_values() {
     let lost = FUNCTIONS.iter().any(|&(x, sin, ..)| {
@@ -196,14 +197,13 @@ fn a_bound_moved_inwards_by_its_width_loses_values() {
         !holds(middle, sin)
     });
     assert!(lost);
-    // 1/3 is no double: neither of its neighbours alone holds it.
+    // 1/3 is not a double, so neither of its neighbours alone is an enclosure.
     let third = Interval::ONE / Interval::point(3.0);
     assert!(third.lo() < third.hi());
     assert_eq!(third.lo().next_up().next_up(), third.hi());
 }
 
-/// Infinite bounds, zeros and numbers that are none give intervals that promise nothing
-/// false.
+/// Infinite bounds, zeros and NaN give intervals that make no false statement.
 #[test]
 fn nothing_is_promised_of_what_overflows() {
     let huge = Interval::point(f64::MAX);
@@ -221,7 +221,7 @@ fn nothing_is_promised_of_what_overflows() {
     assert!(width(s) >= 2.0);
 }
 
-/// Decimal numbers are read to the nearest double: what was typed is within the neighbours.
+/// Decimal numbers are read to the nearest double: the typed number lies between its neighbours.
 #[test]
 fn what_was_typed_is_held() {
     // 0.1 = 0.1000000000000000055… − 5.55e-18.
@@ -252,7 +252,7 @@ fn at_most_product(a: f64, b: f64, c: f64) -> bool {
     a < product || a == product && error >= 0.0
 }
 
-/// An ordinary number: all exponents that neither overflow nor underflow in a product.
+/// A number whose exponent neither overflows nor underflows in a product.
 fn number() -> impl Strategy<Value = f64> {
     (-1.0..1.0_f64, -300..300_i32).prop_map(|(m, e)| m * 2.0_f64.powi(e))
 }
@@ -272,14 +272,14 @@ proptest! {
         prop_assert!(holds(a - b, two_sum(x, -y)));
         prop_assert!(holds(a * b, two_product(x, y)));
         prop_assert!(holds(a.square(), two_product(x, x)));
-        // The bounds' own sums and products too.
+        // Also the sums and products of the bounds.
         prop_assert!(holds(a + b, two_sum(a.lo(), b.lo())) && holds(a + b, two_sum(a.hi(), b.hi())));
         for (p, q) in [(a.lo(), b.lo()), (a.lo(), b.hi()), (a.hi(), b.lo()), (a.hi(), b.hi())] {
             prop_assert!(holds(a * b, two_product(p, q)));
         }
     }
 
-    /// q ≤ x/y just if q y ≤ x, y > 0.
+    /// q ≤ x/y if and only if q y ≤ x, for y > 0.
     #[test]
     fn quotients_hold_the_exact_ones(x in number(), y in number()) {
         prop_assume!(y != 0.0);
@@ -298,8 +298,8 @@ proptest! {
         prop_assert!(at_most_product(x, root.hi(), root.hi()));
     }
 
-    /// Wide intervals: a function of any number in it is in its image (the functions of numbers
-    /// are tested above).
+    /// Wide intervals: the function of any number in an interval lies in the image (functions of
+    /// single numbers are tested above).
     #[test]
     fn functions_of_wide_intervals_hold_those_of_their_numbers(
         x in -40.0..40.0_f64, r in 0.0..3.0_f64, part in -1.0..1.0_f64,
@@ -314,7 +314,7 @@ proptest! {
         prop_assert!(unit.contains(1.0));
     }
 
-    /// z/w · w holds z, and |z w| = |z| |w|.
+    /// z/w · w contains z, and |z w| = |z| |w|.
     #[test]
     fn complex_operations_undo_each_other(
         a in -9.0..9.0_f64, b in -9.0..9.0_f64, c in 0.1..9.0_f64, d in -9.0..9.0_f64,

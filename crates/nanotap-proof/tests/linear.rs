@@ -1,4 +1,4 @@
-//! Inverses and eigenbases of matrices of intervals hold those of the matrices in them.
+//! Inverses and eigenbases of interval matrices contain those of the matrices in them.
 
 use nalgebra::Complex;
 use nanotap_proof::eigen::Eigenbasis;
@@ -17,14 +17,14 @@ fn matrix(entries: &[f64], radius: f64) -> Matrix<Interval> {
     })
 }
 
-/// Whether the interval has zero in it and nothing far from it.
+/// Whether the interval contains zero and nothing far from it.
 fn zero(x: Interval, reach: f64) -> bool {
     x.contains(0.0) && x.magnitude() <= reach
 }
 
 proptest! {
-    /// V⁻¹ V − 1 has zero in every entry, of wide matrices too, and little else in those of
-    /// points; the inverse of a matrix at the edge is in that of all.
+    /// V⁻¹ V − 1 contains zero in every entry, also for wide matrices, and little else for points;
+    /// the inverse of a matrix at the edge lies in that of all.
     #[test]
     fn inverses_undo_their_matrices(all in entries(), imaginary in entries(), e in -30..-8_i32) {
         let radius = 2.0_f64.powi(e);
@@ -56,8 +56,8 @@ proptest! {
         }
     }
 
-    /// Re(R diag(λ) L) holds A, Re(R L) holds 1 and the eigenvalues' sum the trace; the basis
-    /// of a matrix at the edge of a wide one is in the wide one's.
+    /// Re(R diag(λ) L) contains A, Re(R L) contains 1, and the sum of the eigenvalues contains the
+    /// trace; the basis of a matrix at the edge of a wide one lies in the wide one's.
     #[test]
     fn eigenbases_rebuild_their_matrices(all in entries(), e in -40..-6_i32) {
         let a = matrix(&all, 0.0);
@@ -66,7 +66,7 @@ proptest! {
             let m = basis.values.len();
             let turned = Matrix::from_fn(SIZE, m, |i, k| basis.right[(i, k)] * basis.values[k]);
             let (rebuilt, unit) = (&turned * &basis.left, &basis.right * &basis.left);
-            // Ill-conditioned ones are known less well.
+            // Enclosures of ill-conditioned ones are wider.
             let size = basis.right.iter().chain(basis.left.iter());
             let size = size.map(|z| z.magnitude()).fold(1.0, f64::max);
             let reach = 1e-10 * size.powi(4);
@@ -110,7 +110,7 @@ fn eigenvalues_of_a_companion_matrix_are_the_polynomials_roots() {
     }
 }
 
-/// A double eigenvalue has no box of its own, with one eigenvector or with two.
+/// A double eigenvalue has no separate box, with one eigenvector or with two.
 #[test]
 fn eigenvalues_that_meet_are_refused() {
     for corner in [0.0, 1.0] {

@@ -224,6 +224,12 @@ impl CaseCore {
         self.case.cantilever().map(file::to_toml)
     }
 
+    /// Whether its distance is left to a setpoint.
+    #[getter]
+    fn leaves_distance_to_setpoint(&self) -> bool {
+        self.case.leaves_distance_to_setpoint()
+    }
+
     /// Whether its parameters were given in physical units.
     #[getter]
     fn is_physical(&self) -> bool {

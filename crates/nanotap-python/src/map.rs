@@ -21,27 +21,38 @@ type Matrices<'py> = Bound<'py, PyArray3<f64>>;
 /// Drive periods that run where they are asked for; longer work is watched, so that Ctrl-C
 /// stops it.
 const AT_ONCE: usize = 4096;
-
-/// Does `work` of so many drive periods while others use the interpreter.
-fn done<R: Send + 'static>(
-    py: Python<'_>,
-    periods: usize,
-    threads: Option<usize>,
-    work: impl FnOnce(&Control<'_>) -> Result<R, MapError> + Send + 'static,
-) -> PyResult<R> {
-    if periods <= AT_ONCE && threads.is_none() {
-        let result = py.detach(|| work(&Control::default()));
-        return Ok(result.map_err(Failure::from)?);
-    }
-    let result = watched(py, None, move |control| {
-        Ok(install(threads, || work(control))??)
-    })?;
-    Ok(result.result)
-}
+/// The same under a nonlinear force, whose periods take a thousand times longer.
+const NONLINEAR_AT_ONCE: usize = 16;
 
 /// The map of one case.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct MapCore(Arc<Map>);
+
+impl MapCore {
+    /// Does `work` of so many drive periods while others use the interpreter.
+    fn done<R: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        periods: usize,
+        threads: Option<usize>,
+        work: impl FnOnce(&Control<'_>) -> Result<R, MapError> + Send + 'static,
+    ) -> PyResult<R> {
+        let is_nonlinear = self.0.model().nonlinear.is_some();
+        let at_once = if is_nonlinear {
+            NONLINEAR_AT_ONCE
+        } else {
+            AT_ONCE
+        };
+        if periods <= at_once && threads.is_none() {
+            let result = py.detach(|| work(&Control::default()));
+            return Ok(result.map_err(Failure::from)?);
+        }
+        let result = watched(py, None, move |control| {
+            Ok(install(threads, || work(control))??)
+        })?;
+        Ok(result.result)
+    }
+}
 
 #[pymethods]
 impl MapCore {
@@ -73,7 +84,7 @@ impl MapCore {
         let mut values = states.as_slice()?.to_vec();
         let map = Arc::clone(&self.0);
         let all = shape[0].saturating_mul(periods);
-        let values = done(py, all, threads, move |control| {
+        let values = self.done(py, all, threads, move |control| {
             map.apply_all(&mut values, periods, control)?;
             Ok(values)
         })?;
@@ -90,7 +101,7 @@ impl MapCore {
     ) -> PyResult<Rows<'py>> {
         let (state, map) = (state.as_slice()?.to_vec(), Arc::clone(&self.0));
         let all = count.saturating_mul(every);
-        let values = done(py, all, None, move |control| {
+        let values = self.done(py, all, None, move |control| {
             map.iterate(&state, count, every, control)
         })?;
         let shape = [values.len() / self.0.dimension(), self.0.dimension()];
@@ -115,7 +126,7 @@ impl MapCore {
         let (values, map) = (states.as_slice()?.to_vec(), Arc::clone(&self.0));
         // Of several rows only the pool of this process may take part.
         let all = if rows > 1 { usize::MAX } else { periods };
-        let found = done(py, all, threads, move |control| {
+        let found = self.done(py, all, threads, move |control| {
             map.linearised_all(&values, periods, &known, control)
         })?;
         let (mut states, mut jacobians, mut derivatives) = (vec![], vec![], vec![]);
@@ -153,7 +164,7 @@ impl MapCore {
         f64,
     )> {
         let (guess, map) = (guess.as_slice()?.to_vec(), Arc::clone(&self.0));
-        let orbit = done(py, period, None, move |_| map.orbit(&guess, period))?;
+        let orbit = self.done(py, period, None, move |_| map.orbit(&guess, period))?;
         let shape = [orbit.period, self.0.dimension()];
         Ok((
             PyArray1::from_vec(py, orbit.states.concat()).reshape(shape)?,
@@ -175,7 +186,7 @@ impl MapCore {
         let (state, map) = (state.as_slice()?.to_vec(), Arc::clone(&self.0));
         // What makes no sense the library refuses.
         let periods = (length / self.0.period()) as usize;
-        let motion = done(py, periods, None, move |_| map.flow(&state, start, length))?;
+        let motion = self.done(py, periods, None, move |_| map.flow(&state, start, length))?;
         Ok(MotionCore(motion))
     }
 }

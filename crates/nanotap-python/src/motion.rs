@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
 use nanotap::control::Control;
+use nanotap::map::MOST_NUMBERS;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
 use nanotap::observe::time_series::{self, state_names};
@@ -68,6 +69,17 @@ fn rows(
     periods: usize,
     resolution: usize,
 ) -> Result<Vec<f64>, Failure> {
+    let numbers = periods
+        .saturating_mul(resolution)
+        .saturating_mul(time_series::columns(model).len());
+    if numbers > MOST_NUMBERS {
+        let words =
+            format!("a time series of {numbers} numbers is too long; {MOST_NUMBERS} at most");
+        return Err(Failure(Error::input(
+            words,
+            "take fewer {periods} or a lower {resolution}",
+        )));
+    }
     let mut values = Vec::new();
     time_series::sample(model, start, periods, resolution, |row| {
         values.extend_from_slice(row);
@@ -90,7 +102,7 @@ pub(crate) fn simulate<'py>(
         let report = SimulateStudy::run(&studied, &request, control)?;
         let (names, values) = match &report {
             SimulateReport::Exact(run) => {
-                let model = studied.model()?;
+                let model = studied.cancelled_by(control).model()?;
                 let start = &run.motion.start;
                 let values = rows(&model, start, series_periods, request.resolution)?;
                 (time_series::columns(&model), values)
@@ -139,8 +151,8 @@ pub(crate) fn series<'py>(
     resolution: usize,
 ) -> PyResult<Table<'py>> {
     let studied = case.studied(py)?;
-    let done = watched_alone(py, None, move |_| {
-        let model = studied.model()?;
+    let done = watched_alone(py, None, move |control| {
+        let model = studied.cancelled_by(control).model()?;
         let values = rows(&model, &state, periods, resolution)?;
         Ok((time_series::columns(&model), values))
     })?;
@@ -219,12 +231,18 @@ pub(crate) fn observe(
                     return Ok(Err("stopped before its turn".into()));
                 }
                 let request = requests[index % requests.len()].clone();
-                let alone = Control::default();
+                let alone = Control {
+                    cancel: control.cancel,
+                    progress: None,
+                };
                 let found = variants
                     .with(words)
                     .and_then(|case| Ok(at_setpoint(case, &alone)?.0))
                     .and_then(|case| report(&name, &case, request, &alone));
                 let found = match found {
+                    _ if control.is_cancelled() => {
+                        return Ok(Err("stopped before it was done".into()));
+                    }
                     Ok(report) => Ok(entries(report)),
                     Err(error) if error.kind == ErrorKind::Numerics => Err(error.to_string()),
                     Err(other) => return Err(other.into()),
@@ -245,7 +263,7 @@ pub(crate) fn observe(
             if let Ok(entries) = found
                 && !names.contains_key(&entries.dimension)
             {
-                let case = at_setpoint(variants.with(words)?, &Control::default())?.0;
+                let case = at_setpoint(variants.with(words)?, control)?.0;
                 names.insert(entries.dimension, state_names(&case.model()?));
             }
         }

@@ -3,12 +3,12 @@
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -20,12 +20,12 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// How long a message is looked for before its thread goes to sleep: to be woken takes as long as
 /// many a motion, and the next of many calls mostly comes before.
 const AWAKE: Duration = Duration::from_micros(250);
-/// How long work that was told to stop may take to do so. What does not listen is left
+/// How long work that was told to stop may take to do so. What takes longer is left
 /// alone to end by itself: it holds nothing of Python's.
 const PATIENCE: Duration = Duration::from_millis(900);
-/// The same of work that tells its progress: it listens, and what it has done is worth waiting for.
+/// The same of work that reports its progress: what it has done is worth waiting for.
 /// A second Ctrl-C does not wait.
-const LONG_PATIENCE: Duration = Duration::from_secs(30);
+const LONG_PATIENCE: Duration = Duration::from_secs(5);
 
 /// What came of watched work.
 pub(crate) struct Watched<R> {
@@ -60,10 +60,10 @@ pub(crate) fn watched_alone<R: Send + 'static>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&Control<'_>) -> Result<R, Failure> + Send + 'static,
 ) -> PyResult<Watched<R>> {
-    let cancel = Arc::new(AtomicBool::new(false));
+    let cancel = CancelFlag::new();
     let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
     let (sender, receiver) = channel();
-    let inside = (Arc::clone(&cancel), Arc::clone(&counts));
+    let inside = (cancel.clone(), Arc::clone(&counts));
     elsewhere(Box::new(move || {
         let (cancel, counts) = inside;
         let report = |done: usize, total: usize| {
@@ -99,7 +99,7 @@ pub(crate) fn watched_alone<R: Send + 'static>(
             if stopped.is_none() && (done.is_none() || seen != told) {
                 told = seen;
                 if let Err(error) = Python::attach(|py| look(py, progress.as_ref(), seen)) {
-                    cancel.store(true, Ordering::Relaxed);
+                    cancel.cancel();
                     stopped = Some((Instant::now(), error));
                 }
             }

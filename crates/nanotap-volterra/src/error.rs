@@ -82,6 +82,9 @@ pub enum VolterraError {
         /// What is wrong there.
         reason: &'static str,
     },
+    /// The work was cancelled from outside.
+    #[error("stopped from outside")]
+    Cancelled,
     /// The motion left the range of double precision.
     #[error("the motion grew beyond the range of double precision at time {time}")]
     Diverged {
@@ -99,7 +102,10 @@ pub enum VolterraError {
         reason: Refusal,
     },
     /// More steps were needed than are allowed.
-    #[error("{steps} steps reached only time {time}: the force changes too fast for the modes")]
+    #[error(
+        "the limit of {steps} steps was reached at time {time}: the force changes too fast for the \
+         modes, as under a damping that grows without bound in the contact"
+    )]
     TooManySteps {
         /// The steps taken.
         steps: usize,

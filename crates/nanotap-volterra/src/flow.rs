@@ -42,6 +42,9 @@ pub struct Switch {
 
 /// Something that follows a run.
 pub(crate) trait Observer {
+    /// Whether perturbations of the motion are followed: steps must then resolve what every mode
+    /// does to the force, and not only the motion.
+    const PERTURBS: bool = false;
     /// A step was completed, up to `step.end`, where the modal coordinates are `end`.
     fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]);
     /// The law switched after that step, at modal coordinates `modal`.
@@ -54,6 +57,7 @@ impl Observer for () {
 }
 
 impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
+    const PERTURBS: bool = A::PERTURBS || B::PERTURBS;
     fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]) {
         self.0.step(system, solver, step, end);
         self.1.step(system, solver, step, end);
@@ -280,6 +284,9 @@ impl Flow {
                 self.commit_pending(&system, end, observer);
                 return Ok(());
             }
+            if system.cancel().is_cancelled() {
+                return Err(VolterraError::Cancelled);
+            }
             if count >= most {
                 return Err(VolterraError::TooManySteps {
                     steps: count,
@@ -335,7 +342,7 @@ impl Flow {
             }
             self.prepare(map, index, moving);
             let solved = self.solver.solve(system, &mut self.step);
-            match self.judge(system, solved) {
+            match self.judge(system, solved, O::PERTURBS) {
                 Attempt::Whole(growth) => {
                     let growth = if refused { 0 } else { growth };
                     self.hints[self.branch] = index.saturating_sub(growth);
@@ -356,7 +363,7 @@ impl Flow {
                     index = next;
                 }
                 Attempt::Ends(exit, after) => {
-                    if self.has_pending && self.end_step(system, exit, after) {
+                    if self.has_pending && self.end_step(system, exit, after, O::PERTURBS) {
                         let start = self.step.start;
                         if start >= end {
                             self.time = end;
@@ -391,7 +398,12 @@ impl Flow {
         step.moving_end = false;
     }
 
-    fn judge(&mut self, system: &System, solved: Result<Quality, Refusal>) -> Attempt {
+    fn judge(
+        &mut self,
+        system: &System,
+        solved: Result<Quality, Refusal>,
+        perturbs: bool,
+    ) -> Attempt {
         let index = self.step.index;
         let quality = match solved {
             Ok(quality) => quality,
@@ -450,6 +462,13 @@ impl Flow {
             }
             return Attempt::Shorter(next, Refusal::Unresolved);
         }
+        let (map, slopes) = (self.step.map, perturbs.then(|| self.step.slopes()));
+        let resolves =
+            |index: usize| slopes.is_none_or(|slopes| system.kernel().resolves(map, index, slopes));
+        if !resolves(index) {
+            let next = (index + 1..LENGTHS).find(|&next| resolves(next));
+            return Attempt::Shorter(next.unwrap_or(LENGTHS), Refusal::Unresolved);
+        }
         match self.first_switch(system) {
             Err(reason) => Attempt::Shorter(index + 1, reason),
             Ok(Some(found)) => {
@@ -468,7 +487,13 @@ impl Flow {
                         .floor()
                         .clamp(0.0, 3.0) as usize
                 };
-                Attempt::Whole(growth)
+                // The steepness grows with the length at least as fast as that.
+                let fits = |growth: &usize| {
+                    let longer = quality.steepness.powi(2) * 0.5_f64.powi(-(*growth as i32));
+                    longer <= 1.0 && resolves(index.saturating_sub(*growth))
+                };
+                let longest = (0..=growth).rev().find(fits);
+                Attempt::Whole(longest.unwrap_or(0))
             }
         }
     }
@@ -601,7 +626,7 @@ impl Flow {
 
     /// Tries the step that ends the branch through the singular exit `number`, about `after`
     /// from now, beginning somewhere on the pending step. It is left in `self.step`.
-    fn end_step(&mut self, system: &System, number: usize, after: f64) -> bool {
+    fn end_step(&mut self, system: &System, number: usize, after: f64, perturbs: bool) -> bool {
         let kernel = system.kernel();
         let exit = system.exits(self.branch)[number];
         let (Guard::Falls(level) | Guard::Rises(level)) = exit.guard else {
@@ -626,6 +651,9 @@ impl Flow {
         match self.solver.solve_end(system, &self.pending, step) {
             Ok(quality) if quality.error <= 1.0 => {}
             _ => return false,
+        }
+        if perturbs && !kernel.resolves(TimeMap::End, index, self.step.slopes()) {
+            return false;
         }
         // Inside until the end, and no other way out before it.
         let n = self.step.forces.len();

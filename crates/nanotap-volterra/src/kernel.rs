@@ -33,6 +33,10 @@ const PANEL_POINTS: usize = 24;
 const SHORT_POINTS: usize = 10;
 /// How far a mode turns at most where its tangent will do: half the square is far below rounding.
 const TANGENT: f64 = 3e-9;
+/// What a step may leave of a perturbation's part in the force, as a part of the perturbation.
+const PERTURBATION: f64 = 1e-13;
+/// Larger than the strength of any coupling on a step: steeper forces are refused.
+const STRONGEST: f64 = 1e3;
 /// How far a mode may turn or decay within one panel.
 const PANEL_REACH: f64 = 8.0;
 
@@ -105,6 +109,11 @@ pub struct Kernel {
     longest: f64,
     /// Bound of the amplitude in the gap that a unit impulse of force excites.
     pub(crate) reach: f64,
+    /// How strongly a force with a unit slope by the gap, and by its rate, couples each block to
+    /// the others, a unit of time.
+    couplings: Vec<[f64; 2]>,
+    /// From this length number on, steps resolve perturbations under any force that they take.
+    always_resolving: usize,
     panel: Rule<PANEL_POINTS>,
     short: Rule<SHORT_POINTS>,
     tables: [Vec<OnceLock<Box<Table>>>; 3],
@@ -269,6 +278,26 @@ fn moments<const POINTS: usize>(panel: &Panel<POINTS>, block: &Block, out: &mut 
     }
 }
 
+/// `√(g_k g)` of each block, with `g_k` the amplitude in the gap, and in its rate, that a unit
+/// impulse of force excites in the block, and `g` the largest.
+fn couplings(modes: &Modes, gap: &[f64], rate: &[f64], source: &[f64]) -> Vec<[f64; 2]> {
+    let excited: Vec<[f64; 2]> = modes
+        .blocks()
+        .iter()
+        .map(|block| {
+            let part = block.start..block.start + block.size;
+            let norm = |v: &[f64]| dot_body(&v[part.clone()], &v[part.clone()]).sqrt();
+            [gap, rate].map(|readout| norm(readout) * norm(source))
+        })
+        .collect();
+    let largest = |k: usize| excited.iter().map(|e| e[k]).fold(0.0, f64::max);
+    let most = [largest(0), largest(1)];
+    excited
+        .iter()
+        .map(|e| [(e[0] * most[0]).sqrt(), (e[1] * most[1]).sqrt()])
+        .collect()
+}
+
 impl Kernel {
     /// Prepares the modes with the gap `row · x` and the force entering as `column · F`.
     /// `longest` is the longest step, a fraction of the slowest mode's period or of the
@@ -339,6 +368,7 @@ impl Kernel {
                 }
             }
         }
+        let couplings = couplings(&modes, &readout, &rate_readout, &source);
         let direct: f64 = readout.iter().zip(&source).map(|(r, b)| r * b).sum();
         if direct.abs() > 1e-9 * reach {
             return Err(VolterraError::Inertialess);
@@ -350,7 +380,7 @@ impl Kernel {
             let i = (2 * k + 1) * (nodes - 1) / (2 * CHECKS);
             points.push(0.5 * (points[i] + points[i + 1]));
         }
-        Ok(Arc::new(Self {
+        let mut kernel = Self {
             modes,
             readout,
             rate_readout,
@@ -369,10 +399,18 @@ impl Kernel {
             rates,
             longest,
             reach,
+            couplings,
+            always_resolving: LENGTHS,
             panel: rule(),
             short: rule(),
             tables: std::array::from_fn(|_| (0..LENGTHS).map(|_| OnceLock::new()).collect()),
-        }))
+        };
+        // In square-root time a mode turns twice as fast at the end.
+        let fastest = 2.0 * kernel.rates.iter().copied().fold(0.0, f64::max);
+        let always =
+            |index| STRONGEST * kernel.beyond(fastest * kernel.length(index)) <= PERTURBATION;
+        kernel.always_resolving = (0..LENGTHS).find(|index| always(*index)).unwrap_or(LENGTHS);
+        Ok(Arc::new(kernel))
     }
 
     /// The modes.
@@ -400,6 +438,31 @@ impl Kernel {
     pub(crate) fn length(&self, index: usize) -> f64 {
         let half = if index % 2 == 1 { 1.0 / SQRT_2 } else { 1.0 };
         self.longest * half * 0.5_f64.powi((index / 2) as i32)
+    }
+
+    /// Whether the nodes of steps number `index` resolve what a perturbation of every mode does to a
+    /// force with these slopes by gap and rate: the coefficients of `cos ωt` beyond the last are below
+    /// `(z/2)ⁿ/n!` with `z` half the angle that the mode turns by on the step.
+    pub(crate) fn resolves(&self, map: TimeMap, index: usize, [gap, rate]: [f64; 2]) -> bool {
+        if index >= self.always_resolving {
+            return true;
+        }
+        let length = self.length(index);
+        let fastest = map.rate(length, 0.0).max(map.rate(length, 1.0));
+        self.rates
+            .iter()
+            .zip(&self.couplings)
+            .all(|(turns, [by_gap, by_rate])| {
+                let strength = length * (gap * by_gap + rate * by_rate);
+                strength <= PERTURBATION || strength * self.beyond(turns * fastest) <= PERTURBATION
+            })
+    }
+
+    /// A bound of what the nodes leave of a mode that turns by this angle, with Stirling's `n!`.
+    fn beyond(&self, angle: f64) -> f64 {
+        let n = self.nodes as f64;
+        let reach = std::f64::consts::E * angle / (4.0 * n);
+        reach.powi(self.nodes as i32) / (std::f64::consts::TAU * n).sqrt()
     }
 
     /// The longest tabulated step that is no longer than `length`, if there is one.

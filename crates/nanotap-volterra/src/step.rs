@@ -92,6 +92,11 @@ impl Step {
         self.time(self.end)
     }
 
+    /// Bounds of the law's derivatives by the gap and by its rate, at the nodes.
+    pub(crate) fn slopes(&self) -> [f64; 2] {
+        [largest(&self.by_gap), largest(&self.by_rate)]
+    }
+
     /// The force at variable `u`.
     pub(crate) fn force_at(&self, u: f64) -> f64 {
         series(&self.coefficients, u)
@@ -146,6 +151,8 @@ pub(crate) struct Quality {
     pub(crate) truncation: f64,
     /// Whether the error is at the level of rounding.
     pub(crate) rounding: bool,
+    /// How much the force may amplify an error, as a part of what is allowed.
+    pub(crate) steepness: f64,
 }
 
 /// Work space of the solver, and what it has cost.
@@ -432,6 +439,7 @@ impl Solver {
                 error: 0.0,
                 truncation: 0.0,
                 rounding: true,
+                steepness: 0.0,
             });
         }
         let first = step.pinned_start.unwrap_or(self.base_gap[0]);
@@ -464,6 +472,7 @@ impl Solver {
                         error,
                         truncation: error,
                         rounding: false,
+                        steepness: 0.0,
                     });
                 }
             }
@@ -698,6 +707,7 @@ impl Solver {
             error: error / allowed,
             truncation: truncation / allowed,
             rounding: error <= 2.0 * rounding,
+            steepness: steepness / STEEPEST,
         })
     }
 }

@@ -4,7 +4,7 @@ use crate::kernel::{Kernel, LENGTHS, TimeMap};
 use crate::law::{Exit, ForceLaw, Guard};
 use crate::{Complex, VolterraError};
 use nalgebra::DVector;
-use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 use std::sync::{Arc, OnceLock};
 
 /// The largest number of tones.
@@ -75,6 +75,8 @@ pub struct System {
     /// Whether a step needs the gap's rate: the law or a guard does.
     pub(crate) needs_rate: bool,
     phasors: Arc<[Vec<OnceLock<Phasors>>; 3]>,
+    /// What ends its motions from outside.
+    cancel: CancelFlag,
 }
 
 /// Cosines and sines of every tone at the points of a table.
@@ -204,7 +206,20 @@ impl System {
                 (0..LENGTHS).map(|_| OnceLock::new()).collect()
             })),
             kernel,
+            cancel: CancelFlag::default(),
         })
+    }
+
+    /// The same system, whose motions end with [`VolterraError::Cancelled`] once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// What ends its motions from outside.
+    pub fn cancel(&self) -> &CancelFlag {
+        &self.cancel
     }
 
     /// The same modes, drive and law with another offset of the gap; shares all tables.

@@ -331,6 +331,8 @@ impl Tangents {
 }
 
 impl Observer for Tangents {
+    const PERTURBS: bool = true;
+
     fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]) {
         let kernel = system.kernel();
         let table = kernel.table(step.map, step.index);

@@ -113,6 +113,11 @@ impl Error {
         Self::new(ErrorKind::Numerics, message)
     }
 
+    /// Work that was stopped from outside before it was done.
+    pub fn stopped() -> Self {
+        Self::new(ErrorKind::Stopped, "stopped before it was done")
+    }
+
     /// What the file system refused.
     pub fn files(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Files, message)
@@ -220,7 +225,10 @@ impl SourceText {
 
 impl From<nanotap_flow::FlowError> for Error {
     fn from(error: nanotap_flow::FlowError) -> Self {
-        Self::numerics(error.to_string())
+        match error {
+            nanotap_flow::FlowError::Cancelled => Self::stopped(),
+            error => Self::numerics(error.to_string()),
+        }
     }
 }
 

@@ -3,10 +3,12 @@
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
+use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::enclosed::{EnclosureError, enclosed};
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::study::kind::Study as _;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitRequest, OrbitStudy, orbit};
 use nanotap::study::proof::{ProofReport, Prover, candidate};
 use nanotap_flow::Trajectory;
 use nanotap_proof::{Interval, ProofError, Stability, prove};
@@ -145,6 +147,28 @@ fn found(case: &Case, options: &OrbitOptions) -> (OrbitReport, ProofReport) {
     let orbit = orbit(&case.model().unwrap(), options).unwrap();
     let proof = Prover::new(case).report(&orbit.trajectory, orbit.period);
     (orbit, proof)
+}
+
+/// At a drive frequency where the multiplier of modulus 1 − 6.7e-8 is within the margin that rounding
+/// is given, and yet proved to be inside the unit circle.
+#[test]
+fn a_report_says_of_stability_what_is_proved() {
+    let case = case(&["modes=1", "omega=2.9422193073652134"]);
+    let report = |prove: bool| {
+        let request = OrbitRequest {
+            period: Some(1),
+            prove,
+            ..OrbitRequest::default()
+        };
+        let report = OrbitStudy::run(&case, &request, &Control::default());
+        report.unwrap().motion
+    };
+    let seen = report(false);
+    assert_eq!((seen.stable, seen.stability), (false, "marginal"));
+    let proved = report(true);
+    assert_eq!((proved.stable, proved.stability), (true, "stable"));
+    let theorem = proved.proof.unwrap().theorem.unwrap();
+    assert_eq!(theorem.stability, "stable");
 }
 
 fn settled(more: &[&str]) -> ProofReport {

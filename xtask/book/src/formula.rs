@@ -1,14 +1,14 @@
-//! Formulas in LaTeX's notation become MathML.
+//! Conversion of LaTeX formulas to MathML.
 
 use std::fmt::Write as _;
 
 use pulldown_latex::config::{DisplayMode, RenderConfig};
 use pulldown_latex::{Parser, Storage, push_mathml};
 
-/// The MathML of a formula, on one line, so that Markdown takes it as it is.
+/// The MathML of a formula, on one line, so that Markdown leaves it unchanged.
 ///
 /// # Errors
-/// What cannot be read in it.
+/// A description of what cannot be parsed.
 pub(crate) fn typeset(formula: &str, displayed: bool) -> Result<String, String> {
     if bare_fraction(formula) {
         return Err("`12` would be one number: write the fraction's parts in braces".into());
@@ -31,15 +31,15 @@ pub(crate) fn typeset(formula: &str, displayed: bool) -> Result<String, String> 
     Ok(plain_to_markdown(&mathml))
 }
 
-/// Whether a fraction's numerator is a digit without braces, which the parser takes together with
-/// the digits after it.
+/// Whether a fraction's numerator is a digit without braces, which the parser would join with the
+/// digits after it.
 fn bare_fraction(formula: &str) -> bool {
     let mut parts = formula.split("frac");
     parts.next();
     parts.any(|part| part.starts_with(|sign: char| sign.is_ascii_digit()))
 }
 
-/// With every sign that means something in Markdown written as its number.
+/// Replaces every character with a meaning in Markdown by its character reference.
 fn plain_to_markdown(html: &str) -> String {
     let mut text = String::with_capacity(html.len());
     for sign in html.chars() {

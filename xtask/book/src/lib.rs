@@ -1,9 +1,9 @@
-//! The site of documents, before mdBook makes pages of it.
+//! The site of the documents, as input for mdBook.
 //!
-//! `docs/SUMMARY.md` lists the pages; what stands in this repository is checked and copied, with
-//! every formula typeset as MathML, so that the site needs neither a network nor scripts to be
-//! read. Pages under `docs/reference/` are not in the repository: they are made of the tables that
-//! the program itself reads, and of the report on the paper.
+//! `docs/SUMMARY.md` lists the pages. Pages of this repository are checked and copied, with every
+//! formula typeset as MathML, so that the site can be read without a network or scripts. Pages
+//! under `docs/reference/` are not in the repository: they are generated from the tables that the
+//! program itself reads, and from the report on the paper.
 
 mod formula;
 mod page;

@@ -1,6 +1,6 @@
-//! Lays out the site of documents for mdBook: `nanotap-book ROOT FOLDER [--quick]`.
+//! Writes the site of the documents for mdBook: `nanotap-book ROOT FOLDER [--quick]`.
 //!
-//! With `--quick` the report on the paper is computed from fewer starts.
+//! With `--quick` the report on the paper uses fewer initial states.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! The pages of the site, what is wrong with them, and how they are laid out for mdBook.
+//! The pages of the site, their errors, and their layout for mdBook.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -10,7 +10,7 @@ use nanotap_paper::Report;
 use crate::page::Page;
 use crate::reference;
 
-/// Pages of the repository's root that belong to the site.
+/// Pages in the repository's root that belong to the site.
 const AT_ROOT: &[&str] = &[
     "README.md",
     "ARCHITECTURE.md",
@@ -18,15 +18,15 @@ const AT_ROOT: &[&str] = &[
     "CHANGELOG.md",
 ];
 
-/// Where the pictures of the report on the paper will be.
+/// Folder of the pictures of the report on the paper.
 const PICTURES: &str = "docs/reference/paper/";
 
-/// Something that is wrong with a page.
+/// An error in a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trouble {
-    /// The page, from the repository's root.
+    /// Path of the page, from the repository's root.
     pub page: String,
-    /// What is wrong with it.
+    /// Description of the error.
     pub reason: String,
 }
 
@@ -39,17 +39,17 @@ impl fmt::Display for Trouble {
 /// The site.
 pub struct Site {
     root: PathBuf,
-    /// By path from the repository's root, with `/`.
+    /// Pages by path from the repository's root, with `/`.
     pages: BTreeMap<String, Page>,
     summary: Page,
 }
 
 impl Site {
-    /// The pages of the repository at `root`, and those that are made: of the program's tables,
-    /// and of a report on the paper.
+    /// The pages of the repository at `root`, and those generated from the program's tables and
+    /// from a report on the paper.
     ///
     /// # Errors
-    /// When a page cannot be read.
+    /// If a page cannot be read.
     pub fn read(root: &Path, report: &Report) -> Result<Self, Trouble> {
         let mut pages = BTreeMap::new();
         let mut names: Vec<String> = AT_ROOT.iter().map(|&name| name.to_owned()).collect();
@@ -71,18 +71,18 @@ impl Site {
         })
     }
 
-    /// How many pages there are.
+    /// Number of pages.
     pub fn len(&self) -> usize {
         self.pages.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no pages.
     pub fn is_empty(&self) -> bool {
         self.pages.is_empty()
     }
 
-    /// All that is wrong: pages that the summary lacks or has twice, links and anchors that lead
-    /// nowhere, formulas that cannot be typeset.
+    /// All errors: pages that are missing in the summary or listed twice, links and anchors without
+    /// target, formulas that cannot be typeset.
     pub fn troubles(&self) -> Vec<Trouble> {
         let mut troubles = Vec::new();
         let mut listed = BTreeSet::new();
@@ -116,11 +116,11 @@ impl Site {
         troubles
     }
 
-    /// Lays the site out below `folder`: `SUMMARY.md`, every page, and every file that one links
-    /// to, by the paths that they have here.
+    /// Writes the site below `folder`: `SUMMARY.md`, every page, and every linked file, under their
+    /// paths in the repository.
     ///
     /// # Errors
-    /// When a file cannot be read or written.
+    /// If a file cannot be read or written.
     pub fn write(&self, folder: &Path) -> Result<(), Trouble> {
         let summary = self.summary.written(|target| {
             let target = from_root("docs/SUMMARY.md", target)?;
@@ -155,7 +155,7 @@ impl Site {
         links.filter_map(|link| from_root("docs/SUMMARY.md", &link.target))
     }
 
-    /// Why a link of a page leads nowhere, if it does.
+    /// Why a link of a page has no target; `None` if it has one.
     fn dead(&self, name: &str, page: &Page, target: &str) -> Option<String> {
         let (path, anchor) = match target.split_once('#') {
             Some((path, anchor)) => (path, Some(anchor)),
@@ -225,8 +225,8 @@ fn without_anchor(target: &str) -> &str {
     target.split_once('#').map_or(target, |(path, _)| path)
 }
 
-/// Where a link in the page `name` leads, from the repository's root; none if out of it, or into
-/// the network.
+/// The target of a link in the page `name`, as a path from the repository's root; `None` if it is
+/// outside, or on the network.
 fn from_root(name: &str, target: &str) -> Option<String> {
     if target.is_empty() || target.contains("://") {
         return None;
@@ -246,7 +246,7 @@ fn from_root(name: &str, target: &str) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// A folder's front page is called `README.md` by hosts and `index.md` by mdBook.
+/// A folder's front page is `README.md` for repository hosts and `index.md` for mdBook.
 fn renamed(target: &str) -> Option<String> {
     if target.contains("://") {
         return None;

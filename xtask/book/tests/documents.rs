@@ -1,5 +1,5 @@
-//! The documents of this repository: every page is in the summary, every link and anchor leads
-//! somewhere, every formula can be typeset.
+//! The documents of this repository: every page is in the summary, every link and anchor has a
+//! target, every formula can be typeset.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use nanotap_paper::{Options, report};
 #[test]
 fn nothing_is_wrong_with_the_documents() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    // One section of the report that takes no time stands for all.
+    // One fast section of the report represents all.
     let options = Options {
         only: vec!["eq14".into()],
         quick: true,

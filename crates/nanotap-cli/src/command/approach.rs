@@ -15,6 +15,7 @@ use nanotap::observe::{Observables, Set, columns};
 use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
 use nanotap::study::registry::Study as _;
+use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -58,11 +59,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::watched(ApproachStudy::COUNTED, |control| {
+    let report = progress::study::<ApproachStudy, _>(|control| {
         arguments
             .threads
             .install(|| ApproachStudy::run(&case, &request, control))
-    })???;
+    })??;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -199,10 +200,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     ]);
     let step = step_of(report);
     let row = |p: &ApproachPoint| {
-        let what = p.period.map_or_else(
-            || p.classification.name().to_owned(),
-            |n| format!("period {n}"),
-        );
+        let what = motion_of(p);
         let of = |value: &dyn Fn(&Observables) -> String| {
             p.observables.as_ref().map_or_else(String::new, value)
         };
@@ -222,7 +220,9 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         table.row(row(p));
     }
     text.push_str(&thinned(&table, step, report));
-    if report.hysteresis.is_empty() {
+    text.push_str(&jumps(report, &shown));
+    let settles = !report.table.iter().any(|p| p.classification == Classification::Transient);
+    if report.hysteresis.is_empty() && settles && !report.cancelled {
         text.push_str("  both ways show the same motions\n");
     }
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {
@@ -285,6 +285,56 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         )));
     }
     text
+}
+
+/// Where the lever jumps.
+fn jumps(report: &ApproachReport, shown: &dyn Fn(Kind, f64) -> String) -> String {
+    if report.jumps.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new([
+        ("jump on", Align::Left),
+        ("distance", Align::Right),
+        ("at", Align::Left),
+        ("from", Align::Left),
+        ("A/A0", Align::Point),
+        ("phase (°)", Align::Point),
+        ("to", Align::Left),
+        ("A/A0", Align::Point),
+        ("phase (°)", Align::Point),
+    ]);
+    for jump in &report.jumps {
+        let of = |p: &ApproachPoint| {
+            let [ratio, phase] = p.observables.as_ref().map_or_else(Default::default, |s| {
+                [
+                    number::significant(s.first_harmonic / report.free_amplitude, 4),
+                    number::significant(shown_phase(s.phase), 4),
+                ]
+            });
+            [motion_of(p), ratio, phase]
+        };
+        let ([what, ratio, phase], [then, later, after]) = (of(&jump.before), of(&jump.after));
+        table.row([
+            jump.way.name().to_owned(),
+            shown(Kind::Length, jump.gap),
+            jump.reason.clone(),
+            what,
+            ratio,
+            phase,
+            then,
+            later,
+            after,
+        ]);
+    }
+    table.render() + "\n"
+}
+
+/// What the motion of a row is.
+fn motion_of(p: &ApproachPoint) -> String {
+    p.period.map_or_else(
+        || p.classification.name().to_owned(),
+        |n| format!("period {n}"),
+    )
 }
 
 /// What is held and what was found of it.

@@ -7,7 +7,9 @@ use nanotap::case::units::Units;
 use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
-use nanotap::study::attractors::{AttractorReport, Attractors, AttractorsStudy, UnseenReport};
+use nanotap::study::attractors::{
+    AttractorReport, Attractors, AttractorsStudy, EndReport, UnseenReport,
+};
 use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
 use nanotap::study::registry::Study as _;
@@ -32,11 +34,11 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
-    let found = progress::watched(AttractorsStudy::COUNTED, |control| {
+    let found = progress::study::<AttractorsStudy, _>(|control| {
         arguments
             .threads
             .install(|| AttractorsStudy::run(&case, &request, control))
-    })???;
+    })??;
     arguments.study.out.write(|| csv(&model, &found))?;
     arguments
         .study
@@ -155,6 +157,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
     }
     undecided(&mut text, found);
     if let Some(orbits) = &found.unstable {
+        let orbits: Vec<_> = orbits.iter().map(|orbit| &orbit.motion).collect();
         let _ = writeln!(
             text,
             "\n  {}",
@@ -167,7 +170,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             ("tip", Align::Left),
             ("contact (%)", Align::Point),
         ]);
-        for orbit in orbits {
+        for orbit in &orbits {
             let moduli = orbit
                 .multipliers
                 .iter()
@@ -211,17 +214,35 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         ))),
         Some(unseen) => text.push_str(&unseen_paragraphs(found, unseen)),
     }
+    if let Some(tolerance) = found.followed_at {
+        text.push_str(&motion::paragraph(&format!(
+            "starts were followed at {tolerance:e}, by an approximate flow: fractions and bounds are of that flow. Every orbit \
+             is closed by the exact flow, which also gives multipliers and exponents."
+        )));
+    }
     text
 }
 
 /// What the fractions are of, and how much may have been missed.
 fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
+    let percent = |part: f64| number::significant(100.0 * part, 2);
     let mut text = motion::paragraph(&format!(
         "fractions are of starts drawn at every size from the resonant response (1) down to a thousandth of it, and of \
          no other set; motions that Newton met and no start went to have 0 %. {} came after the last new motion: with \
-         95 % confidence less than {} % of such starts lead to motions that are not listed.",
+         95 % confidence less than {} % of such starts lead to motions that are not listed.{}",
         number::counted(unseen.starts, "start", "starts"),
-        number::significant(100.0 * unseen.fraction, 2)
+        percent(unseen.fraction),
+        match found.end {
+            EndReport::AllStarts | EndReport::BoundMet | EndReport::Cancelled => String::new(),
+            EndReport::MaxStarts { limit } => format!(
+                " The census ended at its limit of {limit} starts, before the requested {} %.",
+                percent(unseen.target)
+            ),
+            EndReport::MaxPeriods { limit } => format!(
+                " The census ended at its limit of {limit} drive periods, before the requested {} %.",
+                percent(unseen.target)
+            ),
+        }
     ));
     let mut table = Table::new([
         ("size of the starts", Align::Left),

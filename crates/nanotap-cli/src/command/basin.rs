@@ -49,15 +49,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     );
     let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
     arguments.plot.check()?;
-    let basin = progress::watched("starts of the census", |control| {
+    let basin = progress::watched("basin", "starts of the census", false, |control| {
         dataset
             .threads
             .install(|| Basin::new(&case, &options, control))
-    })???;
+    })??;
     let store = dataset.compute(
         &destination.store,
         basin.schema(),
-        "rows",
+        ["basin", "rows"],
         output,
         |store, work| basin.compute(store, work),
     )?;

@@ -10,7 +10,6 @@ use nanotap::number::shortest;
 use nanotap::observe::{Set, columns, time_series};
 use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
 use nanotap::study::orbit::spectral_radius;
-use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -66,11 +65,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
-    let mut report = progress::watched(BranchStudy::COUNTED, |control| {
+    let mut report = progress::study::<BranchStudy, _>(|control| {
         arguments
             .threads
             .install(|| followed(&case, &options, control))
-    })???;
+    })??;
     if report.cancelled {
         output.warning("stopped before it was done");
     }

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
-use nanotap::control::Control;
 use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{Comparison, ContactLawsStudy, SampleMotion};
@@ -16,14 +15,16 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
-use crate::{motion, number, style};
+use crate::{motion, number, progress, style};
 
 /// The same lever and drive on every contact law: what difference the sample makes.
 pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let result = ContactLawsStudy::run(&case, &request, &Control::default())?;
+    let result = progress::study::<ContactLawsStudy, _>(|control| {
+        ContactLawsStudy::run(&case, &request, control)
+    })?;
     arguments.out.write(|| csv(&result, &case.units()))?;
     arguments
         .plot

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
-use nanotap::control::Control;
 use nanotap::figure::motion::convergence_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::study::convergence::{Convergence, ConvergenceStudy};
@@ -15,14 +14,16 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
-use crate::{motion, number, style};
+use crate::{motion, number, progress, style};
 
 /// The same motion with N = 1 … K modes: how many are enough.
 pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let result = ConvergenceStudy::run(&case, &request, &Control::default())?;
+    let result = progress::study::<ConvergenceStudy, _>(|control| {
+        ConvergenceStudy::run(&case, &request, control)
+    })?;
     arguments.out.write(|| csv(&result))?;
     arguments
         .plot

@@ -81,11 +81,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         request.data.push(Data::read(path)?);
     }
     let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::watched(FitStudy::COUNTED, |control| {
+    let report = progress::study::<FitStudy, _>(|control| {
         arguments
             .threads
             .install(|| FitStudy::run(&case, &request, control))
-    })???;
+    })??;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
         match ending {
             "toml" if !report.case_files.is_empty() => {

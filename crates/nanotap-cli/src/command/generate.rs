@@ -94,9 +94,12 @@ fn completions(shell: Shell) -> String {
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// The command line, every command of it by its whole name, as in `nanotap-orbit`.
+/// The command line, every command of it by its whole name, as in `nanotap-orbit`; the same on every
+/// machine.
 fn command() -> clap::Command {
-    let mut command = super::Arguments::command().disable_help_subcommand(true);
+    let mut command = super::Arguments::command()
+        .disable_help_subcommand(true)
+        .long_version(env!("CARGO_PKG_VERSION"));
     command.build();
     command
 }

@@ -1,6 +1,5 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
-use nanotap::control::Control;
 use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
@@ -12,7 +11,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
-use crate::{motion, number, style};
+use crate::{motion, number, progress, style};
 
 /// Lyapunov spectrum with error bars, and a Poincaré section.
 pub(crate) type Arguments = StudyArguments<LyapunovStudy>;
@@ -24,7 +23,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if !wanted {
         request.points = 0;
     }
-    let report = LyapunovStudy::run(&case, &request, &Control::default())?;
+    let report = progress::study::<LyapunovStudy, _>(|control| {
+        LyapunovStudy::run(&case, &request, control)
+    })?;
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }

@@ -47,12 +47,13 @@ A case is a TOML file:
     alpha6 = 0.2    # contact_damping
     omega = 2.6     # drive_frequency
 
-Exit codes: 0 done, 1 failed, 2 bad input.";
+Exit codes: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM (what is finished
+is kept: reports of what was found so far, chunks of datasets).";
 
 /// What an AFM cantilever does when its tip taps a sample: every motion, its
 /// stability, and what an experimenter would measure in it.
 #[derive(Debug, Parser)]
-#[command(name = "nanotap", version, styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
+#[command(name = "nanotap", version, long_version = long_version(), styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {
     /// Print one JSON document on standard output, and nothing else there
     #[arg(long, global = true)]
@@ -70,6 +71,13 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
+/// The version, and what the speed of this machine depends on.
+fn long_version() -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let instructions = nanotap::model::vector_instructions();
+    format!("{version}\nvector instructions: {instructions}")
+}
+
 /// Every command that there is.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
@@ -77,6 +85,13 @@ pub(crate) enum Command {
     Own(Own),
     #[command(flatten)]
     Study(study::Arguments),
+}
+
+impl Command {
+    /// Whether it hears Ctrl-C by itself.
+    pub(crate) const fn listens_itself(&self) -> bool {
+        matches!(self, Self::Own(Own::Explore(_)))
+    }
 }
 
 /// The commands with a text of their own.

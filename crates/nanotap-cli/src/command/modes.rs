@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use nanotap::control::Control;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
@@ -14,14 +13,15 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
-use crate::{motion, number, style};
+use crate::{motion, number, progress, style};
 
 /// Mode shapes and frequencies, in free flight and in contact.
 pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let table = ModesStudy::run(&case, &request, &Control::default())?;
+    let table =
+        progress::study::<ModesStudy, _>(|control| ModesStudy::run(&case, &request, control))?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     arguments.out.write(|| shapes(&beam, request.points))?;
     arguments.plot.draw(|| shapes_figure(&beam))?;

@@ -3,11 +3,10 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::control::Control;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{PhysicalMotion, Set, time_series};
-use nanotap::study::orbit::{OrbitReport, OrbitRequest, OrbitStudy};
+use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitReport, OrbitRequest, OrbitStudy};
 use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -17,7 +16,7 @@ use crate::motion;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{file, number, series, style};
+use crate::{file, number, progress, series, style};
 
 /// A periodic orbit by Newton, stable or not.
 #[derive(Args, Debug)]
@@ -45,7 +44,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;
-    let found = OrbitStudy::run(&case, &request, &Control::default())?;
+    let found =
+        progress::study::<OrbitStudy, _>(|control| OrbitStudy::run(&case, &request, control))?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
         case.say_held(&[key], output);
@@ -118,9 +118,21 @@ fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set
     let mut text = format!("{}\n\n", style::bold(&heading));
     let verdict = format!("a period-{} orbit, {}", orbit.period, orbit.stability);
     let _ = writeln!(text, "  {}", style::bold(&verdict));
+    let defect = orbit.determinant_defect;
+    let check = if defect <= MAX_DETERMINANT_DEFECT {
+        format!("its multipliers agree with the trace formula to {defect:.1e}")
+    } else if orbit.stability == "undecided" {
+        format!(
+            "its multipliers contradict the trace formula by {defect:.1e}, so that its stability is \
+             undecided"
+        )
+    } else {
+        "its smallest multiplier is lost in rounding, so that the trace formula does not check them"
+            .to_owned()
+    };
     text.push_str(&motion::paragraph(&format!(
-        "Newton closed it to {:.1e}; it is known to {:.1e}; its multipliers agree with the trace formula to {:.1e}",
-        orbit.residual, orbit.error, orbit.determinant_defect
+        "Newton closed it to {:.1e}; it is known to {:.1e}; {check}",
+        orbit.residual, orbit.error
     )));
     let _ = writeln!(text, "\n  {}", style::bold("state at drive phase 0"));
     let mut table = Table::new([("", Align::Left), ("", Align::Point)]);

@@ -59,9 +59,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         only: arguments.only.clone(),
         quick: arguments.quick,
     };
-    let report = progress::watched("percent", |control| {
+    let report = progress::watched("paper", "percent", false, |control| {
         arguments.threads.install(|| report(&options, control))
-    })???;
+    })??;
     let written = report.write(&arguments.out)?;
     let document = Timed {
         document: report.document(&arguments.out, &written),

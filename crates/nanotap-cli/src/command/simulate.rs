@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use nanotap::case::units::Units;
-use nanotap::control::Control;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
 use nanotap::observe::Set;
@@ -17,7 +16,7 @@ use crate::motion;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
-use crate::{number, series, style};
+use crate::{number, progress, series, style};
 
 /// One run: its steady state, or how it gets there.
 pub(crate) type Arguments = StudyArguments<SimulateStudy>;
@@ -25,7 +24,9 @@ pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let model = case.model()?;
-    let report = SimulateStudy::run(&case, &request, &Control::default())?;
+    let report = progress::study::<SimulateStudy, _>(|control| {
+        SimulateStudy::run(&case, &request, control)
+    })?;
     let units = case.units();
     match &report {
         SimulateReport::Exact(report) => {

@@ -74,9 +74,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         GivenCase::of(&arguments.case, output)?
     };
     let request = Value::Object(arguments.given.clone());
-    let document = progress::watched(entry.counted, |control| {
+    let document = progress::watched(entry.name, entry.counted, entry.partial, |control| {
         entry.document(&case, request, control)
-    })??;
+    })?;
     let document: Value = serde_json::from_str(&document)
         .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
     output.result(&document, text)

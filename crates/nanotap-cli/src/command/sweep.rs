@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let store = dataset.compute(
         &destination.store,
         sweep.schema(),
-        noun,
+        ["sweep", noun],
         output,
         |store, work| sweep.compute(store, work),
     )?;

@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let store = arguments.dataset.compute(
         &destination.store,
         sweep.schema(),
-        "values",
+        ["window", "values"],
         output,
         |store, work| sweep.compute(store, work),
     )?;

@@ -273,3 +273,38 @@ fn what_makes_no_sense_is_refused() {
         &["1 numbers", "6 are needed"],
     );
 }
+
+/// Of a physical case an unstable orbit is told in SI too, with all that is observed of it.
+#[test]
+fn unstable_orbits_are_told_in_si() {
+    let folder = Folder::new();
+    let soft = include_str!("../../../../docs/cases/soft-sample.toml");
+    folder.write("soft.toml", soft);
+    let arguments = [
+        "attractors",
+        "soft.toml",
+        "--starts",
+        "8",
+        "--unstable",
+        "1",
+        "--json",
+    ];
+    let json = folder.run(&arguments).json();
+    let orbit = &json["unstable"][0];
+    assert_eq!(orbit["stable"], false);
+    let physical = &orbit["physical"];
+    let attracting = &json["attractors"][0]["physical"];
+    for name in attracting.as_object().unwrap().keys() {
+        assert!(!physical[name].is_null(), "{name}");
+    }
+    let alone = ["orbit", "soft.toml", "--period", "1", "--json", "--state"];
+    let state: Vec<String> = vector(&orbit["state"]).iter().map(f64::to_string).collect();
+    let alone = folder
+        .run(&[&alone[..], &[&state.join(",")]].concat())
+        .json();
+    assert_eq!(
+        alone["physical"]["harmonics"][0]["frequency"],
+        physical["harmonics"][0]["frequency"]
+    );
+    assert_eq!(alone["stable"], false);
+}

@@ -10,6 +10,10 @@ mod case;
 mod existing_motions;
 mod experiments;
 mod files;
+#[cfg(unix)]
+mod interruptions;
+#[cfg(unix)]
+mod limits;
 mod modes;
 mod motions;
 mod paper;

@@ -146,7 +146,7 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
     assert!(bytes(&whole) == bytes(&killed));
 }
 
-/// Ctrl-C leaves what is finished, says how to go on, and exits with 1; so does SIGTERM, by which
+/// Ctrl-C leaves what is finished, says how to go on, and exits with 130; so does SIGTERM, by which
 /// clusters end what has run too long.
 #[cfg(unix)]
 #[test]
@@ -190,7 +190,7 @@ fn interrupted_by(signal: &str) {
     assert!(interrupt.success());
     let output = child.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
     for words in [
         "stopped",
         "chunks are finished",

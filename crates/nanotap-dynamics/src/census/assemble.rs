@@ -2,10 +2,9 @@
 
 use crate::census::escapes::Escapes;
 use crate::census::{
-    Attractor, AttractorKind, Census, Fraction, Lifetime, Outcome, SizeCount, StartOrigin,
-    StartOutcome, StartSet, TransientChaos, Unseen,
+    Attractor, AttractorKind, Census, CensusEnd, Fraction, Lifetime, Outcome, SizeCount,
+    StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen,
 };
-use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
 use crate::orbit::PeriodicOrbit;
 
@@ -23,7 +22,6 @@ pub(crate) fn assemble(
     after: f64,
     transient_spectrum: Option<LyapunovSpectrum>,
     row: usize,
-    control: &Control<'_>,
 ) -> Census {
     let total = outcomes.len();
     let mut groups: Vec<Group> = orbits
@@ -152,7 +150,10 @@ pub(crate) fn assemble(
         counted: counts.counted,
         by_size,
         unseen,
-        cancelled: control.is_cancelled(),
+        unstable: Vec::new(),
+        followed_coarsely: false,
+        end: CensusEnd::AllStarts,
+        cancelled: false,
     }
 }
 

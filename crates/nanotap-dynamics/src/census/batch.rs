@@ -118,6 +118,10 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
     }
 
     fn tell(&self, place: usize, end: RunEnd) {
+        // The map may have ended a run that was under way.
+        if self.batch.control.is_cancelled() {
+            return;
+        }
         let (done, all) = self.batch.progress;
         self.batch.control.report(done, all);
         // What receives it outlives whoever sends.

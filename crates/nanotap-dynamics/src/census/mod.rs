@@ -1,5 +1,9 @@
 //! Which attractors there are, and what part of a set of starts goes to each.
 //!
+//! Where the map has a [coarse](StroboscopicMap::coarse) one, starts are followed on that, and each
+//! motion that they come to is confirmed on the map itself (`motions.rs`).
+//!
+//! 0. Orbits near seeds are closed ([`StartSet::with_seeds`]).
 //! 1. Pilot starts are classified one by one ([`mod@crate::classify`]); orbits that are
 //!    the same up to a cyclic shift, within their own error estimates, are merged.
 //! 2. Around each stable orbit a contracting neighbourhood is found
@@ -33,6 +37,7 @@ mod assemble;
 mod batch;
 mod confidence;
 mod escapes;
+mod motions;
 mod start_box;
 mod start_set;
 mod unseen;
@@ -43,16 +48,15 @@ use rayon::prelude::*;
 
 use crate::census::batch::Batch;
 use crate::census::escapes::Escapes;
+use crate::census::motions::Motions;
 use crate::classify::{
-    Chaos, Classified, ClassifyOptions, Known, MotionKind, RECOGNISABLE, RunEnd, Torus,
-    UndecidedReason, first_entry, watch,
+    Chaos, ClassifyOptions, Known, RECOGNISABLE, RunEnd, Torus, UndecidedReason, first_entry, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::orbit::PeriodicOrbit;
-use crate::orbit::search::merge;
 
 pub use confidence::{Fraction, Lifetime};
 pub use start_box::{StartBox, StartBoxError};
@@ -68,6 +72,18 @@ const DRAWN_AT_ONCE: usize = 16;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
 const LEAST_PATIENCE: usize = 64;
+/// Part of the expected entry for which it is, where periods are cheap.
+const COARSE_PATIENCE: f64 = 1.3;
+/// Periods for which it is at most, where periods are cheap.
+const MAX_COARSE_PATIENCE: usize = 16_384;
+/// Periods for which chaotic starts together are watched, where periods are cheap, and the rounds in
+/// which they are: each takes as long as all before it.
+const WATCHED_TOGETHER: usize = 400_000;
+const WATCH_ROUNDS: u32 = 4;
+/// Escapes after which a lifetime is known well enough.
+const ENOUGH_ESCAPES: usize = 16;
+/// Pilots where orbits are known from seeds and periods are cheap.
+const COARSE_PILOTS: usize = 8;
 /// Chaos is watched for so many times the periods after which escapes are counted.
 const WATCHED_TRANSIENTS: f64 = 8.0;
 
@@ -127,8 +143,28 @@ pub struct Census {
     /// How much of the set of starts may lead to motions not found; `None` if no start
     /// was drawn.
     pub unseen: Option<Unseen>,
+    /// Unstable orbits near seeds.
+    pub unstable: Vec<PeriodicOrbit>,
+    /// Whether starts were followed on the map's [coarse](StroboscopicMap::coarse) one: what counts
+    /// and fractions are of. Orbits and spectra are the map's own.
+    pub followed_coarsely: bool,
+    /// Why no further start was followed.
+    pub end: CensusEnd,
     /// True if the work was stopped before all starts were done.
     pub cancelled: bool,
+}
+
+/// Why a census ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CensusEnd {
+    /// All given starts were followed, or the work was stopped.
+    AllStarts,
+    /// The share that may lead to motions not found is below [`CensusOptions::unseen`].
+    BoundMet,
+    /// [`CensusOptions::max_starts`] were drawn.
+    MaxStarts,
+    /// The starts took [`CensusOptions::max_periods`].
+    MaxPeriods,
 }
 
 /// What happened to the starts of one size.
@@ -225,6 +261,7 @@ pub enum StartOutcome {
 }
 
 /// What one start came to, before attractors are put together.
+#[derive(Clone)]
 enum Outcome {
     Orbit { index: usize, periods: usize },
     Torus(Torus, Vec<f64>),
@@ -255,7 +292,8 @@ pub fn census_of<M: StroboscopicMap>(
         .len()
         .unwrap_or_else(|| given.saturating_add(options.max_starts));
     let mut work = Work {
-        map,
+        motions: Motions::new(map, &options.classify, control.cancel),
+        followed_options: options.classify.clone(),
         starts,
         options,
         control,
@@ -263,18 +301,27 @@ pub fn census_of<M: StroboscopicMap>(
         last,
         outcomes: Vec::new(),
         ends: Vec::new(),
-        orbits: Vec::new(),
         neighbourhoods: Vec::new(),
-        motions: 0,
-        chaos: Vec::new(),
-        transient_spectrum: None,
+        searched: 0,
         patience: 0,
         periods: 0,
         row: 0,
     };
+    if work.motions.is_coarse {
+        work.followed_options = options.classify.on_coarse_map();
+    }
+    work.motions.close_seeds(starts.seeds());
+    if work.motions.count() > 0 {
+        work.know_neighbourhoods(&[]);
+    }
+    let count = if work.motions.is_coarse && !work.neighbourhoods.is_empty() {
+        options.pilots.min(COARSE_PILOTS)
+    } else {
+        options.pilots
+    };
     // Chaos that the first of the pilots are on need not be measured again by the others.
-    let mut pilots = work.follow(options.pilots.clamp(1, FIRST_PILOTS));
-    pilots.extend(work.follow(options.pilots.saturating_sub(FIRST_PILOTS)));
+    let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
+    pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
     work.know_neighbourhoods(&pilots);
     while work.outcomes.len() < last && !work.is_enough() {
         let classified = work.follow(work.next_batch());
@@ -282,20 +329,14 @@ pub fn census_of<M: StroboscopicMap>(
     }
     let mut after = Escapes::after(work.relaxation());
     work.watch_chaos(&mut after);
-    assemble::assemble(
-        &work.outcomes,
-        starts,
-        work.orbits,
-        after,
-        work.transient_spectrum,
-        work.row,
-        control,
-    )
+    work.assemble(after)
 }
 
 /// A census under way.
 struct Work<'a, M> {
-    map: &'a M,
+    motions: Motions<'a, M>,
+    /// Budgets of each start on the map that is followed.
+    followed_options: ClassifyOptions,
     starts: &'a StartSet,
     options: &'a CensusOptions,
     control: &'a Control<'a>,
@@ -305,14 +346,10 @@ struct Work<'a, M> {
     outcomes: Vec<Outcome>,
     /// Least and greatest entries of the starts so far.
     ends: Vec<[f64; 2]>,
-    orbits: Vec<PeriodicOrbit>,
-    /// Index of an orbit and a neighbourhood of it.
+    /// Index of an orbit of the followed map and a neighbourhood of it.
     neighbourhoods: Vec<(usize, Neighbourhood)>,
     /// Orbits whose neighbourhood was looked for.
-    motions: usize,
-    /// Spectra of the chaotic motions and tori found, one of each.
-    chaos: Vec<LyapunovSpectrum>,
-    transient_spectrum: Option<LyapunovSpectrum>,
+    searched: usize,
     /// Periods after which most starts are in a neighbourhood, or on chaos that is recognised.
     patience: usize,
     /// Periods run so far.
@@ -327,14 +364,26 @@ impl<M: StroboscopicMap> Work<'_, M> {
         if self.control.is_cancelled() || self.starts.len().is_some() {
             return self.control.is_cancelled();
         }
-        Unseen::new(self.found(), self.row).share <= self.options.unseen
+        self.is_bound_met()
             || self.outcomes.len() > self.starts.given_count()
                 && self.periods >= self.options.max_periods
     }
 
-    /// Motions found so far.
-    fn found(&self) -> usize {
-        self.orbits.len() + self.chaos.len()
+    fn is_bound_met(&self) -> bool {
+        Unseen::new(self.motions.count(), self.row).share <= self.options.unseen
+    }
+
+    /// Why no further start was followed.
+    fn end(&self) -> CensusEnd {
+        if self.starts.len().is_some() || self.control.is_cancelled() {
+            CensusEnd::AllStarts
+        } else if self.is_bound_met() {
+            CensusEnd::BoundMet
+        } else if self.outcomes.len() >= self.last {
+            CensusEnd::MaxStarts
+        } else {
+            CensusEnd::MaxPeriods
+        }
     }
 
     /// Starts of the next batch: as many as found nothing new in a row, since threads wait for each
@@ -343,7 +392,8 @@ impl<M: StroboscopicMap> Work<'_, M> {
     fn next_batch(&self) -> usize {
         let mut size = self.row;
         if self.starts.len().is_none() {
-            let bound = Unseen::row_for(self.found(), self.options.unseen).saturating_sub(self.row);
+            let bound =
+                Unseen::row_for(self.motions.count(), self.options.unseen).saturating_sub(self.row);
             let periods = self.options.max_periods.saturating_sub(self.periods) as f64;
             let budget = periods * self.outcomes.len() as f64 / self.periods.max(1) as f64;
             size = size.min(bound).min(budget.ceil() as usize);
@@ -356,7 +406,11 @@ impl<M: StroboscopicMap> Work<'_, M> {
         let first = self.outcomes.len();
         let range = first..self.last.min(first + size);
         let drawn = range.clone().into_par_iter().with_min_len(DRAWN_AT_ONCE);
-        let starts: Vec<_> = drawn.filter_map(|k| self.starts.start(k)).collect();
+        let start = |k| {
+            let goes_on = !self.control.is_cancelled();
+            goes_on.then(|| self.starts.start(k)).flatten()
+        };
+        let starts: Vec<_> = drawn.filter_map(start).collect();
         for start in &starts {
             extend(&mut self.ends, start);
         }
@@ -364,7 +418,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         let mut classified = Vec::new();
         for (k, arrival) in range.zip(arrivals) {
-            let before = self.found();
+            let before = self.motions.count();
             if matches!(arrival, Some(RunEnd::Classified(_))) {
                 classified.push(k);
             }
@@ -372,7 +426,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
             self.periods += assemble::periods_of(&outcome);
             let counts = self.starts.len().is_some()
                 || matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
-            if self.found() > before {
+            if self.motions.count() > before {
                 self.row = 0;
             } else if counts && !matches!(outcome, Outcome::Undecided(_)) {
                 self.row += 1;
@@ -390,18 +444,23 @@ impl<M: StroboscopicMap> Work<'_, M> {
             self.check_neighbourhoods(classified);
         }
         let sides = self.sides();
-        self.patience = self
-            .neighbourhoods
-            .iter()
-            .map(|(_, ball)| ball.expected_entry(&sides) as usize)
-            .fold(0, usize::max)
-            .clamp(
-                LEAST_PATIENCE,
-                self.options.classify.max_transient.max(LEAST_PATIENCE),
-            );
+        let balls = self.neighbourhoods.iter();
+        let entries = balls.map(|(_, ball)| ball.expected_entry(&sides));
+        let entry = entries.fold(0.0, f64::max);
+        let longest = self.options.classify.max_transient.max(LEAST_PATIENCE);
+        self.patience = if self.motions.is_coarse {
+            let patience = (COARSE_PATIENCE * entry) as usize + LEAST_PATIENCE;
+            patience.min(longest.max(MAX_COARSE_PATIENCE))
+        } else {
+            (entry as usize).clamp(LEAST_PATIENCE, longest)
+        };
         let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
         if 2 * self.outcomes.iter().filter(chaotic).count() > self.outcomes.len() {
             self.patience = self.patience.max(RECOGNISABLE);
+        }
+        if self.motions.is_coarse {
+            let transient = self.options.classify.max_transient;
+            self.followed_options.max_transient = transient.max(2 * self.patience);
         }
     }
 
@@ -415,17 +474,23 @@ impl<M: StroboscopicMap> Work<'_, M> {
         balls.map(|(_, ball)| ball.clone()).collect()
     }
 
+    /// What a run knows from the start, with these neighbourhoods.
+    fn known<'k>(&'k self, balls: &'k [Neighbourhood]) -> Known<'k> {
+        Known {
+            balls,
+            chaos: &self.motions.spectra,
+            patience: self.patience,
+            cancel: self.control.cancel,
+        }
+    }
+
     fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<RunEnd>> {
         let balls = self.balls();
         let batch = Batch {
-            map: self.map,
+            map: &self.motions.followed,
             starts,
-            known: Known {
-                balls: &balls,
-                chaos: &self.chaos,
-                patience: self.patience,
-            },
-            options: &self.options.classify,
+            known: self.known(&balls),
+            options: &self.followed_options,
             control: self.control,
             progress: (&self.done, self.last),
         };
@@ -433,78 +498,50 @@ impl<M: StroboscopicMap> Work<'_, M> {
     }
 
     fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize]) -> Outcome {
-        let classified = match arrival {
-            None => return Outcome::Undecided(UndecidedReason::Cancelled),
-            Some(RunEnd::Entered { index, periods }) => {
-                return Outcome::Orbit {
-                    index: known[index],
-                    periods,
-                };
-            }
-            Some(RunEnd::Classified(classified)) => *classified,
-        };
-        let Classified {
-            kind,
-            periods,
-            state,
-            met,
-        } = classified;
-        let outcome = match kind {
-            MotionKind::Periodic(orbit) => Outcome::Orbit {
-                index: merge(&mut self.orbits, orbit),
-                periods,
-            },
-            MotionKind::TransientChaos {
-                orbit, spectrum, ..
-            } => {
-                self.transient_spectrum.get_or_insert(spectrum);
-                Outcome::Orbit {
-                    index: merge(&mut self.orbits, orbit),
-                    periods,
-                }
-            }
-            MotionKind::QuasiPeriodic(torus) => {
-                self.know(&torus.spectrum);
-                Outcome::Torus(torus, state)
-            }
-            MotionKind::Chaotic(chaos) => {
-                self.know(&chaos.spectrum);
-                Outcome::Chaos(chaos, state)
-            }
-            MotionKind::Unbounded => Outcome::Unbounded,
-            MotionKind::Undecided { reason, .. } => Outcome::Undecided(reason),
-        };
-        for orbit in met {
-            merge(&mut self.orbits, orbit);
-        }
-        outcome
-    }
-
-    fn know(&mut self, spectrum: &LyapunovSpectrum) {
-        if !self.chaos.iter().any(|k| k.agrees_with(spectrum)) {
-            self.chaos.push(spectrum.clone());
+        match arrival {
+            None => Outcome::Undecided(UndecidedReason::Cancelled),
+            Some(RunEnd::Entered { index, periods }) => self.motions.arrival(known[index], periods),
+            Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified),
         }
     }
 
     /// Looks for the contracting neighbourhoods of the orbits that are new, and says whether there are
     /// any.
     fn find_neighbourhoods(&mut self) -> bool {
-        let new: Vec<(usize, Neighbourhood)> = self.orbits[self.motions..]
-            .par_iter()
+        let motions = &self.motions;
+        let orbits = &motions.followed_orbits;
+        for (orbit, _) in &orbits[self.searched..] {
+            for (own, ball) in &mut self.neighbourhoods {
+                if motions.is_coarse && !orbits[*own].0.is_same_as(orbit) {
+                    ball.keep_clear_of(orbit);
+                }
+            }
+        }
+        let new: Vec<(usize, Neighbourhood)> = (self.searched..orbits.len())
+            .into_par_iter()
             .with_max_len(1)
-            .enumerate()
             .map_init(
-                || self.map.clone(),
-                |map, (k, orbit)| {
-                    let found = Neighbourhood::around(map, orbit).ok().flatten()?;
-                    Some((self.motions + k, found))
+                || motions.followed.clone(),
+                |map, own| {
+                    let orbit = &orbits[own].0;
+                    let others = orbits.iter().map(|(orbit, _)| orbit);
+                    let others = others.enumerate().filter(|(k, _)| *k != own);
+                    let others = others.map(|(_, other)| other).chain(&motions.unstable);
+                    let found = if self.control.is_cancelled() {
+                        return None;
+                    } else if motions.is_coarse {
+                        Neighbourhood::over_block(map, orbit, others)
+                    } else {
+                        Neighbourhood::around(map, orbit)
+                    };
+                    Some((own, found.ok().flatten()?))
                 },
             )
             .collect::<Vec<_>>()
             .into_iter()
             .flatten()
             .collect();
-        self.motions = self.orbits.len();
+        self.searched = orbits.len();
         let found = !new.is_empty();
         self.neighbourhoods.extend(new);
         found
@@ -519,7 +556,11 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .copied()
             .filter(|&k| match self.outcomes[k] {
                 Outcome::Orbit { index, .. } => {
-                    self.neighbourhoods.iter().any(|(i, _)| *i == index)
+                    let mut leads = self
+                        .neighbourhoods
+                        .iter()
+                        .map(|(own, _)| self.leads_to(*own));
+                    leads.any(|other| other == Some(index))
                 }
                 _ => false,
             })
@@ -529,25 +570,35 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .par_iter()
             .with_max_len(1)
             .map_init(
-                || self.map.clone(),
+                || self.motions.followed.clone(),
                 |map, &k| {
                     if self.control.is_cancelled() {
                         return None;
                     }
                     let periods = assemble::periods_of(&self.outcomes[k]);
                     let start = self.starts.start(k)?;
-                    first_entry(map, &start, &balls, periods, &self.options.classify)
+                    let known = Known {
+                        balls: &balls,
+                        cancel: self.control.cancel,
+                        ..Known::default()
+                    };
+                    first_entry(map, &start, known, periods, &self.followed_options)
                 },
             )
             .collect();
         let mut discarded = Vec::new();
+        let leads: Vec<_> = self
+            .neighbourhoods
+            .iter()
+            .map(|(own, _)| self.leads_to(*own))
+            .collect();
         for (k, entry) in checked.into_iter().zip(entries) {
             let (Outcome::Orbit { index, periods }, Some((ball, after))) =
                 (&mut self.outcomes[k], entry)
             else {
                 continue;
             };
-            if self.neighbourhoods[ball].0 == *index {
+            if leads[ball] == Some(*index) {
                 *periods = after;
             } else {
                 discarded.push(ball);
@@ -558,6 +609,14 @@ impl<M: StroboscopicMap> Work<'_, M> {
             position += 1;
             !discarded.contains(&(position - 1))
         });
+    }
+
+    /// Index of the orbit to which starts lead that come to an orbit of the followed map.
+    fn leads_to(&self, own: usize) -> Option<usize> {
+        match self.motions.followed_orbits[own].1 {
+            Outcome::Orbit { index, .. } => Some(index),
+            _ => None,
+        }
     }
 
     /// Follows chaotic starts for several times the periods `after` which escapes are
@@ -573,40 +632,66 @@ impl<M: StroboscopicMap> Work<'_, M> {
         } else {
             0
         };
-        let beside = if self.orbits.is_empty() {
+        let beside = if self.motions.orbits.is_empty() {
             0.0
         } else {
             WATCHED_TRANSIENTS * *after
         };
         let enough = least.max(beside as usize);
+        let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
+        let chaotic = self.outcomes.iter().filter(chaotic).count();
+        let together = WATCHED_TOGETHER / chaotic.max(1);
         let mut budget = self.options.max_periods;
+        if self.motions.is_coarse && together > enough {
+            for round in (0..WATCH_ROUNDS).rev() {
+                self.watch_for(enough.max(together >> round), after, &mut budget);
+                self.find_neighbourhoods();
+                if Escapes::count(&self.outcomes, *after).escaped.len() >= ENOUGH_ESCAPES {
+                    break;
+                }
+            }
+        } else {
+            self.watch_for(enough, after, &mut budget);
+        }
+    }
+
+    /// Follows chaotic starts until each was for so many periods, as long as the budget lasts.
+    fn watch_for(&mut self, enough: usize, after: &mut f64, budget: &mut usize) {
         let watched: Vec<usize> = (0..self.outcomes.len())
             .filter(|&k| match &self.outcomes[k] {
                 Outcome::Chaos(chaos, _) if chaos.observed < enough => {
                     let left = budget.checked_sub(enough - chaos.observed);
-                    budget = left.unwrap_or(budget);
+                    *budget = left.unwrap_or(*budget);
                     left.is_some()
                 }
                 _ => false,
             })
             .collect();
         let balls = self.balls();
+        let known = self.known(&balls);
         let ends: Vec<Result<Vec<f64>, RunEnd>> = watched
             .par_iter()
             .with_max_len(1)
             .map_init(
-                || self.map.clone(),
+                || self.motions.followed.clone(),
                 |map, &k| match &self.outcomes[k] {
                     Outcome::Chaos(chaos, state) => {
                         let periods = enough - chaos.observed;
-                        watch(map, state, &balls, periods, &self.options.classify)
+                        watch(map, state, known, periods, &self.followed_options)
                     }
                     _ => Ok(Vec::new()),
                 },
             )
             .collect();
+        if self.control.is_cancelled() {
+            return;
+        }
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         for (k, end) in watched.into_iter().zip(ends) {
+            // What was seen before the work was stopped stands.
+            if self.control.is_cancelled() {
+                return;
+            }
             let Outcome::Chaos(chaos, at) = &mut self.outcomes[k] else {
                 continue;
             };
@@ -620,7 +705,7 @@ impl<M: StroboscopicMap> Work<'_, M> {
                     let mut outcome = self.outcome(Some(arrival), &known);
                     if let Outcome::Orbit { periods, .. } = &mut outcome {
                         *periods += observed;
-                        self.transient_spectrum.get_or_insert(spectrum);
+                        self.motions.transient_spectrum.get_or_insert(spectrum);
                         *after = after.min(observed as f64);
                     }
                     self.outcomes[k] = outcome;
@@ -636,6 +721,26 @@ impl<M: StroboscopicMap> Work<'_, M> {
             .iter()
             .map(|(_, ball)| ball.relaxation(&sides))
             .fold(0.0, f64::max)
+    }
+
+    fn assemble(self, after: f64) -> Census {
+        let end = self.end();
+        let motions = self.motions;
+        let census = assemble::assemble(
+            &self.outcomes,
+            self.starts,
+            motions.orbits,
+            after,
+            motions.transient_spectrum,
+            self.row,
+        );
+        Census {
+            unstable: motions.unstable,
+            followed_coarsely: motions.is_coarse,
+            end,
+            cancelled: self.control.is_cancelled(),
+            ..census
+        }
     }
 }
 

@@ -8,6 +8,7 @@
 //! Fails: Halton sequences in many dimensions (above about 20) fill the box no more
 //! evenly than random points, until there are as many points as the largest prime.
 
+use crate::control::Control;
 use crate::vector::mix;
 
 /// A box of initial states.
@@ -98,7 +99,15 @@ impl StartBox {
 
     /// Starts 0 … count − 1.
     pub fn starts(&self, seed: u64, count: usize) -> Vec<Vec<f64>> {
-        (0..count as u64).map(|k| self.start(seed, k)).collect()
+        self.starts_until(seed, count, &Control::default())
+    }
+
+    /// The same, as many as there are when the work is cancelled.
+    pub fn starts_until(&self, seed: u64, count: usize, control: &Control<'_>) -> Vec<Vec<f64>> {
+        (0..count as u64)
+            .take_while(|_| !control.is_cancelled())
+            .map(|k| self.start(seed, k))
+            .collect()
     }
 }
 

@@ -16,6 +16,7 @@ use crate::vector::mix;
 /// Where starts come from. Every set has a first start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartSet {
+    seeds: Vec<(usize, Vec<f64>)>,
     given: Vec<Vec<f64>>,
     sizes: Vec<Size>,
     seed: u64,
@@ -40,6 +41,7 @@ impl StartSet {
     /// Draws from one box.
     pub fn drawn(sides: StartBox, seed: u64) -> Self {
         Self {
+            seeds: Vec::new(),
             given: Vec::new(),
             sizes: vec![Size { scale: 1.0, sides }],
             seed,
@@ -82,6 +84,7 @@ impl StartSet {
             })
             .collect::<Result<_, StartBoxError>>()?;
         Ok(Self {
+            seeds: Vec::new(),
             given: Vec::new(),
             sizes,
             seed,
@@ -91,6 +94,7 @@ impl StartSet {
     /// These states and no others.
     pub fn given(states: Vec<Vec<f64>>) -> Self {
         Self {
+            seeds: Vec::new(),
             given: states,
             sizes: Vec::new(),
             seed: 0,
@@ -103,6 +107,20 @@ impl StartSet {
     pub fn with_given(mut self, states: impl IntoIterator<Item = Vec<f64>>) -> Self {
         self.given.extend(states);
         self
+    }
+
+    /// The same set with orbits that Newton closes before any start is followed, each from a period in
+    /// drive periods and a state at drive phase 0 near it. Stable ones are attractors, also where no
+    /// start goes to them.
+    #[must_use]
+    pub fn with_seeds(mut self, seeds: impl IntoIterator<Item = (usize, Vec<f64>)>) -> Self {
+        self.seeds.extend(seeds);
+        self
+    }
+
+    /// Periods and states from which orbits are closed first.
+    pub fn seeds(&self) -> &[(usize, Vec<f64>)] {
+        &self.seeds
     }
 
     /// How many states were given.

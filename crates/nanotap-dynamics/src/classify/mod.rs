@@ -15,7 +15,8 @@
 //! - periodic: closed, stable, approached;
 //! - transient chaos: the exponents were positive by more than five standard errors,
 //!   and then the run escaped to a periodic orbit;
-//! - chaotic: positive by more than five standard errors to the end. One run of T
+//! - chaotic: positive by more than five standard errors to the end, over the whole run
+//!   after its transient and over its last half. One run of T
 //!   periods without escape says that the mean lifetime is above T/3 at 95 %
 //!   (exponential lifetimes: e⁻³ ≈ 0.05) and no more; [`mod@crate::census`] pools runs;
 //! - quasi-periodic: the largest exponent is zero within its error, no orbit up to
@@ -29,7 +30,7 @@
 mod approach;
 mod birkhoff;
 mod candidates;
-mod outlook;
+mod confirm;
 mod pack;
 mod run;
 mod undecided;
@@ -40,7 +41,8 @@ use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
-pub use outlook::{Outlook, outlook};
+pub(crate) use confirm::close_exactly;
+use confirm::confirm;
 pub(crate) use pack::{Followed, follow_starts};
 pub(crate) use run::{Known, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
@@ -91,6 +93,24 @@ impl Default for ClassifyOptions {
     }
 }
 
+/// Residual, relative to the orbit, of Newton's method on a coarse map, whose steps change in number
+/// from state to state.
+const COARSE_RESIDUAL: f64 = 1e-5;
+
+impl ClassifyOptions {
+    /// The same budgets on a coarse map.
+    pub(crate) fn on_coarse_map(&self) -> Self {
+        let residual = self.shooting.residual_tolerance.max(COARSE_RESIDUAL);
+        Self {
+            shooting: ShootingOptions {
+                residual_tolerance: residual,
+                ..self.shooting.clone()
+            },
+            ..self.clone()
+        }
+    }
+}
+
 /// What the motion from a start was found to be.
 #[derive(Clone, Debug)]
 pub struct Classified {
@@ -114,7 +134,7 @@ pub enum MotionKind {
     TransientChaos {
         /// Where it went.
         orbit: PeriodicOrbit,
-        /// The exponents before it escaped.
+        /// The exponents before it escaped, on the map that was followed.
         spectrum: LyapunovSpectrum,
         /// Periods after which the escape was noticed (looks are a factor 2 apart).
         lasted: usize,
@@ -163,6 +183,22 @@ pub struct Chaos {
 }
 
 impl Chaos {
+    /// On a motion of this spectrum for so many periods.
+    pub(crate) fn of(
+        spectrum: LyapunovSpectrum,
+        periods: usize,
+        options: &ClassifyOptions,
+    ) -> Self {
+        let mut chaos = Self {
+            spectrum,
+            observed: 0,
+            lifetime_above: 0.0,
+            longest_period: options.long_period.max(options.max_period),
+        };
+        chaos.watched(periods);
+        chaos
+    }
+
     /// Seen for so many periods in all: what happens with probability 1/τ a period and did not
     /// happen in T of them has τ > T/3 at 95 %.
     pub(crate) fn watched(&mut self, periods: usize) {
@@ -171,13 +207,15 @@ impl Chaos {
     }
 }
 
-/// Follows the motion from `start` until it can be named, within the budgets.
+/// Follows the motion from `start` until it can be named, within the budgets. Where the map has a
+/// [coarse](StroboscopicMap::coarse) one, the transient is followed on that, and the map itself
+/// confirms what it comes to.
 pub fn classify<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
     options: &ClassifyOptions,
 ) -> Classified {
-    outlook(map, start, options).verified(map)
+    classify_beside(map, start, &[], options)
 }
 
 /// As [`classify`], where chaotic motions of the map are known: a run from which neighbours part,
@@ -193,14 +231,28 @@ pub fn classify_beside<M: StroboscopicMap>(
         chaos,
         ..Known::default()
     };
+    let Some(mut coarse) = map.coarse() else {
+        return classify_on(map, start, known, options);
+    };
+    let found = classify_on(&mut coarse, start, known, &options.on_coarse_map());
+    confirm(map, found, start, known, options)
+}
+
+/// As [`classify_beside`], on the given map alone. No neighbourhood is `known`.
+pub(crate) fn classify_on<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    known: Known<'_>,
+    options: &ClassifyOptions,
+) -> Classified {
     let mut end = ended(follow_start(map, start, known, options), start);
     if let MotionKind::Chaotic(found) = &mut end.kind
-        && chaos.contains(&found.spectrum)
+        && known.chaos.contains(&found.spectrum)
     {
         let measured = &options.lyapunov;
         let least = options.max_transient + measured.alignment + measured.min_periods;
         let more = least.saturating_sub(end.periods);
-        match watch(map, &end.state, &[], more, options) {
+        match watch(map, &end.state, known, more, options) {
             Ok(state) => {
                 end.state = state;
                 end.periods += more;

@@ -292,8 +292,8 @@ mod tests {
         let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
         let known = Known {
             balls: &[ball],
-            chaos: &[],
             patience: 100,
+            ..Known::default()
         };
         let ends = assert_same_as_alone(&map, known);
         assert!(matches!(

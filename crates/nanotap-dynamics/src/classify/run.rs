@@ -1,5 +1,7 @@
 //! One start followed until its motion is known.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::classify::approach::approaches;
 use crate::classify::birkhoff::birkhoff_digits;
 use crate::classify::candidates::candidate_periods;
@@ -29,8 +31,11 @@ const LONG_WORTH_TRYING: f64 = 1e-2;
 const LAST_WORTH_TRYING: f64 = 0.1;
 /// Periods after which the means of a run may tell that it is on chaos that is known.
 pub(crate) const RECOGNISABLE: usize = 256;
-/// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
-const TELLING: f64 = 0.2;
+/// Exponents are measured for so many times their budget at most, where chaotic transients end.
+const LONGEST_MEASUREMENT: usize = 4;
+/// Error of an orbit, as a part of its size, that says whether a run is on it: on a coarse map it is
+/// known to less.
+const DETERMINED: f64 = 1e-8;
 /// Distance of a neighbour, in standard deviations of the motion.
 const NEIGHBOUR: f64 = 1e-9;
 /// How many times its distance grows on chaos.
@@ -48,6 +53,8 @@ pub(crate) struct Known<'a> {
     /// Periods after which most runs are in one of the neighbourhoods, or on known chaos:
     /// before that, looking where a run goes costs more than waiting.
     pub(crate) patience: usize,
+    /// A run stops within a period after this becomes true.
+    pub(crate) cancel: Option<&'a AtomicBool>,
 }
 
 /// Where a start arrives when some attractors are known already.
@@ -95,14 +102,10 @@ pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
 pub(crate) fn first_entry<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
-    balls: &[Neighbourhood],
+    known: Known<'_>,
     periods: usize,
     options: &ClassifyOptions,
 ) -> Option<(usize, usize)> {
-    let known = Known {
-        balls,
-        ..Known::default()
-    };
     let mut run = Run::new(start, known, options);
     match run.run_to(map, periods) {
         Err(Stop::Entered(index)) => Some((index, run.periods)),
@@ -114,14 +117,10 @@ pub(crate) fn first_entry<M: StroboscopicMap>(
 pub(crate) fn watch<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
-    balls: &[Neighbourhood],
+    known: Known<'_>,
     periods: usize,
     options: &ClassifyOptions,
 ) -> Result<Vec<f64>, RunEnd> {
-    let known = Known {
-        balls,
-        ..Known::default()
-    };
     let mut run = Run::new(state, known, options);
     if let Err(stop) = run.run_to(map, periods) {
         return Err(run.stopped(stop));
@@ -146,6 +145,7 @@ fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Mot
 pub(super) enum Stop {
     Entered(usize),
     Unbounded,
+    Cancelled,
     Failed(MapFailure),
 }
 
@@ -166,6 +166,8 @@ pub(super) struct Run<'a> {
     keep: usize,
     /// Periods after which it is looked at, if no budget ends before.
     target: usize,
+    /// Periods before which it is not looked for in a neighbourhood.
+    next_entry: usize,
     known: Known<'a>,
     options: &'a ClassifyOptions,
     closing: ShootingOptions,
@@ -245,6 +247,7 @@ impl<'a> Run<'a> {
             recent: start.to_vec(),
             keep,
             target: options.first_look.max(known.patience).max(1),
+            next_entry: 0,
             known,
             options,
             closing: ShootingOptions {
@@ -279,6 +282,7 @@ impl<'a> Run<'a> {
         match stop {
             Stop::Entered(index) => RunEnd::Entered { index, periods },
             Stop::Unbounded => self.classified(MotionKind::Unbounded),
+            Stop::Cancelled => self.classified(undecided(UndecidedReason::Cancelled, None)),
             Stop::Failed(failure) => {
                 let reason = UndecidedReason::Map { periods, failure };
                 self.classified(undecided(reason, None))
@@ -398,9 +402,18 @@ impl<'a> Run<'a> {
         if norm(&self.state) > self.options.bound {
             return Err(Stop::Unbounded);
         }
+        if self.known.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            return Err(Stop::Cancelled);
+        }
+        if self.periods < self.next_entry {
+            return Ok(());
+        }
         for (index, ball) in self.known.balls.iter().enumerate() {
-            if ball.contains(&self.state) && ball.holds(map, &self.state, &mut self.scratch)? {
-                return Err(Stop::Entered(index));
+            if ball.contains(&self.state) {
+                if ball.holds(map, &self.state, &mut self.scratch)? {
+                    return Err(Stop::Entered(index));
+                }
+                self.next_entry = self.periods + ball.retry();
             }
         }
         Ok(())
@@ -456,7 +469,8 @@ impl<'a> Run<'a> {
                 return Some(Closed::Attracting(orbit));
             }
             let mut states = orbit.states.iter();
-            if states.any(|x| distance(x, &self.state) <= 10.0 * orbit.error) {
+            let reach = 10.0 * orbit.error.min(DETERMINED * orbit.scale());
+            if states.any(|x| distance(x, &self.state) <= reach) {
                 return Some(Closed::Occupied(orbit));
             }
             guesses.tried.push(orbit);
@@ -531,10 +545,7 @@ impl<'a> Run<'a> {
         let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
         let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
         let deviations = means.deviations();
-        let telling = deviations
-            .iter()
-            .zip(&means.errors)
-            .all(|(deviation, error)| *error <= TELLING * deviation);
+        let telling = means.is_telling();
         let found = known.find(|k| telling && k.strobe.agree_with(&means));
         found.map(|spectrum| Resembled {
             spectrum: spectrum.clone(),
@@ -563,17 +574,12 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn chaotic(&self, spectrum: LyapunovSpectrum) -> MotionKind {
-        let mut chaos = Chaos {
-            spectrum,
-            observed: 0,
-            lifetime_above: 0.0,
-            longest_period: longest(self.options),
-        };
-        chaos.watched(self.periods);
-        MotionKind::Chaotic(chaos)
+        MotionKind::Chaotic(Chaos::of(spectrum, self.periods, self.options))
     }
 
-    /// Exponents of what does not close, looking for an escape after every doubling.
+    /// Exponents of what does not close, looking for an escape after every doubling. Where the last
+    /// half of the run differs from what was before, or is not chaotic where the whole run is, all
+    /// before it was a transient and is discarded.
     pub(super) fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
         let mut exponents = LyapunovRun::new(self.d);
@@ -581,12 +587,18 @@ impl<'a> Run<'a> {
             self.step_with(map, &mut exponents)?;
         }
         let mut before: Option<LyapunovSpectrum> = None;
-        let mut target = budget.min_periods.max(64);
+        let first = budget.min_periods.max(64);
+        let (mut measured, mut target, mut end) = (first / 2, first, budget.max_periods);
+        self.record(map, &mut exponents, measured)?;
+        let mut early = exponents.spectrum();
         let spectrum = loop {
-            while exponents.periods() < target {
-                self.step_with(map, &mut exponents)?;
-                exponents.record(&self.state);
+            let stretch = target - measured;
+            if 2 * stretch >= exponents.periods() {
+                early = exponents.spectrum();
+                exponents.begin_last_stretch();
             }
+            self.record(map, &mut exponents, stretch)?;
+            measured = target;
             let guesses = self.guesses_at_look();
             if let Some(kind) = self.close(map, guesses)? {
                 return Ok(match (kind, before.filter(is_chaotic)) {
@@ -598,21 +610,55 @@ impl<'a> Run<'a> {
                     (kind, _) => kind,
                 });
             }
+            let last = exponents.last_spectrum();
+            let calmed_down = is_chaotic(&exponents.spectrum()) && !stays_chaotic(&last);
+            if calmed_down {
+                end = (measured + budget.max_periods).min(LONGEST_MEASUREMENT * budget.max_periods);
+            }
+            if calmed_down || !early.agrees_with(&last) {
+                exponents.keep_last_stretch();
+            }
             let spectrum = exponents.spectrum();
-            let enough = || {
-                budget.is_met_by(&spectrum)
-                    || self.known.chaos.iter().any(|k| k.agrees_with(&spectrum))
-            };
-            if target >= budget.max_periods || (is_chaotic(&spectrum) && enough()) {
+            let known = &mut self.known.chaos.iter();
+            let is_known = known.any(|k| k.agrees_with(&spectrum));
+            if is_chaotic(&spectrum) {
+                if budget.is_met_by(&spectrum) || is_known {
+                    break spectrum;
+                }
+            } else if is_known && spectrum.is_telling() {
+                // Perhaps on a torus that is known.
+                let kind = self.neither_periodic_nor_chaotic(map, spectrum.clone())?;
+                if !matches!(kind, MotionKind::Undecided { .. }) {
+                    return Ok(kind);
+                }
+            }
+            if measured >= end {
                 break spectrum;
             }
             before = Some(spectrum);
-            target = (2 * target).min(budget.max_periods);
+            target = (measured + exponents.periods()).min(end);
         };
-        if is_chaotic(&spectrum) {
+        let last = exponents.last_spectrum();
+        let mut tori = self.known.chaos.iter().filter(|k| !is_chaotic(k));
+        let is_on_torus = tori.any(|k| k.strobe.agree_with(&last.strobe));
+        if is_chaotic(&spectrum) && stays_chaotic(&last) && !is_on_torus {
             return Ok(self.chaotic(spectrum));
         }
         self.neither_periodic_nor_chaotic(map, spectrum)
+    }
+
+    /// Runs so many periods more, which count.
+    fn record<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        exponents: &mut LyapunovRun,
+        periods: usize,
+    ) -> Result<(), Stop> {
+        for _ in 0..periods {
+            self.step_with(map, exponents)?;
+            exponents.record(&self.state);
+        }
+        Ok(())
     }
 
     fn step_with<M: StroboscopicMap>(
@@ -642,8 +688,7 @@ impl<'a> Run<'a> {
         if let Some(kind) = self.close(map, Guesses::new(last_guesses))? {
             return Ok(kind);
         }
-        // The average of a bounded logarithm is off by its bound over the length.
-        let zero = (3.0 * error).max(10.0 / spectrum.periods as f64);
+        let zero = spectrum.zero();
         if exponent < -zero {
             return Ok(undecided(
                 UndecidedReason::NothingCloses {
@@ -680,11 +725,7 @@ impl<'a> Run<'a> {
         }
         // A torus of one dimension less than the state encloses a volume, which the map
         // would have to keep.
-        let neutral = spectrum
-            .exponents
-            .iter()
-            .take_while(|l| l.abs() <= zero)
-            .count();
+        let neutral = spectrum.neutral_directions();
         let contraction = map.log_determinant_bound();
         if neutral + 1 >= self.d && contraction < 0.0 {
             return Ok(undecided(
@@ -729,8 +770,17 @@ fn longest(options: &ClassifyOptions) -> usize {
 /// A largest exponent positive beyond doubt: by more than five standard errors, and
 /// with a total growth that no start of the frame explains.
 fn is_chaotic(spectrum: &LyapunovSpectrum) -> bool {
+    is_positive(spectrum, CLEAR, 20.0)
+}
+
+/// The same of the last half of a run, whose error is larger by a root of two, and growth half.
+fn stays_chaotic(last: &LyapunovSpectrum) -> bool {
+    is_positive(last, CLEAR * std::f64::consts::FRAC_1_SQRT_2, 10.0)
+}
+
+fn is_positive(spectrum: &LyapunovSpectrum, clear: f64, growth: f64) -> bool {
     let (exponent, error) = spectrum.largest();
-    exponent > CLEAR * error && exponent * spectrum.periods as f64 > 20.0
+    exponent > clear * error && exponent * spectrum.periods as f64 > growth
 }
 
 #[cfg(test)]
@@ -771,7 +821,7 @@ pub(super) mod tests {
     #[test]
     fn a_motion_that_is_watched_may_go_to_an_orbit_that_nobody_knows() {
         let options = ClassifyOptions::default();
-        let watched = |r: f64| watch(&mut Logistic(r), &[0.3], &[], 200, &options);
+        let watched = |r: f64| watch(&mut Logistic(r), &[0.3], Known::default(), 200, &options);
         let Err(RunEnd::Classified(end)) = watched(3.2) else {
             panic!("the orbit was not noticed")
         };

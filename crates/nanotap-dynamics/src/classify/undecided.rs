@@ -87,6 +87,11 @@ pub enum UndecidedReason {
         /// Digits of agreement.
         digits: f64,
     },
+    /// The map itself does not go where its coarse map goes.
+    #[error(
+        "the approximate flow comes to a motion that the exact flow did not confirm from any state tried"
+    )]
+    NotConfirmed,
     /// The work was stopped before this start was done.
     #[error("stopped before it was done")]
     Cancelled,

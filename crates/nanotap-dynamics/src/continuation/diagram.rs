@@ -27,6 +27,8 @@ pub struct DiagramOptions {
     pub continuation: ContinuationOptions,
     /// Doublings to follow from each seed: 0 for none.
     pub doublings: usize,
+    /// Whether a doubled branch ends at its first orbit that is not stable.
+    pub stable_doublings: bool,
     /// Branches after which assembly stops.
     pub max_branches: usize,
 }
@@ -219,6 +221,7 @@ impl Diagram {
     ) {
         let branch = match followed {
             Ok(branch) => branch,
+            Err(_) if control.is_cancelled() => return,
             Err(error) => {
                 self.failures.push((parameter, error.to_string()));
                 return;
@@ -251,7 +254,7 @@ impl Diagram {
             }
             // A few points tell whether the doubled branch is there already.
             let glimpse = ContinuationOptions {
-                max_points: 3,
+                max_points: 4,
                 ..options.continuation.clone()
             };
             match switch_at_flip(family, &flip, &glimpse, control) {
@@ -263,12 +266,17 @@ impl Diagram {
                         continue;
                     }
                 }
+                Err(_) if control.is_cancelled() => return,
                 Err(error) => {
                     self.failures.push((flip.parameter, error.to_string()));
                     continue;
                 }
             }
-            let doubled = switch_at_flip(family, &flip, &options.continuation, control);
+            let doubled = ContinuationOptions {
+                until_unstable: options.stable_doublings,
+                ..options.continuation.clone()
+            };
+            let doubled = switch_at_flip(family, &flip, &doubled, control);
             self.take(
                 family,
                 doubled,

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, Tests, between};
+use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::end::dead_end;
 use crate::continuation::locating::Locating;
 use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
@@ -17,6 +17,10 @@ use crate::orbit::PeriodicOrbit;
 /// Scaled step at which a branch that keeps slipping onto one of shorter period is
 /// taken to have met it.
 const SHORTEST_MEETING: f64 = 1e-6;
+/// How far beyond −1 a multiplier may be at the first point after a flip.
+const FLIP_OVERSHOOT: f64 = 0.5;
+/// Scaled step at which a flip is taken as it is.
+const SHORTEST_FLIP_STEP: f64 = 1e-6;
 
 pub(crate) fn solver_for<'a, F: MapFamily>(
     family: &'a F,
@@ -116,13 +120,18 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         bifurcations: Vec::new(),
         end: BranchEnd::PointLimit,
     };
+    if options.until_unstable && !branch.points[0].orbit.is_stable() {
+        branch.end = BranchEnd::Unstable {
+            parameter: first.parameter,
+        };
+        return Ok(branch);
+    }
     let start = first.clone();
     let mut before = None;
     let mut node = first;
     let mut step = options.initial_step;
     while branch.points.len() < options.max_points {
         if control.is_cancelled() {
-            branch.end = BranchEnd::Cancelled;
             break;
         }
         if let Some(progress) = control.progress {
@@ -179,6 +188,12 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             }
             continue;
         };
+        // A multiplier that passes −1 by far may have passed more flips than can be told.
+        let passes_flip = tests.flip > 0.0 && next_tests.flip < -FLIP_OVERSHOOT;
+        if passes_flip && !is_closed && step > SHORTEST_FLIP_STEP.max(options.min_step) {
+            step *= 0.5;
+            continue;
+        }
         let index = branch.points.len() - 1;
         if let Some((m, at, mut parameter)) = shortest_collapse(solver, &node, &next, taken) {
             // What happens before the meeting still counts.
@@ -207,21 +222,23 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             break;
         }
         let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
-        let found = if options.until_fold {
-            between(solver, nodes, changes, taken, index)
-        } else {
-            locating.between(solver, nodes, changes, taken, index)
-        };
-        branch.take(found, options.range);
-        let folds = |b: &Bifurcation| matches!(b.kind, BifurcationKind::Fold);
-        if options.until_fold && branch.bifurcations.iter().any(folds) {
-            branch.end = BranchEnd::Fold;
+        let found = locating.between(solver, nodes, changes, taken, index);
+        if control.is_cancelled() {
             break;
         }
+        branch.take(found, options.range);
         arclength += taken;
         let reached = point(solver, &next, &next_tests, arclength)?;
         let multiplier = reached.orbit.spectral_radius();
+        let turns = node.slope * next.slope < 0.0;
+        let unstable = turns || !reached.orbit.is_stable();
         branch.points.push(reached);
+        if options.until_unstable && unstable {
+            branch.end = BranchEnd::Unstable {
+                parameter: node.parameter,
+            };
+            break;
+        }
         if multiplier > options.max_multiplier {
             branch.end = BranchEnd::Repelling {
                 parameter: next.parameter,
@@ -243,6 +260,10 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             branch.end = BranchEnd::Closed;
             break;
         }
+    }
+    // The map may have ended the last step.
+    if control.is_cancelled() {
+        branch.end = BranchEnd::Cancelled;
     }
     Ok(branch)
 }

@@ -48,6 +48,9 @@ impl<'scope> Locating<'_, 'scope> {
                 step,
                 after_point,
             );
+            if control.is_cancelled() {
+                return;
+            }
             let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
             found.extend(located);
         });

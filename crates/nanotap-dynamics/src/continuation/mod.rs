@@ -62,8 +62,8 @@ pub struct ContinuationOptions {
     /// Residual, in units of the orbit's scale, at which a stalled Newton iteration
     /// is accepted: the accuracy of the map.
     pub residual_tolerance: f64,
-    /// Whether the branch is left at its first fold.
-    pub until_fold: bool,
+    /// Whether the branch ends at its first orbit that is not stable.
+    pub until_unstable: bool,
     /// The branch is left where a disturbance grows by more than this in the orbit's period.
     pub max_multiplier: f64,
 }
@@ -82,7 +82,7 @@ impl ContinuationOptions {
             state_scale: None,
             parameter_scale: None,
             residual_tolerance: 1e-10,
-            until_fold: false,
+            until_unstable: false,
             max_multiplier: f64::INFINITY,
         }
     }
@@ -163,8 +163,12 @@ pub enum BranchEnd {
         /// Where.
         parameter: f64,
     },
-    /// It was to be left at its first fold.
-    Fold,
+    /// The orbit is no longer stable, and the branch was to end there. The last point is the
+    /// first that is not stable.
+    Unstable {
+        /// The last parameter at which it was stable.
+        parameter: f64,
+    },
     /// Its multipliers passed [`ContinuationOptions::max_multiplier`].
     Repelling {
         /// Where.
@@ -197,9 +201,15 @@ impl BranchEnd {
                 shown(*parameter)
             ),
             Self::Grazing { parameter } => {
-                format!("the orbit ends where it grazes, at {}", shown(*parameter))
+                format!(
+                    "the orbit grazes at {}, where the multipliers of orbits with this contact grow \
+                     without bound",
+                    shown(*parameter)
+                )
             }
-            Self::Fold => "the first fold".into(),
+            Self::Unstable { parameter } => {
+                format!("the orbit is not stable beyond {}", shown(*parameter))
+            }
             Self::Repelling { parameter } => format!(
                 "the orbit repels too strongly to be met beyond {}",
                 shown(*parameter)
@@ -217,7 +227,7 @@ impl BranchEnd {
             | Self::Closed
             | Self::Collapsed { .. }
             | Self::Vanished { .. }
-            | Self::Fold
+            | Self::Unstable { .. }
             | Self::Grazing { .. }
             | Self::Repelling { .. } => false,
             Self::LeftDomain | Self::StepTooSmall { .. } | Self::PointLimit | Self::Cancelled => {

@@ -81,6 +81,7 @@ impl<F: TwoParameterFamily> CurveSolver<'_, F> {
                     }
                 });
             match next {
+                Err(_) if control.is_cancelled() => return Ok((points, CurveEnd::Cancelled)),
                 Err(reason) => {
                     (self.time, self.borders) = saved;
                     step *= 0.5;

@@ -127,6 +127,13 @@ fn over_graph<M: StroboscopicMap>(
         .into_par_iter()
         .with_max_len(1)
         .map(|k| {
+            if control.is_cancelled() {
+                return GlobalValue {
+                    attractors: Vec::new(),
+                    census: None,
+                    failure: None,
+                };
+            }
             let value = match at(k) {
                 Ok(map) => from_census(census_of(&map, &starts(k, &map), &options.census, &quiet)),
                 Err(failure) => GlobalValue {
@@ -245,6 +252,9 @@ fn trials<M: StroboscopicMap>(
     classify: &ClassifyOptions,
     cancelled: impl Fn() -> bool,
 ) -> Vec<Trial> {
+    if cancelled() {
+        return Vec::new();
+    }
     let known = |(k, a): Place| &values[k].attractors[a].attractor;
     let mut maps = pair.map(|k| at(k).ok());
     let mut trials: Vec<Trial> = Vec::new();

@@ -21,7 +21,7 @@ use nalgebra::DMatrix;
 
 pub(crate) use adapted_norm::AdaptedNorm;
 
-use crate::failure::{MapFailure, advance, advance_with_jacobian};
+use crate::failure::{MapFailure, advance_by, advance_with_jacobian};
 use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
 use crate::vector::unit;
@@ -30,15 +30,29 @@ use crate::vector::unit;
 const SHRINK: f64 = 0.75;
 /// Radii tried: down to 1e-10 of the orbit's scale.
 const TRIALS: usize = 80;
+/// Factor by which a block of returns contracts the distance at the samples.
+const BLOCK_RATE: f64 = 0.75;
+/// Radius that is tried first of a block, as a part of the orbit's scale.
+const FIRST_RADIUS: f64 = 1e-3;
+/// Factors between radii tried as long as a block contracts: large ones first.
+const GROWTH: [f64; 2] = [2.0, 1.4];
+/// Pseudo-random directions in which a block is tried, in addition to the axes.
+const DIRECTIONS: usize = 12;
+/// Part of the distance to the nearest other orbit up to which a ball reaches.
+const REACH: f64 = 0.7;
 
 /// A contracting ball around the first state of a stable orbit.
 #[derive(Clone, Debug)]
 pub struct Neighbourhood {
     center: Vec<f64>,
+    /// Drive periods over which it contracts: one return, or a block of them.
     period: usize,
     norm: AdaptedNorm,
     radius: f64,
+    /// Factor by which it contracts in these.
     rate: f64,
+    /// Periods after which a state in it that came no nearer is worth looking at again.
+    retry: usize,
     /// −ln|μ| of the largest multiplier, per period.
     decay: f64,
     /// Half width of the box that holds the ball: a cheap first test.
@@ -57,50 +71,112 @@ impl Neighbourhood {
         map: &mut M,
         orbit: &PeriodicOrbit,
     ) -> Result<Option<Self>, MapFailure> {
-        if !orbit.is_stable() {
-            return Ok(None);
-        }
-        let d = orbit.dimension();
-        let mut work = Return::new(d);
-        let center = orbit.states[0].clone();
-        let monodromy = work.jacobian(map, &center, orbit.period)?.clone();
-        let Some(norm) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
+        let Some(mut ball) = Self::empty(map, orbit)? else {
             return Ok(None);
         };
-        let rate = norm.rate_of_return();
-        let unit_extents = norm.extents();
-        let floor = 10.0 * norm.floor(&center, &work.state);
-        let scale = orbit.scale().max(1e3 * orbit.error);
-        let mut radius = norm.radius(scale);
+        let mut work = Return::new(orbit.dimension());
+        let mut radius = ball.norm.radius(orbit.scale().max(1e3 * orbit.error));
         for _ in 0..TRIALS {
-            if radius < 8.0 * floor {
+            if radius < 8.0 * ball.floor {
                 break;
             }
-            if contracts(
-                map,
-                &center,
-                orbit.period,
-                &norm,
-                radius,
-                rate,
-                floor,
-                &mut work,
-            ) {
-                let radius = SHRINK * radius;
-                return Ok(Some(Self {
-                    extents: unit_extents.iter().map(|e| e * radius).collect(),
-                    center,
-                    period: orbit.period,
-                    norm,
-                    radius,
-                    rate,
-                    decay: -nanotap_arithmetic::ln(orbit.spectral_radius()) / orbit.period as f64,
-                    floor,
-                }));
+            if ball.contracts(map, radius, &mut work) {
+                ball.set_radius(SHRINK * radius);
+                return Ok(Some(ball));
             }
             radius *= SHRINK;
         }
         Ok(None)
+    }
+
+    /// The largest ball in which a block of returns, one decay time long, contracts by
+    /// [`BLOCK_RATE`] at sample points, and that reaches over none of the `others`; `None` if the
+    /// orbit is not stable or none passes.
+    ///
+    /// # Errors
+    /// When the orbit itself cannot be followed.
+    pub(crate) fn over_block<'a, M: StroboscopicMap>(
+        map: &mut M,
+        orbit: &PeriodicOrbit,
+        others: impl Iterator<Item = &'a PeriodicOrbit>,
+    ) -> Result<Option<Self>, MapFailure> {
+        let Some(mut ball) = Self::empty(map, orbit)? else {
+            return Ok(None);
+        };
+        let returns = (1.0 / (ball.decay * orbit.period as f64)).ceil().max(1.0);
+        ball.period = orbit.period.saturating_mul(returns as usize);
+        ball.rate = BLOCK_RATE;
+        ball.retry = ball.period;
+        let size = orbit.scale().max(1e3 * orbit.error);
+        let mut largest = ball.norm.radius(size);
+        for other in others {
+            largest = largest.min(REACH * ball.distance_to(other));
+        }
+        let mut radius = ball.norm.radius(FIRST_RADIUS * size).min(largest);
+        while !ball.block_contracts(map, radius) {
+            radius *= 0.25;
+            if radius < 8.0 * ball.floor {
+                return Ok(None);
+            }
+        }
+        for growth in GROWTH {
+            while growth * radius <= largest && ball.block_contracts(map, growth * radius) {
+                radius *= growth;
+            }
+        }
+        ball.set_radius(radius);
+        Ok(Some(ball))
+    }
+
+    /// The ball of radius 0 around the first state of an orbit, with the rate of one return; `None`
+    /// if the orbit is not stable.
+    fn empty<M: StroboscopicMap>(
+        map: &mut M,
+        orbit: &PeriodicOrbit,
+    ) -> Result<Option<Self>, MapFailure> {
+        if !orbit.is_stable() {
+            return Ok(None);
+        }
+        let center = orbit.states[0].clone();
+        let mut work = Return::new(center.len());
+        let monodromy = work.jacobian(map, &center, orbit.period)?.clone();
+        let Some(norm) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            period: orbit.period,
+            radius: 0.0,
+            rate: norm.rate_of_return(),
+            retry: 1,
+            decay: -nanotap_arithmetic::ln(orbit.spectral_radius()) / orbit.period as f64,
+            extents: vec![0.0; center.len()],
+            floor: 10.0 * norm.floor(&center, &work.state),
+            center,
+            norm,
+        }))
+    }
+
+    fn set_radius(&mut self, radius: f64) {
+        self.radius = radius;
+        self.extents = self.norm.extents();
+        for extent in &mut self.extents {
+            *extent *= radius;
+        }
+    }
+
+    /// Distance of the centre from the nearest state of an orbit.
+    fn distance_to(&self, orbit: &PeriodicOrbit) -> f64 {
+        let distances = orbit.states.iter();
+        let distances = distances.map(|state| self.norm.distance(state, &self.center));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Shrinks the ball if it reaches over an orbit that was found since.
+    pub(crate) fn keep_clear_of(&mut self, orbit: &PeriodicOrbit) {
+        let largest = REACH * self.distance_to(orbit);
+        if self.radius > largest {
+            self.set_radius(largest);
+        }
     }
 
     /// True if `state` lies in the ball.
@@ -144,17 +220,55 @@ impl Neighbourhood {
             return Ok(false);
         }
         scratch.copy_from_slice(state);
-        for _ in 0..self.period {
-            advance(map, scratch)?;
-        }
+        advance_by(map, scratch, self.period)?;
         let before = self.norm.distance(state, &self.center);
         let after = self.norm.distance(scratch, &self.center);
         Ok(after <= self.rate * before || after <= self.floor)
     }
 
+    /// The checks of one return at one radius.
+    fn contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64, work: &mut Return) -> bool {
+        let d = self.center.len();
+        let mut samples = (0..2 * d + 16 + 2 * d).flat_map(|k| [(k, 1.0), (k, 0.5)]);
+        samples.all(|(sample, fraction)| {
+            let point = self.point(sample, radius * fraction);
+            let Ok(jacobian) = work.jacobian(map, &point, self.period) else {
+                return false;
+            };
+            let before = self.norm.distance(&point, &self.center);
+            self.norm.is_contracted_by(jacobian, self.rate)
+                && self.norm.distance(&work.state, &self.center) <= self.rate * before + self.floor
+        })
+    }
+
+    /// Whether a block of returns comes nearer from all samples at one radius.
+    fn block_contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64) -> bool {
+        (0..2 * self.center.len() + DIRECTIONS).all(|sample| {
+            let mut point = self.point(sample, radius);
+            let before = self.norm.distance(&point, &self.center);
+            advance_by(map, &mut point, self.period).is_ok()
+                && self.norm.distance(&point, &self.center) <= self.rate * before + self.floor
+        })
+    }
+
+    /// A sample point so far from the centre.
+    fn point(&self, sample: usize, radius: f64) -> Vec<f64> {
+        let d = self.center.len();
+        let (mut direction, mut offset) = (vec![0.0; d], vec![0.0; d]);
+        sample_direction(sample, &mut direction);
+        self.norm.unit_vector(&direction, &mut offset);
+        let places = self.center.iter().zip(&offset);
+        places.map(|(c, o)| c + radius * o).collect()
+    }
+
     /// Drive periods after which it comes round again.
     pub(crate) fn period(&self) -> usize {
         self.period
+    }
+
+    /// Periods after which a state in it that came no nearer is worth looking at again.
+    pub(crate) fn retry(&self) -> usize {
+        self.retry
     }
 
     /// Periods after which `state` would have come to the ball if it came at the rate of the
@@ -222,43 +336,6 @@ impl Return {
         }
         Ok(&self.product)
     }
-}
-
-/// The checks at one radius.
-fn contracts<M: StroboscopicMap>(
-    map: &mut M,
-    center: &[f64],
-    period: usize,
-    norm: &AdaptedNorm,
-    radius: f64,
-    rate: f64,
-    floor: f64,
-    work: &mut Return,
-) -> bool {
-    let d = center.len();
-    let mut direction = vec![0.0; d];
-    let mut offset = vec![0.0; d];
-    let mut point = vec![0.0; d];
-    for sample in 0..2 * d + 16 + 2 * d {
-        sample_direction(sample, &mut direction);
-        norm.unit_vector(&direction, &mut offset);
-        for fraction in [1.0, 0.5] {
-            for ((p, c), o) in point.iter_mut().zip(center).zip(&offset) {
-                *p = c + radius * fraction * o;
-            }
-            let Ok(jacobian) = work.jacobian(map, &point, period) else {
-                return false;
-            };
-            if !norm.is_contracted_by(jacobian, rate) {
-                return false;
-            }
-            let before = norm.distance(&point, center);
-            if norm.distance(&work.state, center) > rate * before + floor {
-                return false;
-            }
-        }
-    }
-    true
 }
 
 /// The axes both ways, then pseudo-random directions of length 1.
@@ -412,5 +489,101 @@ mod tests {
             square.iter().all(|s| (s - 1.0 / 3.0).abs() < 0.03),
             "{square:?}"
         );
+    }
+
+    /// z → 0.98 e^{iθ} (1 + |z|²/40) z with θ = 1 + 40 |z|² turns faster farther out: near rest 0.98
+    /// contracts, and beyond |z| = 0.9 the distance grows. The shear keeps a single return from
+    /// contracting every vector where a block of them still contracts.
+    #[derive(Clone)]
+    struct Twist;
+
+    impl StroboscopicMap for Twist {
+        type Error = Infallible;
+
+        fn dimension(&self) -> usize {
+            2
+        }
+
+        fn period(&self) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+            let [x, y] = [state[0], state[1]];
+            let square = x * x + y * y;
+            let (sin, cos) = (1.0 + 40.0 * square).sin_cos();
+            let factor = 0.98 * (1.0 + square / 40.0);
+            state[0] = factor * (cos * x - sin * y);
+            state[1] = factor * (sin * x + cos * y);
+            Ok(())
+        }
+
+        fn advance_with_jacobian(
+            &mut self,
+            state: &mut [f64],
+            jacobian: &mut DMatrix<f64>,
+        ) -> Result<(), Infallible> {
+            let step = 1e-7;
+            for j in 0..2 {
+                let [mut up, mut down] = [state.to_vec(), state.to_vec()];
+                up[j] += step;
+                down[j] -= step;
+                self.advance(&mut up)?;
+                self.advance(&mut down)?;
+                for i in 0..2 {
+                    jacobian[(i, j)] = (up[i] - down[i]) / (2.0 * step);
+                }
+            }
+            self.advance(state)
+        }
+    }
+
+    /// A block of ⌈1/−ln 0.98⌉ = 50 returns contracts by 0.98⁵⁰ = 0.36 at rest, and by 3/4 from
+    /// |z| = 0.7, which iterating the factor gives.
+    #[test]
+    fn blocks_contract_farther_out_than_single_returns() {
+        let mut map = Twist;
+        let options = ShootingOptions {
+            residual_tolerance: 1e-6,
+            ..ShootingOptions::default()
+        };
+        let orbit = PeriodicOrbit {
+            states: vec![vec![0.0, 0.0]],
+            error: 1e-3,
+            ..close_orbit(&mut map, &[1e-3, 0.0], 1, &options).unwrap()
+        };
+        let single = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let none = || std::iter::empty::<&PeriodicOrbit>();
+        let block = Neighbourhood::over_block(&mut map, &orbit, none())
+            .unwrap()
+            .unwrap();
+        assert_eq!(block.period(), 50);
+        assert!(
+            block.extents()[0] > 10.0 * single.extents()[0],
+            "{block:?} {single:?}"
+        );
+        let contraction = |from: f64| {
+            let image = |r: f64, _| 0.98 * (1.0 + r * r / 40.0) * r;
+            (0..50).fold(from, image) / from
+        };
+        assert!(contraction(block.extents()[0]) <= 0.75);
+        assert!(
+            block
+                .holds(&mut map, &[0.9 * block.extents()[0], 0.0], &mut [0.0; 2])
+                .unwrap()
+        );
+        // Another orbit in it ends it before that.
+        let other = PeriodicOrbit {
+            states: vec![vec![0.5 * block.extents()[0], 0.0]],
+            ..orbit.clone()
+        };
+        let apart = other.states[0][0];
+        let smaller = Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other));
+        let smaller = smaller.unwrap().unwrap();
+        assert!(smaller.extents()[0] < 0.75 * apart && !smaller.contains(&other.states[0]));
+        let mut cut = block;
+        cut.keep_clear_of(&other);
+        assert!(!cut.contains(&other.states[0]));
+        near(cut.extents()[0], 0.7 * apart);
     }
 }

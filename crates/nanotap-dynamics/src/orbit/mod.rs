@@ -12,7 +12,8 @@ use nanotap_arithmetic::ComplexFunctions as _;
 pub use multipliers::{MultiplierError, Multipliers, Stability};
 pub use search::{OrbitSearch, find_orbits};
 pub use shooting::{
-    DivergenceReason, ShootingError, ShootingOptions, close_orbit, close_orbit_from_points,
+    DivergenceReason, ShootingError, ShootingOptions, check_size, close_orbit,
+    close_orbit_from_points,
 };
 
 use crate::vector::{distance, norm};

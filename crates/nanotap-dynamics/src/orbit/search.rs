@@ -57,7 +57,7 @@ pub fn find_orbits<M: StroboscopicMap>(
                 if control.is_cancelled() {
                     return Vec::new();
                 }
-                let orbits = from_one_start(map, start, search);
+                let orbits = from_one_start(map, start, search, control);
                 control.report(&done, starts.len());
                 orbits
             },
@@ -93,9 +93,13 @@ fn from_one_start<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
     search: &OrbitSearch,
+    control: &Control<'_>,
 ) -> Vec<PeriodicOrbit> {
     let mut found = Vec::new();
     for period in 1..=search.max_period {
+        if control.is_cancelled() {
+            return found;
+        }
         if let Ok(orbit) = close_orbit(map, start, period, &search.shooting) {
             merge(&mut found, orbit);
         }

@@ -63,6 +63,18 @@ pub enum ShootingError {
     /// The guess does not fit the map.
     #[error("bad guess: {0}")]
     BadGuess(String),
+    /// The orbit's Jacobians would take gigabytes.
+    #[error(
+        "an orbit of period {period} in {dimension} variables takes too much memory; its period can be {limit} at most"
+    )]
+    TooLarge {
+        /// Period asked for.
+        period: usize,
+        /// Dimension of the map.
+        dimension: usize,
+        /// Longest period in so many variables.
+        limit: usize,
+    },
     /// The map failed at the guess.
     #[error("the map could not be followed from the guess")]
     Map(#[from] MapFailure),
@@ -154,6 +166,25 @@ pub fn close_orbit_from_points<M: StroboscopicMap>(
     newton.into_minimal_orbit(map, options)
 }
 
+/// Most entries of the Jacobians of all periods of an orbit: Newton keeps several times as many.
+const MAX_ENTRIES: usize = 1 << 24;
+
+/// Refuses an orbit whose Jacobians do not fit into memory.
+///
+/// # Errors
+/// [`ShootingError::TooLarge`].
+pub fn check_size(dimension: usize, period: usize) -> Result<(), ShootingError> {
+    let limit = MAX_ENTRIES / (dimension * dimension).max(1);
+    if period > limit {
+        return Err(ShootingError::TooLarge {
+            period,
+            dimension,
+            limit,
+        });
+    }
+    Ok(())
+}
+
 fn check<M: StroboscopicMap>(
     map: &M,
     values: &[f64],
@@ -166,6 +197,7 @@ fn check<M: StroboscopicMap>(
             "dimension {d} and period {period} must both be at least 1"
         )));
     }
+    check_size(d, period)?;
     if values.len() != rows * d {
         return Err(ShootingError::BadGuess(format!(
             "{} numbers given, {} needed ({rows} states of {d})",

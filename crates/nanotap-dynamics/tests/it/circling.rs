@@ -110,6 +110,7 @@ fn a_branch_that_meets_its_first_orbit_at_another_strobe_is_closed() {
 #[test]
 fn orbits_on_one_closed_branch_are_one_branch_of_the_diagram() {
     let options = DiagramOptions {
+        stable_doublings: false,
         continuation: ContinuationOptions::over(-2.0, 2.0),
         doublings: 2,
         max_branches: 64,

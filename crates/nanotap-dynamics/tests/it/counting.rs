@@ -1,11 +1,11 @@
 //! The census, its fractions, its claims about chaos, and the list of unstable orbits.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, ClassifyOptions, Control, LyapunovOptions, Neighbourhood,
-    OrbitSearch, ShootingOptions, StartBox, StartOutcome, StartSet, census, census_of, find_orbits,
+    AttractorKind, CancelFlag, Census, CensusOptions, ClassifyOptions, Control, LyapunovOptions,
+    Neighbourhood, OrbitSearch, ShootingOptions, StartBox, StartOutcome, StartSet, census,
+    census_of, find_orbits,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -260,7 +260,8 @@ fn slow_decay_is_no_transient_chaos() {
 
 #[test]
 fn a_cancelled_census_says_so_and_progress_is_heard() {
-    let cancel = AtomicBool::new(true);
+    let cancel = CancelFlag::new();
+    cancel.cancel();
     let control = Control {
         cancel: Some(&cancel),
         progress: None,
@@ -275,8 +276,8 @@ fn a_cancelled_census_says_so_and_progress_is_heard() {
     assert!(result.cancelled);
     assert_eq!(result.undecided.len(), 10);
     // Of many starts most are not even laid out.
-    let stop = |_, _| cancel.store(true, Ordering::Relaxed);
-    cancel.store(false, Ordering::Relaxed);
+    let cancel = CancelFlag::new();
+    let stop = |_, _| cancel.cancel();
     let control = Control {
         cancel: Some(&cancel),
         progress: Some(&stop),

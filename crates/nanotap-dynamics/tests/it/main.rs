@@ -11,6 +11,7 @@ mod branching;
 mod circling;
 mod classifying;
 mod closing;
+mod confirming;
 mod counting;
 mod exponents;
 mod properties;

@@ -365,6 +365,7 @@ fn the_logistic_diagram_assembles_from_one_attractor() {
         panic!()
     };
     let options = DiagramOptions {
+        stable_doublings: false,
         continuation: ContinuationOptions::over(1.2, 3.6),
         doublings: 3,
         max_branches: 100,
@@ -426,6 +427,7 @@ fn a_diagram_is_the_same_on_any_number_of_threads() {
         seed(3.7389, 5),
     ];
     let options = DiagramOptions {
+        stable_doublings: false,
         continuation: ContinuationOptions::over(1.2, 3.9),
         doublings: 1,
         max_branches: 100,
@@ -463,6 +465,7 @@ fn mirror_images_are_branches_of_their_own() {
         (1.5, orbit)
     };
     let options = DiagramOptions {
+        stable_doublings: false,
         continuation: ContinuationOptions::over(1.2, 1.9),
         doublings: 0,
         max_branches: 100,

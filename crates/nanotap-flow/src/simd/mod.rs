@@ -192,6 +192,19 @@ pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
     work.run::<Twice<Plain>>()
 }
 
+/// The vector instructions of the inner loops, in words: results are the same with all, times are
+/// not.
+pub fn vector_instructions() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    match (avx512_available(), avx2_available()) {
+        (true, true) => "AVX-512",
+        (false, true) => "AVX2",
+        (_, false) => "without AVX2: piecewise-linear cases take several times as long",
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    "portable"
+}
+
 /// Whether `NANOTAP_ARITHMETIC` in the environment does not ask for less than this machine has.
 #[cfg(target_arch = "x86_64")]
 fn nobody_asks_for(paths: &[&str]) -> bool {

@@ -1,10 +1,10 @@
-"""What an AFM cantilever does when its tip taps a sample.
+"""Simulation of an AFM cantilever whose tip taps a sample.
 
-A `Case` says which cantilever, sample and drive; a function for every command of the
-terminal says what it does: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`,
-`branch`, `approach`, `fit`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`.
-Results carry the names that the terminal's JSON has, as xarray Datasets, objects and lists of
-objects. A `Map` is the exact stroboscopic map itself, for algorithms of one's own.
+A `Case` describes cantilever, sample and drive. There is a function for every command of the
+terminal: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`, `branch`, `approach`, `fit`,
+`window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`. Results are xarray Datasets,
+objects and lists of objects, with the names of the terminal's JSON. A `Map` is the exact
+stroboscopic map, for your own algorithms.
 
 >>> import nanotap
 >>> case = nanotap.Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=3)
@@ -74,7 +74,7 @@ def __getattr__(name: str) -> object:
         try:
             return import_module(f".{name}", __name__)
         except ModuleNotFoundError as error:
-            # An attribute that is missing, so that `help` and `dir` go on without it.
+            # Reported as a missing attribute, so that `help` and `dir` work without it.
             message = f"nanotap.{name} needs {error.name}: pip install {error.name}"
             raise AttributeError(message) from error
     message = f"module 'nanotap' has no attribute {name!r}"

@@ -1,4 +1,4 @@
-"""Arguments as the extension takes them, with the reason where they cannot be."""
+"""Conversion of arguments for the extension, with error messages."""
 
 import json
 import math
@@ -25,7 +25,7 @@ Varied: TypeAlias = (
     "float | str | np.floating[Any] | np.integer[Any] | Mapping[str, Any] | Sequence[float] "
     "| Sequence[str] | npt.NDArray[Any] | xr.DataArray | None"
 )
-# No machine counts further, and the extension takes no more.
+# The extension takes 64-bit numbers.
 _MOST = 2**63 - 1
 
 
@@ -61,7 +61,7 @@ def seed(value: Any) -> int:
 
 
 def number(name: str, value: Any) -> float:
-    """A real number, finite or not: what it may be is for the library to say."""
+    """A real number, finite or not; the library checks its range."""
     if isinstance(value, bool | np.bool_ | str | bytes | complex):
         message = f"{name}: a number is needed, not {value!r}"
         raise TypeError(message)
@@ -89,7 +89,7 @@ def row(name: str, value: Any) -> Floats:
 
 
 def real(value: Any, name: str) -> Floats:
-    """Real numbers, aligned and contiguous: what comes from elsewhere may be neither."""
+    """Real numbers as an aligned, contiguous array, which other packages may not provide."""
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths
@@ -173,12 +173,12 @@ def slice_axis(name: str, value: str | Mapping[str, Any]) -> str:
     return words[0]
 
 
-# Made once: a new one a request takes longer than the request.
+# Made once: making it takes longer than a request.
 _written = json.JSONEncoder(allow_nan=False).encode
 
 
 class _Option(NamedTuple):
-    """What an option takes: kinds of JSON, and that of an array's entries."""
+    """JSON types that an option takes, and the type of an array's entries."""
 
     kinds: frozenset[str]
     entries: str | None
@@ -190,7 +190,7 @@ class _Option(NamedTuple):
 
 @cache
 def _studies() -> dict[str, tuple[str, dict[str, _Option]]]:
-    """What the progress of each study counts, and what its options take."""
+    """The unit of each study's progress, and the types of its options."""
     studies = {}
     for name, _, counted, schema in _nanotap.studies():
         options = json.loads(schema)["properties"].items()
@@ -199,20 +199,20 @@ def _studies() -> dict[str, tuple[str, dict[str, _Option]]]:
 
 
 def counted(study: str) -> str:
-    """What the progress of a study counts."""
+    """The unit of a study's progress."""
     return _studies()[study][0]
 
 
 def request(study: str, options: Mapping[str, Any]) -> str:
-    """What a study is asked for, as JSON.
+    """The request of a study, as JSON.
 
-    A value of the wrong type is a `TypeError`; ranges and words are for the library to refuse.
+    A value of the wrong type is a `TypeError`; the library checks ranges and choices.
     """
     takes = _studies()[study][1]
     given = {
         name: _plain("from_" if name == "from" else name, value, takes[name])
         for name, value in options.items()
-        # Only a number cannot be nothing.
+        # `None` omits an option; for a number it is passed on and refused.
         if value is not None or takes[name].kinds <= {"integer", "number"}
     }
     return _written(given)
@@ -227,7 +227,7 @@ def _kinds(schema: Mapping[str, Any]) -> set[str]:
 
 
 def _plain(name: str, value: Any, takes: _Option) -> Any:
-    """A value as JSON has it."""
+    """A value in JSON."""
     kinds = takes.kinds
     if "boolean" in kinds:
         return bool(value)
@@ -252,12 +252,12 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
 
 
 def _finite(value: float) -> float | str:
-    """JSON has no infinity: its word is refused with what would be right."""
+    """Refuses infinity and NaN, which JSON does not have, with a remedy."""
     return value if math.isfinite(value) else str(value)
 
 
 def names(name: str, value: Any) -> list[str]:
-    """Names, of which one may be a text of its own."""
+    """Names: a single text, or several."""
     given = [value] if isinstance(value, str) else value
     if not isinstance(given, Iterable) or not all(isinstance(v, str) for v in given):
         message = f"{name}: names are needed, not {value!r}"
@@ -301,7 +301,7 @@ def _of_dataset(data: "xr.Dataset") -> dict[str, list[Any]]:
 
 
 def column(name: str, values: Any) -> list[Any]:
-    """Entries of a column: numbers, texts, nothing for what is not a number."""
+    """Entries of a column: numbers or texts; `None` for NaN."""
     array = np.asarray(values)
     if array.ndim != 1:
         message = f"{name}: a row of entries is needed, not an array of {array.ndim} dimensions"

@@ -1,4 +1,4 @@
-"""The case: which cantilever, sample and drive."""
+"""The case: cantilever, sample and drive."""
 
 import json
 import os
@@ -30,7 +30,7 @@ _OTHER_NAMES = {
 }
 
 
-# What `to_dict` has beside the keys: it follows from them.
+# Entries of `to_dict` that follow from the keys.
 _FOLLOWS = {"period", "physical"}
 
 
@@ -42,8 +42,8 @@ class Case:
     `contact_stiffness`, `gap`, `contact_damping`, `drive_frequency`). Physical: the tables
     as dictionaries, with quantities and their units: texts (`"10 nm"`), numbers in SI (`1e-8`), or
     quantities of pint, astropy or unyt. A force curve, `sample={"law": "table", "table": …}`,
-    is the path of a CSV file, or its columns as a dictionary or a pandas table whose keys say the
-    units: `{"gap (nm)": […], "force (nN)": […]}`.
+    is the path of a CSV file, or its columns as a dictionary or a pandas table with units in the
+    names: `{"gap (nm)": […], "force (nN)": […]}`.
 
     >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
     2.6
@@ -57,7 +57,7 @@ class Case:
     21.43
 
     Raises:
-        ValueError: a key or value is not right; the words say which and what would be.
+        ValueError: a key or value is invalid; the message names it and a remedy.
         TypeError: a value is neither number nor text.
     """
 
@@ -74,9 +74,9 @@ class Case:
     def from_file(
         cls, path: Path, *, catalogue: Path | Iterable[Path] = (), **keys: Value
     ) -> "Case":
-        """The case of a file (TOML), with `keys` in place of what it says.
+        """The case of a TOML file, with `keys` replacing its values.
 
-        `catalogue` names files of levers and materials beside the built-in ones.
+        `catalogue` names files with further levers and materials.
         """
         case = cls.__new__(cls)
         case._keys = key_words(keys)
@@ -89,7 +89,7 @@ class Case:
 
     @classmethod
     def from_toml(cls, text: str, *, name: str = "case", **keys: Value) -> "Case":
-        """The case of a TOML text, called `name` where something in it is not right."""
+        """The case of a TOML text, called `name` in error messages."""
         if not isinstance(text, str):
             message = f"text: a TOML text is needed, not {text!r}"
             raise TypeError(message)
@@ -111,7 +111,7 @@ class Case:
         return _again(cls, None, key_words(own) | key_words(keys), [])
 
     def with_(self, **keys: Value) -> "Case":
-        """The same case with some keys changed; `None` takes a key away."""
+        """The same case with some keys changed; `None` removes a key."""
         if not keys:
             return self
         source, _, catalogues = self._core.made_of
@@ -142,8 +142,14 @@ class Case:
 
     @property
     def physical(self) -> Record | None:
-        """What is known of it in SI (frequencies in Hz), if it is a physical case."""
-        physical = self._document.get("physical")
+        """Quantities in SI (frequencies in Hz), if it is a physical case.
+
+        Where the distance is left to a setpoint, it is solved for.
+        """
+        document = self._document
+        if self._core.leaves_distance_to_setpoint:
+            document = Record(json.loads(self._core.document_at_setpoint))
+        physical = document.get("physical")
         return physical if isinstance(physical, Record) else None
 
     @property
@@ -153,14 +159,14 @@ class Case:
 
     @property
     def remarks(self) -> list[tuple[str, str]]:
-        """What was assumed (`note`) and what puts it in doubt (`warning`)."""
+        """Assumptions (`note`) and warnings (`warning`)."""
         return self._core.remarks
 
     @property
     def setpoint_distances(self) -> Record | None:
-        """Every distance at which an orbit has the setpoint amplitude, and which of them the
-        feedback finds (`chosen`); of a physical case with a setpoint and without `gap.tip`,
-        whose distance is solved for when it is first studied. Else `None`.
+        """Every distance at which an orbit has the setpoint amplitude, and the one that the
+        feedback finds (`chosen`), for a physical case with a setpoint and without `gap.tip`,
+        whose distance is solved for when it is first studied. Otherwise `None`.
         """
         text = self._core.setpoint
         return None if text is None else Record(json.loads(text))
@@ -172,7 +178,7 @@ class Case:
 
     @property
     def mapping(self) -> "pd.DataFrame":
-        """Every dimensionless parameter beside the physical quantity that it stands for.
+        """Every dimensionless parameter and the physical quantity that it represents.
 
         Columns: parameter, value, formula, quantity, si, unit. Empty without physical units.
         """
@@ -183,10 +189,10 @@ class Case:
         return table.set_index("parameter")
 
     def to_toml(self) -> str:
-        """The dimensionless case file that says the same.
+        """The equivalent dimensionless case file.
 
         Raises:
-            ValueError: it is an oscillator.
+            ValueError: the case is an oscillator.
         """
         text = self._core.toml
         if text is None:
@@ -195,7 +201,7 @@ class Case:
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything that is known of it, as the terminal's `nanotap case --json`."""
+        """The whole document, as the terminal's `nanotap case --json`."""
         return self._document.to_dict()
 
     def __getattr__(self, name: str) -> Any:
@@ -301,7 +307,7 @@ def _text(path: Path) -> str:
 
 
 def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
-    """`key=value` words by the one name that each key has."""
+    """`key=value` texts with the main name of each key."""
     words: dict[str, str] = {}
     typed: dict[str, str] = {}
     for key, value in keys.items():
@@ -326,7 +332,7 @@ def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
 
 def _written(name: str, value: Any) -> str:
     if value is None:
-        # The key is taken away.
+        # The key is removed.
         return ""
     value = in_si(name, value)
     if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:

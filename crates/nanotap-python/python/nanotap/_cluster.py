@@ -1,8 +1,8 @@
 """Chunks on the workers of a Dask cluster.
 
-A chunk is a pure function of the case, the options and its index: a worker makes the files
-of one and sends them back; only this process writes. A chunk whose worker dies is computed
-again elsewhere, and what is written stays.
+A chunk is a pure function of the case, the options and its index. A worker computes the files
+of a chunk and sends them back; only this process writes. A chunk whose worker dies is computed
+again elsewhere, and written files stay.
 """
 
 import os
@@ -32,13 +32,13 @@ def compute(
     store: str,
     hears: Callable[[int, int], object] | None,
 ) -> bool:
-    """Computes the chunks that `store` lacks; says whether Ctrl-C stopped it.
+    """Computes the chunks missing in `store`; returns whether Ctrl-C stopped it.
 
     Raises:
-        RuntimeError: a chunk lost its worker again and again, or a worker runs another
+        RuntimeError: a chunk lost its worker repeatedly, or a worker runs another
             version.
     """
-    # The client proves that it is there; its functions have no types.
+    # Dask is installed, since there is a client; its functions have no types.
     distributed: Any = import_module("distributed")
     receiver = recipe.receiver(store)
     missing = receiver.missing
@@ -88,7 +88,7 @@ def compute(
 
 
 def _packed(plan: Plan) -> tuple[str, str, Case, str]:
-    """A plan that can be sent, and be a key."""
+    """A plan that can be pickled and used as a key."""
     return (_nanotap.__version__, *plan)
 
 

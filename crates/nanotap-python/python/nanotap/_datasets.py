@@ -74,12 +74,12 @@ def _state_of(entry: Any, name: str) -> list[float]:
 
 
 def open(path: Path) -> "xr.Dataset":
-    """A sweep or basin that the terminal or Python wrote, lazily.
+    """A sweep or basin written by the terminal or Python, loaded lazily.
 
-    Its chunks are read when they are needed: through dask where that is installed.
+    Its chunks are read when needed, through dask if it is installed.
 
     Raises:
-        ValueError: it is not there, or is no dataset of nanotap's.
+        ValueError: it does not exist, or is not a dataset of nanotap.
     """
     import xarray as xr
 
@@ -101,17 +101,17 @@ def open(path: Path) -> "xr.Dataset":
 
 
 def merge(sources: Iterable[Path], out: Path) -> Record:
-    """Puts together what several machines computed of one dataset with `chunk`.
+    """Merges partial datasets computed on several machines with `chunk`.
 
     Args:
-        sources: The datasets, made by the same call with different shares.
-        out: The merged dataset: byte for byte what one machine would have made.
+        sources: The datasets, written by the same call with different values of `chunk`.
+        out: The merged dataset, identical to that of a single machine.
 
     Returns:
-        `path`, `chunks`, `copied` and `missing` (chunks that are in none of them).
+        `path`, `chunks`, `copied` and `missing` (chunks in none of the sources).
 
     Raises:
-        ValueError: one is no dataset, or two do not belong together.
+        ValueError: one is not a dataset, or two do not belong together.
     """
     if isinstance(sources, str | os.PathLike):
         message = "sources: several datasets are needed, as a list"
@@ -122,7 +122,7 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
 
 
 def summary(ds: "xr.Dataset | Path") -> Record:
-    """What the runs of a sweep, or the points of a basin, in a store came to."""
+    """The results of the runs of a sweep, or of the points of a basin, in a store."""
     return Record(json.loads(_nanotap.summary(_path_of(ds))))
 
 
@@ -134,7 +134,7 @@ def window(
     client: "Client | None",
     progress: Progress,
 ) -> "xr.Dataset":
-    """The census at every point, with what its motions mean for imaging."""
+    """The census at every point, with the consequences for imaging."""
     import xarray as xr
 
     request = _arguments.request(
@@ -185,7 +185,7 @@ def _computed(
     client: "Client | None",
     progress: Progress,
 ) -> "xr.Dataset":
-    """Computes what the store lacks, then opens it."""
+    """Computes the missing chunks of the store, then opens it."""
     if client is not None and chunk != "1/1":
         message = f"chunk {chunk}: a client computes all chunks; leave one of them away"
         raise ValueError(message)
@@ -206,9 +206,9 @@ def _computed(
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     del ds.attrs["path"]
-    # What was read is in memory, whatever it was read from.
+    # The data are in memory, so the store is no longer needed.
     ds.close()
-    # It may be written anywhere: how the store compressed it is no longer of use.
+    # It may be written elsewhere; the compression of the store no longer applies.
     ds = ds.drop_encoding()
     if stopped:
         message = "stopped; what was not reached is missing"
@@ -217,7 +217,7 @@ def _computed(
 
 
 def _recipe(plan: "Plan", threads: int | None, progress: Progress) -> "_nanotap.Recipe":
-    """What is to be computed; for basins, the census of their attractors."""
+    """The plan of the computation; for basins, including the census of attractors."""
     study, case, request = plan
     many = _arguments.optional_count("threads", threads)
     with bar(progress if study == "basin" else False, "starts") as show:

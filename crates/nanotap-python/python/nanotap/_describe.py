@@ -1,4 +1,4 @@
-"""What the entries of results are called, and their units."""
+"""Names and units of the entries of results."""
 
 import json
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ _GLOSSARY = json.loads(_nanotap.glossary())
 
 @cache
 def name_in_si(name: str) -> str:
-    """What an entry is called among quantities in SI."""
+    """Name of an entry among quantities in SI."""
     words = _GLOSSARY["model"].get(name, {}).get("words")
     others = (
         si for si, entry in _GLOSSARY["physical"].items() if entry["words"] == words
@@ -30,7 +30,7 @@ def name_in_si(name: str) -> str:
 
 @cache
 def _attributes(name: str) -> dict[str, str]:
-    """`long_name` and `units` of an entry; empty where they are not known."""
+    """`long_name` and `units` of an entry; empty if unknown."""
     physical = name.startswith("physical_")
     words = _GLOSSARY["physical" if physical else "model"]
     inner = name.removeprefix("physical_")
@@ -41,7 +41,7 @@ def _attributes(name: str) -> dict[str, str]:
 
 
 def describe(ds: "xr.Dataset") -> "xr.Dataset":
-    """The same Dataset, every variable with `long_name` and `units` where they are known."""
+    """The same Dataset, every variable with `long_name` and `units` if known."""
     for name, variable in ds.variables.items():
         for key, text in _attributes(str(name)).items():
             variable.attrs.setdefault(key, text)
@@ -50,7 +50,7 @@ def describe(ds: "xr.Dataset") -> "xr.Dataset":
 
 @lru_cache(maxsize=64)
 def _labels(dim: str, names: tuple[str, ...]) -> "PandasIndex":
-    """An index of words, kept: to make one costs more than many a motion."""
+    """A cached index of labels: making one takes longer than many motions."""
     import pandas as pd
     from xarray.indexes import PandasIndex
 
@@ -63,8 +63,8 @@ def dataset(
     attributes: Mapping[str, Any],
 ) -> "xr.Dataset":
     """A described Dataset of variables and coordinates, each as `(dims, values)` or
-    `(dims, values, attributes)`; a plain array is a dimension's own coordinate. Its parts are
-    made ready beforehand, which takes half the time that xarray would.
+    `(dims, values, attributes)`; a plain array is the coordinate of a dimension. Its parts
+    are prepared here, which takes half the time of xarray.
     """
     import pandas as pd
     import xarray as xr
@@ -92,13 +92,13 @@ def dataset(
 
 
 def described(name: str, *, physical: bool) -> tuple[str, str]:
-    """The words for an entry and its unit; empty where there are none."""
+    """Description and unit of an entry; empty if there are none."""
     entry = _GLOSSARY["physical" if physical else "model"].get(name, {})
     return str(entry.get("words", "")), str(entry.get("unit", ""))
 
 
 def case_attributes(case: "Case", title: str) -> dict[str, str]:
-    """What a Dataset says of its origin."""
+    """Attributes of a Dataset that state its origin."""
     from ._nanotap import __version__
 
     return {

@@ -1,7 +1,7 @@
-"""Figures as matplotlib draws them, from the same description that the terminal draws.
+"""Figures drawn by matplotlib from the description that the terminal program draws.
 
-The description is JSON: panels with two axes and layers (lines, points, markers …), with every
-range, colour and letter decided. Nothing here knows what a figure is of.
+The description is JSON: panels with two axes and layers (lines, points, markers …), with all
+ranges, colours and letters resolved. Nothing here depends on the subject of a figure.
 """
 
 import json
@@ -50,7 +50,7 @@ STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
-"""What the figures set of matplotlib; `matplotlib.rc_context(STYLE)` gives it to yours."""
+"""The figures' matplotlib settings; `matplotlib.rc_context(STYLE)` applies them to yours."""
 
 _DASHES: dict[str, Any] = {
     "solid": "-",
@@ -74,12 +74,12 @@ _CORNERS = {
     "bottom-left": "lower left",
     "bottom-right": "lower right",
 }
-# Behind, in the order of the terminal: maps, bands, rules, data, notes.
+# Order of drawing, as in the terminal program: maps, bands, rules, data, notes.
 _DEPTHS = {"heatmap": 0.5, "category-map": 0.5, "band": 0.7, "rule": 1.2, "note": 4}
 
 
 class Picture(Figure):
-    """A matplotlib Figure that a notebook shows without pyplot being set up."""
+    """A matplotlib Figure that a notebook shows without pyplot."""
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
@@ -102,8 +102,8 @@ def page(width: float, height: float, **grid: Any) -> Iterator[tuple[Picture, An
 def draw(
     description: str, axes: Any = None, ax: Any = None, panels: str | None = None
 ) -> Figure:
-    """Draws a figure: on a page of its own, or into `axes` (`ax`), one for each panel; of its
-    panels those whose letters `panels` has.
+    """Draws a figure on a new page, or into `axes` (`ax`), one for each panel; `panels` selects
+    panels by their letters.
 
     Raises:
         ValueError: there are not as many axes as panels, or no such panel.
@@ -166,7 +166,7 @@ def _drawn_at(
             lowest = index + cols >= len(panels)
             _panel(one, panel, last=lowest or not figure["share_x"])
             if lowest:
-                # matplotlib leaves them to the panel beneath, where there is none.
+                # matplotlib leaves them to the panel below, which does not exist here.
                 one.tick_params(labelbottom=True)
             one.annotate(
                 panel["letter"] or "",
@@ -196,7 +196,7 @@ def _panel(axes: "Axes", panel: dict[str, Any], last: bool = True) -> None:
     handles: list[Any] = []
     for layer in panel["layers"]:
         handles += _LAYERS[layer["kind"]](axes, layer) or []
-    # What was drawn may have moved them.
+    # Drawing may have changed them.
     for axis, name in both:
         _limit(axis, name, axes)
     axes.set_ylabel(_label(panel["y"]))
@@ -206,7 +206,7 @@ def _panel(axes: "Axes", panel: dict[str, Any], last: bool = True) -> None:
         axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center")
     rows = _legend(axes, panel["legend"], handles)
     if panel["title"]:
-        # The title stands above a legend that stands above the panel.
+        # The title is above a legend that is above the panel.
         axes.set_title(_text(panel["title"]), pad=4 + 12 * rows)
 
 
@@ -229,9 +229,9 @@ def _limit(axis: dict[str, Any], name: str, axes: "Axes") -> None:
 
 
 def _legend(axes: "Axes", place: str, more: list[Any]) -> int:
-    """Draws the legend; its rows above the panel, if it stands there."""
+    """Draws the legend; in rows if it is above the panel."""
     handles, labels = axes.get_legend_handles_labels()
-    # Layers of the same words share an entry.
+    # Layers with the same label share an entry.
     entries = dict(zip(reversed(labels), reversed(handles), strict=True))
     entries = dict(reversed(entries.items())) | {
         patch.get_label(): patch for patch in more
@@ -258,14 +258,14 @@ def _legend(axes: "Axes", place: str, more: list[Any]) -> int:
     legend = axes.legend(entries.values(), entries.keys(), **settings)
     for handle in legend.legend_handles:
         if isinstance(handle, mpl.collections.PathCollection):
-            # A dot that is seen, however small those of the cloud.
+            # A visible dot, however small those of the cloud are.
             handle.set_sizes([max(6.0, *handle.get_sizes())])
     above = place == "above"
     return -(-len(entries) // _columns_above(axes, entries)) if above else 0
 
 
 def _columns_above(axes: "Axes", entries: dict[str, Any]) -> int:
-    """As many columns as the panel is wide, with letters of about half their height."""
+    """Number of columns that fit, for letters half as wide as high."""
     bounds = axes.get_position()
     width = 72 * bounds.width * axes.figure.get_figwidth()
     columns = [30 + 3.6 * len(words) for words in entries]

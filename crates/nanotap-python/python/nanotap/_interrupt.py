@@ -6,9 +6,9 @@ R = TypeVar("R")
 
 
 class Interrupted(KeyboardInterrupt, Generic[R]):
-    """Ctrl-C stopped the work; `result` is what was finished until then.
+    """Ctrl-C stopped the computation; `result` is the finished part.
 
-    A notebook still has it afterwards: `import sys; sys.last_value.result`.
+    In a notebook it remains available: `import sys; sys.last_value.result`.
     """
 
     def __init__(self, message: str, result: R) -> None:

@@ -1,4 +1,4 @@
-"""The stroboscopic map of a case, for algorithms of one's own."""
+"""The stroboscopic map of a case, for your own algorithms."""
 
 import json
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ from ._record import Record
 
 
 class Map:
-    """The exact map of a case from the state at drive phase 0 to that one drive period later.
+    """The exact map of a case from the state at drive phase 0 to the state one period later.
 
-    A state is (a₁ … a_N, ȧ₁ … ȧ_N) of a cantilever and (x, ẋ) of an oscillator, in the model's
-    units; `state_names` says which. Where a state is taken, an array of them will do: the last
-    axis is that of the state, the others stay. A map does not change: threads may share one,
-    and it can be pickled. While it works, other Python threads run.
+    A state is (a₁ … a_N, ȧ₁ … ȧ_N) for a cantilever and (x, ẋ) for an oscillator, in the model's
+    units; `state_names` lists the entries. Every function that takes a state also takes an array
+    of states, whose last axis is that of the state. A map is immutable: threads may share it, and
+    it can be pickled. It releases the interpreter lock while it computes.
 
     >>> case = Case.paper(omega=3)
     >>> map = Map(case)
@@ -31,7 +31,7 @@ class Map:
     ((6, 6), (6,))
 
     Args:
-        case: Whose map. A distance that it leaves to a setpoint is solved for.
+        case: The case. A distance that follows from a setpoint is solved for.
         **keys: Keys of the case to change.
     """
 
@@ -47,7 +47,7 @@ class Map:
 
     @property
     def dimension(self) -> int:
-        """How many numbers a state has."""
+        """Number of entries of a state."""
         return self._core.dimension
 
     @property
@@ -63,14 +63,14 @@ class Map:
     def __call__(
         self, z: npt.ArrayLike, periods: int = 1, *, threads: int | None = None
     ) -> Floats:
-        """The states that come of `z` after so many drive periods.
+        """The states that `z` reaches after `periods` drive periods.
 
-        Many states are spread over all cores, or `threads` threads; the same numbers come out
-        whatever their count.
+        Many states are distributed over all cores, or `threads` threads; the result does not
+        depend on their number.
 
         Raises:
-            ValueError: `z` is no state and no array of them.
-            RuntimeError: a motion could not be followed; the words say which.
+            ValueError: `z` is neither a state nor an array of states.
+            RuntimeError: a motion could not be followed; the message names it.
         """
         rows, shape = self._rows(z)
         found = self._core.apply(
@@ -79,10 +79,10 @@ class Map:
         return found.reshape(shape)
 
     def iterate(self, z: npt.ArrayLike, periods: int, *, every: int = 1) -> Floats:
-        """`z` and what comes of it at the end of `every` so many of the next drive periods.
+        """`z` and the states that it reaches after every `every` drive periods.
 
         Returns:
-            `periods // every + 1` rows, the first of them `z`.
+            `periods // every + 1` rows, the first of which is `z`.
         """
         every = _arguments.count("every", every, 1)
         many = _arguments.count("periods", periods) // every + 1
@@ -109,14 +109,14 @@ class Map:
 
         Args:
             z: States.
-            key: A key of the case, `"alpha4"`, `"sample.stiffness"`, or several. Of a physical
-                quantity the derivative is per SI unit; what else stays is what stays when that
-                quantity is varied in a sweep.
+            key: A key of the case, `"alpha4"`, `"sample.stiffness"`, or several. For a physical
+                quantity the derivative is per SI unit, with the same quantities constant as when
+                that quantity is varied in a sweep.
             periods: k.
-            threads: Of many states: threads; without it, one a core.
+            threads: Number of threads for many states; default: one per core.
 
         Returns:
-            `… × n`; of several keys `… × n × keys`.
+            `… × n`; for several keys `… × n × keys`.
         """
         rows, shape = self._rows(z)
         keys = [key] if isinstance(key, str) else list(key)
@@ -125,12 +125,12 @@ class Map:
         return found.reshape(shape if isinstance(key, str) else (*shape, len(keys)))
 
     def orbit(self, z0: npt.ArrayLike, period: int = 1) -> "PeriodicOrbit":
-        """The periodic orbit that Newton finds near the motion from `z0`, stable or not.
+        """The periodic orbit that Newton's method finds from `z0`, stable or not.
 
-        `nanotap.orbit(case, state=…)` tells what would be observed of it.
+        `nanotap.orbit(case, state=…)` also computes its observables.
 
         Raises:
-            RuntimeError: there is none, or none that is isolated to rounding.
+            RuntimeError: no orbit was found, or none that is isolated to rounding.
         """
         many = _arguments.count("period", period, 1)
         states, multipliers, stability, residual, error = self._core.orbit(
@@ -147,13 +147,12 @@ class Map:
 
         Args:
             z: One state.
-            tau: When to look: a time or an array of them, in the model's unit; 0 is drive
-                phase 0.
-            start: When the motion begins, within the first drive period.
+            tau: A time or an array of times, in the model's unit; 0 is drive phase 0.
+            start: Time at which the motion begins, within the first drive period.
 
         Returns:
-            The motion: at the times `tau` as its entries, at any other in between by calling
-            it.
+            The motion. Its entries are those at the times `tau`; call it for other times in
+            between.
         """
         return Motion(self, self._one(z, "z"), tau, _arguments.number("start", start))
 
@@ -201,7 +200,7 @@ class PeriodicOrbit:
 
     @property
     def state(self) -> Floats:
-        """Its first state."""
+        """The first of its states."""
         first: Floats = self.states[0]
         return first
 
@@ -212,22 +211,22 @@ class PeriodicOrbit:
 
 
 class Motion:
-    """A motion between its strobes, known in closed form at every instant.
+    """A motion between its strobes, in closed form at every time.
 
-    Its entries are those at the times that were asked for; calling it gives the same at
-    others. Numbers in the model's units.
+    Its entries are those at the requested times; calling it gives them at other times. Numbers
+    are in the model's units.
 
     Attributes:
         tau: The times, 0 at drive phase 0.
         state: States there, `… × n`.
-        tip: Tip deflection W, of an oscillator x.
+        tip: Tip deflection W; for an oscillator x.
         tip_rate: Its rate.
         gap: Height V_T of the tip over the undeformed surface.
         force: Force of the sample on the tip.
-        guard: What ends the present regime by falling to zero: in flight the gap, in contact
-            what keeps the contact.
+        guard: The quantity that ends the present regime when it falls to zero: in flight the gap,
+            in contact the condition of contact.
         contact: Whether tip and sample touch.
-        events: Contacts begun and ended: `tau`, `kind`, `gap_rate`.
+        events: Beginnings and ends of contacts: `tau`, `kind`, `gap_rate`.
     """
 
     __slots__ = (
@@ -264,7 +263,7 @@ class Motion:
         self._look(times)
 
     def __call__(self, tau: npt.ArrayLike) -> "Motion":
-        """The same motion seen at other times."""
+        """The same motion at other times."""
         times = _arguments.real(tau, "tau")
         seen = Motion.__new__(Motion)
         seen._made_of, seen._core, seen.events = self._made_of, self._core, self.events

@@ -19,9 +19,9 @@ from ._results import Modes, Orbit
 if TYPE_CHECKING:
     import xarray as xr
 
-# Periods of a time series that nobody asked for in full.
+# Largest number of periods of a time series by default.
 _SHOWN_PERIODS = 100
-# Rows that a time series may have: 800 MB at N = 3.
+# Largest number of rows of a time series: 800 MB at N = 3.
 _MOST_ROWS = 8_000_000
 
 
@@ -50,7 +50,7 @@ def simulate(
     progress: Progress,
     parameters: Mapping[str, Any],
 ) -> "xr.Dataset":
-    """One run, or one for each value of the arrays among `parameters`."""
+    """One run, or one for each value of the arrays in `parameters`."""
     case, varied = _split(case, options, parameters)
     states = _states(options)
     if varied or states is not None:
@@ -79,7 +79,7 @@ def orbit(
     progress: Progress,
     parameters: Mapping[str, Any],
 ) -> "Orbit | xr.Dataset":
-    """A periodic orbit, or one for each value of the arrays among `parameters`."""
+    """A periodic orbit, or one for each value of the arrays in `parameters`."""
     case, varied = _split(case, options, parameters)
     states = _states(options)
     if varied or states is not None:
@@ -99,14 +99,14 @@ def orbit(
 
 
 def _document(text: str) -> dict[str, Any]:
-    """A document without what the caller has: the case and the version."""
+    """A document without the case and the version, which the caller has."""
     document: dict[str, Any] = json.loads(text)
     del document["case"], document["version"]
     return document
 
 
 def words(names: Sequence[str]) -> "np.typing.NDArray[np.str_]":
-    """Labels as numpy holds them: in a plain list, "a1" would be taken for a type."""
+    """Labels as a numpy array: in a list, "a1" would be taken for a type."""
     return np.array(names, dtype=str)
 
 
@@ -164,7 +164,7 @@ def _columns(names: list[str], values: Floats) -> tuple[dict[str, Any], dict[str
 def _recorded(
     document: dict[str, Any], entries: list[str]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and coordinates of strobe points and events, which leave the document."""
+    """Variables and coordinates of strobe points and events, removed from the document."""
     strobe = np.array(document.pop("strobe"), dtype=float).reshape(-1, len(entries))
     events = document.pop("events")
     variables = {
@@ -198,7 +198,7 @@ def _run_dataset(
 def _variables(
     document: Mapping[str, Any], entries: list[str]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The entries of a document as variables, and those that are words to be read."""
+    """The entries of a document as variables, and its text entries."""
     variables: dict[str, Any] = {}
     attributes: dict[str, Any] = {}
     for name, value in document.items():
@@ -214,13 +214,13 @@ def _variables(
             variables["energy"] = index
         elif isinstance(value, Mapping):
             inner, _ = _variables(value, entries)
-            # What has a shape of its own belongs to single results.
+            # Entries with their own shape are available for single results only.
             flat = {key: entry for key, entry in inner.items() if entry[0] == ()}
             variables |= {f"{name}_{key}": entry for key, entry in flat.items()}
         elif isinstance(value, list):
             variable = _vector(name, value, entries)
             if variable is not None:
-                # `state` is the dimension along which states lie.
+                # `state` is the dimension of the entries of a state.
                 variables["orbit_state" if name == "state" else name] = variable
         elif isinstance(value, bool | str):
             variables[name] = ((), value)
@@ -263,7 +263,7 @@ def _fixed_step(
 
 
 def _states(options: Mapping[str, Any]) -> Floats | None:
-    """Several initial states, a row each; `None` where there is one or none."""
+    """Several initial states, one per row; `None` if there is one or none."""
     if options["state"] is None:
         return None
     states = _arguments.real(options["state"], "state")
@@ -284,7 +284,7 @@ def _over(
     threads: int | None,
     progress: Progress,
 ) -> "xr.Dataset":
-    """A Dataset over the product of arrays, or over the dimensions of DataArrays; of several
+    """A Dataset over the product of arrays, or over the dimensions of DataArrays; with several
     initial states also over `start`."""
     import xarray as xr
 
@@ -307,7 +307,7 @@ def _over(
     rows = [array.values.ravel().tolist() for array in broadcast.values()]
     named = [dict(zip(broadcast, row, strict=True)) for row in zip(*rows, strict=True)]
     named = named or [{} for _ in range(first.size)]
-    # What is wrong with a key is said of the first.
+    # An error in a key is reported for its first value.
     case.with_(**named[0])
     texts = [key_words(keys) for keys in named]
     asked = requests if order is None else [requests[k] for k in order]
@@ -343,7 +343,7 @@ def _over(
             told = {"long_name": "initial state", "units": "model units"}
             variables["initial_state"] = (("start", "state"), states, told)
             coords["state"] = words(entries)
-    # What the case says of a parameter that varies does not matter.
+    # The value in the case of a parameter that varies does not matter.
     attributes = case_attributes(case, noun) | {"over": json.dumps(list(varied))}
     ds = dataset(variables, coords, attributes)
     if interrupted:
@@ -359,7 +359,7 @@ def _coords(
     names: Mapping[str, list[str]],
     options: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """The coordinates of results over arrays: those of the arrays, and those within entries."""
+    """The coordinates of results over arrays: of the arrays, and of the entries."""
     coords: dict[str, Any] = {}
     for key, array in arrays.items():
         for name, coord in array.coords.items():

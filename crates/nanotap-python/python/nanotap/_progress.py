@@ -1,4 +1,4 @@
-"""Progress bars, where tqdm is installed and somebody looks."""
+"""Progress bars, if tqdm is installed and output is shown."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -9,13 +9,13 @@ from typing import Any
 
 from ._arguments import Progress
 
-# Nothing is said of work shorter than this, in seconds.
+# Shorter computations show no progress, in seconds.
 _PATIENCE = 0.7
 
 
 @contextmanager
 def bar(progress: Progress, noun: str) -> Iterator[Callable[[int, int], object] | None]:
-    """What hears of progress: a bar of tqdm's, the caller's own function, or nothing.
+    """The receiver of progress: a bar of tqdm, the caller's function, or none.
 
     `None` shows a bar on a terminal and in a notebook, `True` everywhere.
     """
@@ -52,7 +52,7 @@ def _somebody_looks() -> bool:
 
 
 def _tqdm() -> Any:
-    """tqdm's bar: of widgets in a notebook that has them, else of letters."""
+    """tqdm's bar: a widget in a notebook that supports it, otherwise text."""
     if "ipykernel" in sys.modules and find_spec("ipywidgets"):
         return import_module("tqdm.notebook").tqdm
     return import_module("tqdm").tqdm

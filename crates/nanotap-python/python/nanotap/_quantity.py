@@ -1,4 +1,4 @@
-"""Values of a case's keys: numbers in SI, texts with a unit, quantities of a package of units."""
+"""Values of a case's keys: numbers in SI, texts with a unit, quantities of a units package."""
 
 from typing import Any
 
@@ -14,12 +14,12 @@ _UNITS = {
 
 
 def si_unit(key: str) -> str:
-    """The SI unit of a key by its path, `gap.tip`; empty of a number."""
+    """The SI unit of a key given by its path, `gap.tip`; empty if it is dimensionless."""
     return _UNITS.get(key, "")
 
 
 def in_si(key: str, value: Any) -> Any:
-    """A quantity of pint, astropy or unyt as numbers in the key's SI unit; else the value."""
+    """A quantity of pint, astropy or unyt as numbers in the key's SI unit; otherwise the value."""
     if isinstance(value, str | int | float | list | tuple) or not hasattr(value, "to"):
         return value
     unit = si_unit(key)
@@ -28,19 +28,19 @@ def in_si(key: str, value: Any) -> Any:
             return value.to_value(unit)
         if hasattr(value, "magnitude"):
             return value.to(unit).magnitude
-    except Exception as error:  # each package has errors of its own
+    except Exception as error:  # each package has its own errors
         message = f"{key}: {value!r} has no value in {unit or 'plain numbers'}: {error}"
         raise ValueError(message) from error
     return value
 
 
 def text(key: str, value: float) -> str:
-    """A number as the case reads it: with the SI unit that the key has."""
+    """A number as text with the SI unit of the key."""
     return f"{value!r} {si_unit(key)}".rstrip()
 
 
 def many(key: str, value: Any) -> Any:
-    """Values of a key, one a place: numbers in SI, or texts."""
+    """Values of a key, one per place: numbers in SI, or texts."""
     if isinstance(value, list | tuple) and any(hasattr(one, "to") for one in value):
         value = [in_si(key, one) for one in value]
     return np.asarray(in_si(key, value))

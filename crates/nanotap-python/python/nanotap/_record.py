@@ -15,7 +15,7 @@ class Record(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         value = self._entries[name]
         if isinstance(value, dict | list):
-            # Wrapped when it is looked at: most of a document never is.
+            # Wrapped on access, since most of a document is never accessed.
             value = self._entries[name] = _wrapped(value)
         return value
 
@@ -45,12 +45,12 @@ class Record(Mapping[str, Any]):
         return Record, (self.to_dict(),)
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as plain dictionaries and lists."""
+        """The entries as plain dictionaries and lists."""
         return {key: _plain(value) for key, value in self._entries.items()}
 
 
 def _wrapped(value: Any) -> Any:
-    # JSON has no other kinds, and whether something is a Mapping takes long to ask.
+    # JSON has no other types, and testing for a Mapping is slow.
     if type(value) is dict:
         return Record(value)
     if type(value) is list and value and type(value[0]) not in (float, int, str):

@@ -1,4 +1,4 @@
-"""What results are: objects with the names of the terminal's JSON."""
+"""Results: objects with the names of the terminal's JSON."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 
 class Fit(Record):
-    """What a fit found, by the names of the terminal's JSON."""
+    """The result of a fit, with the names of the terminal's JSON."""
 
     __slots__ = ()
 
     @property
     def best(self) -> dict[str, float]:
-        """The best values by key; of parameters one a curve, `key of curve`."""
+        """The best values by key; for parameters with one value per curve, `key of curve`."""
         return {_of_curve(p): float(p["value"]) for p in self["parameters"]}
 
     @property
     def errors(self) -> dict[str, float]:
-        """Their standard errors; not a number where the data do not determine them."""
+        """Their standard errors; NaN where the data do not determine them."""
         return {
             _of_curve(p): math.nan
             if p["standard_error"] is None
@@ -41,10 +41,10 @@ class Fit(Record):
         }
 
     def best_case(self, curve: str | None = None) -> "Case":
-        """The case of the best fit; where parameters are one a curve, that of `curve`.
+        """The case of the best fit; if parameters differ between curves, that of `curve`.
 
         Raises:
-            KeyError: there is no such curve.
+            KeyError: no curve has this name.
         """
         from ._case import Case
 
@@ -54,12 +54,12 @@ class Fit(Record):
         return Case.from_toml(files[curve])
 
     def compared(self) -> "pd.DataFrame":
-        """The contact laws that were compared, a row each: `fits`, `aic`, `bic`, `above_best`,
-        `weight` …; empty where none were asked for.
+        """The compared contact laws, one per row: `fits`, `aic`, `bic`, `above_best`,
+        `weight` …; empty if none were requested.
 
-        A smaller criterion says which of these laws describes these data better for its
-        parameters, by more than chance from a difference of some ten on. It is no proof that
-        a law is right.
+        The law with the smaller criterion describes the data better for its number of
+        parameters; a difference of some ten is more than chance. It does not prove that a law
+        is right.
         """
         import pandas as pd
 
@@ -86,7 +86,7 @@ def _of_curve(parameter: Mapping[str, Any]) -> str:
 
 
 def floats(value: Sequence[Any]) -> Floats:
-    """Numbers of a document; what it could not say as a number is not one."""
+    """Numbers of a document; `null` becomes NaN."""
     return np.array(value, dtype=np.float64)
 
 
@@ -98,10 +98,10 @@ def pairs(value: Sequence[Sequence[float]]) -> npt.NDArray[np.complex128]:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Result:
-    """A result: its chief entries are fields, the others are found by their names too.
+    """A result: its main entries are fields, the others are accessible by name too.
 
     Attributes:
-        document: Everything, as the terminal's JSON has it.
+        document: The whole document, as in the terminal's JSON.
     """
 
     document: Record = field(kw_only=True)
@@ -111,7 +111,7 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any], **beside: Any) -> Self:
-        """The result that a document tells of; `beside` is what no document holds."""
+        """The result of a document; `beside` has fields that are not in the document."""
         record = document if isinstance(document, Record) else Record(document)
         values: dict[str, Any] = {"document": record, **beside}
         for name in cls.__dataclass_fields__:
@@ -153,7 +153,7 @@ class Modes(Result):
     """Frequencies Ω and mode shapes, free and in contact; Galerkin and of the beam itself.
 
     Attributes:
-        modes: How many modes.
+        modes: Number of modes.
         free: Frequencies in free flight (N, Ω).
         contact: Frequencies in contact (N, Ω).
         exact_free: Those of the beam itself, in free flight (N, Ω).
@@ -171,7 +171,7 @@ class Modes(Result):
     _arrays = frozenset({"free", "contact", "exact_free", "exact_contact"})
 
     def table(self) -> "pd.DataFrame":
-        """A row a mode."""
+        """One row per mode."""
         import pandas as pd
 
         columns = {
@@ -188,8 +188,8 @@ class Modes(Result):
 
 
 class _Observed:
-    """What is observed of an orbit, in the model's units: found in its document, where only what
-    was asked for is.
+    """Observables of an orbit, in the model's units, from its document, which has only the
+    requested ones.
     """
 
     tip_max: float
@@ -230,7 +230,7 @@ class _Observed:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Orbit(_Observed, Result):
-    """A periodic orbit, closed by Newton, with its stability and what is observed of it.
+    """A periodic orbit, closed by Newton's method, with its stability and observables.
 
     Attributes:
         period: Minimal period in drive periods.
@@ -242,25 +242,25 @@ class Orbit(_Observed, Result):
         stable: Whether every multiplier is inside the unit circle.
         stability: stable, unstable or marginal.
         events: Contacts begun and ended: `tau`, `kind`, `gap_rate`.
-        tip_max: Greatest tip deflection W (g0).
-        tip_min: Least tip deflection W (g0).
-        amplitude: Half of peak to peak of W (g0).
-        contact_fraction: Part of the time in contact.
-        peak_force: Greatest force of the sample on the tip (EI g0/L³).
-        energy_balance: Energy fed and drained: `drive_work`, `beam_damping`,
+        tip_max: Largest tip deflection W (g0).
+        tip_min: Smallest tip deflection W (g0).
+        amplitude: Half of the peak-to-peak value of W (g0).
+        contact_fraction: Contact time / period.
+        peak_force: Largest force of the sample on the tip (EI g0/L³).
+        energy_balance: Energy input and losses: `drive_work`, `beam_damping`,
             `sample_damping`, `stored`, `residual`.
         harmonics: Components: `order`, `tip`, `tip_phase`, `force`, `force_phase`,
             `slope`.
-        thd: Part of the tip deflection's power outside the drive's frequency.
+        thd: Fraction of the tip deflection's power outside the drive's frequency.
         phase: Phase lag of the tip deflection behind the drive, degrees.
         first_harmonic: Amplitude of the tip deflection at the drive's frequency (g0).
-        physical: The same in SI, if the case is physical.
-        derivatives: Derivatives by the keys that were asked for: `state`, the
+        physical: Observables in SI, if the case is physical.
+        derivatives: Derivatives by the requested keys: `state`, the
             observables, `physical`.
-        proof: The theorem, if one was asked for: `proved`, `statement`, and if it was
-            proved enclosures of `state`, `switches` and `multipliers`, `stability`,
+        proof: Result of the proof, if requested: `proved`, `statement`, and if proved
+            enclosures of `state`, `switches` and `multipliers`, `stability`,
             `unique_within`.
-        made_series: What makes the time series.
+        made_series: Function that computes the time series.
 
     Lengths and forces are in the model's units; `physical` has them in SI.
     """
@@ -288,20 +288,20 @@ class Orbit(_Observed, Result):
 
     @property
     def series(self) -> "xr.Dataset | None":
-        """One repetition as a time series over `tau`; of an orbit found by `orbit`."""
+        """One repetition as a time series over `tau`, for an orbit computed by `orbit`."""
         made = self.made_series
         if callable(made):
             made = made()
-            # A frozen object may still remember what it worked out.
+            # A frozen object may cache a result.
             object.__setattr__(self, "made_series", made)
         return made
 
     @property
     def series_in_si(self) -> "xr.Dataset":
-        """The same in SI: `tau` in s, `tip` and `gap` in m, `force` in N …
+        """The time series in SI: `tau` in s, `tip` and `gap` in m, `force` in N …
 
         Raises:
-            ValueError: the case is not a physical one, or the orbit has no time series.
+            ValueError: the case is not physical, or the orbit has no time series.
         """
         from ._si import in_si
 
@@ -315,7 +315,7 @@ class Orbit(_Observed, Result):
 
     @property
     def spectral_radius(self) -> float:
-        """Largest modulus of a multiplier: below 1 the orbit attracts."""
+        """Largest modulus of a multiplier; below 1 the orbit is stable."""
         return float(np.abs(self.multipliers).max())
 
     def spectrum(self) -> "pd.DataFrame":
@@ -333,14 +333,18 @@ class Orbit(_Observed, Result):
         return plot.orbit(self, **options)
 
     def __repr__(self) -> str:
+        # Of chosen observables these two need not be there.
+        low, high = (getattr(self, end, None) for end in ("tip_min", "tip_max"))
+        swing = "" if low is None and high is None else (
+            f", W from {_number(low)} to {_number(high)}"
+        )
         return (
             f"Orbit(period={self.period}, {self.stability}, largest multiplier "
-            f"{_number(self.spectral_radius)}, W from {_number(self.tip_min)} to "
-            f"{_number(self.tip_max)})"
+            f"{_number(self.spectral_radius)}{swing})"
         )
 
     def _repr_html_(self) -> str:
-        """A table for notebooks: in SI where the case is physical."""
+        """A table for notebooks, in SI if the case is physical."""
         from ._describe import described
 
         shown = self.physical if self.physical is not None else self.document
@@ -367,23 +371,23 @@ def _orbit_again(document: Mapping[str, Any], series: "xr.Dataset | None") -> Or
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Attractor(Result):
-    """A motion that others go to: an orbit, a torus or chaos.
+    """An attractor: an orbit, a torus or chaos.
 
     Attributes:
         classification: periodic, quasi-periodic or chaotic.
-        fraction: Part of the starts that go there.
+        fraction: Fraction of the initial states that lead to it.
         lyapunov: Lyapunov exponents per drive period (n).
-        evidence: Why it was named so.
-        count: How many starts went there.
-        period: Minimal period, of an orbit.
+        evidence: Evidence for the classification.
+        count: Number of initial states that lead to it.
+        period: Minimal period of an orbit, in drive periods.
         state: A state on it, at drive phase 0 (n).
         states: States at phase 0 of all periods of an orbit (period × n).
-        multipliers: Floquet multipliers, of an orbit (n).
-        tip_max: Greatest tip deflection W (g0).
-        tip_min: Least tip deflection W (g0).
-        amplitude: Half of peak to peak of W (g0).
-        contact_fraction: Part of the time in contact.
-        proof: The theorem on an orbit, if one was asked for, as of an `Orbit`.
+        multipliers: Floquet multipliers of an orbit (n).
+        tip_max: Largest tip deflection W (g0).
+        tip_min: Smallest tip deflection W (g0).
+        amplitude: Half of the peak-to-peak value of W (g0).
+        contact_fraction: Contact time / period.
+        proof: Result of the proof for an orbit, if requested, as in `Orbit`.
     """
 
     classification: str
@@ -406,7 +410,7 @@ class Attractor(Result):
 
     @property
     def name(self) -> str:
-        """What it is called: `period 4`, `chaotic`."""
+        """Name of the motion: `period 4`, `chaotic`."""
         return f"period {self.period}" if self.period else self.classification
 
     def __repr__(self) -> str:
@@ -417,7 +421,7 @@ class Attractor(Result):
 
 
 class Attractors(Sequence[Attractor]):
-    """A census: the attractors as a sequence, the largest first, and what else it found."""
+    """A census: the attractors as a sequence, largest share first, and its other results."""
 
     def __init__(self, case: "Case", document: Mapping[str, Any]) -> None:
         self.case = case
@@ -448,20 +452,20 @@ class Attractors(Sequence[Attractor]):
 
     @property
     def undecided(self) -> list[Record]:
-        """Starts of which nothing could be shown: `start`, `state`, `reason`."""
+        """Initial states that were not classified: `start`, `state`, `reason`."""
         return list(self.document["undecided"])
 
     @property
     def unstable(self) -> list[Orbit]:
-        """Unstable orbits, if they were asked for."""
+        """Unstable orbits, if requested."""
         return [Orbit.of(entry) for entry in self.document.get("unstable") or []]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as the terminal's `nanotap attractors --json`."""
+        """The whole document, as the terminal's `nanotap attractors --json`."""
         return self.document.to_dict()
 
     def table(self) -> "pd.DataFrame":
-        """A row an attractor."""
+        """One row per attractor."""
         import pandas as pd
 
         columns = [
@@ -499,13 +503,13 @@ class Lyapunov(Result):
     """A Lyapunov spectrum with error bars, and a Poincaré section.
 
     Attributes:
-        classification: What the motion is.
-        exponents: Exponents per drive period, the largest first (n).
-        errors: Their standard errors (n).
-        sum: Their sum.
+        classification: Kind of the motion.
+        exponents: Exponents per drive period, largest first (n).
+        errors: Standard errors of the exponents (n).
+        sum: Sum of the exponents.
         sum_by_trace: The same from the trace of the equations and the time in contact.
-        kaplan_yorke_dimension: Of the attractor's section.
-        evidence: Why the motion was named so.
+        kaplan_yorke_dimension: Kaplan–Yorke dimension of the attractor's section.
+        evidence: Evidence for the classification.
         period: Minimal period, if periodic.
         section: The section's points: `phase`, `tip`, `tip_rate`, `gap_rate`, `state`.
     """
@@ -536,13 +540,13 @@ class Convergence(Result):
 
     Attributes:
         modes: Numbers of modes.
-        difference: Difference of the tip deflection from that of the most modes, as a
-            part of the amplitude (K).
-        enough: The least number of modes from which on the difference stays below the
+        difference: Difference of the tip deflection from that with the most modes, relative
+            to the amplitude (K).
+        enough: The smallest number of modes from which on the difference stays below the
             tolerance.
-        tolerance: The difference that is small enough.
-        verdict: The answer in words.
-        motions: The motions with each number of modes.
+        tolerance: Tolerance of the difference.
+        verdict: The result as text.
+        motions: The motion for each number of modes.
     """
 
     modes: list[int]
@@ -555,7 +559,7 @@ class Convergence(Result):
     _arrays = frozenset({"difference"})
 
     def table(self) -> "pd.DataFrame":
-        """A row a number of modes."""
+        """One row per number of modes."""
         import pandas as pd
 
         table = pd.DataFrame([motion.to_dict() for motion in self.motions])
@@ -567,12 +571,12 @@ class Convergence(Result):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Paper(Result):
-    """The paper computed again.
+    """Reproduction of the paper.
 
     Attributes:
         out: The folder of the report.
-        html: The report.
-        pictures: Its pictures.
+        html: Path of the report.
+        pictures: Paths of its pictures.
         reproduced: Statements that are reproduced.
         differs: Statements that differ.
         ambiguous: Statements that can be read in more than one way.
@@ -588,7 +592,7 @@ class Paper(Result):
     checks: list[Record]
 
     def table(self) -> "pd.DataFrame":
-        """A row a statement."""
+        """One row per statement."""
         import pandas as pd
 
         return pd.DataFrame([check.to_dict() for check in self.checks]).set_index("id")

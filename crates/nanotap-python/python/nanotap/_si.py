@@ -28,13 +28,13 @@ def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
 
 
 def in_si(ds: "xr.Dataset") -> "xr.Dataset":
-    """The same with every variable that has a unit of the model in SI, as sweeps of physical cases
-    have it: a run, an orbit's series, what is observed over arrays of parameters, approach curves,
-    branches. States, which have several units, stay in the model's; so does, where a physical
-    quantity varies and the model's units with it, what has no counterpart in SI.
+    """A result with its variables converted from the model's units to SI, as in sweeps of physical
+    cases: a run, an orbit's series, observables over arrays of parameters, approach curves,
+    branches. States, which have several units, stay in the model's units. So do variables without
+    a counterpart in SI if a physical quantity varies, and with it the model's units.
 
     Raises:
-        ValueError: it is not of a physical case.
+        ValueError: the case is not physical.
     """
     units = _units(ds)
     varies = any("." in key for key in json.loads(ds.attrs.get("over", "[]")))

@@ -421,6 +421,7 @@ def approach(
     branches: bool = True,
     switch: int = 1,
     max_period: int = 32,
+    speed: float | str | None = None,
     fm: bool = False,
     phase: float = 90.0,
     shift: float | str | None = None,
@@ -445,9 +446,15 @@ def approach(
     branches : bool
         Also continue the branches that coexist, stable and unstable.
     switch : int
-        Doublings of branches to follow (0 to 12).
+        Doublings of branches to follow, as far as their orbits are stable (0 to
+        12).
     max_period : int
         Longest period looked for (1 to 10000).
+    speed : float | str | None
+        Speed of the approach and of the retraction, in units of the case ("500
+        nm/s") or as alpha5 a unit of time: the distance changes each drive period
+        and the lever does not settle; without it, both are so slow that it always
+        does.
     fm : bool
         Frequency modulation: hold amplitude (the case's free amplitude) and phase
         by frequency and strength of the drive, and tell the frequency shift.
@@ -471,9 +478,10 @@ def approach(
     What is observed over `way` (approach, retract) and the distance (by the name of
     its parameter, with `zc` in metres for a physical case): `first_harmonic`,
     `phase`, `peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`,
-    `physical_E_dis` …; the branches over `branch_point`. With `fm=True` also
-    `relative_shift`, `drive_ratio`, `sader_jarvis_force` … and in SI
-    `physical_frequency_shift` …, with what is held in the attribute `modulation`.
+    `physical_E_dis` …; the branches over `branch_point`; where the lever jumps in
+    the attribute `jumps`. With `fm=True` also `relative_shift`, `drive_ratio`,
+    `sader_jarvis_force` … and in SI `physical_frequency_shift` …, with what is held
+    in the attribute `modulation`.
 
     Raises
     ------
@@ -489,6 +497,7 @@ def approach(
         "branches": branches,
         "switch": switch,
         "max_period": max_period,
+        "speed": speed,
         "fm": fm,
         "phase": phase,
         "shift": shift,

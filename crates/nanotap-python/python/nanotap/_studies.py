@@ -1,4 +1,4 @@
-"""What exists and how it changes: census, branches, exponents, modes enough, the paper."""
+"""Studies: census, branches, exponents, number of modes, fits, the paper."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -29,7 +29,7 @@ def _run(
     threads: int | None = None,
     progress: Progress = None,
 ) -> tuple[dict[str, Any], bool]:
-    """The document of a study, and whether Ctrl-C stopped it."""
+    """The document of a study, and whether it was stopped by Ctrl-C."""
     core = _cased(case)._core
     request = _arguments.request(name, options)
     many = _arguments.optional_count("threads", threads)
@@ -43,7 +43,7 @@ def _run(
 def attractors(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Attractors:
-    """A census; of one that Ctrl-C stopped, what was done."""
+    """A census; the finished part if Ctrl-C stopped it."""
     document, interrupted = _run("attractors", case, options, threads, progress)
     found = Attractors(case, document)
     if interrupted:
@@ -55,7 +55,7 @@ def attractors(
 
 
 def _finished(found: Found, interrupted: bool) -> Found:
-    """What a study found, if nobody stopped it."""
+    """The result of a study; raises `Interrupted` if it was stopped."""
     if interrupted:
         message = "stopped before it was done"
         raise Interrupted(message, found)
@@ -65,7 +65,7 @@ def _finished(found: Found, interrupted: bool) -> Found:
 def branch(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "xr.Dataset":
-    """Branches over `point`; of work that Ctrl-C stopped, what was followed."""
+    """Branches over `point`; the finished part if Ctrl-C stopped it."""
     document, interrupted = _run("branch", case, options, threads, progress)
     return _finished(_branch_dataset(case, document), interrupted)
 
@@ -156,7 +156,7 @@ def _columns(
 def approach(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "xr.Dataset":
-    """An approach curve over `way` and distance; of one that Ctrl-C stopped, what was done."""
+    """An approach curve over `way` and distance; the finished part if Ctrl-C stopped it."""
     document, interrupted = _run("approach", case, options, threads, progress)
     return _finished(_approach_dataset(case, document), interrupted)
 
@@ -176,7 +176,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     gaps = sorted({gap for _, gap in rows})
     flat = [rows.get((way, gap), {}) for way in ways for gap in gaps]
     for entry in flat:
-        # A word that is not said is empty, not missing.
+        # A missing text is empty.
         entry.setdefault("classification", "")
         entry.setdefault("reason", "")
     columns = _columns(flat, "row", "", 0)
@@ -187,7 +187,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     }
     coords: dict[str, Any] = {"way": words(ways), name: np.array(gaps)}
     if "zc" in columns:
-        # Both ways stop at the same distances.
+        # Approach and retract have the same distances.
         zc = columns["zc"][1].reshape(len(ways), len(gaps))
         coords["zc"] = (name, np.where(np.isnan(zc[0]), zc[1], zc[0]))
     branches = report.get("branches") or {"points": []}
@@ -208,6 +208,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ds.attrs.update(
         parameter=name,
         hysteresis=json.dumps(report["hysteresis"]),
+        jumps=json.dumps(report["jumps"]),
         returned=int(report["returned"]),
     )
     if "modulation" in report:
@@ -247,7 +248,7 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
 
 
 def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:
-    """The motion with each number of modes."""
+    """The motion for each number of modes."""
     return Convergence.of(_run("convergence", case, options)[0])
 
 
@@ -258,7 +259,7 @@ def document(
     threads: int | None,
     progress: Progress,
 ) -> Record:
-    """The document of a study, by the names of the terminal's JSON."""
+    """The document of a study, with the names of the terminal's JSON."""
     found, interrupted = _run(name, case, options, threads, progress)
     return _finished(Record(found), interrupted)
 
@@ -266,7 +267,7 @@ def document(
 def fit(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Fit:
-    """The free parameters that describe measured curves."""
+    """The parameters that describe measured curves best."""
     if options["data"] is None:
         message = "data: measured curves are needed"
         raise TypeError(message)
@@ -288,18 +289,18 @@ def paper(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Paper:
-    """Every figure and number of the paper computed again, with verdicts and evidence.
+    """Recomputes every figure and number of the paper, with verdicts and evidence.
 
     Args:
-        out: Folder for the report and its pictures; made if it is not there.
+        out: Folder for the report and its pictures; created if necessary.
         only: Only these sections, such as "fig4".
-        quick: Fewer starts and parameter values: seconds instead of minutes, wider bounds.
-        threads: Threads; without it, one a core.
-        progress: Whether to show a bar, or what hears of progress.
+        quick: Fewer initial states and values: seconds instead of minutes, wider bounds.
+        threads: Number of threads; default: one per core.
+        progress: Whether to show a bar, or a function that receives the progress.
 
     Raises:
-        ValueError: there is no such section.
-        Interrupted: Ctrl-C; its `result` is the report of what was computed.
+        ValueError: a section does not exist.
+        Interrupted: Ctrl-C; its `result` is the report of the finished sections.
     """
     sections = [only] if isinstance(only, str) else [str(name) for name in only]
     with bar(progress, "%") as hears:

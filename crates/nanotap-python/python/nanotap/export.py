@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 def table(result: Any) -> pd.DataFrame:
     """A result as a table.
 
-    Of a sweep a row a start, of a basin a row a point, of a branch or approach a row a point
-    of it, of a run or orbit a row an instant; of attractors, modes, convergence and paper
-    their own tables.
+    The rows are the initial states of a sweep, the points of a basin, branch or approach curve,
+    or the instants of a run or orbit; attractors, modes, convergence and paper have their own
+    tables.
     """
     if isinstance(result, Attractors | Convergence | Modes | Paper):
         return result.table()
@@ -51,7 +51,7 @@ def table(result: Any) -> pd.DataFrame:
 
 
 def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
-    """What lies along `dims`, codes as the words that they mean; states a column an entry."""
+    """The variables along `dims`; codes as text; states with one column per entry."""
     chosen: dict[str, Any] = {}
     for key, variable in ds.data_vars.items():
         name = str(key)
@@ -86,7 +86,7 @@ def parquet(result: Any, path: Path) -> None:
 
 
 def hdf5(result: Any, path: Path) -> None:
-    """An orbit or a Dataset as HDF5: an array a variable, `long_name` and `units` as
+    """An orbit or a Dataset as HDF5: one array per variable, `long_name` and `units` as
     attributes, the case as JSON in the attribute `case`; needs h5py."""
     import h5py
 
@@ -146,16 +146,16 @@ def _datasets(group: Any, ds: "xr.Dataset") -> None:
 def gsf(
     ds: "xr.Dataset", path: Path, *, variable: str | None = None, start: int = 0
 ) -> None:
-    """A map over two parameters, or a basin, as a field of Gwyddion's.
+    """A map over two parameters, or a basin, as a Gwyddion field.
 
     Args:
         ds: The Dataset.
-        path: The file, ending in .gsf.
-        variable: Which variable; without it, `attractor` of a basin, `amplitude` of a sweep.
-        start: Of a sweep: which start.
+        path: The file, with the extension .gsf.
+        variable: The variable; default: `attractor` of a basin, `amplitude` of a sweep.
+        start: Index of the initial state of a sweep.
 
     Raises:
-        ValueError: there is no such map, or its axes do not rise in equal steps.
+        ValueError: the map does not exist, or its axes are not equidistant and ascending.
     """
     name = variable or ("attractor" if "attractor" in ds else "amplitude")
     if name not in ds:
@@ -187,7 +187,7 @@ def gsf(
     _written(path, write)
 
 
-# Units as Gwyddion writes them; those of the dimensionless model are none.
+# Units in Gwyddion's spelling; those of the dimensionless model are empty.
 _GWYDDION = {"m", "N", "J", "s", "Hz", "N/m", "Pa", "m/s", "W", "eV"}
 
 
@@ -201,12 +201,12 @@ def _shared_unit(x: object, y: object) -> str:
 
 
 def netcdf(ds: "xr.Dataset", path: Path, **options: Any) -> None:
-    """A Dataset as netCDF, which has no complex numbers: of those `NAME_re` and `NAME_im`.
+    """A Dataset as netCDF; complex numbers, which it lacks, become `NAME_re` and `NAME_im`.
 
     Args:
         ds: The Dataset.
-        path: The file, ending in .nc.
-        **options: Those of `Dataset.to_netcdf`.
+        path: The file, with the extension .nc.
+        **options: Options of `Dataset.to_netcdf`.
     """
     plain = ds.copy()
     for name, variable in ds.data_vars.items():
@@ -220,7 +220,7 @@ def netcdf(ds: "xr.Dataset", path: Path, **options: Any) -> None:
 
 
 def _written(path: Path, write: Callable[[str], object]) -> None:
-    """Writes under a temporary name beside it, then renames: nobody meets half a file."""
+    """Writes under a temporary name in the same folder, then renames."""
     name = os.fspath(path)
     folder, last = os.path.split(name)
     temporary = os.path.join(folder, f".{last}.{os.getpid()}.tmp")

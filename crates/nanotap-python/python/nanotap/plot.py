@@ -1,9 +1,9 @@
-"""Figures of results: the terminal's, drawn with matplotlib.
+"""Figures of results: those of the terminal program, drawn with matplotlib.
 
-`nanotap.plot.orbit(orbit)`, `sweep(ds)`, `basin(ds)` …; `show(result)` picks by what the
-result is. Each returns a matplotlib Figure; with `axes=` (one for each panel), or `ax=`, it draws
-into yours instead; `panels=` names those to draw, by their letters: `"a"`, `"bd"`. What is drawn, its colours and its words are described once, for the terminal and for Python; here
-results only become the columns that are drawn.
+`nanotap.plot.orbit(orbit)`, `sweep(ds)`, `basin(ds)` …; `show(result)` chooses by the type of the
+result. Each returns a matplotlib Figure; with `axes=` (one for each panel) or `ax=` it draws into
+your axes instead. `panels=` selects panels by their letters: `"a"`, `"bd"`. Layers, colours and
+labels are described once, for the terminal and for Python; this module only provides the data.
 """
 
 import json
@@ -45,7 +45,7 @@ __all__ = [
 
 
 class Where(TypedDict, total=False):
-    """Where a figure is drawn, and which of its panels."""
+    """Axes for a figure, and the selection of its panels."""
 
     axes: Any
     ax: Any
@@ -53,7 +53,7 @@ class Where(TypedDict, total=False):
 
 
 LINES, PERIODS, MOTIONS = _nanotap.colours()
-"""Colours of lines in their order, of the periods 1 to 16, and of the other motions by name."""
+"""Colours of lines in order, of the periods 1 to 16, and of the other motions by name."""
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, _ = LINES
 YELLOW, GREY, LIGHT_GREY = "#f0e442", "#808080", "#e2e2e2"
 
@@ -78,7 +78,7 @@ def _drawn(
     where: Where,
     columns: Mapping[str, Any] | None = None,
 ) -> "Figure":
-    """The figure that a study's facts and large columns describe."""
+    """The figure of a study, from its document and its large columns."""
     arrays = {
         name: np.require(np.ravel(values), np.float64, ["C", "A"])
         for name, values in (columns or {}).items()
@@ -87,7 +87,7 @@ def _drawn(
 
 
 def _points(x: Any, y: Any) -> list[list[float]]:
-    """Points that have a place."""
+    """Points with finite coordinates."""
     table = np.column_stack([np.asarray(x, float), np.asarray(y, float)])
     return list(table[np.isfinite(table).all(axis=1)].tolist())
 
@@ -170,13 +170,13 @@ def orbit(orbit: Orbit, **where: Unpack[Where]) -> "Figure":
     return _drawn("orbit", facts, where)
 
 
-# Attractors that are drawn, and drive periods of one that never repeats.
+# Numbers of attractors drawn, and of drive periods of one that does not repeat.
 _MOST = 8
 _ENDLESS_PERIODS = 64
 
 
 def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
-    """Phase portraits and strobe points of every attractor, each in its own colour."""
+    """Phase portraits and strobe points of every attractor, in different colours."""
     case = found.case
     curves = []
     for one in list(found)[:_MOST]:
@@ -239,7 +239,7 @@ def _labelled(ds: "xr.Dataset", name: str) -> str:
 def _over_one(
     ds: "xr.Dataset", name: str, show: str, branch: Any, where: Where
 ) -> "Figure":
-    """One variable over one parameter, a colour a period."""
+    """One variable over one parameter, one colour per period."""
     import xarray as xr
 
     if show not in ds or ds[show].dtype.kind not in "iuf":
@@ -291,10 +291,10 @@ def _over_one(
 def orbits(
     ds: "xr.Dataset", *, show: str = "first_harmonic", **where: Unpack[Where]
 ) -> "Figure":
-    """Orbits or runs over an array of one parameter: any variable that is a number each.
+    """Orbits or runs over an array of one parameter: any scalar variable.
 
     Raises:
-        ValueError: there is no such variable, or there are several parameters.
+        ValueError: the variable does not exist, or there are several parameters.
     """
     names = [name for name in json.loads(ds.attrs.get("over", "[]")) if name in ds.dims]
     if len(names) != 1:
@@ -342,7 +342,7 @@ def sweep(
 
 
 def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
-    """Basins: a colour an attractor, and where the attractors' own strobe points lie."""
+    """Basins: one colour per attractor, with the strobe points of the attractors."""
     y, x = (str(dim) for dim in ds.attractor.dims)
     facts = {
         "x": x,
@@ -357,8 +357,8 @@ def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
 def branch(
     ds: "xr.Dataset", *, show: str = "tip_max", **where: Unpack[Where]
 ) -> "Figure":
-    """Branches against the parameter, a colour a period, with their bifurcations; beside them
-    the bifurcation curves in two parameters, if they were traced."""
+    """Branches against the parameter, one colour per period, with their bifurcations, and the
+    bifurcation curves in two parameters, if they were traced."""
     known = [str(n) for n, v in ds.data_vars.items() if v.dims == ("point",)]
     if show not in known or ds[show].dtype.kind not in "iuf":
         message = f"show: `{show}` is none; there are {', '.join(known)}"
@@ -384,7 +384,7 @@ def branch(
 
 
 def _rows(**columns: Any) -> list[dict[str, Any]]:
-    """Columns as rows, where all numbers are."""
+    """Columns as rows, without rows that have missing numbers."""
     lists = [column.values.tolist() for column in columns.values()]
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
     return [row for row in rows if np.isfinite(row["x"]) and np.isfinite(row["y"])]
@@ -426,7 +426,7 @@ _PREFIXES = {
 
 
 def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]:
-    """What values are multiplied with, and their unit in brackets with the prefix that fits."""
+    """Factor of the values, and their unit in brackets with a suitable prefix."""
     known = np.abs(values[np.isfinite(values)])
     size = float(known.max()) if known.size else 0.0
     if size <= 1e-9 * natural:
@@ -436,10 +436,10 @@ def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]
 
 
 def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
-    """Amplitude, phase, dissipated energy and peak force against the distance, both ways.
+    """Amplitude, phase, dissipated energy and peak force against distance, approach and retract.
 
-    Under frequency modulation its shift, the drive, the dissipated energy and the force that
-    the shifts tell.
+    Under frequency modulation: frequency shift, drive, dissipated energy, and the force from
+    the shifts.
     """
     name = ds.attrs["parameter"]
     physical = "physical_A" in ds
@@ -460,14 +460,14 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
             rows[2],
             (force, f"physical_{force}", "force after Sader, Jarvis", "N", 1.0),
         )
-    # Where the least distance is kept, the amplitude grows with the distance.
+    # With a constant least distance the amplitude grows with the distance.
     kept = "closest" in json.loads(ds.attrs.get("modulation", "{}"))
     if kept:
         rows = rows[:3]
         amplitude = ds.physical_A if physical else ds.first_harmonic
         distance = amplitude.max("way").values
         factor, unit = _prefixed(distance, "m") if physical else (1.0, "")
-    # How many of the unit a model's number is: its ratio where it is largest.
+    # Factor from the model's unit to the unit: the ratio at the largest value.
     x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
     panels = []
     for plain, si, label, base, part in rows:
@@ -493,9 +493,17 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
         shown *= scale
 
         def curve(
-            way: str, values: Any = ds[plain], by: float = shown
+            way: str, values: Any = ds[plain], by: float = shown, plain: str = plain
         ) -> list[list[float]]:
-            return _points(factor * distance, by * values.sel(way=way).values)
+            # The ends of a jump belong to the curve.
+            ends = [
+                jump[end]
+                for jump in json.loads(ds.attrs.get("jumps", "[]"))
+                for end in ("before", "after")
+                if jump["way"] == way and jump[end].get(plain) is not None
+            ]
+            points = _points(factor * distance, by * values.sel(way=way).values)
+            return points + [[x_scale * end["gap"], by * end[plain]] for end in ends]
 
         def branches(
             prefix: str, by: float = shown, plain: str = plain, **more: Any
@@ -567,7 +575,7 @@ def modes(found: Modes, **where: Unpack[Where]) -> "Figure":
 
 
 def convergence(found: Convergence, **where: Unpack[Where]) -> "Figure":
-    """What the tip deflection still changes, against the number of modes."""
+    """Change of the tip deflection against the number of modes."""
     facts = {
         "modes": list(found.modes),
         "difference": [float(d) if np.isfinite(d) else None for d in found.difference],
@@ -598,7 +606,7 @@ _FIGURES: dict[type, Callable[..., "Figure"]] = {
     Convergence: convergence,
     Fit: fit,
 }
-# The first one that a Dataset has says what it is.
+# The first of these that a Dataset has determines its type.
 _FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {
     "branch": branch,
     "attractor": basin,

@@ -37,6 +37,7 @@ pub mod units;
 use std::path::Path;
 use std::sync::Arc;
 
+use nanotap_dynamics::{CancelFlag, Control};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
@@ -66,6 +67,8 @@ pub const DEFAULT_MODES: usize = 3;
 pub struct Case {
     title: Arc<str>,
     what: What,
+    /// What ends the motions of its models from outside.
+    cancel: CancelFlag,
 }
 
 /// The kinds of case.
@@ -107,6 +110,7 @@ impl Case {
         Self {
             title: "case".into(),
             what,
+            cancel: CancelFlag::default(),
         }
     }
 
@@ -164,6 +168,32 @@ impl Case {
     pub fn called(mut self, title: &str) -> Self {
         self.title = title.into();
         self
+    }
+
+    /// The same, whose models' motions end with an error once `control` cancels the work; with a
+    /// control that cannot, the same.
+    #[must_use]
+    pub fn cancelled_by(&self, control: &Control<'_>) -> Self {
+        let mut case = self.clone();
+        if let Some(cancel) = control.cancel {
+            case.cancel = cancel.clone();
+        }
+        case
+    }
+
+    /// The same, whose models' motions may go on for a moment after the work was cancelled: for
+    /// reports of what is finished.
+    #[must_use]
+    pub(crate) fn with_grace(&self) -> Self {
+        Self {
+            cancel: self.cancel.with_grace(),
+            ..self.clone()
+        }
+    }
+
+    /// What ends the motions of its models from outside.
+    pub fn cancel(&self) -> &CancelFlag {
+        &self.cancel
     }
 
     /// What it is called in a heading.
@@ -329,6 +359,7 @@ impl Case {
         Self {
             title: Arc::clone(&self.title),
             what,
+            cancel: self.cancel.clone(),
         }
     }
 
@@ -358,11 +389,21 @@ impl Case {
     /// # Errors
     /// When it makes no sense or cannot be solved in closed form.
     pub fn model(&self) -> Result<Model, CaseError> {
-        Ok(match &self.what {
+        let model = match &self.what {
             What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
             What::Oscillator(oscillator) => oscillator.model()?,
-            What::Quantities(quantities) => Model::cantilever(&quantities.view()?.cantilever)?,
-        })
+            What::Quantities(quantities) => {
+                let model = Model::cantilever(&quantities.view()?.cantilever)?;
+                // Another number of modes has other states.
+                let start = quantities.start.as_ref();
+                let start = start.filter(|state| state.len() == model.dimension());
+                Model {
+                    start: start.cloned(),
+                    ..model
+                }
+            }
+        };
+        Ok(model.cancelled_by(&self.cancel))
     }
 
     /// How its map changes with the value of a key.
@@ -585,18 +626,24 @@ impl Case {
         quantities.stated.remove(Key::GapTip);
         quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
         Self {
-            title: self.title,
             what: What::Quantities(Box::new(quantities.mapped(true))),
+            ..self
         }
     }
 
     /// The same with the tip at `distance` (in m) from the sample, where its setpoint is
-    /// reached, and a note that says so. The unit of length stays; the beam, which moves with
-    /// the tip, is out of place by less than the free amplitude.
+    /// reached, and a note that says so. Its motions start from `state`, at drive phase 0. The
+    /// unit of length stays; the beam, which moves with the tip, is out of place by less than the
+    /// free amplitude.
     ///
     /// # Errors
     /// When the quantities make no sense there.
-    pub fn at_distance(&self, distance: f64, note: Remark) -> Result<Self, CaseFileError> {
+    pub fn at_distance(
+        &self,
+        distance: f64,
+        note: Remark,
+        state: Vec<f64>,
+    ) -> Result<Self, CaseFileError> {
         let What::Quantities(quantities) = &self.what else {
             return Ok(self.clone());
         };
@@ -609,9 +656,11 @@ impl Case {
             quantities.stated.put(Key::GapBeam, beam);
         }
         quantities.notes.push(note);
+        quantities.start = Some(state);
         Ok(Self {
             title: Arc::clone(&self.title),
             what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
+            cancel: self.cancel.clone(),
         })
     }
 }

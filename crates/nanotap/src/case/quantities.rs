@@ -26,6 +26,8 @@ pub(super) struct Quantities {
     pub(super) view: Result<Box<Physical>, Box<CaseFileError>>,
     /// What a study found out about the case.
     pub(super) notes: Vec<Remark>,
+    /// State at drive phase 0 of the orbit at the setpoint, from which motions start.
+    pub(super) start: Option<Vec<f64>>,
 }
 
 impl Quantities {
@@ -38,6 +40,7 @@ impl Quantities {
             held: false,
             view: Err(Box::new(empty)),
             notes: Vec::new(),
+            start: None,
         };
         quantities.mapped(false)
     }
@@ -49,7 +52,7 @@ impl Quantities {
         }
     }
 
-    /// The same, its quantities mapped; where neither lever nor tip changed, the lever stays.
+    /// The same, its quantities mapped; where neither lever nor tip nor modes changed, the lever stays.
     pub(super) fn mapped(mut self, same_lever: bool) -> Self {
         let lever = self.view.as_ref().ok().map(|view| view.lever);
         let lever = lever.filter(|_| same_lever);
@@ -91,7 +94,7 @@ impl Quantities {
         }
         if key == Key::Modes {
             varied.stated.put(key, Value::Number(value, Kind::Number));
-            return varied.mapped(true);
+            return varied.mapped(false);
         }
         if let (false, Ok(view)) = (self.held, &self.view) {
             varied.stated = view.held(&self.stated);

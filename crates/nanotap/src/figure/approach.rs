@@ -210,7 +210,9 @@ impl ApproachPanel {
             |gap: f64, observables: &Observables| (x_factor * gap, factor * of(shown, observables));
         let way = |way: Way| {
             let met = report.table.iter().chain(&report.coexisting);
-            let on = met.filter(|p| p.way == way);
+            // The ends of a jump belong to the curve.
+            let jumps = report.jumps.iter().flat_map(|j| [&j.before, &j.after]);
+            let on = met.chain(jumps).filter(|p| p.way == way);
             on.filter_map(|p| Some(place(p.gap, p.observables.as_ref()?)))
                 .collect()
         };

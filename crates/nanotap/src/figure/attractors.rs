@@ -51,7 +51,7 @@ pub fn attractors_figure(model: &Model, found: &Attractors, units: &Units) -> Fi
         .unstable
         .iter()
         .flatten()
-        .flat_map(|o| o.states.iter().map(|s| at_phase_zero(model, s)))
+        .flat_map(|o| o.motion.states.iter().map(|s| at_phase_zero(model, s)))
         .collect();
     AttractorCurves {
         axes: MotionAxes {

@@ -319,7 +319,7 @@ pub(crate) fn motion(code: u8, period: i32) -> Option<Motion> {
         Classification::QuasiPeriodic => Motion::QuasiPeriodic,
         Classification::Chaotic => Motion::Chaotic,
         Classification::Unbounded => Motion::Unbounded,
-        Classification::Undecided => Motion::Undecided,
+        Classification::Transient | Classification::Undecided => Motion::Undecided,
     })
 }
 

@@ -33,9 +33,10 @@ mod tangent;
 use std::sync::{Arc, OnceLock};
 
 pub use motion_error::MotionError;
-pub use nanotap_flow::FlowError;
+use nanotap_arithmetic::CancelFlag;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
+pub use nanotap_flow::{FlowError, vector_instructions};
 pub use tangent::ModelTangent;
 
 use crate::model::beam::Modes;
@@ -82,9 +83,8 @@ pub struct Model {
     pub force: Vec<Output>,
     /// What feeds and drains energy: see [`Model::power`].
     pub(crate) power: PowersOnDemand,
-    /// What an impact takes, as a factor of the square of the gap's rate: ½ m (1 − r²)
-    /// for a rigid stop, 0 otherwise.
-    pub impact_loss: f64,
+    /// The rigid stop, if there is one.
+    pub rigid_stop: Option<RigidStop>,
     /// The beam's modes, if it is a beam.
     pub beam: Option<BeamOutputs>,
     /// How many numbers at the end of the state are the sample's.
@@ -96,6 +96,28 @@ pub struct Model {
     pub forgetting: Option<Forgetting>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
+    /// State at drive phase 0 from which a motion starts when no other is given; `None`: rest.
+    pub start: Option<Vec<f64>>,
+}
+
+/// A rigid stop on which the tip bounces.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RigidStop {
+    /// The mass m that bounces.
+    pub mass: f64,
+    /// The coefficient of restitution r.
+    pub restitution: f64,
+    /// Tip displacement at the stop.
+    pub tip: f64,
+}
+
+impl RigidStop {
+    /// Impulse on the tip of an impact from regime `from` to `to` at unit speed: m (1 + r), or m
+    /// where the tip comes to rest on the stop.
+    pub fn impulse(&self, from: usize, to: usize) -> f64 {
+        let bounce = if from == to { self.restitution } else { 0.0 };
+        self.mass * (1.0 + bounce)
+    }
 }
 
 /// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
@@ -194,6 +216,20 @@ impl BeamOutputs {
 }
 
 impl Model {
+    /// The state at rest: at deflection 0, or on a rigid stop that stands before it.
+    pub fn rest(&self) -> Vec<f64> {
+        let mut state = vec![0.0; self.dimension()];
+        self.stop_at_wall(&mut state);
+        state
+    }
+
+    /// Puts a state that lies behind a rigid stop on it.
+    pub fn stop_at_wall(&self, state: &mut [f64]) {
+        if let (Some(stop), Some(x)) = (self.rigid_stop, state.first_mut()) {
+            *x = x.min(stop.tip);
+        }
+    }
+
     /// The cantilever of `case`, Eqs. (8)–(18).
     ///
     /// # Errors
@@ -219,12 +255,13 @@ impl Model {
             height: outputs.height,
             force: outputs.force,
             power: PowersOnDemand::of(galerkin),
-            impact_loss: 0.0,
+            rigid_stop: None,
             beam: Some(outputs.beam),
             memory: usize::from(law.has_memory),
             forgetting: outputs.forgetting,
             second_phase: case.tone2_phase.to_radians(),
             nonlinear: None,
+            start: None,
             system,
         })
     }
@@ -251,11 +288,12 @@ impl Model {
             height: outputs.height,
             beam: Some(outputs.beam),
             power: PowersOnDemand::of(galerkin),
-            impact_loss: 0.0,
+            rigid_stop: None,
             memory: usize::from(memory),
             forgetting: None,
             second_phase,
             nonlinear: Some(Arc::new(nonlinear)),
+            start: None,
             system: Arc::new(system),
         })
     }
@@ -314,6 +352,24 @@ impl Model {
         }
         found.sort_by(|a, b| b.gap.total_cmp(&a.gap));
         found
+    }
+
+    /// The same model, whose motions end with an error once `cancel` is set.
+    #[must_use]
+    pub fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
+        let system = Arc::unwrap_or_clone(self.system);
+        self.system = Arc::new(system.cancelled_by(cancel.clone()));
+        self.nonlinear = self
+            .nonlinear
+            .map(|nonlinear| Arc::new(Arc::unwrap_or_clone(nonlinear).cancelled_by(cancel)));
+        self
+    }
+
+    /// The same model, whose motions may go on for a moment after the work was cancelled.
+    #[must_use]
+    pub(crate) fn with_grace(&self) -> Self {
+        let cancel = self.system.cancel().with_grace();
+        self.clone().cancelled_by(&cancel)
     }
 
     /// Dimension of the state.
@@ -480,7 +536,7 @@ pub(crate) fn cantilever_model_tangent(
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),
         second_phase: second_phase.to_radians(),
-        impact_loss: 0.0,
+        rigid_stop: RigidStop::default(),
     })
 }
 

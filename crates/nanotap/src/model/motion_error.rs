@@ -37,6 +37,7 @@ impl From<MotionError> for crate::Error {
     fn from(error: MotionError) -> Self {
         match error {
             MotionError::Flow(error) => error.into(),
+            MotionError::Nonlinear(VolterraError::Cancelled) => Self::stopped(),
             MotionError::Nonlinear(error) => Self::numerics(error.to_string()),
             MotionError::TooManyRows { .. } => Self::input(
                 error.to_string(),

@@ -6,7 +6,7 @@
 //! A whole number does not vary, so that its row and column of the Jacobian are zero and one
 //! multiplier is.
 
-use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -33,6 +33,10 @@ const NODES: usize = 20;
 /// How much the error of a step may move the gap, as a part of what the tip swings and stands
 /// away: a few units of rounding.
 const TOLERANCE: f64 = 3e-15;
+
+/// Steps of a period of the drive, tens of times what tapping with twenty modes takes: a tenth of a
+/// second.
+const MAX_STEPS: f64 = 10_000.0;
 
 /// The lever under a nonlinear force.
 #[derive(Clone, Debug)]
@@ -86,7 +90,18 @@ impl Nonlinear {
             offset: height.constant,
             tones,
         };
-        let system = System::new(kernel, Arc::clone(&law), forcing, Options::new(tolerance))?;
+        // A repetition of two tones has several of the drive's periods.
+        let slowest = drive
+            .frequencies()
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let repetitions = (drive.period() * slowest / TAU).max(1.0);
+        let options = Options {
+            max_steps: (MAX_STEPS * repetitions) as usize,
+            ..Options::new(tolerance)
+        };
+        let system = System::new(kernel, Arc::clone(&law), forcing, options)?;
         Ok(Self {
             system: Arc::new(system),
             contact: (0..law.branches()).map(|b| law.touches(b)).collect(),
@@ -94,6 +109,13 @@ impl Nonlinear {
             clamp_force: beam.clamp_force(),
             remembers: law.remembers(),
         })
+    }
+
+    /// The same, whose motions end with an error once `cancel` is set.
+    pub(crate) fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
+        let system = Arc::unwrap_or_clone(self.system);
+        self.system = Arc::new(system.cancelled_by(cancel.clone()));
+        self
     }
 
     /// The branch of the law in a state of the model at drive phase 0: the one that it
@@ -446,7 +468,7 @@ impl Variation {
             .iter()
             .any(|(p, slope)| of_modes(*p) && *slope != 0.0)
         {
-            return Self::between(case, slopes, law);
+            return Self::between(case, nonlinear.system.cancel(), slopes, law);
         }
         let galerkin = Galerkin::new(case)?;
         let drive = model.system.drive();
@@ -480,6 +502,7 @@ impl Variation {
 
     fn between(
         case: &Cantilever,
+        cancel: &CancelFlag,
         slopes: &[(Parameter, f64)],
         law: &[f64],
     ) -> Result<Self, ModelError> {
@@ -502,7 +525,7 @@ impl Variation {
             if !law.is_empty() {
                 moved.law = moved.law.map(|own| own.moved(law, side * step));
             }
-            Model::cantilever(&moved)
+            Ok(Model::cantilever(&moved)?.cancelled_by(cancel))
         };
         let (low, high, width) = match (at(-1.0), at(1.0)) {
             (Ok(low), Ok(high)) => (low, high, 2.0 * step),

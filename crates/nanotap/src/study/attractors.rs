@@ -3,9 +3,10 @@
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusOptions, ClassifyOptions, Control, Fraction, OrbitSearch,
-    PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
+    AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
+    OrbitSearch, PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
 };
+use nanotap_volterra::coarse;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,9 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::approach::states_near;
+use crate::study::averaged_orbits::averaged_orbits;
+use crate::study::in_si::InSi;
 use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitError, OrbitReport, report};
@@ -39,6 +43,12 @@ pub struct AttractorsOptions {
     pub classify: ClassifyOptions,
     /// Starts settled before any attractor is known.
     pub pilots: usize,
+    /// Share of drawn starts that may lead to motions not found, with 95 % confidence, at which no more
+    /// are drawn; `None`: [`NONLINEAR_UNSEEN`] under a nonlinear law, else [`CensusOptions`]'s.
+    pub unseen: Option<f64>,
+    /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
+    /// addition to those from averaging: Newton closes them before any start is drawn.
+    pub seeds: Vec<(usize, Vec<f64>)>,
     /// Longest period of unstable orbits to list; 0: none.
     pub unstable: usize,
     /// Harmonics reported of each orbit.
@@ -54,6 +64,8 @@ impl Default for AttractorsOptions {
             start_box: None,
             classify: census.classify,
             pilots: census.pilots,
+            unseen: None,
+            seeds: Vec::new(),
             unstable: 0,
             harmonics: 20,
         }
@@ -109,6 +121,13 @@ pub struct Attractors {
     /// How much may have been missed, where starts were drawn until that was small.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen: Option<UnseenReport>,
+    /// Why no further start was followed.
+    pub end: EndReport,
+    /// Relative tolerance of the approximate flow on which starts were followed, if they were: shares,
+    /// lifetimes and the bound of what was not seen are of that flow. Orbits, multipliers and exponents
+    /// are always those of the exact flow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub followed_at: Option<f64>,
     /// Starts left undecided.
     pub undecided: Vec<UndecidedStart>,
     /// Part of the starts left undecided.
@@ -119,7 +138,7 @@ pub struct Attractors {
     pub transient_chaos: Option<TransientChaosReport>,
     /// Unstable orbits, if they were looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub unstable: Option<Vec<OrbitReport>>,
+    pub unstable: Option<Vec<InSi<OrbitReport>>>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
 }
@@ -144,6 +163,30 @@ pub struct UnseenReport {
     pub starts: usize,
     /// With 95 % confidence at most this part of the starts leads to motions not found.
     pub fraction: f64,
+    /// The part at which no more starts were to be drawn.
+    pub target: f64,
+}
+
+/// Why a census ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "reason", rename_all = "snake_case")]
+pub enum EndReport {
+    /// All given starts were followed.
+    AllStarts,
+    /// The share of starts that may lead to motions not found is as small as requested.
+    BoundMet,
+    /// As many starts were drawn as a census draws at most.
+    MaxStarts {
+        /// How many that is.
+        limit: usize,
+    },
+    /// The starts took as many drive periods as a census takes at most.
+    MaxPeriods {
+        /// How many that is.
+        limit: usize,
+    },
+    /// The work was stopped.
+    Cancelled,
 }
 
 /// A side of the box of starts.
@@ -209,12 +252,13 @@ impl Attractors {
     fn prove(&mut self, case: &Case) {
         let prover = Prover::new(case);
         let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
-        for orbit in stable.chain(self.unstable.iter_mut().flatten()) {
-            orbit.proof = Some(prover.report(&orbit.trajectory, orbit.period));
+        let unstable = self.unstable.iter_mut().flatten();
+        for orbit in stable.chain(unstable.map(|orbit| &mut orbit.motion)) {
+            orbit.prove(&prover);
         }
     }
 
-    /// The same with every attractor told in SI too, of the case `view`.
+    /// The same with every motion told in SI too, of the case `view`.
     #[must_use]
     pub fn in_si(mut self, view: &Physical) -> Self {
         for attractor in &mut self.attractors {
@@ -227,6 +271,10 @@ impl Attractors {
                 (None, Some(seen)) => Some(PhysicalMotion::alone(&seen.observables, None, view)),
                 (None, None) => None,
             };
+        }
+        for orbit in self.unstable.iter_mut().flatten() {
+            let (observables, spectrum) = (&orbit.motion.observables, &orbit.motion.spectrum);
+            orbit.physical = Some(PhysicalMotion::alone(observables, Some(spectrum), view));
         }
         self
     }
@@ -276,9 +324,12 @@ pub struct TransientChaosReport {
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
-pub const MOST_STARTS: usize = 10_000_000;
+pub const MOST_STARTS: usize = 1_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
+/// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
+/// law.
+pub const NONLINEAR_UNSEEN: f64 = 0.01;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -309,24 +360,22 @@ pub fn attractors(
         return Err(AttractorsError::Dimension { found, expected });
     }
     let set = match options.starts {
-        Some(count) => StartSet::given(start_box.starts(options.seed, count)),
+        Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
     };
+    let averaged = averaged_orbits(model).into_iter();
+    let averaged = averaged.map(|orbit| (orbit.period, orbit.states[0].clone()));
+    let set = set.with_seeds(averaged.chain(options.seeds.iter().cloned()));
     let map = Strobe::new(model);
-    let classify = bounded(&options.classify, &start_box);
-    let found = census_of(
-        &map,
-        &set,
-        &CensusOptions {
-            pilots: options.pilots,
-            classify,
-            ..CensusOptions::default()
-        },
-        control,
-    );
+    // Motions that were found are measured, also of work that was cancelled.
+    let model = &model.with_grace();
+    let budgets = budgets(model, options, &start_box);
+    let found = census_of(&map, &set, &budgets, control);
     let unstable = if options.unstable > 0 {
         let searched = found.outcomes_by_start.len().min(SEARCHED_STARTS);
-        let searched: Vec<_> = (0..searched).map_while(|k| set.start(k)).collect();
+        let seeds = set.seeds().iter().map(|(_, state)| state.clone());
+        let starts = (0..searched).map_while(|k| set.start(k));
+        let searched: Vec<_> = seeds.chain(starts).collect();
         Some(unstable_orbits(model, &map, &searched, options, control)?)
     } else {
         None
@@ -340,10 +389,29 @@ pub fn attractors(
             upper,
         })
         .collect();
-    described(model, &found, &set, options, sides, unstable)
+    described(model, &found, &set, (options, &budgets), sides, unstable)
 }
 
-/// The budgets with a bound on the states that fits the box.
+/// How the census is taken. A smaller bound than the default has larger budgets.
+fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> CensusOptions {
+    let default = CensusOptions::default();
+    let usual = if model.nonlinear.is_some() {
+        NONLINEAR_UNSEEN
+    } else {
+        default.unseen
+    };
+    let unseen = options.unseen.unwrap_or(usual);
+    let times = (usual / unseen).max(1.0);
+    CensusOptions {
+        pilots: options.pilots,
+        classify: bounded(&options.classify, start_box),
+        unseen,
+        max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
+        max_periods: (times * default.max_periods as f64) as usize,
+    }
+}
+
+/// The budgets of each start with a bound on the states that fits the box.
 fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions {
     let widest = start_box
         .lower()
@@ -365,9 +433,9 @@ fn described(
     model: &Model,
     found: &Census,
     set: &StartSet,
-    options: &AttractorsOptions,
+    (options, budgets): (&AttractorsOptions, &CensusOptions),
     sides: Vec<Side>,
-    unstable: Option<Vec<OrbitReport>>,
+    unstable: Option<Vec<InSi<OrbitReport>>>,
 ) -> Result<Attractors, AttractorsError> {
     let starts = found.outcomes_by_start.len();
     let attractors = found
@@ -405,7 +473,20 @@ fn described(
             motions: unseen.motions,
             starts: unseen.starts,
             fraction: unseen.share,
+            target: budgets.unseen,
         }),
+        end: match found.end {
+            _ if found.cancelled => EndReport::Cancelled,
+            CensusEnd::AllStarts => EndReport::AllStarts,
+            CensusEnd::BoundMet => EndReport::BoundMet,
+            CensusEnd::MaxStarts => EndReport::MaxStarts {
+                limit: budgets.max_starts,
+            },
+            CensusEnd::MaxPeriods => EndReport::MaxPeriods {
+                limit: budgets.max_periods,
+            },
+        },
+        followed_at: found.followed_coarsely.then_some(coarse::TOLERANCE),
         undecided: found
             .undecided
             .iter()
@@ -514,7 +595,7 @@ fn unstable_orbits(
     searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Vec<OrbitReport>, AttractorsError> {
+) -> Result<Vec<InSi<OrbitReport>>, AttractorsError> {
     let search = OrbitSearch {
         max_period: options.unstable,
         ..OrbitSearch::default()
@@ -522,7 +603,12 @@ fn unstable_orbits(
     find_orbits(map, searched, &search, control)
         .iter()
         .filter(|orbit| !orbit.is_stable())
-        .map(|orbit| Ok(report(model, orbit, options.harmonics)?))
+        .map(|orbit| {
+            Ok(InSi {
+                motion: report(model, orbit, options.harmonics)?,
+                physical: None,
+            })
+        })
         .collect()
 }
 
@@ -532,9 +618,14 @@ fn unstable_orbits(
 pub struct AttractorsRequest {
     /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
     /// resonant response down to below the gap, go on until the share of starts that may lead to
-    /// motions not found is below 0.2 % (with 95 % confidence), or 5000 are done
+    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods are done
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: Option<usize>,
+    /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
+    /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
+    /// one raises the limits of {starts} and drive periods in proportion
+    #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
+    pub unseen: Option<f64>,
     /// Seed of the starts: the same seed gives the same answer on any number of threads
     #[schemars(extend("x-value" = "K"))]
     pub seed: u64,
@@ -558,6 +649,7 @@ impl Default for AttractorsRequest {
         let options = AttractorsOptions::default();
         Self {
             starts: options.starts,
+            unseen: options.unseen,
             seed: options.seed,
             sides: Intervals::default(),
             max_period: options.classify.max_period,
@@ -579,6 +671,7 @@ impl AttractorsRequest {
                 .starts
                 .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
             seed: self.seed,
+            unseen: self.unseen,
             start_box: Some(box_with(model, &self.sides.numbers()?)?),
             classify: ClassifyOptions {
                 max_period: self.max_period,
@@ -598,16 +691,27 @@ impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
     const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
     const COUNTED: &'static str = "starts";
+    const PARTIAL: bool = true;
     type Request = AttractorsRequest;
     type Report = Attractors;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &AttractorsRequest,
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let mut found = attractors(&model, &request.options(&model)?, control)?;
+        let options = request.options(&model)?;
+        let known = states_near(case, options.classify.max_period, control)?;
+        let seeds = known.into_iter().filter_map(|orbit| {
+            let state = orbit.states.into_iter().next()?;
+            Some((orbit.period, state))
+        });
+        let options = AttractorsOptions {
+            seeds: seeds.collect(),
+            ..options
+        };
+        let mut found = attractors(&model, &options, control)?;
         if request.prove {
             found.prove(case);
         }

@@ -26,6 +26,7 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
+use crate::model::Model;
 use crate::model::strobe::{Strobe, together};
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
@@ -254,7 +255,7 @@ pub struct Known {
 /// Basins on a slice: prepared, ready to be computed chunk by chunk.
 #[derive(Debug)]
 pub struct Basin {
-    map: Strobe,
+    model: Model,
     basins: Basins,
     schema: Schema,
     known: Vec<Known>,
@@ -296,7 +297,8 @@ impl Basin {
         }
         let model = case.model()?;
         let names = state_names(&model);
-        let origin = starting_state(&model, options.state.as_deref())?;
+        let rest = vec![0.0; model.dimension()];
+        let origin = starting_state(&model, Some(options.state.as_deref().unwrap_or(&rest)))?;
         if options.x.name == options.y.name {
             return Err(BasinError::SameAxis {
                 name: options.x.name.clone(),
@@ -310,7 +312,7 @@ impl Basin {
                 }
                 states.clone()
             }
-            None => starts_in(&slice, model.dimension(), options)?,
+            None => starts_in(&slice, model.dimension(), options, control)?,
         };
         let map = Strobe::new(&model);
         let how = CensusOptions {
@@ -368,7 +370,7 @@ impl Basin {
             .collect();
         let schema = schema(case, options, &names, &basins, &known);
         Ok(Self {
-            map,
+            model,
             basins,
             schema,
             known,
@@ -395,11 +397,12 @@ impl Basin {
     /// # Errors
     /// When the work was stopped (what is finished stays), or the store refuses.
     pub fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
+        let map = self.map(&how.control);
         work(
             store,
             how,
             rows,
-            |block, item| self.row(block, item, &how.control),
+            |block, item| self.row(&map, block, item, &how.control),
             |_, rows| columns(&rows),
         )
     }
@@ -409,18 +412,30 @@ impl Basin {
     pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
         let grid = &self.schema.grid;
         let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
+        let map = self.map(control);
         let labels = (0..rows(&block))
-            .map(|item| self.row(&block, item, control))
+            .map(|item| self.row(&map, &block, item, control))
             .collect::<Option<Vec<_>>>()?;
         Some(chunk_files(&self.schema, &block, &columns(&labels)))
     }
 
+    /// The map, whose motions end once `control` cancels the work.
+    fn map(&self, control: &Control<'_>) -> Strobe {
+        Strobe::new(&self.model.clone().cancelled_by(&control.flag()))
+    }
+
     /// The labels of one row of the slice; `None` when it was stopped.
-    fn row(&self, block: &Block, item: usize, control: &Control<'_>) -> Option<Vec<Label>> {
+    fn row(
+        &self,
+        map: &Strobe,
+        block: &Block,
+        item: usize,
+        control: &Control<'_>,
+    ) -> Option<Vec<Label>> {
         let length = self.schema.grid.axes[1].length;
         let y = block.ranges[0].start + item;
         let end = (y + 1) * length;
-        let mut map = self.map.clone();
+        let mut map = map.clone();
         let mut labels = Vec::with_capacity(length);
         // A row may take minutes: whoever stops it need not wait for its end.
         for start in (y * length..end).step_by(UNSTOPPED) {
@@ -430,7 +445,8 @@ impl Basin {
             let range = start..end.min(start + UNSTOPPED);
             labels.append(&mut self.basins.chunk(&mut map, range));
         }
-        Some(labels)
+        // The map may have ended the last of them.
+        (!control.is_cancelled()).then_some(labels)
     }
 }
 
@@ -494,6 +510,7 @@ fn starts_in(
     slice: &Slice,
     dimension: usize,
     options: &BasinOptions,
+    control: &Control<'_>,
 ) -> Result<Vec<Vec<f64>>, BasinError> {
     // The first point has the least values along both axes, the last the greatest.
     let (mut lower, mut upper) = (vec![0.0; dimension], vec![0.0; dimension]);
@@ -503,7 +520,7 @@ fn starts_in(
         given: options.x.name.clone(),
         what: error.to_string(),
     })?;
-    Ok(sides.starts(options.seed, options.starts))
+    Ok(sides.starts_until(options.seed, options.starts, control))
 }
 
 impl Known {
@@ -814,7 +831,7 @@ impl DatasetStudy for BasinStudy {
     type Request = BasinRequest;
     type Report = Shares;
 
-    fn recipe(case: &Case, request: &BasinRequest, control: &Control<'_>) -> Result<Recipe, Error> {
+    fn plan(case: &Case, request: &BasinRequest, control: &Control<'_>) -> Result<Recipe, Error> {
         let basin = Basin::new(case, &request.options()?, control)?;
         Ok(Box::new(basin))
     }

@@ -17,7 +17,7 @@ use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::kind::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
+use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
 use crate::study::orbit::{OrbitError, OrbitOptions, orbit, pairs};
 use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, key_and_ends};
@@ -37,6 +37,8 @@ pub struct BranchOptions {
     pub state: Option<Vec<f64>>,
     /// Doublings to follow: 0 for the one branch alone.
     pub doublings: usize,
+    /// Whether doubled branches end at their first orbit that is not stable.
+    pub stable_doublings: bool,
     /// Seeds from a census instead of the one orbit at the start.
     pub census: Option<SeedOptions>,
     /// A second parameter and its range: loci of the bifurcations are traced in both.
@@ -88,6 +90,7 @@ impl BranchOptions {
             period: None,
             state: None,
             doublings: 0,
+            stable_doublings: false,
             census: None,
             second: None,
             max_step: continuation.max_step,
@@ -113,6 +116,7 @@ impl BranchOptions {
         DiagramOptions {
             continuation: self.continuation(),
             doublings: self.doublings,
+            stable_doublings: self.stable_doublings,
             max_branches: self.max_branches,
         }
     }
@@ -606,6 +610,8 @@ fn census_seeds(
 }
 
 fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchReport {
+    // Branches that were followed are measured, also of work that was cancelled.
+    let case = &case.with_grace();
     let key = options.key;
     let mut report = BranchReport {
         parameter: key.path(),
@@ -664,6 +670,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         for point in points {
             match point {
                 Ok(point) => report.points.push(point),
+                Err(_) if case.cancel().is_cancelled() => {}
                 Err(failure) => report.failures.push(failure),
             }
         }
@@ -677,6 +684,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         for bifurcation in bifurcations {
             match bifurcation {
                 Ok(found) => report.bifurcations.push(found),
+                Err(_) if case.cancel().is_cancelled() => {}
                 Err(failure) => report.failures.push(failure),
             }
         }
@@ -850,6 +858,7 @@ fn loci(
                 meets: [0, 1].map(|k| locus.ends[k].meets()),
                 ends: locus.ends.map(|end| end.to_string()),
             }),
+            Err(_) if control.is_cancelled() => break,
             Err(error) => failures.push(FailureReport {
                 parameter: b.parameter,
                 reason: format!("the locus of its {}: {error}", kind_name(b.kind)),
@@ -909,7 +918,7 @@ pub struct BranchRequest {
     #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
     pub values: usize,
     /// Of the {diagram}: starts at each
-    #[schemars(range(min = 1, max = MOST_POINTS), extend("x-value" = "S"))]
+    #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
     pub starts: usize,
     /// Of the {diagram}: seed of the starts
     #[schemars(extend("x-value" = "K"))]
@@ -987,10 +996,11 @@ impl Study for BranchStudy {
     const ABOUT: &'static str =
         "Periodic orbits followed in a parameter, stable and unstable, with their bifurcations";
     const COUNTED: &'static str = "points";
+    const PARTIAL: bool = true;
     type Request = BranchRequest;
     type Report = BranchReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &BranchRequest,
         control: &Control<'_>,

@@ -253,6 +253,7 @@ fn motion(
     control: &Control<'_>,
 ) -> Result<SampleMotion, ComparisonError> {
     let model = Model::cantilever(&case).map_err(CaseError::from)?;
+    let model = model.cancelled_by(&control.flag());
     let rest = vec![0.0; model.dimension()];
     let mut map = Strobe::new(&model);
     let named = Named::of(&classify(&mut map, &rest, &ClassifyOptions::default()).kind);
@@ -297,7 +298,7 @@ fn followed(
     // Closed already: this only puts it in the form that branches begin with.
     let seed = close_orbit(map, &found.state, found.period, &ShootingOptions::default())
         .map_err(OrbitError::from)?;
-    let case = Case::from(case.clone());
+    let case = Case::from(case.clone()).cancelled_by(control);
     Ok(branches_through(
         &case,
         &[(case.omega(), seed)],
@@ -404,7 +405,7 @@ impl Study for ContactLawsStudy {
     type Request = ContactLawsRequest;
     type Report = Comparison;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &ContactLawsRequest,
         control: &Control<'_>,

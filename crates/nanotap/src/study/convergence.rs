@@ -80,11 +80,15 @@ pub fn convergence(
     largest: usize,
     tolerance: f64,
     options: &OrbitOptions,
+    control: &Control<'_>,
 ) -> Result<Convergence, ModelError> {
     let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
     let mut motions = Vec::new();
     let models: Vec<Model> = (1..=largest)
-        .map(|modes| Model::cantilever(&case.clone().with_modes(modes)))
+        .map(|modes| {
+            let model = Model::cantilever(&case.clone().with_modes(modes))?;
+            Ok::<_, ModelError>(model.cancelled_by(&control.flag()))
+        })
         .collect::<Result<_, _>>()?;
     for (modes, model) in (1..).zip(&models) {
         let guess = OrbitOptions {
@@ -258,10 +262,10 @@ impl Study for ConvergenceStudy {
     type Request = ConvergenceRequest;
     type Report = Convergence;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &ConvergenceRequest,
-        _: &Control<'_>,
+        control: &Control<'_>,
     ) -> Result<Convergence, Error> {
         let options = OrbitOptions {
             period: request.period,
@@ -273,6 +277,7 @@ impl Study for ConvergenceStudy {
             largest,
             tolerance,
             &options,
+            control,
         )?)
     }
 }

@@ -29,15 +29,35 @@ pub trait Study {
     /// Whether it chooses the distance itself, so that none is solved for a setpoint.
     const ANY_DISTANCE: bool = false;
 
-    /// Studies `case`.
+    /// Whether the report of work that was stopped holds what is finished, and says so.
+    const PARTIAL: bool = false;
+
+    /// Studies `case`: what [`run`](Self::run) does, whose `control` the case carries.
     ///
     /// # Errors
     /// When the request is not right, or the computation does not succeed.
-    fn run(
+    fn compute(
         case: &Case,
         request: &Self::Request,
         control: &Control<'_>,
     ) -> Result<Self::Report, Error>;
+
+    /// Studies `case`. Once `control` cancels the work it ends soon, with what is finished where
+    /// the report can hold that.
+    ///
+    /// # Errors
+    /// When the request is not right, the computation does not succeed, or it was stopped.
+    fn run(
+        case: &Case,
+        request: &Self::Request,
+        control: &Control<'_>,
+    ) -> Result<Self::Report, Error> {
+        let report = Self::compute(&case.cancelled_by(control), request, control);
+        if control.is_cancelled() && !(Self::PARTIAL && report.is_ok()) {
+            return Err(Error::stopped());
+        }
+        report
+    }
 }
 
 /// A study whose report is a dataset, computed chunk by chunk.
@@ -53,12 +73,29 @@ pub trait DatasetStudy {
     /// What its dataset comes to.
     type Report: Serialize + JsonSchema;
 
-    /// What is to be computed of `case`.
+    /// What is to be computed of `case`: what [`recipe`](Self::recipe) gives, whose `control` the
+    /// case carries.
     ///
     /// # Errors
     /// When the request is not right, or what must be known beforehand cannot be found.
-    fn recipe(case: &Case, request: &Self::Request, control: &Control<'_>)
-    -> Result<Recipe, Error>;
+    fn plan(case: &Case, request: &Self::Request, control: &Control<'_>) -> Result<Recipe, Error>;
+
+    /// What is to be computed of `case`.
+    ///
+    /// # Errors
+    /// When the request is not right, what must be known beforehand cannot be found, or the work
+    /// was stopped.
+    fn recipe(
+        case: &Case,
+        request: &Self::Request,
+        control: &Control<'_>,
+    ) -> Result<Recipe, Error> {
+        let recipe = Self::plan(&case.cancelled_by(control), request, control);
+        if control.is_cancelled() {
+            return Err(Error::stopped());
+        }
+        recipe
+    }
 
     /// What a finished dataset comes to.
     ///

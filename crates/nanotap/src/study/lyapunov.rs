@@ -100,7 +100,7 @@ pub struct LyapunovReport {
     /// The same from the trace of the equations and the time in each regime, with twice the
     /// logarithm of the restitution at every impact, over the same periods: the check.
     pub sum_by_trace: f64,
-    /// Kaplan–Yorke dimension of the strobe points.
+    /// Kaplan–Yorke dimension of the strobe points: 1 of a circle.
     pub kaplan_yorke_dimension: f64,
     /// Mean strobe state.
     pub mean: Vec<f64>,
@@ -263,7 +263,10 @@ pub fn lyapunov(
         periods: spectrum.periods,
         sum: spectrum.exponents.iter().sum(),
         sum_by_trace: spectrum.log_determinant,
-        kaplan_yorke_dimension: spectrum.kaplan_yorke_dimension(),
+        kaplan_yorke_dimension: match named.classification {
+            Classification::QuasiPeriodic => spectrum.neutral_directions() as f64,
+            _ => spectrum.kaplan_yorke_dimension(),
+        },
         exponents: spectrum.exponents,
         errors: spectrum.errors,
         mean: spectrum.strobe.mean_state().to_vec(),
@@ -403,8 +406,8 @@ pub enum SectionKind {
     Contact,
 }
 
-/// Most points of a section: 800 MB with three modes.
-pub const MOST_SECTION_POINTS: usize = 10_000_000;
+/// Most points of a section: 300 MB with three modes.
+pub const MOST_SECTION_POINTS: usize = 2_000_000;
 
 /// What the study of Lyapunov exponents is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -470,7 +473,7 @@ impl Study for LyapunovStudy {
     type Request = LyapunovRequest;
     type Report = LyapunovReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &LyapunovRequest,
         control: &Control<'_>,

@@ -137,7 +137,7 @@ impl Study for ModesStudy {
     type Request = ModesRequest;
     type Report = ModeTable;
 
-    fn run(case: &Case, _: &ModesRequest, _: &Control<'_>) -> Result<ModeTable, Error> {
+    fn compute(case: &Case, _: &ModesRequest, _: &Control<'_>) -> Result<ModeTable, Error> {
         Ok(ModeTable::new(cantilever(case, Self::NAME)?)?)
     }
 }

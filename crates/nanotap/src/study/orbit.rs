@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use nanotap_dynamics::{
     ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingError,
-    ShootingOptions, classify, close_orbit, close_orbit_from_points, find_orbits,
+    ShootingOptions, check_size, classify, close_orbit, close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
@@ -111,13 +111,14 @@ pub struct OrbitReport {
     pub error: f64,
     /// Floquet multipliers, real and imaginary part, largest modulus first.
     pub multipliers: Vec<[f64; 2]>,
-    /// Whether every multiplier is inside the unit circle.
+    /// Whether every multiplier is inside the unit circle, or the orbit is proved to be stable.
     pub stable: bool,
-    /// What the multipliers say, in a word: stable, unstable or marginal.
+    /// What the multipliers say, or what is proved, in a word: stable, unstable or marginal;
+    /// undecided where the multipliers contradict the trace formula.
     pub stability: &'static str,
-    /// |log|det DPⁿ| − trace formula|: zero to rounding of an exact Jacobian. Where a sample
-    /// forgets at the end of each contact, the product of the other multipliers stands for
-    /// the determinant, which is zero.
+    /// |log|det DPⁿ| − trace formula|: zero to rounding of an exact Jacobian, and without meaning where
+    /// the smallest multiplier is lost in rounding. Where a sample forgets at the end of each
+    /// contact, the product of the other multipliers stands for the determinant, which is zero.
     pub determinant_defect: f64,
     /// Contacts begun and ended.
     pub events: Vec<ContactEvent>,
@@ -139,6 +140,21 @@ pub struct OrbitReport {
     /// Its full length, for figures.
     #[serde(skip)]
     pub trajectory: Recording,
+}
+
+impl OrbitReport {
+    /// Tries to prove it. What is proved of its stability stands in place of what the multipliers
+    /// leave open next to the unit circle.
+    pub fn prove(&mut self, prover: &Prover) {
+        let proof = prover.report(&self.trajectory, self.period);
+        if let Some(decided) = proof.theorem.as_ref().map(|theorem| theorem.stability)
+            && decided != "undecided"
+        {
+            self.stability = decided;
+            self.stable = decided == "stable";
+        }
+        self.proof = Some(proof);
+    }
 }
 
 /// The largest modulus of a report's multipliers; 0 of none.
@@ -165,6 +181,7 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Orbit
             harmonics: options.harmonics,
         });
     }
+    check_size(model.dimension(), options.period.unwrap_or(1))?;
     let start = starting_state(model, options.state.as_deref())?;
     let mut map = Strobe::new(model);
     let found = match (options.period, &options.state) {
@@ -222,7 +239,11 @@ fn searched(
         shooting: options.shooting.clone(),
         ..OrbitSearch::default()
     };
-    let found = find_orbits(map, &starts, &search, &Control::default());
+    let control = Control {
+        cancel: Some(model.system.cancel()),
+        progress: None,
+    };
+    let found = find_orbits(map, &starts, &search, &control);
     found
         .into_iter()
         .find(|orbit| orbit.period == period)
@@ -298,6 +319,11 @@ fn report_on(
     };
     let observed = OutOfRange::observed_with(model, observables);
     let seen = watch(model, &start, orbit.period, observed, kept)?;
+    let determinant_defect = match &seen.recording {
+        Recording::Exact(trajectory) => determinant_defect(model, orbit, trajectory),
+        Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
+    };
+    let agrees = determinant_defect <= allowed_defect(orbit);
     Ok(OrbitReport {
         period: orbit.period,
         state: start,
@@ -305,12 +331,13 @@ fn report_on(
         residual: orbit.residual,
         error: orbit.error,
         multipliers: pairs(&orbit.multipliers),
-        stable: orbit.is_stable(),
-        stability: orbit.stability.name(),
-        determinant_defect: match &seen.recording {
-            Recording::Exact(trajectory) => determinant_defect(model, orbit, trajectory),
-            Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
+        stable: agrees && orbit.is_stable(),
+        stability: if agrees {
+            orbit.stability.name()
+        } else {
+            "undecided"
         },
+        determinant_defect,
         events: seen.events,
         spectrum: Spectrum::of(model, &seen.recording, orbit.period, harmonics),
         out_of_range: OutOfRange::of(model, &seen.observables),
@@ -319,6 +346,19 @@ fn report_on(
         proof: None,
         trajectory: seen.recording,
     })
+}
+
+/// The largest disagreement of multipliers and trace formula that is called agreement.
+pub const MAX_DETERMINANT_DEFECT: f64 = 1e-8;
+/// A bound of what rounding leaves in a multiplier.
+const MULTIPLIER_ROUNDING: f64 = 1e-11;
+
+/// How far the multipliers may be from the trace formula: rounding weighs in the smallest multiplier
+/// that is not zero.
+fn allowed_defect(orbit: &PeriodicOrbit) -> f64 {
+    let moduli = orbit.multipliers.iter().map(|m| m.modulus());
+    let smallest = moduli.filter(|m| *m > 0.0).fold(1.0, f64::min);
+    MAX_DETERMINANT_DEFECT.max(MULTIPLIER_ROUNDING / smallest)
 }
 
 /// Multipliers as reports list them.
@@ -358,6 +398,8 @@ fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Traject
                 .sum();
             (found - expected - log_remembered(model, forgetting, trajectory)).abs()
         }
+        // Both vanish where the motion sticks.
+        _ if orbit.log_determinant == expected => 0.0,
         _ => (orbit.log_determinant - expected).abs(),
     }
 }
@@ -416,6 +458,10 @@ fn flights(model: &Model, trajectory: &Trajectory) -> impl Iterator<Item = f64> 
 /// log|det DPⁿ| from Liouville's formula: every impact has determinant ±(product of the
 /// resets), every other switch that of its saltation, every segment e^{tr A · length}.
 fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
+    let mut segments = trajectory.segments().iter();
+    if segments.any(|s| model.system.sticks(s.regime)) {
+        return f64::NEG_INFINITY;
+    }
     // A memory that is forgotten is left out, and its jump with it.
     let forgets = model.forgetting.as_ref();
     let forgotten = match forgets {
@@ -512,7 +558,7 @@ impl Study for OrbitStudy {
     type Request = OrbitRequest;
     type Report = InSi<OrbitReport>;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &OrbitRequest,
         _: &Control<'_>,
@@ -537,7 +583,7 @@ impl Study for OrbitStudy {
             found.derivatives.insert(key.path(), derivative);
         }
         if request.prove {
-            found.proof = Some(Prover::new(case).report(&found.trajectory, found.period));
+            found.prove(&Prover::new(case));
         }
         let physical = case.physical().map(|resolved| {
             PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved)
@@ -555,6 +601,9 @@ impl From<OrbitError> for crate::Error {
             OrbitError::NoPeriod => Self::input(error.to_string(), "give {period} 1 or more"),
             OrbitError::TooManyHarmonics { .. } => {
                 Self::input(error.to_string(), "give fewer {harmonics}")
+            }
+            OrbitError::Newton(ShootingError::TooLarge { .. }) => {
+                Self::input(error.to_string(), "give a shorter {period} or fewer modes")
             }
             OrbitError::Start(error) => error.into(),
             OrbitError::NotFound { .. } => {

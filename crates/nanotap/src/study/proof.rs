@@ -108,6 +108,7 @@ impl Prover {
             ),
             (None, None) => (Err(EnclosureError::NotPiecewiseLinear), String::new()),
         };
+        let system = system.map(|system| system.cancelled_by(case.cancel().clone()));
         Self { system, about }
     }
 

@@ -5,10 +5,10 @@
 //! entry's schemas.
 //!
 //! ```
-//! use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+//! use std::sync::atomic::{AtomicUsize, Ordering};
 //!
 //! use nanotap::case::Case;
-//! use nanotap::control::Control;
+//! use nanotap::control::{CancelFlag, Control};
 //! use nanotap::study::registry::study;
 //! use serde_json::{Value, json};
 //!
@@ -16,7 +16,7 @@
 //! let case = Case::parse(None, &words.map(str::to_owned))?;
 //! let attractors = study("attractors").expect("it is in the list");
 //!
-//! let (stop, done) = (AtomicBool::new(false), AtomicUsize::new(0));
+//! let (stop, done) = (CancelFlag::new(), AtomicUsize::new(0));
 //! let count = |_: usize, _: usize| {
 //!     done.fetch_add(1, Ordering::Relaxed);
 //! };
@@ -59,6 +59,8 @@ pub struct StudyEntry {
     pub report: fn() -> Schema,
     /// What its progress counts.
     pub counted: &'static str,
+    /// Whether the report of work that was stopped holds what is finished.
+    pub partial: bool,
     /// Whether it chooses the distance itself.
     pub any_distance: bool,
     /// Runs it.
@@ -82,6 +84,7 @@ impl StudyEntry {
             request: schema::<S::Request>,
             report: answer_schema::<Document<'static, S::Report>>,
             counted: S::COUNTED,
+            partial: S::PARTIAL,
             any_distance: S::ANY_DISTANCE,
             run: Run::Document(|case, request, control| {
                 let request = read::<S::Request>(request)?;
@@ -103,6 +106,7 @@ impl StudyEntry {
             request: schema::<S::Request>,
             report: answer_schema::<S::Report>,
             counted: S::COUNTED,
+            partial: true,
             any_distance: false,
             run: Run::Dataset(|case, request, control| {
                 let request = read::<S::Request>(request)?;

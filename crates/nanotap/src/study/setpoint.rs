@@ -1,26 +1,33 @@
 //! The distance at which the amplitude has its setpoint: what the feedback loop finds.
 //!
-//! All branches of an approach curve are searched for the setpoint amplitude A_set (of the
-//! first harmonic, as a lock-in amplifier reads it). Each crossing is closed by Newton at
-//! distances chosen by regula falsi, so that every solution is an orbit with its multipliers.
-//! The feedback comes from far: it stops at the first distance on the approach at which the
-//! followed motion's amplitude falls to A_set. Where the amplitude jumps past A_set instead,
-//! or the motion there is not periodic, nothing is chosen and the reason is given.
+//! The feedback comes from far and slowly: the lever follows its branch of stable orbits, and
+//! jumps where that ends (see [`approach`](super::approach)). It stops at the first distance at
+//! which the amplitude of the first harmonic, as a lock-in amplifier reads it, has fallen to the
+//! setpoint A_set. The orbit there is closed by Newton at distances chosen by regula falsi.
+//! Where the amplitude jumps past A_set instead, or the motion there is not periodic, nothing is
+//! chosen and the reason is given.
 //!
-//! Fails by omission: solutions on branches that no motion of the curve lies on.
+//! The branch of that orbit is then continued round its folds: other orbits with the amplitude
+//! A_set, and other stable orbits at the chosen distance, are reported too.
+//!
+//! Fails by omission: orbits on other branches.
 
-use nanotap_dynamics::{Control, PeriodicOrbit, ShootingOptions, close_orbit_from_points};
+use nanotap_dynamics::{
+    BranchPoint, ContinuationOptions, Control, DiagramOptions, PeriodicOrbit, ShootingOptions,
+    assemble_diagram, close_orbit_from_points,
+};
+use rayon::prelude::*;
 use serde::Serialize;
 
-use super::approach::{
-    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Way, approach,
-};
-use crate::case::Case;
+use super::FreeMotion;
+use super::approach::distance_sweep::{DistanceSweep, Motion, Piece};
+use super::approach::{ApproachError, MAX_MULTIPLIER, SETPOINT_PERIODS};
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
+use crate::case::{Case, CaseError};
 use crate::model::strobe::Strobe;
+use crate::observe::table::shown_phase;
 use crate::observe::{Observables, OutOfRange, PhysicalMotion, Set, measure};
-use crate::study::branch::PointReport;
 
 /// Why no distance was chosen.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -101,6 +108,22 @@ pub struct SetpointSolution {
     pub physical: PhysicalMotion,
 }
 
+/// Another stable orbit at the chosen distance.
+#[derive(Clone, Debug, Serialize)]
+pub struct SetpointState {
+    /// Its period.
+    pub period: usize,
+    /// Largest |multiplier|.
+    pub spectral_radius: f64,
+    /// State at drive phase 0.
+    pub state: Vec<f64>,
+    /// What it looks like.
+    #[serde(flatten)]
+    pub observables: Observables,
+    /// The same in SI.
+    pub physical: PhysicalMotion,
+}
+
 /// The setpoint solved for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointReport {
@@ -112,6 +135,8 @@ pub struct SetpointReport {
     pub solutions: Vec<SetpointSolution>,
     /// Which of them the approach reaches.
     pub chosen: usize,
+    /// Other stable orbits at the distance that the approach reaches.
+    pub other_states: Vec<SetpointState>,
 }
 
 impl SetpointReport {
@@ -141,17 +166,30 @@ impl SetpointReport {
                     .join(", ")
             ),
         };
+        let also: Vec<String> = self
+            .other_states
+            .iter()
+            .map(|other| {
+                format!(
+                    "A = {}, phase {}°",
+                    Kind::Length.format(other.physical.observables.first_harmonic),
+                    Kind::Number.format_digits(shown_phase(other.observables.phase), 4)
+                )
+            })
+            .collect();
+        let bistable = if also.is_empty() {
+            String::new()
+        } else {
+            format!("; bistable: the lever may also be at {}", also.join(", or at "))
+        };
         Remark::note(format!(
-            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}",
+            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}",
             Kind::Length.format(self.amplitude),
             Kind::Number.format(self.ratio),
             Kind::Length.format(self.zc()),
         ))
     }
 }
-
-/// Distances of the curve that is searched.
-const POINTS: usize = 60;
 
 /// Solves the setpoint of a physical case for the distance.
 ///
@@ -160,49 +198,46 @@ const POINTS: usize = 60;
 pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, SetpointError> {
     let view = case.physical().ok_or(SetpointError::None)?;
     let ratio = view.setpoint.ok_or(SetpointError::None)?;
-    let options = ApproachOptions {
-        points: POINTS,
-        ..ApproachOptions::default()
+    let free = FreeMotion::of(&case.model().map_err(ApproachError::Model)?);
+    if !(free.reach > 0.0 && free.reach.is_finite()) {
+        return Err(ApproachError::NoDrive.into());
+    }
+    let target = ratio * free.amplitude;
+    let mut search = Search {
+        case,
+        ratio,
+        target,
+        free,
+        before: None,
+        least: f64::INFINITY,
+        found: None,
     };
-    let curve = approach(case, &options, control)?;
-    if curve.cancelled {
+    let failed = |error: CaseError| SetpointError::Approach(error.into());
+    let range = (0.0, FARTHER * free.reach);
+    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)
+        .map_err(failed)?;
+    let place = sweep.free().map_err(failed)?;
+    let (pieces, _) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
+    if control.is_cancelled() {
         return Err(SetpointError::Cancelled);
     }
-    let target = ratio * curve.free_amplitude;
-    let (before, after) = bracket(&curve, ratio, target)?;
-    let mut solutions = all_solutions(case, &curve, target);
-    // What the approach reaches lies between two of its distances, on a branch that attracts.
-    let step = before.gap - after.gap;
-    let reached = solutions
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| {
-            s.stable
-                && s.gap <= before.gap + 1e-9 * step
-                && s.gap >= after.gap - 1e-9 * step
-                && Some(s.period) == after.period
-        })
-        .max_by(|a, b| a.1.gap.total_cmp(&b.1.gap))
-        .map(|(k, _)| k);
-    let amplitude = |p: &ApproachPoint| {
-        p.observables
-            .map_or(f64::NAN, |s| s.first_harmonic / curve.free_amplitude)
-    };
-    let Some(chosen) = reached else {
-        return Err(SetpointError::Jump {
+    let reached = search.found.take().unwrap_or_else(|| {
+        Err(SetpointError::NotReached {
             ratio,
-            before: amplitude(before),
-            after: amplitude(after),
-            from: told(before),
-            to: told(after),
-        });
-    };
-    solutions[chosen].reached = true;
+            least: search.least / free.amplitude,
+        })
+    })?;
+    drop(pieces);
+    let (mut solutions, other_states) = search.others(&sweep, &reached, control);
+    solutions.push(reached);
+    solutions.sort_by(|a, b| b.gap.total_cmp(&a.gap));
+    let chosen = solutions.iter().position(|s| s.reached).unwrap_or(0);
     Ok(SetpointReport {
         ratio,
         amplitude: ratio * view.free_amplitude,
         solutions,
         chosen,
+        other_states,
     })
 }
 
@@ -218,8 +253,9 @@ pub fn at_setpoint(
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    let report = solve_setpoint(&case, control)?;
-    let there = case.at_distance(report.zc(), report.remark());
+    let report = solve_setpoint(&case.cancelled_by(control), control)?;
+    let state = report.solutions.get(report.chosen).map(|s| s.state.clone());
+    let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default());
     let there = there.map_err(|error| ApproachError::Model(Box::new(error).into()))?;
     Ok((there, Some(report)))
 }
@@ -250,161 +286,274 @@ impl SolvedCase {
     }
 }
 
-/// The distance of a point in words.
-fn told(point: &ApproachPoint) -> String {
-    point
-        .zc
-        .map_or_else(|| point.gap.to_string(), |zc| Kind::Length.format(zc))
-}
+/// How much farther than the free tip swings the way begins.
+const FARTHER: f64 = 2.0;
 
-/// The points of the approach between which the amplitude first falls to the target.
-fn bracket(
-    curve: &ApproachReport,
+/// The search for the setpoint along the way from far.
+struct Search<'a> {
+    case: &'a Case,
     ratio: f64,
+    /// The amplitude at the setpoint, in the model's unit.
     target: f64,
-) -> Result<(&ApproachPoint, &ApproachPoint), SetpointError> {
-    let there: Vec<&ApproachPoint> = curve
-        .table
-        .iter()
-        .filter(|p| p.way == Way::Approach)
-        .collect();
-    let mut least = f64::INFINITY;
-    for pair in there.windows(2) {
-        let (before, after) = (pair[0], pair[1]);
-        let Some(observables) = after.observables.filter(|_| after.period.is_some()) else {
-            return Err(SetpointError::NotPeriodic {
-                what: after.classification.name(),
-                at: told(after),
-                ratio,
-            });
-        };
-        least = least.min(observables.first_harmonic);
-        if observables.first_harmonic <= target {
-            return Ok((before, after));
-        }
-    }
-    Err(SetpointError::NotReached {
-        ratio,
-        least: least / curve.free_amplitude,
-    })
+    free: FreeMotion,
+    /// The distance and the amplitude last passed.
+    before: Option<(f64, f64)>,
+    least: f64,
+    found: Option<Result<SetpointSolution, SetpointError>>,
 }
 
-/// Every crossing of the target on every branch, the farthest first.
-fn all_solutions(case: &Case, curve: &ApproachReport, target: f64) -> Vec<SetpointSolution> {
-    let Some(branches) = &curve.branches else {
-        return Vec::new();
-    };
-    let mut found: Vec<SetpointSolution> = Vec::new();
-    for pair in branches.points.windows(2) {
-        let (a, b) = (&pair[0], &pair[1]);
-        let excess = |p: &PointReport| p.observables.first_harmonic - target;
-        if a.branch != b.branch || (excess(a) > 0.0) == (excess(b) > 0.0) {
-            continue;
-        }
-        if let Some(solution) = crossing(case, a, b, target) {
-            let near = 1e-9 * curve.free_reach.max(solution.gap.abs());
-            let known = |s: &SetpointSolution| {
-                s.period == solution.period
-                    && (s.gap - solution.gap).abs() <= near
-                    && (s.observables.phase - solution.observables.phase).abs() < 1e-4
+/// An orbit of a branch and its amplitude.
+#[derive(Clone, Debug)]
+struct Sample<'a> {
+    gap: f64,
+    orbit: &'a PeriodicOrbit,
+    amplitude: f64,
+}
+
+impl Search<'_> {
+    /// The distance in words.
+    fn told(&self, gap: f64) -> String {
+        self.case.physical().map_or_else(
+            || gap.to_string(),
+            |view| Kind::Length.format(gap * view.scales.length),
+        )
+    }
+
+    fn amplitude(&self, sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
+        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+        let seen = sweep.model(gap).ok().and_then(|model| {
+            measure(&model, start, orbit.period, Set::FIRST_HARMONIC).ok()
+        });
+        seen.map_or(f64::NAN, |seen| seen.first_harmonic)
+    }
+
+    /// Whether the search ends in a piece of the way.
+    fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece) -> bool {
+        let stretch = match &piece.motion {
+            Motion::Periodic(stretch) => *stretch,
+            Motion::OnGrid(found) => {
+                let what = found.first().map_or("undecided", |(_, met)| match met.orbit {
+                    Some(_) => "of a long period",
+                    None => met.classification.name(),
+                });
+                self.found = Some(Err(SetpointError::NotPeriodic {
+                    what,
+                    at: self.told(piece.from),
+                    ratio: self.ratio,
+                }));
+                return true;
+            }
+        };
+        let points = &sweep.stretches[stretch].points;
+        let inside = points.iter().rev().filter(|p| p.parameter < piece.from && p.parameter > piece.to);
+        let mut gaps: Vec<(f64, Option<PeriodicOrbit>)> =
+            vec![(piece.from, sweep.orbit_at(stretch, piece.from))];
+        gaps.extend(inside.map(|p| (p.parameter, Some(p.orbit.clone()))));
+        gaps.push((piece.to, sweep.orbit_at(stretch, piece.to)));
+        let orbits: Vec<(f64, PeriodicOrbit)> =
+            gaps.into_iter().filter_map(|(gap, orbit)| Some((gap, orbit?))).collect();
+        let amplitudes: Vec<f64> = orbits
+            .par_iter()
+            .with_max_len(1)
+            .map(|(gap, orbit)| self.amplitude(sweep, *gap, orbit))
+            .collect();
+        let mut before: Option<Sample<'_>> = None;
+        for ((gap, orbit), amplitude) in orbits.iter().zip(amplitudes) {
+            let here = Sample {
+                gap: *gap,
+                orbit,
+                amplitude,
             };
-            if !found.iter().any(known) {
-                found.push(solution);
+            self.least = self.least.min(amplitude);
+            if amplitude <= self.target {
+                let jumped = |(from, above): (f64, f64)| {
+                    Err(SetpointError::Jump {
+                        ratio: self.ratio,
+                        before: above / self.free.amplitude,
+                        after: amplitude / self.free.amplitude,
+                        from: self.told(from),
+                        to: self.told(*gap),
+                    })
+                };
+                let crossed = before.as_ref().map(|last| {
+                    self.crossing(last, &here).map(|found| SetpointSolution {
+                        reached: true,
+                        ..found
+                    })
+                });
+                self.found = match (crossed, self.before) {
+                    (Some(Some(found)), _) => Some(Ok(found)),
+                    (_, Some(above)) => Some(jumped(above)),
+                    // Below the setpoint from the first: nothing is reached from above.
+                    (_, None) => None,
+                };
+                return true;
+            }
+            self.before = Some((*gap, amplitude));
+            before = Some(here);
+        }
+        false
+    }
+
+    /// The other orbits with the setpoint's amplitude, and the other stable orbits at the chosen
+    /// distance, on the branch of the orbit that is reached.
+    fn others(
+        &self,
+        sweep: &DistanceSweep<'_>,
+        reached: &SetpointSolution,
+        control: &Control<'_>,
+    ) -> (Vec<SetpointSolution>, Vec<SetpointState>) {
+        let mut solutions: Vec<SetpointSolution> = Vec::new();
+        let mut states: Vec<SetpointState> = Vec::new();
+        let Some(chosen) = self.closed(reached.gap, &reached.state, reached.period) else {
+            return (solutions, states);
+        };
+        let options = DiagramOptions {
+            continuation: ContinuationOptions {
+                max_multiplier: MAX_MULTIPLIER,
+                ..ContinuationOptions::over(0.0, sweep.farthest())
+            },
+            doublings: 0,
+            stable_doublings: false,
+            max_branches: 8,
+        };
+        let quiet = Control {
+            progress: None,
+            ..*control
+        };
+        let family = self.case.family(self.case.gap_key());
+        let diagram =
+            assemble_diagram(&family, &[(reached.gap, chosen.clone())], &options, &quiet);
+        for branch in &diagram.branches {
+            let points: &[BranchPoint] = &branch.branch.points;
+            let amplitudes: Vec<f64> = points
+                .par_iter()
+                .with_max_len(1)
+                .map(|p| self.amplitude(sweep, p.parameter, &p.orbit))
+                .collect();
+            for (pair, both) in points.windows(2).zip(amplitudes.windows(2)) {
+                let [a, b] = [0, 1].map(|k| Sample {
+                    gap: pair[k].parameter,
+                    orbit: &pair[k].orbit,
+                    amplitude: both[k],
+                });
+                if (a.amplitude > self.target) != (b.amplitude > self.target)
+                    && let Some(solution) = self.crossing(&a, &b)
+                {
+                    let near = 1e-9 * self.free.reach.max(solution.gap.abs());
+                    let known = |s: &SetpointSolution| {
+                        s.period == solution.period
+                            && (s.gap - solution.gap).abs() <= near
+                            && (s.observables.phase - solution.observables.phase).abs() < 1e-4
+                    };
+                    if !solutions.iter().chain([reached]).any(known) {
+                        solutions.push(solution);
+                    }
+                }
+                let share = (reached.gap - a.gap) / (b.gap - a.gap);
+                if (0.0..=1.0).contains(&share)
+                    && a.orbit.is_stable()
+                    && b.orbit.is_stable()
+                    && let Some((_, orbit, observables)) = self.orbit_between(&a, &b, share)
+                    && orbit.is_stable()
+                    && !orbit.is_same_as(&chosen)
+                    && let Some(view) = self.case.physical()
+                {
+                    states.push(SetpointState {
+                        period: orbit.period,
+                        spectral_radius: orbit.spectral_radius(),
+                        state: orbit.states.first().cloned().unwrap_or_default(),
+                        physical: PhysicalMotion::of(&observables, view),
+                        observables,
+                    });
+                }
             }
         }
+        (solutions, states)
     }
-    found.sort_by(|a, b| b.gap.total_cmp(&a.gap));
-    found
+
+    fn closed(&self, gap: f64, state: &[f64], period: usize) -> Option<PeriodicOrbit> {
+        let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
+        let mut map = Strobe::new(&model);
+        nanotap_dynamics::close_orbit(&mut map, state, period, &ShootingOptions::default()).ok()
+    }
 }
 
 /// Steps of regula falsi at most.
 const STEPS: usize = 60;
 
-/// The orbit between two points of a branch that has the target amplitude.
-fn crossing(
-    case: &Case,
-    a: &PointReport,
-    b: &PointReport,
-    target: f64,
-) -> Option<SetpointSolution> {
-    let view = case.physical()?;
-    let (mut low, mut high) = (
-        (0.0, a.observables.first_harmonic),
-        (1.0, b.observables.first_harmonic),
-    );
-    let mut closed: Option<(f64, PeriodicOrbit, Observables)> = None;
-    for _ in 0..STEPS {
-        // The curve is nearly straight between two points of a branch.
-        let slope = (high.1 - low.1) / (high.0 - low.0);
-        let middle = low.0 + (target - low.1) / slope;
-        let t = if middle.is_finite() && middle > low.0 && middle < high.0 {
-            middle
-        } else {
-            0.5 * (low.0 + high.0)
-        };
-        let (gap, orbit, observables) = orbit_between(case, a, b, t)?;
-        let value = observables.first_harmonic;
-        closed = Some((gap, orbit, observables));
-        if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
-            break;
+impl Search<'_> {
+    /// The orbit between two of a branch that has the target amplitude.
+    fn crossing(&self, a: &Sample<'_>, b: &Sample<'_>) -> Option<SetpointSolution> {
+        let view = self.case.physical()?;
+        let target = self.target;
+        let (mut low, mut high) = ((0.0, a.amplitude), (1.0, b.amplitude));
+        let mut closed: Option<(f64, PeriodicOrbit, Observables)> = None;
+        for _ in 0..STEPS {
+            // The curve is nearly straight between two points of a branch.
+            let slope = (high.1 - low.1) / (high.0 - low.0);
+            let middle = low.0 + (target - low.1) / slope;
+            let t = if middle.is_finite() && middle > low.0 && middle < high.0 {
+                middle
+            } else {
+                0.5 * (low.0 + high.0)
+            };
+            let (gap, orbit, observables) = self.orbit_between(a, b, t)?;
+            let value = observables.first_harmonic;
+            closed = Some((gap, orbit, observables));
+            if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
+                break;
+            }
+            if (value > target) == (low.1 > target) {
+                low = (t, value);
+            } else {
+                high = (t, value);
+            }
         }
-        if (value > target) == (low.1 > target) {
-            low = (t, value);
-        } else {
-            high = (t, value);
+        let (gap, orbit, observables) = closed?;
+        // Where a fold lies between the points, Newton may have closed the other orbit.
+        if (observables.first_harmonic - target).abs() > 1e-6 * target.abs() {
+            return None;
         }
+        Some(SetpointSolution {
+            gap,
+            zc: gap * view.scales.length,
+            period: orbit.period,
+            stable: orbit.is_stable(),
+            spectral_radius: orbit.spectral_radius(),
+            reached: false,
+            state: orbit.states.first().cloned().unwrap_or_default(),
+            physical: PhysicalMotion::of(&observables, view),
+            observables,
+        })
     }
-    let (gap, orbit, observables) = closed?;
-    // Where a fold lies between the points, Newton may have closed the other orbit.
-    if (observables.first_harmonic - target).abs() > 1e-6 * target.abs() {
-        return None;
-    }
-    Some(SetpointSolution {
-        gap,
-        zc: gap * view.scales.length,
-        period: orbit.period,
-        stable: orbit.is_stable(),
-        spectral_radius: orbit.spectral_radius(),
-        reached: false,
-        state: orbit.states.first().cloned().unwrap_or_default(),
-        physical: PhysicalMotion::of(&observables, view),
-        observables,
-    })
-}
 
-/// The orbit at a share `t` of the way from one point of a branch to the next.
-fn orbit_between(
-    case: &Case,
-    a: &PointReport,
-    b: &PointReport,
-    t: f64,
-) -> Option<(f64, PeriodicOrbit, Observables)> {
-    use nanotap_dynamics::StroboscopicMap as _;
-    let gap = a.parameter + t * (b.parameter - a.parameter);
-    let model = case.with(case.gap_key(), gap).model().ok()?;
-    let mut map = Strobe::new(&model);
-    let mut state: Vec<f64> = a
-        .state
-        .iter()
-        .zip(&b.state)
-        .map(|(x, y)| x + t * (y - x))
-        .collect();
-    let mut points = Vec::new();
-    for _ in 0..a.period {
-        points.extend_from_slice(&state);
-        map.advance(&mut state).ok()?;
+    /// The orbit at a share `t` of the way from one orbit of a branch to the next.
+    fn orbit_between(
+        &self,
+        a: &Sample<'_>,
+        b: &Sample<'_>,
+        t: f64,
+    ) -> Option<(f64, PeriodicOrbit, Observables)> {
+        let gap = a.gap + t * (b.gap - a.gap);
+        let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
+        let mut map = Strobe::new(&model);
+        let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
+        let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
+        let period = a.orbit.period;
+        let options = ShootingOptions::default();
+        let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
+        let start = orbit.states.first()?;
+        let observables = measure(&model, start, orbit.period, Set::COMMON).ok()?;
+        (orbit.period == period).then_some((gap, orbit, observables))
     }
-    let orbit =
-        close_orbit_from_points(&mut map, &points, a.period, &ShootingOptions::default()).ok()?;
-    let start = orbit.states.first()?;
-    let observables = measure(&model, start, orbit.period, Set::COMMON).ok()?;
-    (orbit.period == a.period).then_some((gap, orbit, observables))
 }
 
 impl From<SetpointError> for crate::Error {
     fn from(error: SetpointError) -> Self {
         match error {
             SetpointError::Approach(error) => error.into(),
+            SetpointError::Cancelled => Self::new(crate::ErrorKind::Stopped, error.to_string()),
             SetpointError::None => Self::input(error.to_string(), "give drive.setpoint"),
             other => Self::numerics(other.to_string()),
         }

@@ -3,9 +3,10 @@
 //!
 //! Every point is a census of its own: motions from rest, from the linear responses and from
 //! seeded starts of every size, each named as in a [sweep](crate::study::sweep), whose datasets,
-//! chunks and resumption serve here too; then the orbits of each point are tried at its
-//! neighbours, until none gains one. What is found is certain, what is not found is only not
-//! found: more starts see more.
+//! chunks and resumption serve here too. Then come the states of a lever that is moved slowly,
+//! coming from far and from the nearest distance ([`approach`](crate::study::approach)), and the
+//! orbits of each point are tried at its neighbours, until none gains one. What is found is
+//! certain, what is not found is only not found: more starts see more.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -334,7 +335,7 @@ impl DatasetStudy for WindowStudy {
     type Request = WindowRequest;
     type Report = Window;
 
-    fn recipe(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
+    fn plan(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
         Ok(Box::new(request.sweep(case)?))
     }
 

@@ -1,10 +1,8 @@
 //! Whatever is typed, a study answers or refuses: no panic, and nothing is allocated by a number
 //! that nobody checked.
 
-use std::sync::atomic::AtomicBool;
-
 use nanotap::case::Case;
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use nanotap::study::registry::{Run, STUDIES, StudyEntry, study};
 use nanotap::study::request::properties;
 use proptest::prelude::*;
@@ -22,7 +20,8 @@ const PAPER: [&str; 7] = [
 
 /// Runs a study, stopped before its first step; its words if it refuses.
 fn run(study: &StudyEntry, case: &Case, request: Value) -> Result<(), String> {
-    let stop = AtomicBool::new(true);
+    let stop = CancelFlag::new();
+    stop.cancel();
     let control = Control {
         cancel: Some(&stop),
         progress: None,

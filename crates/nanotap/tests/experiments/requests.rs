@@ -1,10 +1,8 @@
 //! Requests as a browser or a script may send them: whatever stands in them, every study refuses
 //! what is no request with a reason that names it.
 
-use std::sync::atomic::AtomicBool;
-
 use nanotap::case::Case;
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use nanotap::study::registry::{Run, STUDIES};
 use nanotap::{Error, ErrorKind};
 use proptest::prelude::*;
@@ -33,7 +31,8 @@ fn hostile() -> impl Strategy<Value = Value> {
 
 fn run(at: usize, request: Value) -> Result<(), Error> {
     // What takes long is stopped before it begins.
-    let stop = AtomicBool::new(true);
+    let stop = CancelFlag::new();
+    stop.cancel();
     let control = Control {
         cancel: Some(&stop),
         progress: None,

@@ -5,8 +5,9 @@ use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::{SetpointError, at_setpoint, solve_setpoint};
+use nanotap::study::simulate::{SimulateOptions, simulate};
 
-use crate::approach::{STIFF, studied};
+use crate::approach::{MICA, STIFF, studied};
 
 /// Without `gap.tip`, the setpoint decides.
 fn held(set: &[&str]) -> nanotap::case::Case {
@@ -78,4 +79,63 @@ fn a_distance_and_a_setpoint_are_two_ways_to_say_one_thing() {
         refused.contains("drive.setpoint and gap.tip cannot both be given"),
         "{refused}"
     );
+}
+
+/// A sweep in steps of 5 pm and two ramps stop at 8.177 nm, in the attractive state; the repulsive one
+/// has the same amplitude at 8.003 nm, and another at 8.177 nm.
+#[test]
+fn the_setpoint_is_reached_in_the_state_that_comes_from_far() {
+    let lever = studied(MICA, &["drive.setpoint=0.8"]);
+    let report = solve_setpoint(&lever, &Control::default()).unwrap();
+    assert!((report.zc() / 8.177e-9 - 1.0).abs() < 1e-4, "{}", report.zc());
+    let chosen = &report.solutions[report.chosen];
+    assert!(chosen.stable && chosen.observables.phase > 90.0);
+    assert_eq!(chosen.observables.contact_fraction, 0.0);
+    let repulsive = |s: &&nanotap::study::setpoint::SetpointSolution| s.stable && !s.reached;
+    let other = report.solutions.iter().find(repulsive).unwrap();
+    assert!((other.zc / 8.003e-9 - 1.0).abs() < 1e-4, "{}", other.zc);
+    let [also] = &report.other_states[..] else {
+        panic!("{} other states", report.other_states.len())
+    };
+    assert!(also.observables.phase < 90.0);
+    assert!(report.remark().text.contains("bistable: the lever may also be at A = "));
+}
+
+/// `findings/sp.toml`: the orbit at the setpoint's distance is that of the setpoint, not the repulsive
+/// one with A/A0 = 0.944 and 70.8°, to which a run from rest goes.
+#[test]
+fn motions_start_from_the_orbit_at_the_setpoint() {
+    let text = "\
+[model]
+modes=1
+[cantilever]
+k=\"2.8 N/m\"
+f0=\"75 kHz\"
+Q=200
+[tip]
+radius=\"10 nm\"
+modulus=\"160 GPa\"
+poisson=0.3
+[sample]
+law=\"dmt\"
+modulus=\"1 GPa\"
+poisson=0.3
+hamaker=\"3e-20 J\"
+intermolecular_distance=\"0.169 nm\"
+[drive]
+actuation=\"tip\"
+frequency=\"75 kHz\"
+free_amplitude=\"20 nm\"
+setpoint=0.9
+";
+    let (at, solved) = at_setpoint(studied(text, &[]), &Control::default()).unwrap();
+    let model = at.model().unwrap();
+    let found = orbit(&model, &OrbitOptions::default()).unwrap();
+    let scales = &at.physical().unwrap().scales;
+    let ratio = found.observables.first_harmonic * scales.length / 20e-9;
+    assert!((ratio - 0.9).abs() < 1e-6, "{ratio}");
+    assert!((found.observables.phase - 115.8).abs() < 0.1, "{}", found.observables.phase);
+    let run = simulate(&model, &SimulateOptions::default()).unwrap();
+    assert!((run.observables.phase - 115.8).abs() < 0.1);
+    assert!(!solved.unwrap().other_states.is_empty());
 }

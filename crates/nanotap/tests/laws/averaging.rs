@@ -12,7 +12,7 @@ use nanotap_dynamics::StroboscopicMap;
 use std::path::Path;
 
 /// The cases of the folder with their expected orbits.
-fn cases() -> Vec<(String, Model, serde_json::Value)> {
+pub(crate) fn cases() -> Vec<(String, Model, serde_json::Value)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/census");
     let read = |name: &Path| std::fs::read_to_string(name).unwrap();
     let mut names: Vec<_> = std::fs::read_dir(&folder)
@@ -35,7 +35,7 @@ fn cases() -> Vec<(String, Model, serde_json::Value)> {
     names.iter().map(case).collect()
 }
 
-fn numbers(value: &serde_json::Value) -> Vec<f64> {
+pub(crate) fn numbers(value: &serde_json::Value) -> Vec<f64> {
     let values = value.as_array().unwrap().iter();
     values.map(|v| v.as_f64().unwrap()).collect()
 }

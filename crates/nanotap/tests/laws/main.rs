@@ -6,10 +6,12 @@
 )]
 
 mod averaging;
+mod census;
 mod common;
 mod derivatives;
 mod frequency_modulation;
 mod grazing;
+mod permanent_contact;
 mod reference;
 mod refusals;
 mod studies;

@@ -34,7 +34,8 @@ fn many_states_go_as_each_alone_and_stop_when_told() {
         .chunks(6)
         .flat_map(|state| map.apply(state, 1500).unwrap())
         .collect();
-    let cancel = std::sync::atomic::AtomicBool::new(true);
+    let cancel = nanotap::control::CancelFlag::new();
+    cancel.cancel();
     let stopped = Control {
         cancel: Some(&cancel),
         ..Control::default()

@@ -263,7 +263,8 @@ fn exponents_sum_to_the_trace() {
 #[test]
 fn exponents_stop_when_they_are_to() {
     let model = Model::cantilever(&at(3.0)).unwrap();
-    let stop = std::sync::atomic::AtomicBool::new(true);
+    let stop = nanotap::control::CancelFlag::new();
+    stop.cancel();
     let control = Control {
         cancel: Some(&stop),
         ..Control::default()

@@ -6,8 +6,7 @@ use nanotap::figure::basin::figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, shares};
-use nanotap_dynamics::{ClassifyOptions, Control, MotionKind, classify};
-use std::sync::atomic::AtomicBool;
+use nanotap_dynamics::{CancelFlag, ClassifyOptions, Control, MotionKind, classify};
 
 use crate::folder::{Folder, assert_same};
 
@@ -126,9 +125,12 @@ fn bytes_do_not_depend_on_threads_or_stops() {
     let path = folder.join("stopped");
     let basin = Basin::new(&subject, &options, &Control::default()).unwrap();
     let store = Store::create_or_resume(&path, basin.schema().clone()).unwrap();
-    let cancel = AtomicBool::new(false);
-    let progress =
-        |done: usize, _: usize| cancel.store(done > 4, std::sync::atomic::Ordering::Relaxed);
+    let cancel = CancelFlag::new();
+    let progress = |done: usize, _: usize| {
+        if done > 4 {
+            cancel.cancel();
+        }
+    };
     let control = Control {
         cancel: Some(&cancel),
         progress: Some(&progress),
@@ -235,7 +237,8 @@ fn bad_slices_are_refused() {
     ] {
         assert!(message.contains(word), "{word}: {message}");
     }
-    let cancel = AtomicBool::new(true);
+    let cancel = CancelFlag::new();
+    cancel.cancel();
     let control = Control {
         cancel: Some(&cancel),
         progress: None,

@@ -1,7 +1,7 @@
 //! Stores: resuming, threads, shares, merging, refusals.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
@@ -83,7 +83,8 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
         computed(&sweep, &there, 1);
         assert_same(&here, &there);
         assert!(sweep.chunk_files(store.chunks(), &nowhere).is_none());
-        let cancel = AtomicBool::new(true);
+        let cancel = CancelFlag::new();
+        cancel.cancel();
         let stopped = Control {
             cancel: Some(&cancel),
             progress: None,
@@ -104,11 +105,13 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     // Stopped on the way.
     let path = folder.join("resumed");
     let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
-    let (cancel, last) = (AtomicBool::new(false), AtomicUsize::new(0));
+    let (cancel, last) = (CancelFlag::new(), AtomicUsize::new(0));
     let progress = |done: usize, total: usize| {
         assert!(done <= total);
         last.fetch_max(done, Ordering::Relaxed);
-        cancel.store(done >= 10, Ordering::Relaxed);
+        if done >= 10 {
+            cancel.cancel();
+        }
     };
     let control = Control {
         cancel: Some(&cancel),

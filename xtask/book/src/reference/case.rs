@@ -10,15 +10,16 @@ use super::{code, head, row};
 const INTRODUCTION: &str = "\
 # The keys of a case file
 
-A case states either `[model]` alone, in the model's own units, or a lever, a sample and a drive in
-physical units under the other tables; never a mix (`modes`, and what else the model chooses rather
-than the instrument has, may stand in `[model]` beside them). A quantity is a text with its unit,
-`\"65.7 kHz\"`; the range and the default are those of the number in SI. `--set KEY=VALUE` takes the
-same keys, those of the other tables with the table's name before them:
-`--set drive.frequency=\"65 kHz\"`. An unknown key is refused with the nearest one that exists.
+A case has either `[model]` alone, in the model's own units, or a lever, a sample and a drive in
+physical units in the other tables, but not both. The exception are keys that belong to the model and
+not to the instrument, such as `modes`: they may be given in `[model]` of a physical case. A quantity is
+a string with its unit, `\"65.7 kHz\"`; range and default refer to its value in SI. `--set KEY=VALUE`
+takes the same keys, those of the other tables with the table's name as prefix:
+`--set drive.frequency=\"65 kHz\"`. An unknown key is an error, and the message names the nearest
+known key.
 
-This page is made of the table of keys in the program; `nanotap schema case` prints the same as a
-JSON schema.
+This page is generated from the program's table of keys; `nanotap schema case` prints the same table
+as a JSON schema.
 ";
 
 pub(super) fn page() -> String {
@@ -28,13 +29,7 @@ pub(super) fn page() -> String {
     for (name, table) in tables {
         let _ = write!(text, "\n## `[{name}]`\n\n");
         text += &head(&[
-            "key",
-            "",
-            "what it is",
-            "takes",
-            "range",
-            "without it",
-            "instead of",
+            "key", "symbol", "meaning", "value", "range", "default", "replaces",
         ]);
         for (key, schema) in table["properties"].as_object().into_iter().flatten() {
             text += &entry(key, schema);

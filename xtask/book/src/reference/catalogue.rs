@@ -7,9 +7,9 @@ use super::{code, head, row};
 const INTRODUCTION: &str = "\
 # The catalogue
 
-Names that `cantilever.lever`, `sample.material` and `tip.material` understand; `nanotap catalogue`
-prints the same, and `--catalogue FILE` adds more. A lever's constants are its maker's typical
-values: those of a single lever differ, the spring constant by a factor of two and more.
+The names that `cantilever.lever`, `sample.material` and `tip.material` accept. `nanotap catalogue`
+prints the same list; `--catalogue FILE` adds entries. A lever's constants are the maker's typical
+values. Those of an individual lever differ, the spring constant by a factor of two or more.
 
 ## Levers
 
@@ -52,7 +52,7 @@ pub(super) fn page() -> String {
     text
 }
 
-/// Without the rounding that a unit's factor leaves.
+/// The number without the rounding error of a conversion of units.
 fn rounded(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -14,23 +14,22 @@ const INTRODUCTION: &str = "\
 
 ## Exact laws
 
-Piecewise linear: between two switches the motion is in closed form.
+Piecewise-linear laws: between two switches the motion has a closed form.
 
 ";
 
 const NONLINEAR: &str = "
 ## Nonlinear laws
 
-The beam stays exact; the force in time is a polynomial that solves a Volterra equation, see
-[nonlinear laws](../theory/nonlinear.md). A sum is written with `+`, as in
-`\"hertz + exponential-damping\"`; two laws that describe the same part of the interaction are not
-added. The keys of `[sample]` and `[tip]` that give the parameters are in [the case
-file](case.md).
+The motion of the beam under a given force is exact; the force as a function of time is a polynomial
+that solves a Volterra equation, see [nonlinear laws](../theory/nonlinear.md). Write a sum with `+`, as
+in `\"hertz + exponential-damping\"`; two laws for the same part of the interaction cannot be added. The
+keys of `[sample]` and `[tip]` that set the parameters are listed in [the case file](case.md).
 ";
 
 pub(super) fn page() -> String {
     let mut text = INTRODUCTION.to_owned();
-    text += &head(&["name", "what it is"]);
+    text += &head(&["name", "meaning"]);
     for law in ContactLaw::ALL {
         text += &row(&[code(law.name()), law.meaning().to_owned()]);
     }
@@ -45,7 +44,7 @@ pub(super) fn page() -> String {
             "Dissipates, or has a memory."
         };
         let _ = write!(text, "{memory} Source: {}.\n\n", plain(entry.source));
-        text += &head(&["parameter", "what it is", "unit", "range", "without it"]);
+        text += &head(&["parameter", "meaning", "unit", "range", "default"]);
         for parameter in entry.parameters {
             let default = parameter.default.map_or(String::new(), |value| {
                 if value.is_infinite() {

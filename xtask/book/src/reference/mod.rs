@@ -1,4 +1,4 @@
-//! The pages of the reference, made of the tables that the program itself reads.
+//! The pages of the reference, generated from the tables that the program itself reads.
 
 mod case;
 mod catalogue;
@@ -32,17 +32,17 @@ fn row<C: AsRef<str>>(cells: &[C]) -> String {
     format!("| {} |\n", cells.join(" | "))
 }
 
-/// The head of a table.
+/// The header of a table.
 fn head(titles: &[&str]) -> String {
     format!("{}|{}\n", row(titles), "---|".repeat(titles.len()))
 }
 
-/// Text as a cell takes it.
+/// Text escaped for a table cell.
 fn in_cell(text: &str) -> String {
     plain(text).replace('\n', " ").replace('|', "\\|")
 }
 
-/// Text in which no sign means anything to Markdown; code stays code.
+/// Text in which no character has a meaning in Markdown; code stays code.
 fn plain(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     let mut code = false;

@@ -7,17 +7,17 @@ use super::{code, head, row};
 const INTRODUCTION: &str = "\
 # The observables
 
-What is measured of a motion, by the names that JSON, CSV headers, datasets, `--show` and Python
-use. In a document the entries of a motion are in the model's units and those under `physical` in
-SI, where two have the names that experimenters know. *Recorded* are those that sweeps, branches and
-curves keep of every motion; the others are measured where one motion is reported. How each is
-defined is in [what is read off a motion](../theory/observables.md).
+The observables of a motion, by the names that JSON, CSV headers, datasets, `--show` and Python use.
+In a JSON document the entries of a motion are in the model's units, and those under `physical` in
+SI, where some have names that experimenters use. Sweeps, branches and curves store the *recorded*
+observables of every motion; the others are measured when a single motion is reported. The
+[definitions](../theory/observables.md) are on a separate page.
 ";
 
 pub(super) fn page() -> String {
     let mut text = INTRODUCTION.to_owned();
     text.push('\n');
-    text += &head(&["name", "in SI", "what it is", "unit", "SI unit", "recorded"]);
+    text += &head(&["name", "in SI", "meaning", "unit", "SI unit", "recorded"]);
     for observable in OBSERVABLES {
         let si_name = if observable.si_name == observable.name {
             String::new()

@@ -1,4 +1,4 @@
-//! What the paper says, and what holds.
+//! Every statement of the paper, with its verdict.
 
 use std::fmt::Write as _;
 
@@ -9,10 +9,10 @@ use super::{code, head, plain, row};
 const INTRODUCTION: &str = "\
 # Every statement of the paper
 
-What `nanotap paper` finds: each figure and number of \"Multi-modal analysis on the intermittent
-contact dynamics of atomic force microscope\" (Journal of Sound and Vibration, 2011) computed again,
-with a verdict, what it rests on, and the command that computes it once more. What is to be learnt
-from it is in [what the paper says and what holds](../paper.md).
+The results of `nanotap paper`: each figure and number of \"Multi-modal analysis on the intermittent
+contact dynamics of atomic force microscope\" (Journal of Sound and Vibration, 2011) recomputed, with
+a verdict, its evidence, and the command that reproduces it. [The paper's statements,
+checked](../paper.md) is a summary.
 
 ";
 

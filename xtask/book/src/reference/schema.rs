@@ -1,8 +1,8 @@
-//! What a JSON schema says of a value, in words.
+//! Descriptions of the values in a JSON schema.
 
 use serde_json::Value;
 
-/// The type of a value: `number`, `list of text`, one of some words, another table.
+/// The type of a value: `number`, `list of text`, a choice of words, another table.
 pub(crate) fn kind(schema: &Value) -> String {
     if let Some(name) = schema["$ref"].as_str() {
         let name = name.rsplit('/').next().unwrap_or_default();
@@ -63,7 +63,7 @@ fn several(kind: &str) -> String {
     }
 }
 
-/// The values that are allowed.
+/// The range of allowed values.
 pub(crate) fn range(schema: &Value) -> String {
     if let (Some(_), Some(_)) = (schema["minimum"].as_f64(), schema["maximum"].as_f64()) {
         return format!(
@@ -86,7 +86,7 @@ pub(crate) fn range(schema: &Value) -> String {
     words.join(", ")
 }
 
-/// A bound as it is read; the least positive number of the machine is "above zero".
+/// A bound as text; the smallest positive number stands for "above zero".
 fn bound(value: &Value) -> String {
     match value.as_f64() {
         Some(f64::MIN_POSITIVE) => "0".to_owned(),

@@ -1,4 +1,4 @@
-//! What a study is asked for, and what it reports.
+//! The options and the report of a study.
 
 use std::fmt::Write as _;
 
@@ -13,13 +13,13 @@ pub(super) fn page(entry: &StudyEntry) -> String {
     let report = (entry.report)().to_value();
     let name = entry.name;
     let mut text = format!(
-        "# {name}\n\n{}.\n\nIn a terminal `nanotap {name}`, in [Python](../python.md) `nanotap.{}`. This page \
-         is made of the study's own schema, which `nanotap schema {name}` prints; what concerns \
-         the terminal alone is in `nanotap {name} --help`.\n\n## Options\n\n",
+        "# {name}\n\n{}.\n\nCommand: `nanotap {name}`. [Python](../python.md): `nanotap.{}`. This page is \
+         generated from the study's schema, which `nanotap schema {name}` prints; options of the \
+         command line only are listed by `nanotap {name} --help`.\n\n## Options\n\n",
         entry.about,
         name.replace('-', "_"),
     );
-    text += &head(&["option", "what it says", "takes", "range", "without it"]);
+    text += &head(&["option", "meaning", "value", "range", "default"]);
     for (name, schema) in request["properties"].as_object().into_iter().flatten() {
         text += &row(&[
             code(&format!("--{}", name.replace('_', "-"))),
@@ -29,7 +29,7 @@ pub(super) fn page(entry: &StudyEntry) -> String {
             bare(&schema["default"]),
         ]);
     }
-    text += "\n## The document\n\nWhat `--json` prints; Python's results carry the same names.\n\n";
+    text += "\n## JSON document\n\n`--json` prints these entries; Python's results have the same names.\n\n";
     text += &entries(&report);
     for part in [&request, &report] {
         for (name, schema) in part["$defs"].as_object().into_iter().flatten() {
@@ -39,7 +39,7 @@ pub(super) fn page(entry: &StudyEntry) -> String {
     text
 }
 
-/// A table of what an object holds.
+/// A table of the entries of an object.
 fn entries(schema: &Value) -> String {
     let required: Vec<&str> = schema["required"]
         .as_array()
@@ -47,7 +47,7 @@ fn entries(schema: &Value) -> String {
         .flatten()
         .filter_map(Value::as_str)
         .collect();
-    let mut text = head(&["entry", "what it is", "type", "unit", "always"]);
+    let mut text = head(&["entry", "meaning", "type", "unit", "always"]);
     for (name, schema) in schema["properties"].as_object().into_iter().flatten() {
         text += &row(&[
             code(name),
@@ -65,7 +65,7 @@ fn entries(schema: &Value) -> String {
     text
 }
 
-/// A table that entries of others name.
+/// A table to which entries of other tables refer.
 fn definition(name: &str, schema: &Value) -> String {
     let mut text = format!("\n### {name}\n\n");
     let about = meaning(schema);

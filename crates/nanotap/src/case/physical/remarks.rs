@@ -1,12 +1,10 @@
 //! What had to be assumed in mapping a case, and what puts it in doubt.
 
-use super::error::PhysicalError;
 use super::reader::Reader;
 use super::remark::Remark;
 use super::view::{Physical, USUAL_TIP_HEIGHT};
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
-use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
 
@@ -53,7 +51,6 @@ impl Physical {
             )));
         }
         remarks.extend(self.clearance_remarks());
-        remarks.extend(self.truncation_remark().ok().flatten());
         remarks
     }
 
@@ -97,50 +94,5 @@ impl Physical {
             )));
         }
         remarks
-    }
-
-    /// How far the truncated model's first resonance lies from f₀: with a tip mass, modes of
-    /// the bare beam do not reproduce it exactly.
-    fn truncation_remark(&self) -> Result<Option<Remark>, PhysicalError> {
-        let exact = exact_beam::frequencies(self.cantilever.alpha1, 0.0, 1)?[0];
-        let truncated = truncated_first_frequency(&self.cantilever)?;
-        let shift = truncated / exact - 1.0;
-        if shift * self.lever.quality_factor < 0.05 {
-            return Ok(None);
-        }
-        Ok(Some(Remark::warning(format!(
-            "with {} modes the model resonates at {} instead of {}, {} of the resonance's \
-             width away: take more modes",
-            self.cantilever.modes,
-            Kind::Frequency.format_digits(self.lever.f0 * (1.0 + shift), 5),
-            Kind::Frequency.format_digits(self.lever.f0, 5),
-            Kind::Number.format_digits(shift * self.lever.quality_factor, 2)
-        ))))
-    }
-}
-
-/// First natural frequency of the Galerkin equations with tip mass: the root below ω₀₁ of
-/// 1 = α1Ω² Σφ_j(1)²/(β_j⁴ − Ω²), whose right side rises from 0 to infinity.
-fn truncated_first_frequency(case: &Cantilever) -> Result<f64, PhysicalError> {
-    let bare = exact_beam::frequencies(0.0, 0.0, case.modes)?;
-    let excess = |omega: f64| {
-        let square = omega * omega;
-        let sum: f64 = bare
-            .iter()
-            .map(|frequency| 4.0 / (frequency * frequency - square))
-            .sum();
-        case.alpha1 * square * sum >= 1.0
-    };
-    let (mut low, mut high) = (0.0, bare[0]);
-    loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return Ok(middle);
-        }
-        if excess(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
     }
 }

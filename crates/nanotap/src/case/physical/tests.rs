@@ -101,6 +101,7 @@ fn data(tip_mass: TipMass) -> LeverData {
         modulus: None,
         density: None,
         tip_mass,
+        modes: 3,
     }
 }
 
@@ -197,7 +198,9 @@ fn tip_mass_comes_back_from_the_second_mode_and_from_the_mass() {
         );
         let by_mass = lever(&data(TipMass::Absolute(by_ratio.tip_mass())));
         assert!((by_mass.tip_mass_ratio - ratio).abs() <= 1e-13 * (1.0 + ratio * ratio));
-        close(by_mass.first_frequency(), spectrum[0], 1e-12);
+        // Of the exact beam, but for three modes that stand for it: from above (Rayleigh and Ritz).
+        let excess = by_mass.first_frequency() / spectrum[0] - 1.0;
+        assert!((-1e-14..4e-3).contains(&excess), "{ratio}: {excess}");
     }
 }
 
@@ -208,7 +211,8 @@ fn impossible_levers_are_refused_with_the_possible_range() {
     let low = refusal(&data(TipMass::SecondMode(6.2 * 75e3)));
     assert!(low.starts_with("cantilever.f2 = 465 kHz (f2/f1 = 6.2): ") && low.contains("6.2669"));
     assert!(refusal(&data(TipMass::SecondMode(1e12))).contains("6.2669"));
-    // k/ω₀² = 2.8/(2π 75e3)² kg = 12.61 ng carried by a massless beam.
+    // k/ω₀² = 2.8/(2π 75e3)² kg = 12.61 ng carried by a massless beam, which three modes of the
+    // bare one, with Σ4/ω_j² = 0.99984/3, make 1.0002 times as stiff.
     let heavy = refusal(&data(TipMass::Absolute(13e-12)));
     assert!(
         heavy.starts_with("tip.mass = 13 ng") && heavy.contains("12.61 ng"),
@@ -252,9 +256,9 @@ fn impossible_levers_are_refused_with_the_possible_range() {
     }
 }
 
-/// Q as an experimenter reads it off the free resonance: peak frequency over the width at
-/// 1/√2 of the peak, of the simulated response.
-fn half_power_quality(case: &Cantilever) -> f64 {
+/// Frequency and Q as an experimenter reads them off the free resonance near `guess`: the peak, and
+/// its frequency over its width at 1/√2 of the height, of the simulated response.
+fn resonance(case: &Cantilever, guess: f64) -> (f64, f64) {
     let gain = |omega: f64| {
         free_response(&Cantilever {
             omega,
@@ -263,7 +267,6 @@ fn half_power_quality(case: &Cantilever) -> f64 {
         .unwrap()
         .modulus()
     };
-    let guess = exact_beam::frequencies(case.alpha1, 0.0, 1).unwrap()[0];
     let (mut low, mut high) = (0.97 * guess, 1.03 * guess);
     while high - low > 1e-9 * guess {
         let third = (high - low) / 3.0;
@@ -286,33 +289,77 @@ fn half_power_quality(case: &Cantilever) -> f64 {
         }
         inside
     };
-    peak / (edge(peak, 1.2 * peak) - edge(peak, 0.8 * peak))
+    let width = edge(peak, 1.2 * peak) - edge(peak, 0.8 * peak);
+    (peak, peak / width)
 }
 
 #[test]
-fn the_resonance_curve_has_the_quality_factor_asked_for() {
-    for ratio in [0.0, 0.1, 1.0] {
-        let quality_factor = 300.0;
-        let lever = lever(&LeverData {
-            quality_factor: Some(quality_factor),
-            ..data(TipMass::Ratio(ratio))
-        });
-        let case = Cantilever {
-            modes: 20,
-            alpha1: ratio,
-            alpha3: lever.damping(),
-            alpha4: 0.0,
-            ..Cantilever::paper()
-        };
-        close(half_power_quality(&case), quality_factor, 2e-3);
+fn the_model_resonates_at_f0_with_the_quality_factor_asked_for() {
+    for modes in [1, 2, 3, 20] {
+        for ratio in [0.0, 0.1, 1.0] {
+            let quality_factor = 300.0;
+            let lever = lever(&LeverData {
+                quality_factor: Some(quality_factor),
+                modes,
+                ..data(TipMass::Ratio(ratio))
+            });
+            let case = Cantilever {
+                modes,
+                alpha1: ratio,
+                alpha3: lever.damping(),
+                alpha4: 0.0,
+                ..Cantilever::paper()
+            };
+            let (peak, quality) = resonance(&case, lever.first_frequency());
+            // The peak's height lies 1/(4Q²) below f0 or, driven at the base, above it.
+            close(peak / (TAU * lever.time_unit()), 75e3, 1e-5);
+            close(quality, quality_factor, 2e-3);
+        }
+    }
+}
+
+/// At f0 the lever lags by 90°, whatever the number of modes: what the higher modes add to a motion
+/// of Q = 400 is below 0.1°. The case is that of a heavy tip found detuned, 45° at one mode.
+#[test]
+fn a_lever_with_a_tip_lags_by_a_quarter_at_its_resonance() {
+    for modes in [1, 2, 3, 5, 10, 20] {
+        for ratio in [0.0, 0.01, 0.1, 1.0] {
+            let ratio = ratio.to_string();
+            let view = with_modes(
+                modes,
+                &[
+                    ("cantilever", "k", "40 N/m"),
+                    ("cantilever", "f0", "300 kHz"),
+                    ("cantilever", "Q", "400"),
+                    ("tip", "mass_ratio", &ratio),
+                    ("tip", "radius", "10 nm"),
+                    ("sample", "law", "hertz"),
+                    ("sample", "modulus", "1 GPa"),
+                    ("drive", "actuation", "tip"),
+                    ("drive", "frequency_ratio", "1"),
+                    ("drive", "free_amplitude", "20 nm"),
+                    ("gap", "tip", "40 nm"),
+                ],
+            );
+            let view = view.unwrap();
+            assert!(
+                (view.free_phase - 90.0).abs() < 0.1,
+                "{modes}, {ratio}: {}",
+                view.free_phase
+            );
+            assert_eq!(view.free_amplitude, 20e-9);
+        }
     }
 }
 
 #[test]
 fn damping_with_a_tip_agrees_with_the_mode_shape_integrated() {
     for ratio in [0.01, 0.1, 1.0, 50.0] {
-        let lever = lever(&data(TipMass::Ratio(ratio)));
-        let omega = lever.first_frequency();
+        let lever = lever(&LeverData {
+            modes: 50,
+            ..data(TipMass::Ratio(ratio))
+        });
+        let omega = exact_beam::frequencies(ratio, 0.0, 1).unwrap()[0];
         let beta = omega.sqrt();
         let sigma = (beta.cosh() + beta.cos()) / (beta.sinh() + beta.sin());
         let shape = |x: f64| {
@@ -332,10 +379,14 @@ fn damping_with_a_tip_agrees_with_the_mode_shape_integrated() {
             })
             .sum();
         let factor = 1.0 + ratio * shape(1.0).powi(2) / square;
-        close(lever.damping(), omega * factor / 200.0, 1e-8);
+        // Fifty modes leave 2e-6 of the exact beam's.
+        close(lever.damping(), omega * factor / 200.0, 1e-5);
     }
     // A heavy tip bends the beam statically, ∫φ² = (33/140) φ(1)².
-    let heavy = lever(&data(TipMass::Ratio(1e5)));
+    let heavy = lever(&LeverData {
+        modes: 50,
+        ..data(TipMass::Ratio(1e5))
+    });
     let factor = heavy.damping() * 200.0 / heavy.first_frequency();
     close(factor, 1.0 + 1e5 * 140.0 / 33.0, 1e-4);
 }
@@ -905,18 +956,6 @@ fn a_beam_that_would_touch_is_warned_of() {
     ];
     assert!(!warned(&hard, "touch"));
     assert!(warned(&[("drive", "amplitude", "13 um")], "clamped end"));
-}
-
-#[test]
-fn too_few_modes_for_a_heavy_tip_are_warned_of() {
-    let entries = changed(&[("tip", "mass", ""), ("tip", "mass_ratio", "0.5")]);
-    let warned = |modes| {
-        let read = with_modes(modes, &entries).unwrap();
-        let more = |remark: &Remark| remark.text.contains("take more modes");
-        read.remarks.iter().any(more)
-    };
-    assert!(warned(1));
-    assert!(!warned(30));
 }
 
 #[test]

@@ -58,8 +58,8 @@ pub struct Physical {
 }
 
 impl Physical {
-    /// What the stated quantities come to. Where neither lever nor tip changed, the `lever`
-    /// that they gave before is taken.
+    /// What the stated quantities come to. Where neither lever nor tip nor modes changed, the
+    /// `lever` that they gave before is taken.
     ///
     /// # Errors
     /// [`PhysicalError`] if the quantities contradict each other or describe something

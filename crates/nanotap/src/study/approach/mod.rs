@@ -1,13 +1,15 @@
-//! Approach and retract curves: the sample is brought near in steps, then taken away, and at
-//! each distance the motion is followed from where the one before ended, so that hysteresis
-//! shows. Through every periodic motion found, branches are continued in the distance, stable
-//! and unstable, with their folds, flips and grazings located.
+//! Approach and retract curves: the sample is brought near and taken away so slowly that the
+//! lever always settles ([`distance_sweep`]). Branches of stable orbits are continued in the
+//! distance, and where one ends the flow from there gives the motion to which the lever jumps.
+//! So jumps and hysteresis are those of the branches: they do not depend on the distances at
+//! which the curve is written. Through every stretch of stable orbits found, branches are
+//! continued, stable and unstable, with their folds, flips and grazings located.
 //!
-//! A motion counts only if [`classify()`](nanotap_dynamics::classify()) could name it: a periodic
-//! one is the orbit itself, closed by Newton and seen to be approached; a chaotic or
-//! quasi-periodic one is described by a recording; of what is undecided no numbers are given.
-//! Attractors met at one distance are then tried at the distances beside it, until none gains
-//! one: what coexists with both ways is part of the report.
+//! A periodic motion is an orbit closed by Newton; a chaotic or quasi-periodic one is described
+//! by a recording; of what is undecided no numbers are given.
+//!
+//! With [`ApproachOptions::speed`] the distance changes each drive period instead and the lever
+//! is given no time to settle.
 //!
 //! The distance is the gap between tip and sample at rest, `alpha5` of the cantilever (zc of
 //! AFM people, with which the piezo moves) and `gap` of an oscillator. The model's unit of
@@ -18,40 +20,33 @@
 //! drive, as in frequency modulation: see [`frequency_modulation`].
 //! Orbits are then continued from distance to distance.
 //!
-//! Fails: a jump is located to a step of the distance only (the fold behind it exactly, where
-//! its branch was followed); of branches that no motion on the way lies on nothing is known.
+//! Fails: of branches that no motion on the way lies on nothing is known.
 
+pub(in crate::study) mod distance_sweep;
 pub mod frequency_modulation;
-mod meanwhile;
-mod steps;
-mod walk;
+pub(in crate::study) mod quasistatic;
+mod ramp;
 
-use std::sync::mpsc::Sender;
-
-use nanotap_dynamics::{
-    Attractor, AttractorKind, ClassifyOptions, Control, PeriodicOrbit, grid_neighbours,
-    orbits_shared,
-};
+use nanotap_dynamics::{Control, PeriodicOrbit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::{Case, CaseError, Key, ParameterUnit};
-use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::case::physical::Kind;
+use crate::model::{Model, MotionError};
 use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
-use crate::study::branch::{BranchError, BranchOptions, BranchReport, BranchesThrough};
+use crate::study::branch::{BranchError, BranchOptions, BranchReport};
 use crate::study::kind::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_POINTS};
+use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
 use crate::study::simulate::Classification;
-use crate::study::sweep::SweepOptions;
 use crate::study::value::Amount;
 use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
 };
-use meanwhile::{Seed, following};
-use walk::Walk;
+use distance_sweep::Met;
+pub use quasistatic::{states_at, states_near};
 
 /// How to approach. Distances are in the model's unit of length.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +65,9 @@ pub struct ApproachOptions {
     pub max_period: usize,
     /// Periods recorded of a motion that is not periodic.
     pub periods: usize,
+    /// Speed with which the distance changes, in the model's unit of length a unit of time;
+    /// `None`: so slowly that the lever always settles.
+    pub speed: Option<f64>,
     /// The phase in degrees that is held together with the case's free amplitude, by frequency
     /// and strength of the drive; `None`: the drive stays as it is.
     pub phase: Option<f64>,
@@ -91,6 +89,7 @@ impl Default for ApproachOptions {
             doublings: 1,
             max_period: 32,
             periods: 256,
+            speed: None,
             phase: None,
             shift: None,
             closest: None,
@@ -145,6 +144,34 @@ pub enum ApproachError {
     /// Nothing to record.
     #[error("at least one period must be recorded of motions that are not periodic")]
     NoPeriods,
+    /// A speed that is none.
+    #[error("the distance cannot change at a speed of {given}: a finite one above zero is needed")]
+    Speed {
+        /// What was given.
+        given: f64,
+    },
+    /// A speed that takes too long.
+    #[error(
+        "at this speed the lever takes {needed:.3e} drive periods there and back; {most} are \
+         followed at most"
+    )]
+    Slow {
+        /// Drive periods there and back.
+        needed: f64,
+        /// The most that are followed.
+        most: usize,
+    },
+    /// A speed that leaves no period for a distance.
+    #[error("at this speed less than a drive period passes between two written distances")]
+    Fast,
+    /// The flow failed.
+    #[error("at the distance {gap}: {error}")]
+    Flow {
+        /// Where.
+        gap: f64,
+        /// Why.
+        error: MotionError,
+    },
     /// A longest period of 0.
     #[error("no motion has the longest period 0: at least 1 is needed")]
     NoPeriod,
@@ -218,6 +245,27 @@ pub struct ApproachPoint {
     pub orbit: Option<PeriodicOrbit>,
 }
 
+/// A jump of a slowly moved lever from one motion to another.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct StateJump {
+    /// Which way.
+    pub way: Way,
+    /// Where, in the model's unit of length.
+    pub gap: f64,
+    /// The same in m, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zc: Option<f64>,
+    /// How well that is known, in the model's unit of length.
+    pub uncertainty: f64,
+    /// What ends the motion before it: fold, flip, neimark-sacker, grazing, crossing, or a
+    /// sentence.
+    pub reason: String,
+    /// The motion before it, at its end.
+    pub before: ApproachPoint,
+    /// The motion after it.
+    pub after: ApproachPoint,
+}
+
 /// An interval of distances in which approach and retract show different motions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Hysteresis {
@@ -245,15 +293,17 @@ pub struct ApproachReport {
     pub free_phase: f64,
     /// Distance at which the free motion begins to touch.
     pub free_reach: f64,
-    /// The motions in the order in which they were met: there, then back.
+    /// The motions at the distances asked for, in the order of the way: there, then back.
     pub table: Vec<ApproachPoint>,
-    /// Attractors that neither way met at a distance, but that those of the distances beside it
-    /// lead to, by descending distance.
+    /// Where the lever changes from one motion to another by a jump, in the order of the way.
+    pub jumps: Vec<StateJump>,
+    /// Stable orbits of the same distances on neither way, that lie on stretches of stable orbits
+    /// on which a way is at other distances, by descending distance.
     pub coexisting: Vec<ApproachPoint>,
     /// Least height of the beam above the sample in the motion at the nearest distance, in the
     /// model's unit of length: where it is not above zero, another part than the tip touches.
     pub beam_clearance: Option<f64>,
-    /// Where the two ways differ.
+    /// Where the two ways differ, its ends as exact as those of the branches.
     pub hysteresis: Vec<Hysteresis>,
     /// Whether the way back ends in the motion with which the way there began; if not, it
     /// begins too near.
@@ -287,50 +337,8 @@ pub fn approach(
     let free = FreeMotion::of(&case.model()?);
     let distances = distances(&free, options)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
-    let curve = Curve {
-        case,
-        options,
-        classify: budgets(options),
-    };
-    let quiet = Control {
-        progress: None,
-        ..*control
-    };
-    let curve = &curve;
-    // What both ways meet, each as soon as it is known, then what coexists with it.
-    let motions = |met: Option<Sender<Seed>>| {
-        let walk = Walk {
-            case,
-            classify: &ClassifyOptions {
-                first_look: walk::FIRST_LOOK,
-                ..curve.classify.clone()
-            },
-            distances: &distances,
-            observed: &|way, gap, model, met| curve.observed(way, gap, model, met),
-            told: &|point| {
-                if let Some((met, seed)) = met.as_ref().zip(point.seed()) {
-                    // It cannot fail: whoever follows listens until the walk is over.
-                    let _ = met.send(seed);
-                }
-            },
-        };
-        let table = walk.there_and_back(control)?;
-        drop(met);
-        let coexisting = curve.coexisting(&distances, &table, &quiet)?;
-        Ok::<_, CaseError>((table, coexisting))
-    };
-    let how = branching(key, (from, to), options);
-    let branches = options.branches.then(|| BranchesThrough::new(case, &how));
-    let mut branches = branches.transpose()?;
-    let (table, coexisting) = match &mut branches {
-        Some(branches) => following(branches, |met| motions(Some(met)), &quiet),
-        None => motions(None),
-    }?;
-    let branches = branches.and_then(|mut branches| {
-        branches.follow(coexisting.iter().filter_map(ApproachPoint::seed), &quiet);
-        let any = !branches.is_empty() && !control.is_cancelled();
-        any.then(|| branches.report(&quiet))
-    });
+    let curve = Curve { case, options };
+    let found = quasistatic::found(&curve, &free, &distances, control)?;
     Ok(ApproachReport {
         parameter: key.path(),
         from,
@@ -338,12 +346,13 @@ pub fn approach(
         free_amplitude: free.amplitude,
         free_phase: free.phase,
         free_reach: free.reach,
-        beam_clearance: beam_clearance(case, &table),
-        hysteresis: hysteresis(&table, |a, b| difference(a, b, free.amplitude)),
-        returned: returned(&table, free.amplitude),
-        table,
-        coexisting,
-        branches,
+        beam_clearance: beam_clearance(case, &found.table),
+        hysteresis: found.hysteresis,
+        returned: returned(&found.table, options.speed, free.amplitude),
+        table: found.table,
+        jumps: found.jumps,
+        coexisting: found.coexisting,
+        branches: found.branches,
         cancelled: control.is_cancelled(),
         parameter_unit: case.parameter_unit(key),
         modulation: None,
@@ -365,6 +374,11 @@ pub(in crate::study) fn distances(
     }
     if options.max_period == 0 {
         return Err(ApproachError::NoPeriod);
+    }
+    if let Some(given) = options.speed
+        && !(given > 0.0 && given.is_finite())
+    {
+        return Err(ApproachError::Speed { given });
     }
     if options.from.is_none() && !(free.reach > 0.0 && free.reach.is_finite()) {
         return Err(ApproachError::NoDrive);
@@ -398,83 +412,13 @@ pub(in crate::study) fn distances(
         .collect())
 }
 
-/// Each motion is one of many: a sweep's budgets, but for the patience that a lever of high
-/// quality factor needs.
-fn budgets(options: &ApproachOptions) -> ClassifyOptions {
-    let sweep = SweepOptions {
-        max_period: options.max_period,
-        ..SweepOptions::new(Vec::new())
-    };
-    ClassifyOptions {
-        max_transient: 2048,
-        ..sweep.classify()
-    }
-}
-
-/// How a curve is taken.
+/// How a curve is written.
 struct Curve<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
-    classify: ClassifyOptions,
 }
 
 impl Curve<'_> {
-    /// What neither way met at a distance, but the attractors of the distances beside it lead to.
-    fn coexisting(
-        &self,
-        distances: &[f64],
-        table: &[ApproachPoint],
-        control: &Control<'_>,
-    ) -> Result<Vec<ApproachPoint>, CaseError> {
-        let case = self.case;
-        let model = |k: usize| case.with(case.gap_key(), distances[k]).model();
-        let mut known: Vec<Vec<PeriodicOrbit>> = vec![Vec::new(); distances.len()];
-        for (step, orbit) in table.iter().enumerate() {
-            let there = step.min(2 * distances.len() - 1 - step);
-            let orbits = &mut known[there];
-            if let Some(orbit) = &orbit.orbit
-                && !orbits.iter().any(|other| other.is_same_as(orbit))
-            {
-                orbits.push(orbit.clone());
-            }
-        }
-        let at = |k: usize| model(k).map_or_else(|e| Err(e.to_string()), |m| Ok(Strobe::new(&m)));
-        let neighbours = grid_neighbours(&[distances.len()]);
-        let shared = orbits_shared(known, at, neighbours, &self.classify, control);
-        let mut found = Vec::new();
-        for (k, value) in shared.into_iter().enumerate() {
-            let gained = value
-                .attractors
-                .into_iter()
-                .filter(|a| a.shown_by.is_some());
-            for Attractor { kind, state, .. } in gained.map(|a| a.attractor) {
-                let (classification, orbit) = match kind {
-                    AttractorKind::Periodic(orbit) => (Classification::Periodic, Some(orbit)),
-                    AttractorKind::QuasiPeriodic(_) => (Classification::QuasiPeriodic, None),
-                    AttractorKind::Chaotic { .. } => (Classification::Chaotic, None),
-                };
-                let met = Met {
-                    classification,
-                    evidence: String::new(),
-                    orbit,
-                    state,
-                };
-                let point = self.observed(Way::Neither, distances[k], &model(k)?, met);
-                // Chaos that one of the ways met is the same chaos as far as is known.
-                let here = table
-                    .iter()
-                    .filter(|p| p.gap.to_bits() == point.gap.to_bits());
-                if here
-                    .into_iter()
-                    .all(|p| difference(p, &point, 0.0).is_some())
-                {
-                    found.push(point);
-                }
-            }
-        }
-        Ok(found)
-    }
-
     /// A motion as a line of the table.
     fn observed(&self, way: Way, gap: f64, model: &Model, met: Met) -> ApproachPoint {
         let seen = match (&met.orbit, met.classification) {
@@ -511,33 +455,22 @@ impl Curve<'_> {
     }
 }
 
-/// A motion as it was found.
-struct Met {
-    classification: Classification,
-    evidence: String,
-    orbit: Option<PeriodicOrbit>,
-    state: Vec<f64>,
-}
-
-impl ApproachPoint {
-    /// The orbit whose branch is followed, where the motion is one.
-    fn seed(&self) -> Option<Seed> {
-        Some((self.gap, self.orbit.clone()?))
-    }
-}
-
 /// How branches are followed.
 fn branching(key: Key, (from, to): (f64, f64), options: &ApproachOptions) -> BranchOptions {
     BranchOptions {
         doublings: options.doublings,
-        max_multiplier: STRONGEST,
+        stable_doublings: true,
+        max_multiplier: MAX_MULTIPLIER,
         ..BranchOptions::over(key, from, to)
     }
 }
 
-/// Growth of disturbances over a period beyond which an orbit is no part of what is met: near the
-/// snap-in of an attractive sample unstable branches reach 10⁶, in ever shorter steps.
-const STRONGEST: f64 = 1e4;
+/// Growth of disturbances over a period beyond which an unstable branch is left: near the snap-in
+/// of an attractive sample it reaches 10⁶, in ever shorter steps.
+pub(in crate::study) const MAX_MULTIPLIER: f64 = 1e4;
+
+/// Longest period looked for on the way to a setpoint.
+pub(in crate::study) const SETPOINT_PERIODS: usize = 32;
 
 /// Relative difference of amplitudes that is no longer rounding.
 const DIFFERENT: f64 = 1e-6;
@@ -590,11 +523,15 @@ pub(in crate::study) fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> 
     Some(clearance.height + moved)
 }
 
-fn returned(table: &[ApproachPoint], free_amplitude: f64) -> bool {
-    table
-        .first()
-        .zip(table.last())
-        .is_some_and(|(first, last)| difference(first, last, free_amplitude).is_none())
+/// Part of the free amplitude within which a lever that is moved fast has returned.
+const RETURNED: f64 = 1e-2;
+
+fn returned(table: &[ApproachPoint], speed: Option<f64>, free_amplitude: f64) -> bool {
+    let ends = table.first().zip(table.last());
+    ends.is_some_and(|(first, last)| {
+        let apart = difference(first, last, free_amplitude);
+        apart.is_none() || speed.is_some() && apart.is_some_and(|a| a <= RETURNED * free_amplitude)
+    })
 }
 
 /// How much two motions at one distance differ; `None` if they are one as far as is known.
@@ -622,17 +559,22 @@ pub struct ApproachRequest {
     #[schemars(extend("x-value" = "DISTANCE"))]
     pub to: Option<Amount>,
     /// Distances each way
-    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
     pub points: usize,
     /// Also continue the branches that coexist, stable and unstable
     #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
     pub branches: bool,
-    /// Doublings of branches to follow
+    /// Doublings of branches to follow, as far as their orbits are stable
     #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
     pub switch: usize,
     /// Longest period looked for
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
     pub max_period: usize,
+    /// Speed of the approach and of the retraction, in units of the case ("500 nm/s") or as alpha5
+    /// a unit of time: the distance changes each drive period and the lever does not settle;
+    /// without it, both are so slow that it always does
+    #[schemars(extend("x-value" = "SPEED"))]
+    pub speed: Option<Amount>,
     /// Frequency modulation: hold amplitude (the case's free amplitude) and phase by frequency and
     /// strength of the drive, and tell the frequency shift
     pub fm: bool,
@@ -659,6 +601,7 @@ impl Default for ApproachRequest {
             branches: options.branches,
             switch: options.doublings,
             max_period: options.max_period,
+            speed: None,
             fm: false,
             phase: 90.0,
             shift: None,
@@ -696,7 +639,16 @@ impl ApproachRequest {
                 "add {fm}, which holds amplitude and phase",
             ));
         }
+        if self.speed.is_some() && self.fm {
+            return Err(Error::option(
+                "speed",
+                "frequency modulation follows orbits, at no finite speed",
+                "leave away {fm} or {speed}",
+            ));
+        }
+        let speed = self.speed.as_ref().map(|amount| speed_of(case, amount));
         Ok(ApproachOptions {
+            speed: speed.transpose()?,
             closest: distance("closest", &self.closest)?,
             shift: shift.map_err(|error| Error::from(error).at("shift"))?,
             from: distance("from", &self.from)?,
@@ -711,6 +663,20 @@ impl ApproachRequest {
     }
 }
 
+/// A speed in the model's unit of length a unit of time, as it is given of a case.
+fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
+    if let Ok(speed) = amount.text().parse::<f64>() {
+        return Ok(speed);
+    }
+    let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
+    let speed = Kind::Velocity.parse(amount.text());
+    let speed = speed.map_err(|error| refused(error.to_string()))?;
+    let view = case.physical().ok_or_else(|| {
+        refused("a dimensionless case has no unit of length: a plain number is needed".to_owned())
+    })?;
+    Ok(speed / view.scales.velocity)
+}
+
 /// An approach and retract curve.
 #[derive(Clone, Copy, Debug)]
 pub struct ApproachStudy;
@@ -721,10 +687,11 @@ impl Study for ApproachStudy {
                                  sample, both ways, with the branches that coexist";
     const COUNTED: &'static str = "distances";
     const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
     type Request = ApproachRequest;
     type Report = ApproachReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &ApproachRequest,
         control: &Control<'_>,
@@ -743,6 +710,12 @@ impl From<ApproachError> for crate::Error {
             ApproachError::NoDrive => input("give {from}"),
             ApproachError::NoPeriod => input("give a {max_period} of 1 or more"),
             ApproachError::NoPeriods => input("give 1 or more {periods}"),
+            ApproachError::Speed { .. } => input("change {speed}"),
+            ApproachError::Slow { .. } => {
+                input("raise {speed}, or leave it away: the lever then settles at each distance")
+            }
+            ApproachError::Fast => input("lower {speed} or {points}"),
+            ApproachError::Flow { .. } => Self::numerics(error.to_string()),
             ApproachError::Model(error) => error.clone().into(),
             ApproachError::Branch(error) => error.clone().into(),
             ApproachError::Held(error) => error.clone().into(),

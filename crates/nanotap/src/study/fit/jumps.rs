@@ -90,7 +90,7 @@ impl Fold {
             max_step: 0.1,
             max_angle: 0.3,
             max_points: POINTS,
-            until_fold: true,
+            until_unstable: true,
             ..ContinuationOptions::over(at, end)
         };
         let way = if side > 0.0 {

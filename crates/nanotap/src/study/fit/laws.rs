@@ -60,7 +60,10 @@ pub(super) fn compare(
             request.bounds.0.retain(|bound| takes(law, &bound.name));
             fit_one(&case, &request, control)
         });
-        found.push((law.text(), fitted));
+        // A law whose fit was stopped before it found anything is not judged.
+        if fitted.is_ok() || !control.is_cancelled() {
+            found.push((law.text(), fitted));
+        }
     }
     let rank = |fitted: &Result<FitReport, Error>| match fitted {
         Ok(report) => (!report.fits, report.aic),

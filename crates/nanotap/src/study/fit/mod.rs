@@ -133,10 +133,15 @@ impl Study for FitStudy {
     const ABOUT: &'static str = "Parameters of lever and sample from measured curves";
     const COUNTED: &'static str = "starts";
     const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
     type Request = FitRequest;
     type Report = FitReport;
 
-    fn run(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+    fn compute(
+        case: &Case,
+        request: &FitRequest,
+        control: &Control<'_>,
+    ) -> Result<FitReport, Error> {
         fit(case, request, control)
     }
 }

@@ -163,17 +163,21 @@ impl Search<'_> {
             } else {
                 student(self.freedom(&found) as f64)
             };
-            if !self.request.profile || self.control.is_cancelled() {
+            let profiled = self.request.profile && !self.control.is_cancelled();
+            let profiled = profiled.then(|| {
+                let problem = self.problem_of(&found);
+                let deeper = if rounds > 0 { DEEPER } else { f64::INFINITY };
+                profile(&problem, &found.solution, &information, width, deeper)
+            });
+            let Some(profiled) = profiled.filter(|_| !self.control.is_cancelled()) else {
                 let values = found.solution.x.iter().zip(&information.errors);
                 let symmetric = values.map(|(value, error)| {
                     [-1.0, 1.0].map(|side| error.map(|error| value + side * width * error))
                 });
                 let intervals = symmetric.collect();
                 return (found, intervals);
-            }
-            let problem = self.problem_of(&found);
-            let deeper = if rounds > 0 { DEEPER } else { f64::INFINITY };
-            match profile(&problem, &found.solution, &information, width, deeper) {
+            };
+            match profiled {
                 Profile::Intervals(intervals) => return (found, intervals),
                 Profile::Lower(x) => {
                     rounds -= 1;

@@ -161,6 +161,9 @@ impl<'a> Search<'a> {
                 break;
             }
             let (point, candidates) = problem.discover(&x, known.as_deref());
+            if self.control.is_cancelled() {
+                break;
+            }
             known = Some(candidates);
             let branches = branches_of(&point);
             if before.as_ref() == Some(&branches) {
@@ -182,13 +185,16 @@ impl<'a> Search<'a> {
         let mut found: Option<Found> = None;
         let mut steps = 0;
         for _ in 0..ROUNDS {
-            if self.control.is_cancelled() && found.is_some() {
+            if self.control.is_cancelled() {
                 break;
             }
             let problem = self.weighted(noise.clone(), None);
             // The parameters move little from here on.
             let known = found.as_ref().map(|found| found.candidates.as_slice());
             let (mut point, candidates) = problem.discover(&x, known);
+            if self.control.is_cancelled() {
+                break;
+            }
             if point.iter().all(|row| row.lost) {
                 return None;
             }
@@ -198,7 +204,11 @@ impl<'a> Search<'a> {
             if self.request.jumps {
                 problem.find_jumps(&x, &mut point);
             }
-            let solution = minimise(&problem, x.clone(), point, &self.bounds(), 1e-8)?;
+            let solution = minimise(&problem, x.clone(), point, &self.bounds(), 1e-8);
+            let solution = match solution {
+                None if self.control.is_cancelled() => break,
+                solution => solution?,
+            };
             steps += solution.iterations;
             x.clone_from(&solution.x);
             let after = self.noise(&x, &solution.point);

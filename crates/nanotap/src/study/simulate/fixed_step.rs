@@ -7,6 +7,7 @@
 //! strobe points is called apparent, and what the exact flow makes of the same motion
 //! stands beside it.
 
+use std::collections::VecDeque;
 use std::time::Instant;
 
 use nanotap_dynamics::{ClassifyOptions, classify};
@@ -18,7 +19,7 @@ use serde::Serialize;
 use crate::model::strobe::Strobe;
 use crate::model::{FlowError, Model, MotionError};
 use crate::study::simulate::{
-    Classification, Named, SimulateError, SimulateOptions, is_none, starting_state,
+    Classification, Named, SimulateError, SimulateOptions, check_states, is_none, starting_state,
 };
 
 /// How to run.
@@ -157,8 +158,9 @@ pub struct ExactVerdict {
 pub const APPARENT_CLOSURE: f64 = 1e-6;
 /// Longest apparent period looked for.
 const LONGEST_APPARENT: usize = 64;
-/// Drive periods kept for figures.
+/// Drive periods, and steps of them, kept for figures.
 const CURVE_PERIODS: usize = 64;
+const CURVE_POINTS: usize = 2_000_000;
 
 /// Runs `model` with fixed steps.
 ///
@@ -172,6 +174,7 @@ pub fn fixed_step_run(
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods.into());
     }
+    check_states(model, options.strobe.min(options.periods))?;
     if model.nonlinear.is_some() {
         return Err(FixedStepError::Nonlinear);
     }
@@ -189,24 +192,30 @@ pub fn fixed_step_run(
     let clock = Instant::now();
     for period in 0..options.transient {
         run.run_period(|_, _| {});
-        finite(run.state(), period)?;
+        check(model, run.state(), period)?;
     }
     let start = run.state().to_vec();
-    let mut grid = Grid::new(model, &start);
-    let mut strobes = Vec::with_capacity(options.periods);
-    for period in 0..options.periods {
-        run.run_period(|phase, x| grid.see(period, phase, x));
-        finite(run.state(), options.transient + period)?;
-        strobes.push(run.state().to_vec());
-    }
-    let seconds = clock.elapsed().as_secs_f64().max(1e-9);
-    let (apparent_period, closure) = apparent_period(&strobes);
-    let last = strobes.last().cloned().unwrap_or_default();
-    let events_left_out = grid.events.len().saturating_sub(options.events);
-    grid.events.truncate(options.events);
-    let named = Named::of(&classify(&mut Strobe::new(model), &last, &options.classify).kind);
+    let mut grid = Grid::new(model, &start, options.events);
+    // As many of the last states as are listed or compared.
+    let kept = options.strobe.max(2 * LONGEST_APPARENT);
+    let mut strobes: VecDeque<Vec<f64>> = VecDeque::new();
+    let mut strobe_curve = Vec::with_capacity(options.periods);
     let rate = model.tip_rate();
     let at = |o: &nanotap_flow::Output, x: &[f64]| o.at(model.system.drive(), x, 0.0);
+    for period in 0..options.periods {
+        run.run_period(|phase, x| grid.see(period, phase, x));
+        check(model, run.state(), options.transient + period)?;
+        strobe_curve.push([at(&model.tip, run.state()), at(&rate, run.state())]);
+        if strobes.len() == kept {
+            strobes.pop_front();
+        }
+        strobes.push_back(run.state().to_vec());
+    }
+    let seconds = clock.elapsed().as_secs_f64().max(1e-9);
+    let mut strobes = Vec::from(strobes);
+    let (apparent_period, closure) = apparent_period(&strobes);
+    let last = strobes.last().cloned().unwrap_or_default();
+    let named = Named::of(&classify(&mut Strobe::new(model), &last, &options.classify).kind);
     Ok(FixedStepRun {
         method: "rk4",
         steps: options.steps,
@@ -224,13 +233,10 @@ pub fn fixed_step_run(
         tip_min: grid.low,
         amplitude: 0.5 * (grid.high - grid.low),
         contact_fraction: grid.in_contact / (options.periods as f64 * model.period()),
-        strobe_curve: strobes
-            .iter()
-            .map(|x| [at(&model.tip, x), at(&rate, x)])
-            .collect(),
+        strobe_curve,
         strobe: strobes.split_off(strobes.len().saturating_sub(options.strobe)),
         events: grid.events,
-        events_left_out,
+        events_left_out: grid.events_left_out,
         periods_per_second: (options.transient + options.periods) as f64 / seconds,
         exact: ExactVerdict {
             classification: named.classification,
@@ -241,7 +247,11 @@ pub fn fixed_step_run(
     })
 }
 
-fn finite(state: &[f64], period: usize) -> Result<(), FixedStepError> {
+/// An error once the work is cancelled, or where the state is not finite after a period.
+fn check(model: &Model, state: &[f64], period: usize) -> Result<(), FixedStepError> {
+    if model.system.cancel().is_cancelled() {
+        return Err(SimulateError::Stopped.into());
+    }
     if state.iter().all(|v| v.is_finite()) {
         Ok(())
     } else {
@@ -259,11 +269,14 @@ struct Grid<'a> {
     contact: bool,
     before: f64,
     events: Vec<GridEvent>,
+    /// How many events are listed, and how many more there were.
+    most_events: usize,
+    events_left_out: usize,
     curve: Vec<[f64; 3]>,
 }
 
 impl<'a> Grid<'a> {
-    fn new(model: &'a Model, start: &[f64]) -> Self {
+    fn new(model: &'a Model, start: &[f64], most_events: usize) -> Self {
         let drive = model.system.drive();
         let tip = model.tip.at(drive, start, 0.0);
         let rate = model.tip_rate();
@@ -274,6 +287,8 @@ impl<'a> Grid<'a> {
             contact: model.gap.at(drive, start, 0.0) <= 0.0,
             before: 0.0,
             events: Vec::new(),
+            most_events,
+            events_left_out: 0,
             curve: vec![[0.0, tip, rate.at(drive, start, 0.0)]],
             rate,
             model,
@@ -297,10 +312,14 @@ impl<'a> Grid<'a> {
             } else {
                 "contact_end"
             };
-            self.events.push(GridEvent { tau, kind });
+            if self.events.len() < self.most_events {
+                self.events.push(GridEvent { tau, kind });
+            } else {
+                self.events_left_out += 1;
+            }
             self.contact = contact;
         }
-        if period < CURVE_PERIODS {
+        if period < CURVE_PERIODS && self.curve.len() < CURVE_POINTS {
             self.curve.push([tau, tip, self.rate.at(drive, x, phase)]);
         }
     }

@@ -19,7 +19,7 @@ use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, Kept, Observables, OutOfRange, Set, watch};
 use crate::study::in_si::InSi;
 use crate::study::kind::Study;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES};
+use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES, MOST_STATE_NUMBERS};
 use crate::study::value::Steps;
 use fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
 
@@ -77,9 +77,27 @@ pub enum SimulateError {
         /// What was given.
         value: f64,
     },
+    /// The starting state lies behind a rigid stop.
+    #[error("the state's x = {x} lies behind the rigid stop at {stop}")]
+    BehindStop {
+        /// Its displacement.
+        x: f64,
+        /// Where the stop stands.
+        stop: f64,
+    },
     /// Nothing to record.
     #[error("at least one period must be recorded, 0 were asked for")]
     NoPeriods,
+    /// More states to keep than fit into memory.
+    #[error("{states} states of {dimension} numbers are too many to keep; {limit} at most")]
+    TooManyStates {
+        /// States to keep.
+        states: usize,
+        /// Dimension of the model.
+        dimension: usize,
+        /// Most that are kept.
+        limit: usize,
+    },
     /// The flow failed.
     #[error(transparent)]
     Flow(#[from] MotionError),
@@ -100,6 +118,8 @@ pub enum Classification {
     Chaotic,
     /// It leaves every bound.
     Unbounded,
+    /// It is observed before it has settled, as where the distance changes at a finite speed.
+    Transient,
     /// None of these could be shown.
     Undecided,
 }
@@ -112,6 +132,7 @@ impl Classification {
             Self::QuasiPeriodic => "quasi-periodic",
             Self::Chaotic => "chaotic",
             Self::Unbounded => "unbounded",
+            Self::Transient => "transient",
             Self::Undecided => "undecided",
         }
     }
@@ -187,6 +208,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     if options.periods == 0 {
         return Err(SimulateError::NoPeriods);
     }
+    check_states(model, options.strobe.min(options.periods))?;
     let mut map = Strobe::new(model);
     let transient = if let Some(transient) = options.transient {
         map.advance_by(&mut state, transient)?;
@@ -230,15 +252,32 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     })
 }
 
-/// The state to start from: as given, or rest. A sample with a memory is relaxed where the
-/// state does not say otherwise.
+/// Refuses to keep more states than fit into memory.
+///
+/// # Errors
+/// [`SimulateError::TooManyStates`].
+fn check_states(model: &Model, states: usize) -> Result<(), SimulateError> {
+    let dimension = model.dimension();
+    let limit = MOST_STATE_NUMBERS / dimension;
+    if states > limit {
+        return Err(SimulateError::TooManyStates {
+            states,
+            dimension,
+            limit,
+        });
+    }
+    Ok(())
+}
+
+/// The state to start from: as given, or that of the model ([`Model::start`]), or rest. A sample
+/// with a memory is relaxed where the state does not say otherwise.
 ///
 /// # Errors
 /// [`SimulateError::State`] when its length does not fit.
 pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
     let n = model.dimension();
     let Some(state) = state else {
-        return Ok(vec![0.0; n]);
+        return Ok(model.start.clone().unwrap_or_else(|| model.rest()));
     };
     let mut state = state.to_vec();
     if state.len() + model.memory == n {
@@ -264,8 +303,16 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
             value,
         });
     }
+    if let Some(stop) = model.rigid_stop.map(|stop| stop.tip)
+        && state[0] > stop + BEHIND_STOP * stop.abs().max(state[0].abs())
+    {
+        return Err(SimulateError::BehindStop { x: state[0], stop });
+    }
     Ok(state)
 }
+
+/// Part of a displacement by which a state counts as behind a rigid stop.
+const BEHIND_STOP: f64 = 1e-9;
 
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
@@ -441,10 +488,10 @@ pub struct SimulateRequest {
     #[schemars(extend("x-value" = "A1,…"))]
     pub state: Option<Vec<f64>>,
     /// How many of the last states at drive phase 0 to keep
-    #[schemars(range(min = 0, max = MOST_RECORDED), extend("x-value" = "K"))]
+    #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
     pub strobe: usize,
     /// How many contacts and releases to list at most, the first ones
-    #[schemars(range(min = 0, max = MOST_EVENTS), extend("x-value" = "K"))]
+    #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
     pub events: usize,
     /// Longest period looked for
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
@@ -464,10 +511,10 @@ pub struct SimulateRequest {
     pub switching: Grid,
 }
 
-/// Most drive periods recorded: their events fill some gigabytes.
-pub const MOST_RECORDED: usize = 10_000_000;
-/// Most events listed.
-const MOST_EVENTS: usize = 100 * MOST_RECORDED;
+/// Most drive periods recorded: their events fill some hundred megabytes.
+pub const MOST_RECORDED: usize = 2_000_000;
+/// Most events, and states at drive phase 0, that are listed.
+const MOST_LISTED: usize = 1_000_000;
 
 impl Default for SimulateRequest {
     fn default() -> Self {
@@ -548,7 +595,7 @@ impl Study for SimulateStudy {
     type Request = SimulateRequest;
     type Report = SimulateReport;
 
-    fn run(
+    fn compute(
         case: &Case,
         request: &SimulateRequest,
         _: &Control<'_>,
@@ -571,6 +618,12 @@ impl From<SimulateError> for crate::Error {
         match error {
             SimulateError::State { .. } | SimulateError::StateValue { .. } => {
                 Self::input(error.to_string(), "count the numbers of {state}")
+            }
+            SimulateError::BehindStop { .. } => {
+                Self::input(error.to_string(), "give a {state} in front of the stop")
+            }
+            SimulateError::TooManyStates { .. } => {
+                Self::input(error.to_string(), "keep fewer with {strobe}")
             }
             SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
             SimulateError::Flow(error) => error.into(),

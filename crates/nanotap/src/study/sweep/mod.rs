@@ -167,31 +167,41 @@ impl Sweep {
     /// # Errors
     /// When the work was stopped (what is finished stays), or the store refuses.
     pub fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
+        let sweep = self.cancelled_by(&how.control);
         let cancelled = || how.control.is_cancelled();
         work(
             store,
             how,
-            |block| self.items(block),
-            |block, item| self.item(block, item, &cancelled),
-            |_, items| self.columns(&items),
+            |block| sweep.items(block),
+            |block, item| sweep.item(block, item, &cancelled),
+            |_, items| sweep.columns(&items),
         )?;
         if store.missing() > 0 {
             return Ok(());
         }
         let threads = Some(how.threads).filter(|threads| *threads > 0);
-        install(threads, || self.share(store, &how.control))
+        install(threads, || sweep.share(store, &how.control))
             .map_err(|error| WorkError::Threads(Box::new(error)))?
     }
 
     /// The files of one chunk, computed on this thread: the same bytes wherever that is.
     /// `None` when it was stopped, and for a chunk that there is not.
     pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        let sweep = self.cancelled_by(control);
         let grid = &self.schema.grid;
         let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
         let items = (0..self.items(&block))
-            .map(|item| self.item(&block, item, &|| control.is_cancelled()))
+            .map(|item| sweep.item(&block, item, &|| control.is_cancelled()))
             .collect::<Option<Vec<_>>>()?;
         Some(chunk_files(&self.schema, &block, &self.columns(&items)))
+    }
+
+    /// The same, whose motions end once `control` cancels the work.
+    fn cancelled_by(&self, control: &Control<'_>) -> Self {
+        Self {
+            case: self.case.cancelled_by(control),
+            ..self.clone()
+        }
     }
 
     /// Pieces of work in a chunk: values, or the whole line that is followed.
@@ -209,11 +219,13 @@ impl Sweep {
         item: usize,
         cancelled: &impl Fn() -> bool,
     ) -> Option<Vec<run::Outcome>> {
-        if self.options.follow == Follow::Off {
+        let outcomes = if self.options.follow == Follow::Off {
             run::at_value(self, block, item, cancelled)
         } else {
             run::along_line(self, block, cancelled)
-        }
+        };
+        // The map may have ended a run that was under way.
+        outcomes.filter(|_| !cancelled())
     }
 
     fn columns(&self, items: &[Vec<run::Outcome>]) -> Vec<Values> {

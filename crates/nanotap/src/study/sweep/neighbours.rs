@@ -4,7 +4,10 @@
 //! Starts are drawn; an attractor whose basin is small is met at some values and missed at
 //! others. So each stable orbit that the runs ended on is tried at the neighbouring values,
 //! both ways along every parameter, and what is new there at its neighbours in turn
-//! ([`nanotap_dynamics::orbits_shared`]). What that finds is kept beside the dataset, in
+//! ([`nanotap_dynamics::orbits_shared`]). Where starts of all sizes are drawn at each value, the
+//! states of a slowly moved lever there ([`states_near`]) are tried as well: one approach
+//! serves all distances of a line of values, and of many lines or values some are chosen, whose
+//! states neighbours lead to in turn. What that finds is kept beside the dataset, in
 //! `neighbours.json`: the runs stay what they are.
 //!
 //! Fails: where the number of modes varies, or no strobe states were kept, nothing is tried;
@@ -19,11 +22,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::run::is_on;
-use super::{Motions, Sweep};
+use super::{Motions, Starts, Sweep};
 use crate::case::{Case, CaseError, Key};
 use crate::dataset::{Store, StoreError, Values, WorkError};
 use crate::model::strobe::Strobe;
 use crate::observe::{Set, measure};
+use crate::study::approach::{states_at, states_near};
 
 /// The file of a sweep's dataset that keeps them.
 const FILE: &str = "neighbours.json";
@@ -86,21 +90,32 @@ impl Sweep {
         let map_at = |k: usize| model_at(k).map(|m| Strobe::new(&m));
         let neighbours = grid_neighbours(&shape);
         let states = self.orbit_states(store, strobe, count)?;
-        let known: Vec<Vec<PeriodicOrbit>> = states
-            .par_iter()
+        let quasistatic = match self.options.starts {
+            Starts::Spread { .. } => self.quasistatic(&shape, &case_at, control),
+            _ => vec![Vec::new(); count],
+        };
+        // How many orbits runs ended on, and all that are known.
+        let known: Vec<(usize, Vec<PeriodicOrbit>)> = states
+            .into_par_iter()
+            .zip(quasistatic)
             .with_max_len(1)
             .enumerate()
-            .map(|(k, states)| map_at(k).map_or_else(|_| Vec::new(), |map| closed(map, states)))
+            .map(|(k, (met, further))| {
+                let Ok(map) = map_at(k) else {
+                    return (0, Vec::new());
+                };
+                let own = closed(map.clone(), &met);
+                let all = closed(map, &[met, further].concat());
+                (own.len(), all)
+            })
             .collect();
+        let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
         let classify = self.options.classify();
         let values = orbits_shared(known, at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {
-            let gained = value
-                .attractors
-                .into_iter()
-                .filter(|a| a.shown_by.is_some());
+            let gained = value.attractors.into_iter().skip(own[k]);
             for attractor in gained.map(|a| a.attractor) {
                 let period = match &attractor.kind {
                     AttractorKind::Periodic(orbit) => orbit.period,
@@ -132,6 +147,64 @@ impl Sweep {
             }
         }
         Ok(found)
+    }
+
+    /// Periods and states of the orbits on which a slowly moved lever may be, at values that
+    /// are chosen.
+    fn quasistatic(
+        &self,
+        shape: &[usize],
+        case_at: &(impl Fn(usize) -> Case + Sync),
+        control: &Control<'_>,
+    ) -> Vec<Vec<OrbitState>> {
+        let quiet = Control {
+            progress: None,
+            ..*control
+        };
+        let gap = self.case.gap_key();
+        let distances = self.options.over.iter();
+        let distances = distances.map(|over| over.key == gap || over.key == Key::GapTip);
+        let distances: Vec<bool> = distances.collect();
+        let columns = shape[0];
+        let rows = shape.get(1).copied().unwrap_or(1);
+        // Each choice is a line of values of the distance, or a value.
+        let chosen = |count: usize, most: usize| (0..count).step_by(count.div_ceil(most).max(1));
+        let lines: Vec<Vec<usize>> = match distances[..] {
+            [true, ..] => chosen(rows, LINES)
+                .map(|y| (0..columns).map(|x| y * columns + x).collect())
+                .collect(),
+            [false, true] => chosen(columns, LINES)
+                .map(|x| (0..rows).map(|y| y * columns + x).collect())
+                .collect(),
+            _ => chosen(rows, LINES / 2)
+                .flat_map(|y| chosen(columns, LINES / 2).map(move |x| vec![y * columns + x]))
+                .collect(),
+        };
+        let found: Vec<(Vec<usize>, Vec<Vec<PeriodicOrbit>>)> = lines
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|line| {
+                let case = case_at(line[0]);
+                let most = self.options.max_period;
+                let states = if line.len() == 1 {
+                    states_near(&case, most, &quiet).map(|states| vec![states])
+                } else {
+                    let gaps: Vec<f64> = line.iter().map(|&k| case_at(k).get(gap)).collect();
+                    states_at(&case, &gaps, most, &quiet)
+                };
+                (line, states.unwrap_or_default())
+            })
+            .collect();
+        let mut states = vec![Vec::new(); columns * rows];
+        for (line, orbits) in found {
+            for (k, orbits) in line.into_iter().zip(orbits) {
+                let own = orbits.into_iter().filter_map(|orbit| {
+                    Some((orbit.period, orbit.states.into_iter().next()?))
+                });
+                states[k].extend(own);
+            }
+        }
+        states
     }
 
     /// Period and state of every run that ended on an orbit, value by value, the first
@@ -178,6 +251,9 @@ impl Sweep {
 
 /// Period and state of an orbit on which a run ended.
 type OrbitState = (usize, Vec<f64>);
+
+/// Lines of values of the distance, at most, for each of which an approach is followed.
+const LINES: usize = 16;
 
 /// Drive periods over which a motion that does not repeat is measured.
 const UNREPEATED: usize = 64;

@@ -129,7 +129,7 @@ impl DatasetStudy for SweepStudy {
     type Request = SweepRequest;
     type Report = Summary;
 
-    fn recipe(case: &Case, request: &SweepRequest, _: &Control<'_>) -> Result<Recipe, Error> {
+    fn plan(case: &Case, request: &SweepRequest, _: &Control<'_>) -> Result<Recipe, Error> {
         Ok(Box::new(request.sweep(case)?))
     }
 

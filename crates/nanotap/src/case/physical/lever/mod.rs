@@ -2,9 +2,11 @@
 //! to stiffness, beam mass and tip mass.
 //!
 //! With k = 3EI/L³ and T = √(mL⁴/EI) the beam's mass is mL = kT²/3, and its first free
-//! frequency, measured with the tip on it, is f₀ = Ω₁(α1)/(2πT), where Ω₁ is the first root of
-//! the exact beam with tip mass α1 = M/(mL). Any two of k, mL and f₀ give the third once the
-//! tip's mass is known; f₂/f₁ depends on α1 alone and tells it.
+//! frequency, measured with the tip on it, is f₀ = Ω₁(α1)/(2πT) with tip mass α1 = M/(mL). Ω₁ is
+//! that of the model's modes, a little above the exact beam's (without a tip mass they are the
+//! same), so that a drive at f₀ meets the resonance of the model that is solved. Any two of k, mL
+//! and f₀ give the third once the tip's mass is known; f₂/f₁ of the exact beam depends on α1
+//! alone and tells it.
 
 mod in_fluid;
 
@@ -41,6 +43,8 @@ pub struct LeverData {
     pub density: Option<f64>,
     /// The mass at its end.
     pub tip_mass: TipMass,
+    /// Modes of the model.
+    pub modes: usize,
 }
 
 impl LeverData {
@@ -70,6 +74,9 @@ pub struct Lever {
     pub quality_factor: f64,
     /// Its length in m, if known: only slopes need it.
     pub length: Option<f64>,
+    /// Modes of the model whose resonance and quality factor are those above.
+    #[serde(skip)]
+    pub modes: usize,
 }
 
 /// The largest tip mass ratio considered. Beyond it the beam is a massless spring to six
@@ -85,10 +92,11 @@ impl Lever {
     pub fn resolve(data: &LeverData) -> Result<Self, PhysicalError> {
         check(data)?;
         let weight = data.weight();
+        let modes = data.modes;
         let (k, beam_mass, ratio) = match (data.k.or(data.bending()), data.f0, weight) {
             (Some(k), Some(f0), _) => {
-                let ratio = ratio_from_resonance(data.tip_mass, k, f0)?;
-                let time = first_frequency(ratio)? / (TAU * f0);
+                let ratio = ratio_from_resonance(data.tip_mass, k, f0, modes)?;
+                let time = first_frequency(ratio, modes)? / (TAU * f0);
                 (k, k * time * time / 3.0, ratio)
             }
             (Some(k), None, Some(mass)) => (k, mass, ratio_to_beam(data.tip_mass, mass)?),
@@ -97,7 +105,7 @@ impl Lever {
                     TipMass::SecondMode(f2) => ratio_from_second_mode(f2, f0)?,
                     other => ratio_to_beam(other, mass)?,
                 };
-                let time = first_frequency(ratio)? / (TAU * f0);
+                let time = first_frequency(ratio, modes)? / (TAU * f0);
                 (3.0 * mass / (time * time), mass, ratio)
             }
             (Some(_), None, None) => {
@@ -120,9 +128,12 @@ impl Lever {
             k,
             beam_mass,
             tip_mass_ratio: ratio,
-            f0: data.f0.unwrap_or(first_frequency(ratio)? / (TAU * time)),
+            f0: data
+                .f0
+                .unwrap_or(first_frequency(ratio, modes)? / (TAU * time)),
             quality_factor: data.quality_factor.unwrap_or(f64::INFINITY),
             length: data.geometry.map(|geometry| geometry.length),
+            modes,
         };
         match (data.fluid, data.geometry) {
             (Some(fluid), Some(geometry)) => fluid.around(&lever, geometry.width, geometry.length),
@@ -139,7 +150,7 @@ impl Lever {
         let ratio = bounded(mass / self.beam_mass)?;
         Ok(Self {
             tip_mass_ratio: ratio,
-            f0: first_frequency(ratio)? / (TAU * self.time_unit()),
+            f0: first_frequency(ratio, self.modes)? / (TAU * self.time_unit()),
             ..self
         })
     }
@@ -154,7 +165,7 @@ impl Lever {
         (3.0 * self.beam_mass / self.k).sqrt()
     }
 
-    /// Ω₁ of the exact free beam with the tip: 2πf₀T.
+    /// Ω₁ of the model's free beam with the tip: 2πf₀T.
     pub fn first_frequency(&self) -> f64 {
         TAU * self.f0 * self.time_unit()
     }
@@ -166,7 +177,8 @@ impl Lever {
     /// for the bare beam α3 = ω₀₁/Q. Corrections are of order 1/Q².
     pub fn damping(&self) -> f64 {
         let omega = self.first_frequency();
-        omega * modal_mass_factor(omega.sqrt(), self.tip_mass_ratio) / self.quality_factor
+        let share = model_tip_share(omega, self.tip_mass_ratio, self.modes);
+        omega * (1.0 + self.tip_mass_ratio * share) / self.quality_factor
     }
 
     /// Frequency in Hz and φ(1)²/∫φ² of the free mode `k`, 0 the first, where the beam and what
@@ -284,7 +296,7 @@ fn comparison(what: &str, kind: Kind, used: f64, other: f64) -> Remark {
 
 /// α1 from the tip's mass where k and f₀ are known: α1Ω₁²(α1) = 3Mω₀²/k, which grows from 0
 /// to 3.
-fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64) -> Result<f64, PhysicalError> {
+fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64, modes: usize) -> Result<f64, PhysicalError> {
     let mass = match tip {
         TipMass::Ratio(ratio) => return bounded(ratio),
         TipMass::SecondMode(f2) => return ratio_from_second_mode(f2, f0),
@@ -292,17 +304,19 @@ fn ratio_from_resonance(tip: TipMass, k: f64, f0: f64) -> Result<f64, PhysicalEr
     };
     let heaviest = k / (TAU * f0).powi(2);
     let wanted = 3.0 * mass / heaviest;
-    ratio_where(|ratio| Ok(ratio * first_frequency(ratio)?.powi(2) >= wanted))?.ok_or_else(|| {
-        PhysicalError::impossible(
-            Key::TipMass,
-            Kind::Mass.format(mass),
-            format!(
-                "with this k and f0 it must be below k/(2 pi f0)^2 = {}, which a beam without \
+    ratio_where(|ratio| Ok(ratio * first_frequency(ratio, modes)?.powi(2) >= wanted))?.ok_or_else(
+        || {
+            PhysicalError::impossible(
+                Key::TipMass,
+                Kind::Mass.format(mass),
+                format!(
+                    "with this k and f0 it must be below k/(2 pi f0)^2 = {}, which a beam without \
                  mass would carry",
-                Kind::Mass.format(heaviest)
-            ),
-        )
-    })
+                    Kind::Mass.format(heaviest)
+                ),
+            )
+        },
+    )
 }
 
 /// α1 where the beam's mass is known.
@@ -387,9 +401,46 @@ fn ratio_where(
     }
 }
 
-/// Ω₁ of the exact free beam.
-fn first_frequency(ratio: f64) -> Result<f64, PhysicalError> {
-    Ok(exact_beam::frequencies(ratio, 0.0, 1)?[0])
+/// Ω₁ of the free beam with the tip in so many modes of the bare beam: the root below ω₁ of
+/// 1 = α1Ω² Σφ_j(1)²/(ω_j² − Ω²), whose right side rises from 0 to infinity.
+fn first_frequency(ratio: f64, modes: usize) -> Result<f64, PhysicalError> {
+    let bare = exact_beam::frequencies(0.0, 0.0, modes)?;
+    if ratio == 0.0 {
+        return Ok(bare[0]);
+    }
+    let excess = |omega: f64| ratio * omega * omega * receptances(&bare, omega)[0] >= 1.0;
+    let (mut low, mut high) = (0.0, bare[0]);
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return Ok(middle);
+        }
+        if excess(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+}
+
+/// Σφ_j(1)²/(ω_j² − Ω²) and Σφ_j(1)²/(ω_j² − Ω²)² over bare modes, whose φ_j(1)² is 4.
+fn receptances(bare: &[f64], omega: f64) -> [f64; 2] {
+    let terms = bare.iter().map(|own| 1.0 / (own * own - omega * omega));
+    terms.fold([0.0; 2], |[once, twice], term| {
+        [once + 4.0 * term, twice + 4.0 * term * term]
+    })
+}
+
+/// φ(1)²/∫φ² of the model's first free mode with frequency Ω: its shape has the parts
+/// φ_j(1)/(ω_j² − Ω²) of the bare modes, and 4 without a tip's mass.
+fn model_tip_share(omega: f64, ratio: f64, modes: usize) -> f64 {
+    match exact_beam::frequencies(0.0, 0.0, modes) {
+        Ok(bare) if ratio > 0.0 => {
+            let [once, twice] = receptances(&bare, omega);
+            once * once / twice
+        }
+        _ => 4.0,
+    }
 }
 
 /// Ω₂/Ω₁ of the exact free beam.
@@ -398,16 +449,11 @@ fn frequency_ratio(ratio: f64) -> Result<f64, PhysicalError> {
     Ok(frequencies[1] / frequencies[0])
 }
 
-/// 1 + α1φ(1)²/∫φ² for the free mode of wave number β with tip mass α1.
+/// φ(1)²/∫φ² of the exact beam's free mode of wave number β with tip mass α1:
+/// 4/(1 − 3α1 + 2α1q) with q = β sin β sinh β/D, D = sin β cosh β − cos β sinh β.
 ///
 /// By Rayleigh's principle d ln ω²/dα1 = −φ(1)²/(∫φ² + α1φ(1)²); the left side follows from
-/// 1 + cos β cosh β = α1 β D, D = sin β cosh β − cos β sinh β, whence with
-/// q = β sin β sinh β/D the factor is (1 + α1 + 2α1q)/(1 − 3α1 + 2α1q).
-fn modal_mass_factor(beta: f64, ratio: f64) -> f64 {
-    1.0 + ratio * tip_share(beta, ratio)
-}
-
-/// φ(1)²/∫φ² of that mode: 4/(1 − 3α1 + 2α1q).
+/// 1 + cos β cosh β = α1 β D.
 fn tip_share(beta: f64, ratio: f64) -> f64 {
     let q = if beta < 1.0 {
         // Both cancel to third order: q = (3/2)(1 − x/360 …)/(1 − x/840 …), x = 4β⁴.
@@ -454,6 +500,7 @@ impl LeverData {
             modulus: reader.number(Key::LeverModulus)?,
             density: reader.number(Key::LeverDensity)?,
             tip_mass: tip_mass.or(f2).unwrap_or(TipMass::Absolute(0.0)),
+            modes: crate::case::file::modes(reader.stated),
         })
     }
 }

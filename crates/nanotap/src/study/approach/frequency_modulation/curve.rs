@@ -101,6 +101,8 @@ pub fn modulated_approach(
                     jumps.extend(breaks.map(|[from, to]| Jump { way, from, to }));
                     orbit
                 }
+                // The map may have ended the step.
+                Err(_) if control.is_cancelled() => break,
                 Err(error) => {
                     failed.get_or_insert_with(|| Ended {
                         way,
@@ -115,7 +117,11 @@ pub fn modulated_approach(
                 }
             };
             let amplitude = walk.held(gap).amplitude;
-            table.push(curve.point(way, gap, orbit, amplitude)?);
+            let point = match curve.point(way, gap, orbit, amplitude) {
+                Err(_) if control.is_cancelled() => break,
+                point => point?,
+            };
+            table.push(point);
             walk.keep(closest, reach);
             done += 1;
             if let Some(report) = control.progress {
@@ -138,6 +144,7 @@ pub fn modulated_approach(
         .shift
         .map(|shift| curve.setpoints(held, shift, &table, control));
     Ok(ApproachReport {
+        jumps: Vec::new(),
         parameter: case.gap_key().path(),
         from,
         to,

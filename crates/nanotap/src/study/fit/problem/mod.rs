@@ -108,6 +108,12 @@ impl Deref for Point {
 }
 
 impl Problem<'_> {
+    /// What was computed of the rows; `None` once the work is cancelled: orbits that were being
+    /// looked for meanwhile may be missing.
+    fn finished<T>(&self, computed: T) -> Option<T> {
+        (!self.case.cancel().is_cancelled()).then_some(computed)
+    }
+
     /// What is observed.
     fn set(&self) -> Set {
         let columns = self.data.columns.iter();
@@ -623,7 +629,8 @@ impl LeastSquares for Problem<'_> {
             return None;
         }
         if let Some(held) = self.held {
-            return Some(held.follow(self, (x, &bases), (before, from)));
+            let point = held.follow(self, (x, &bases), (before, from));
+            return self.finished(point);
         }
         let one = |((curve, row), before_point): (&(usize, &Row), &RowPoint)| {
             let lost = || before_point.without_orbit();
@@ -656,7 +663,7 @@ impl LeastSquares for Problem<'_> {
                 found.or_else(|| Some(before.as_ref()?.of_before()))
             });
         let folds = folds.collect();
-        Some(Point { rows, folds })
+        self.finished(Point { rows, folds })
     }
 
     fn residuals(&self, x: &[f64], point: &Point) -> DVector<f64> {
@@ -730,6 +737,7 @@ impl LeastSquares for Problem<'_> {
                 jacobian[(rows.len() * columns + index, k)] = *slope;
             }
         }
-        jacobian.iter().all(|v| v.is_finite()).then_some(jacobian)
+        let jacobian = jacobian.iter().all(|v| v.is_finite()).then_some(jacobian);
+        jacobian.and_then(|jacobian| self.finished(jacobian))
     }
 }

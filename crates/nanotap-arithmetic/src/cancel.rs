@@ -1,0 +1,93 @@
+//! A flag that ends work.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+/// How long work with a [grace period](CancelFlag::with_grace) may go on.
+const GRACE: Duration = Duration::from_millis(300);
+
+/// A flag that ends work from outside. Clones share the flag. The default can never be set.
+///
+/// Systems carry it and poll it on every stretch of a motion, so that a loop over motions ends
+/// early, with errors, even where it does not poll the flag itself. It is no part of what a system
+/// is: two flags always compare equal.
+#[derive(Clone, Debug, Default)]
+pub struct CancelFlag {
+    flag: Option<Arc<AtomicBool>>,
+    /// When this flag was first polled after it was set, where it has a grace period.
+    grace: Option<Arc<OnceLock<Instant>>>,
+}
+
+impl CancelFlag {
+    /// A flag that is not set and can be.
+    pub fn new() -> Self {
+        Self {
+            flag: Some(Arc::default()),
+            grace: None,
+        }
+    }
+
+    /// The same flag, seen as set only 0.3 s after it was first polled as set: for work that brings
+    /// finished results into a report.
+    #[must_use]
+    pub fn with_grace(&self) -> Self {
+        Self {
+            flag: self.flag.clone(),
+            grace: Some(Arc::default()),
+        }
+    }
+
+    /// Sets the flag: work that polls it ends soon.
+    pub fn cancel(&self) {
+        if let Some(flag) = &self.flag {
+            flag.store(true, Ordering::SeqCst);
+        }
+    }
+
+    /// Whether the flag is set.
+    #[inline]
+    pub fn is_cancelled(&self) -> bool {
+        match &self.flag {
+            Some(flag) if flag.load(Ordering::Relaxed) => self.is_late(),
+            _ => false,
+        }
+    }
+
+    /// Whether the grace period is over, if there is one.
+    #[cold]
+    fn is_late(&self) -> bool {
+        self.grace
+            .as_ref()
+            .is_none_or(|since| since.get_or_init(Instant::now).elapsed() > GRACE)
+    }
+}
+
+impl PartialEq for CancelFlag {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clones_share_the_flag_and_a_grace_period_ends() {
+        let flag = CancelFlag::new();
+        let (clone, graced) = (flag.clone(), flag.with_grace());
+        assert!(!clone.is_cancelled() && !graced.is_cancelled());
+        flag.cancel();
+        assert!(clone.is_cancelled() && !graced.is_cancelled());
+        std::thread::sleep(GRACE + Duration::from_millis(5));
+        assert!(graced.is_cancelled());
+    }
+
+    #[test]
+    fn the_default_cannot_be_set() {
+        let flag = CancelFlag::default();
+        flag.cancel();
+        assert!(!flag.is_cancelled());
+    }
+}

@@ -1,0 +1,217 @@
+//! Motions that are followed on a coarse map and confirmed on the map itself.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use nanotap_dynamics::{
+    AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, DMatrix, MotionKind,
+    PeriodicOrbit, StartBox, StartSet, StroboscopicMap, census_of, classify,
+};
+
+use crate::systems::{Cubic, Formula, Logistic, Nested, System};
+
+/// A map with another as its coarse one, and the periods that were advanced on each.
+#[derive(Clone)]
+struct Pair<F> {
+    map: System<F>,
+    coarse: Option<F>,
+    exact_periods: Arc<AtomicUsize>,
+    coarse_periods: Arc<AtomicUsize>,
+}
+
+impl<F> Pair<F> {
+    fn new(exact: F, coarse: F) -> Self {
+        Self {
+            map: System(exact),
+            coarse: Some(coarse),
+            exact_periods: Arc::default(),
+            coarse_periods: Arc::default(),
+        }
+    }
+
+    fn count(&self) {
+        let periods = match self.coarse {
+            Some(_) => &self.exact_periods,
+            None => &self.coarse_periods,
+        };
+        periods.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn periods(&self) -> [usize; 2] {
+        [&self.exact_periods, &self.coarse_periods].map(|periods| periods.load(Ordering::Relaxed))
+    }
+}
+
+impl<F: Formula> StroboscopicMap for Pair<F> {
+    type Error = Infallible;
+
+    fn dimension(&self) -> usize {
+        self.map.dimension()
+    }
+
+    fn period(&self) -> f64 {
+        self.map.period()
+    }
+
+    fn coarse(&self) -> Option<Self> {
+        let coarse = self.coarse.clone()?;
+        Some(Self {
+            map: System(coarse),
+            coarse: None,
+            ..self.clone()
+        })
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+        self.count();
+        self.map.advance(state)
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Infallible> {
+        self.count();
+        self.map.advance_with_jacobian(state, jacobian)
+    }
+}
+
+fn drawn(low: f64, high: f64) -> StartSet {
+    StartSet::drawn(StartBox::new(vec![low], vec![high]).unwrap(), 1)
+}
+
+fn taken<F: Formula>(map: &Pair<F>, starts: &StartSet) -> Census {
+    let options = CensusOptions {
+        unseen: 0.01,
+        ..CensusOptions::default()
+    };
+    census_of(map, starts, &options, &Control::default())
+}
+
+fn orbits(census: &Census) -> Vec<&PeriodicOrbit> {
+    let orbits = census.attractors.iter().map(|a| match &a.kind {
+        AttractorKind::Periodic(orbit) => orbit,
+        other => panic!("{other:?}"),
+    });
+    orbits.collect()
+}
+
+/// The fixed points of r x − x³ are ±√(r − 1), and half of the starts go to each.
+#[test]
+fn orbits_are_those_of_the_map_itself() {
+    let map = Pair::new(Cubic(1.6), Cubic(1.601));
+    let found = taken(&map, &drawn(-1.0, 1.0));
+    assert!(found.followed_coarsely);
+    assert_eq!(found.end, CensusEnd::BoundMet);
+    assert_eq!(found.attractors.len(), 2);
+    for (orbit, attractor) in orbits(&found).iter().zip(&found.attractors) {
+        assert!((orbit.states[0][0].abs() - 0.6f64.sqrt()).abs() < 1e-14);
+        assert!((orbit.multipliers[0].re - (3.0 - 2.0 * 1.6)).abs() < 1e-12);
+        assert!(attractor.fraction.low < 0.5 && 0.5 < attractor.fraction.high);
+    }
+    let [exact, coarse] = map.periods();
+    assert!(exact < 100 && coarse > 10 * exact, "{exact} {coarse}");
+}
+
+/// r x (1 − x) doubles its period at r = 3: on one side of it the coarse map, on the other the map.
+#[test]
+fn another_period_is_that_of_the_map_itself() {
+    for (exact, coarse, period) in [(3.02, 2.98, 2), (2.98, 3.02, 1)] {
+        let mut map = Pair::new(Logistic(exact), Logistic(coarse));
+        let named = classify(&mut map, &[0.3], &ClassifyOptions::default());
+        let MotionKind::Periodic(orbit) = &named.kind else {
+            panic!("{named:?}")
+        };
+        assert_eq!(orbit.period, period);
+        let found = taken(&map, &drawn(0.1, 0.9));
+        assert_eq!(found.attractors.len(), 1);
+        assert_eq!(orbits(&found)[0].period, period);
+        assert_eq!(found.attractors[0].fraction.count, found.counted);
+    }
+}
+
+/// At 3.83 there is a stable period 3, at 3.9 there is none: it is not reported.
+#[test]
+fn a_motion_of_the_coarse_map_alone_is_not_reported() {
+    let mut map = Pair::new(Logistic(3.9), Logistic(3.83));
+    let named = classify(&mut map, &[0.3], &ClassifyOptions::default());
+    assert!(matches!(named.kind, MotionKind::Chaotic(_)), "{named:?}");
+    let found = taken(&map, &drawn(0.1, 0.9));
+    assert_eq!(found.attractors.len(), 1);
+    let kind = &found.attractors[0].kind;
+    assert!(matches!(kind, AttractorKind::Chaotic { .. }), "{kind:?}");
+}
+
+/// The exponent at r = 4 is ln 2; the coarse map's at 3.9 is 0.5.
+#[test]
+fn exponents_are_those_of_the_map_itself() {
+    let map = Pair::new(Logistic(4.0), Logistic(3.999));
+    let found = taken(&map, &drawn(0.1, 0.9));
+    assert_eq!(found.attractors.len(), 1);
+    let AttractorKind::Chaotic { spectrum, .. } = &found.attractors[0].kind else {
+        panic!("{found:?}")
+    };
+    let (exponent, error) = spectrum.largest();
+    assert!((exponent - 2f64.ln()).abs() < 5.0 * error + 2e-3);
+    let [exact, coarse] = map.periods();
+    assert!(coarse > 20 * exact, "{exact} {coarse}");
+}
+
+/// At 3.8285, beside the window of period 3 (from 1 + √8 = 3.828427), the orbit attracts after chaos
+/// that the coarse map at 3.82 does not leave.
+#[test]
+fn chaos_that_only_the_map_itself_leaves_is_no_attractor() {
+    let mut map = Pair::new(Logistic(3.84), Logistic(3.82));
+    let named = classify(&mut map, &[0.3], &ClassifyOptions::default());
+    let MotionKind::Periodic(orbit) = &named.kind else {
+        panic!("{named:?}")
+    };
+    assert_eq!(orbit.period, 3);
+    let found = taken(&map, &drawn(0.1, 0.9));
+    let mut kinds = found.attractors.iter().map(|a| &a.kind);
+    assert!(kinds.all(|kind| matches!(kind, AttractorKind::Periodic(orbit) if orbit.period == 3)));
+}
+
+/// A motion with a basin of 1e-9 of the starts, from a seed near it; the unstable orbit at 0 that parts
+/// two basins is known too.
+#[test]
+fn seeds_are_attractors_without_starts() {
+    let nested = Nested { r: 1.5, s: 1e-9 };
+    let map = Pair::new(nested.clone(), nested);
+    let start = drawn(-3.0, 3.0);
+    let found = taken(
+        &map,
+        &start
+            .clone()
+            .with_seeds([(1, vec![6e-10]), (1, vec![1e-15])]),
+    );
+    assert_eq!(found.attractors.len(), 3);
+    assert_eq!(found.attractors[2].fraction.count, 0);
+    assert_eq!(found.attractors[2].first_start, None);
+    assert_eq!(found.unstable.len(), 1);
+    assert_eq!(taken(&map, &start).attractors.len(), 2);
+}
+
+/// After the signal each thread follows its motion for a period or so, and looks at it once.
+#[test]
+fn a_cancelled_census_of_chaos_ends_soon() {
+    let map = Pair::new(Logistic(3.9), Logistic(3.9001));
+    let cancel = AtomicBool::new(false);
+    let at = AtomicUsize::new(0);
+    let stop = |done, _| {
+        if done == 100 {
+            cancel.store(true, Ordering::Relaxed);
+            at.store(map.periods().iter().sum(), Ordering::Relaxed);
+        }
+    };
+    let control = Control {
+        cancel: Some(&cancel),
+        progress: Some(&stop),
+    };
+    let found = census_of(&map, &drawn(0.1, 0.9), &CensusOptions::default(), &control);
+    assert!(found.cancelled);
+    let after = map.periods().iter().sum::<usize>() - at.load(Ordering::Relaxed);
+    assert!(after < 20_000, "{after}");
+}

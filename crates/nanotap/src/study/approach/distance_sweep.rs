@@ -1,0 +1,834 @@
+//! A motion followed along the distance, so slowly that it always settles.
+//!
+//! A lever that is brought near slowly stays on its branch of stable orbits until that ends: at
+//! a fold, at a bifurcation that destabilises it, where it grazes and does not go on, or where
+//! its law has no motion any more. So branches are continued, and a run is needed only at their
+//! ends: it starts beside the last stable orbit just beyond the end, and where it goes the lever
+//! jumps. At a flip with a stable doubled branch beyond it the lever goes on along that one. A
+//! motion that does not close is followed on a grid of distances that depends on the case alone,
+//! until an orbit is found there, whose branch is then continued back to its beginning as well.
+//!
+//! Fails: what a motion that does not close meets within a step of the grid is not seen, and
+//! where it ends by a jump the place is known to a step of the grid.
+
+use std::fmt;
+
+use nanotap_dynamics::{
+    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
+    ContinuationOptions, Control, Direction, MotionKind, PeriodicOrbit, ShootingOptions,
+    UndecidedReason, classify, close_orbit, close_orbit_from_points, continue_orbit,
+    switch_at_flip,
+};
+
+use crate::case::{Case, CaseError, Family};
+use crate::model::Model;
+use crate::model::strobe::Strobe;
+use crate::study::branch::kind_name;
+use crate::study::simulate::{Classification, Named};
+use crate::study::sweep::SweepOptions;
+
+use super::BEYOND;
+
+/// Steps of the grid on which motions without a branch are followed, in the scale of distances.
+const GRID: f64 = 100.0;
+/// Longest period of orbits whose branches are followed.
+const LONGEST_BRANCH: usize = 8;
+/// Distance between places, in the scale of distances, that are one.
+const SAME_PLACE: f64 = 1e-7;
+/// Distances beyond a fold, in the scale of distances, at which the jump is followed, and how far
+/// from the orbit at the fold the run starts, as a part of its size, towards the unstable side.
+/// The farther ones are for where the nearer leave the run beside the fold for too long.
+const BEYOND_FOLD: [(f64, f64); 2] = [(1e-5, 0.02), (1e-3, 0.1)];
+/// The same beyond other ends, where a disturbance grows in proportion to the distance.
+const BEYOND_END: (f64, f64) = (1e-3, 0.01);
+/// Part of an orbit's size by which a motion may differ and still be its continuation.
+const CONTINUOUS: f64 = 0.05;
+/// How often a grid step is halved where no motion can be followed over it.
+const HALVINGS: usize = 6;
+/// Branches and stretches without an orbit after which a way is not followed further.
+const MAX_PIECES: usize = 200;
+/// Points after which a branch is not followed further.
+const MAX_POINTS: usize = 2000;
+/// Periods after which a motion that is followed on the grid is measured at the latest.
+const GRID_TRANSIENT: usize = 512;
+/// Decay times that a jump is given to settle, and periods at most.
+const DECAY_TIMES: f64 = 30.0;
+const MAX_TRANSIENT: usize = 1 << 15;
+
+/// Why a piece of a way ends.
+#[derive(Clone, Debug)]
+pub(in crate::study) enum End {
+    /// The range of distances ends.
+    Range,
+    /// The orbits are stable no longer; with the first that is not.
+    Bifurcation {
+        at: Box<Bifurcation>,
+        unstable: Option<Box<PeriodicOrbit>>,
+    },
+    /// The orbits meet a branch of this shorter period.
+    Meeting { period: usize },
+    /// A motion without a branch goes over into one that has one.
+    Closes,
+    /// The branch could not be followed further.
+    Lost(String),
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range => f.write_str("the end of the range"),
+            Self::Bifurcation { at, .. } => f.write_str(kind_name(at.kind)),
+            Self::Meeting { period } => write!(f, "meets period {period}"),
+            Self::Closes => f.write_str("becomes periodic"),
+            Self::Lost(reason) => f.write_str(reason),
+        }
+    }
+}
+
+/// A stretch of a branch on which all orbits are stable, by ascending distance.
+#[derive(Clone, Debug)]
+pub(in crate::study) struct Stretch {
+    pub(in crate::study) period: usize,
+    pub(in crate::study) points: Vec<BranchPoint>,
+    /// The least and the greatest distance, and why it ends there.
+    pub(in crate::study) ends: [(f64, End); 2],
+}
+
+impl Stretch {
+    pub(in crate::study) fn holds(&self, gap: f64) -> bool {
+        (self.ends[0].0..=self.ends[1].0).contains(&gap)
+    }
+
+    fn end(&self, direction: Direction) -> &(f64, End) {
+        &self.ends[usize::from(direction == Direction::Increasing)]
+    }
+}
+
+/// A motion as it was found.
+#[derive(Clone, Debug)]
+pub(in crate::study) struct Met {
+    pub(in crate::study) classification: Classification,
+    pub(in crate::study) evidence: String,
+    pub(in crate::study) orbit: Option<PeriodicOrbit>,
+    pub(in crate::study) state: Vec<f64>,
+    /// Whether the motion from the start could not be computed.
+    failed: bool,
+}
+
+impl Met {
+    pub(in crate::study) fn on(orbit: PeriodicOrbit) -> Self {
+        Self {
+            classification: Classification::Periodic,
+            evidence: String::new(),
+            state: orbit.states.first().cloned().unwrap_or_default(),
+            orbit: Some(orbit),
+            failed: false,
+        }
+    }
+
+    pub(in crate::study) fn undecided(evidence: String, state: &[f64]) -> Self {
+        Self {
+            classification: Classification::Undecided,
+            evidence,
+            orbit: None,
+            state: state.to_vec(),
+            failed: true,
+        }
+    }
+
+    /// Where the motion at the next distance starts: rest, where this one ran off.
+    fn onwards(&self) -> Vec<f64> {
+        match self.classification {
+            Classification::Unbounded => vec![0.0; self.state.len()],
+            _ => self.state.clone(),
+        }
+    }
+}
+
+/// What the lever does along a piece of its way.
+#[derive(Clone, Debug)]
+pub(in crate::study) enum Motion {
+    /// The stable orbits of a stretch, by its index.
+    Periodic(usize),
+    /// A motion without a branch that is followed, as it was found at distances in the order of
+    /// the way: none that closes, or one of a long period.
+    OnGrid(Vec<(f64, Met)>),
+}
+
+/// A piece of a way.
+#[derive(Clone, Debug)]
+pub(in crate::study) struct Piece {
+    /// The distances between which it lies, in the order of the way.
+    pub(in crate::study) from: f64,
+    pub(in crate::study) to: f64,
+    pub(in crate::study) motion: Motion,
+    /// Where the motion was first seen.
+    pub(in crate::study) entered: f64,
+    /// Why it ends.
+    pub(in crate::study) end: End,
+    /// Whether the lever jumps there.
+    pub(in crate::study) jumps: bool,
+    /// How well the place of the end is known.
+    pub(in crate::study) uncertainty: f64,
+}
+
+impl Piece {
+    pub(in crate::study) fn holds(&self, gap: f64) -> bool {
+        gap >= self.from.min(self.to) && gap <= self.from.max(self.to)
+    }
+}
+
+/// Where the lever is.
+#[derive(Clone, Debug)]
+pub(in crate::study) enum Place {
+    On { stretch: usize, gap: f64 },
+    Off { gap: f64, met: Met },
+}
+
+/// Motions followed along the distance.
+pub(in crate::study) struct DistanceSweep<'a> {
+    case: &'a Case,
+    family: Family,
+    /// The least and the greatest distance.
+    range: (f64, f64),
+    /// The unit in which small differences of distances are measured.
+    scale: f64,
+    classify: ClassifyOptions,
+    control: Control<'a>,
+    pub(in crate::study) stretches: Vec<Stretch>,
+}
+
+impl<'a> DistanceSweep<'a> {
+    /// Of a case between two distances. `reach` is how far the free tip swings.
+    pub(in crate::study) fn new(
+        case: &'a Case,
+        (near, far): (f64, f64),
+        reach: f64,
+        max_period: usize,
+        control: &Control<'a>,
+    ) -> Result<Self, CaseError> {
+        let swings = reach > 0.0 && reach.is_finite();
+        let far = if swings { far.max(BEYOND * reach) } else { far };
+        let sweep = SweepOptions {
+            max_period,
+            ..SweepOptions::new(Vec::new())
+        };
+        let model = case.with(case.gap_key(), far).model()?;
+        // The slowest decay of the free lever, by its trace.
+        let rate = model.system.regimes().first().map_or(0.0, |free| {
+            let matrix = free.matrix();
+            -matrix.trace() / matrix.nrows().max(1) as f64 * model.system.drive().period()
+        });
+        let decays = (DECAY_TIMES / rate).min(MAX_TRANSIENT as f64);
+        let decays = if decays.is_nan() { 0 } else { decays as usize };
+        Ok(Self {
+            case,
+            family: case.family(case.gap_key()),
+            range: (near, far),
+            scale: if swings { reach } else { far - near },
+            classify: ClassifyOptions {
+                first_look: 4,
+                max_transient: decays.max(2048).next_power_of_two(),
+                ..sweep.classify()
+            },
+            control: Control {
+                progress: None,
+                ..*control
+            },
+            stretches: Vec::new(),
+        })
+    }
+
+    /// The greatest distance: that of the free motion, or beyond.
+    pub(in crate::study) const fn farthest(&self) -> f64 {
+        self.range.1
+    }
+
+    pub(in crate::study) fn model(&self, gap: f64) -> Result<Model, CaseError> {
+        self.case.with(self.case.gap_key(), gap).model()
+    }
+
+    /// The motion far from the sample: the orbit that Newton closes beside the free response, or
+    /// where a run from rest goes.
+    pub(in crate::study) fn free(&mut self) -> Result<Place, CaseError> {
+        let gap = self.range.1;
+        let model = self.model(gap)?;
+        let drive = model.system.drive();
+        let response = model.system.regimes().first();
+        let response = response.map(|free| free.response().at(drive, 0.0).as_slice().to_vec());
+        let mut start = vec![0.0; model.dimension()];
+        if let Some(response) = response.filter(|x| x.iter().all(|v| v.is_finite())) {
+            let shared = start.len().min(response.len());
+            start[..shared].copy_from_slice(&response[..shared]);
+            let mut map = Strobe::new(&model);
+            let closed = close_orbit(&mut map, &start, 1, &ShootingOptions::default());
+            if let Ok(orbit) = closed
+                && orbit.is_stable()
+                && orbit.nearest(&start).1 <= CONTINUOUS * orbit.scale()
+            {
+                return Ok(self.on(gap, orbit));
+            }
+            start.fill(0.0);
+        }
+        Ok(self.arrive(gap, &start))
+    }
+
+    /// Where a run from a state at a distance goes.
+    fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
+        let met = self.met(gap, start, self.classify.max_transient);
+        self.place(gap, met)
+    }
+
+    /// The place of a motion: on its branch, where that is followed.
+    fn place(&mut self, gap: f64, met: Met) -> Place {
+        match met.orbit {
+            Some(orbit) if orbit.period <= LONGEST_BRANCH => self.on(gap, orbit),
+            _ => Place::Off { gap, met },
+        }
+    }
+
+    /// What a run from a state at a distance goes to.
+    fn met(&self, gap: f64, start: &[f64], max_transient: usize) -> Met {
+        let model = match self.model(gap) {
+            Ok(model) => model,
+            Err(error) => return Met::undecided(error.to_string(), start),
+        };
+        let options = ClassifyOptions {
+            max_transient,
+            ..self.classify.clone()
+        };
+        let classified = classify(&mut Strobe::new(&model), start, &options);
+        let named = Named::of(&classified.kind);
+        Met {
+            classification: named.classification,
+            evidence: named.evidence,
+            orbit: named.orbit,
+            failed: matches!(
+                classified.kind,
+                MotionKind::Undecided {
+                    reason: UndecidedReason::Map { .. } | UndecidedReason::BadStart(_),
+                    ..
+                }
+            ),
+            state: classified.state,
+        }
+    }
+
+    /// The place on a stable orbit, whose stretch is continued both ways unless it is known.
+    fn on(&mut self, gap: f64, orbit: PeriodicOrbit) -> Place {
+        let known = (0..self.stretches.len()).find(|&k| {
+            let stretch = &self.stretches[k];
+            stretch.period == orbit.period
+                && stretch.holds(gap)
+                && (self.orbit_at(k, gap)).is_some_and(|own| is_same(&own, &orbit))
+        });
+        let stretch = known.unwrap_or_else(|| {
+            self.stretches.push(self.continued(gap, orbit));
+            self.stretches.len() - 1
+        });
+        Place::On { stretch, gap }
+    }
+
+    /// A state at drive phase 0 of the lever at a place.
+    pub(in crate::study) fn state(&self, place: &Place) -> Vec<f64> {
+        match place {
+            Place::On { stretch, gap } => {
+                let orbit = self.orbit_at(*stretch, *gap);
+                orbit.and_then(|o| o.states.first().cloned()).unwrap_or_default()
+            }
+            Place::Off { met, .. } => met.state.clone(),
+        }
+    }
+
+    fn options(&self) -> ContinuationOptions {
+        let (near, far) = self.range;
+        ContinuationOptions {
+            until_unstable: true,
+            max_points: MAX_POINTS,
+            parameter_scale: Some(self.scale),
+            ..ContinuationOptions::over(near, far)
+        }
+    }
+
+    fn follow(&self, gap: f64, orbit: &PeriodicOrbit, direction: Direction) -> (Vec<BranchPoint>, (f64, End)) {
+        let options = self.options();
+        match continue_orbit(&self.family, gap, orbit, direction, &options, &self.control) {
+            Ok(branch) => stable_part(branch),
+            Err(error) => (Vec::new(), (gap, End::Lost(error.to_string()))),
+        }
+    }
+
+    /// The stretch of stable orbits through one.
+    fn continued(&self, gap: f64, orbit: PeriodicOrbit) -> Stretch {
+        let (mut points, near) = self.follow(gap, &orbit, Direction::Decreasing);
+        let (further, far) = self.follow(gap, &orbit, Direction::Increasing);
+        points.reverse();
+        let shared = usize::from(!points.is_empty());
+        points.extend(further.into_iter().skip(shared));
+        let period = orbit.period;
+        if points.is_empty() {
+            points.push(BranchPoint {
+                parameter: gap,
+                orbit,
+                arclength: 0.0,
+                slope: 0.0,
+                tangencies: Vec::new(),
+            });
+        }
+        Stretch {
+            period,
+            points,
+            ends: [near, far],
+        }
+    }
+
+    /// The orbit of a stretch at a distance.
+    pub(in crate::study) fn orbit_at(&self, stretch: usize, gap: f64) -> Option<PeriodicOrbit> {
+        let stretch = &self.stretches[stretch];
+        for (at, end) in &stretch.ends {
+            if let End::Bifurcation { at: found, .. } = end
+                && *at == gap
+            {
+                return Some(found.orbit.clone());
+            }
+        }
+        let points = &stretch.points;
+        let above = points.partition_point(|p| p.parameter < gap);
+        let beside = [above.checked_sub(1), Some(above)];
+        let [below, above] = beside.map(|k| k.and_then(|k| points.get(k)));
+        if let (Some(a), Some(b)) = (below, above) {
+            let t = (gap - a.parameter) / (b.parameter - a.parameter);
+            let [from, to] = [a, b].map(|p| p.orbit.states.concat());
+            let between: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
+            let chord = from.iter().zip(&to).fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
+            let model = self.model(gap).ok()?;
+            let options = ShootingOptions::default();
+            let mut map = Strobe::new(&model);
+            let closed = close_orbit_from_points(&mut map, &between, stretch.period, &options);
+            if let Ok(orbit) = closed
+                && orbit.period == stretch.period
+                && orbit.is_stable()
+            {
+                let moved = orbit.states.concat();
+                let moved = moved.iter().zip(&between);
+                let moved = moved.fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
+                if moved <= 0.5 * chord + 10.0 * orbit.error {
+                    return Some(orbit);
+                }
+            }
+        }
+        // Beside an end, and where the chord leads elsewhere: step by step from the nearer point.
+        let nearest = [below, above].into_iter().flatten();
+        let nearest = nearest.min_by(|a, b| {
+            let apart = |p: &BranchPoint| (p.parameter - gap).abs();
+            apart(a).total_cmp(&apart(b))
+        })?;
+        if nearest.parameter == gap {
+            return Some(nearest.orbit.clone());
+        }
+        let (low, high) = (gap.min(nearest.parameter), gap.max(nearest.parameter));
+        let options = ContinuationOptions {
+            range: (low, high),
+            ..self.options()
+        };
+        let direction = if gap > nearest.parameter {
+            Direction::Increasing
+        } else {
+            Direction::Decreasing
+        };
+        let (at, orbit) = (nearest.parameter, &nearest.orbit);
+        let branch =
+            continue_orbit(&self.family, at, orbit, direction, &options, &self.control).ok()?;
+        let last = branch.points.into_iter().next_back()?;
+        let arrived = matches!(branch.end, BranchEnd::RangeEnd) && last.orbit.is_stable();
+        arrived.then_some(last.orbit)
+    }
+
+    /// The motion of a piece at a distance.
+    pub(in crate::study) fn motion_at(&self, piece: &Piece, gap: f64) -> Met {
+        let beside = match &piece.motion {
+            Motion::Periodic(stretch) => {
+                if let Some(orbit) = self.orbit_at(*stretch, gap) {
+                    return Met::on(orbit);
+                }
+                let nearest = self.stretches[*stretch].points.iter().min_by(|a, b| {
+                    let apart = |p: &BranchPoint| (p.parameter - gap).abs();
+                    apart(a).total_cmp(&apart(b))
+                });
+                nearest.and_then(|p| p.orbit.states.first().cloned())
+            }
+            Motion::OnGrid(found) => {
+                if let Some((_, met)) = found.iter().find(|(at, _)| *at == gap) {
+                    return met.clone();
+                }
+                let passed = |at: f64| (at - piece.from).abs() <= (gap - piece.from).abs();
+                let last = found.iter().rfind(|(at, _)| passed(*at)).or(found.first());
+                last.map(|(_, met)| met.onwards())
+            }
+        };
+        self.met(gap, &beside.unwrap_or_default(), GRID_TRANSIENT)
+    }
+
+    /// The pieces of the way from a place to a distance, until one is `enough`.
+    pub(in crate::study) fn way(
+        &mut self,
+        mut place: Place,
+        to: f64,
+        mut enough: impl FnMut(&Self, &Piece) -> bool,
+    ) -> (Vec<Piece>, Place) {
+        let mut pieces: Vec<Piece> = Vec::new();
+        loop {
+            let (mut piece, next) = self.piece(place.clone(), to);
+            // A jump takes no distance.
+            piece.from = pieces.last().map_or(piece.from, |last| last.to);
+            let done = enough(self, &piece) || self.control.is_cancelled();
+            pieces.push(piece);
+            match next {
+                Some(next) if !done && pieces.len() < MAX_PIECES => place = next,
+                Some(next) => return (pieces, next),
+                None => {
+                    let last = pieces.last().map(|p| (p.motion.clone(), p.to));
+                    let end = match last {
+                        Some((Motion::Periodic(stretch), gap)) => Place::On { stretch, gap },
+                        Some((Motion::OnGrid(mut found), gap)) => match found.pop() {
+                            Some((_, met)) => Place::Off { gap, met },
+                            None => place,
+                        },
+                        None => place,
+                    };
+                    return (pieces, end);
+                }
+            }
+        }
+    }
+
+    /// The piece that begins at a place, and where the lever goes at its end; nowhere if that is
+    /// `to`.
+    fn piece(&mut self, place: Place, to: f64) -> (Piece, Option<Place>) {
+        match place {
+            Place::On { stretch, gap } => {
+                let direction = direction(gap, to);
+                let (at, end) = self.stretches[stretch].end(direction).clone();
+                let beyond = (at - to) * sign(direction) >= 0.0;
+                let piece = |to: f64, end: End, jumps: bool| Piece {
+                    from: gap,
+                    entered: gap,
+                    to,
+                    motion: Motion::Periodic(stretch),
+                    uncertainty: match &end {
+                        End::Bifurcation { at, .. } => at.uncertainty,
+                        _ => 0.0,
+                    },
+                    end,
+                    jumps,
+                };
+                if beyond || matches!(end, End::Range) {
+                    return (piece(to, End::Range, false), None);
+                }
+                let (next, jumps) = self.beyond(stretch, direction, to);
+                // A stretch that leads no further is not entered again.
+                let stuck = (at - gap).abs() <= 1e-9 * self.scale;
+                let next = match next {
+                    Place::On { stretch: same, gap } if same == stretch && stuck => {
+                        let met = self.orbit_at(same, gap).map_or_else(
+                            || Met::undecided(end.to_string(), &[]),
+                            Met::on,
+                        );
+                        Place::Off { gap, met }
+                    }
+                    next => next,
+                };
+                (piece(at, end, jumps), Some(next))
+            }
+            Place::Off { gap, met } => self.on_grid(gap, met, to),
+        }
+    }
+
+    /// Where the lever goes from the end of a stretch, and whether by a jump.
+    fn beyond(&mut self, stretch: usize, direction: Direction, to: f64) -> (Place, bool) {
+        let (at, end) = self.stretches[stretch].end(direction).clone();
+        let (side, scale) = (sign(direction), self.scale);
+        let points = &self.stretches[stretch].points;
+        let last = match direction {
+            Direction::Increasing => points.last(),
+            Direction::Decreasing => points.first(),
+        };
+        let last = last.map(|p| p.orbit.clone());
+        let (orbit, unstable, tries) = match end {
+            End::Bifurcation { at: found, unstable } => {
+                if found.kind == BifurcationKind::Flip
+                    && let Some(stretch) = self.doubled(&found, direction)
+                {
+                    return (Place::On { stretch, gap: at }, false);
+                }
+                let tries: &[_] = match found.kind {
+                    BifurcationKind::Fold => &BEYOND_FOLD,
+                    _ => &[BEYOND_END],
+                };
+                (Some(found.orbit), unstable, tries)
+            }
+            End::Meeting { period } => {
+                let met = (0..self.stretches.len()).find(|&k| {
+                    let other = &self.stretches[k];
+                    let near = |(gap, _): &(f64, End)| (gap - at).abs() <= SAME_PLACE * scale;
+                    other.period == period && other.ends.iter().any(near)
+                });
+                if let Some(stretch) = met {
+                    return (Place::On { stretch, gap: at }, false);
+                }
+                (last, None, &[BEYOND_END][..])
+            }
+            _ => (last, None, &[BEYOND_END][..]),
+        };
+        let Some(orbit) = orbit else {
+            let met = Met::undecided(NO_ORBIT.to_owned(), &[]);
+            return (Place::Off { gap: at, met }, true);
+        };
+        let mut next = None;
+        for &(step, push) in tries {
+            let gap = at + side * step * scale;
+            let gap = if (gap - to) * side > 0.0 { to } else { gap };
+            let place = self.arrive(gap, &pushed(&orbit, unstable.as_deref(), push));
+            let settled = !matches!(&place, Place::Off { met, .. }
+                if met.classification == Classification::Undecided);
+            next = Some(place);
+            if settled {
+                break;
+            }
+        }
+        let met = || Met::undecided(NO_ORBIT.to_owned(), &[]);
+        let next = next.unwrap_or_else(|| Place::Off { gap: at, met: met() });
+        let jumps = !self.goes_on(&orbit, &next);
+        (next, jumps)
+    }
+
+    /// Whether a place is the continuation of an orbit.
+    fn goes_on(&self, orbit: &PeriodicOrbit, place: &Place) -> bool {
+        let near = |state: &[f64]| orbit.nearest(state).1 <= CONTINUOUS * orbit.scale();
+        match place {
+            Place::On { stretch, gap } => (self.orbit_at(*stretch, *gap))
+                .is_some_and(|next| next.states.iter().all(|state| near(state))),
+            Place::Off { met, .. } => match &met.orbit {
+                Some(next) => next.states.iter().all(|state| near(state)),
+                None => near(&met.state),
+            },
+        }
+    }
+
+    /// The stretch of doubled period that begins at a flip and goes on in a direction.
+    fn doubled(&mut self, flip: &Bifurcation, direction: Direction) -> Option<usize> {
+        let period = 2 * flip.orbit.period;
+        if period > LONGEST_BRANCH.min(self.classify.max_period) {
+            return None;
+        }
+        let at = flip.parameter;
+        let known = (0..self.stretches.len()).find(|&k| {
+            let (gap, end) = self.stretches[k].end(reversed(direction));
+            let born = matches!(end, End::Meeting { period } if *period == flip.orbit.period);
+            self.stretches[k].period == period
+                && born
+                && (gap - at).abs() <= SAME_PLACE * self.scale
+        });
+        if known.is_some() {
+            return known;
+        }
+        let branch = switch_at_flip(&self.family, flip, &self.options(), &self.control).ok()?;
+        let (mut points, end) = stable_part(branch);
+        let side = sign(direction);
+        let first = points.first()?;
+        let last = points.last()?;
+        let onwards = (first.parameter - at) * side >= 0.0 && (last.parameter - at) * side > 0.0;
+        if !onwards {
+            return None;
+        }
+        let birth = (
+            at,
+            End::Meeting {
+                period: flip.orbit.period,
+            },
+        );
+        let ends = match direction {
+            Direction::Increasing => [birth, end],
+            Direction::Decreasing => {
+                points.reverse();
+                [end, birth]
+            }
+        };
+        self.stretches.push(Stretch {
+            period,
+            points,
+            ends,
+        });
+        Some(self.stretches.len() - 1)
+    }
+
+    /// A motion without a branch that is followed, from grid distance to grid distance until it
+    /// has one.
+    fn on_grid(&mut self, from: f64, met: Met, to: f64) -> (Piece, Option<Place>) {
+        let side = sign(direction(from, to));
+        let step = self.scale / GRID;
+        let mut piece = Piece {
+            from,
+            entered: from,
+            to,
+            motion: Motion::OnGrid(Vec::new()),
+            end: End::Range,
+            jumps: false,
+            uncertainty: 0.0,
+        };
+        let mut found = vec![(from, met)];
+        let mut onwards = None;
+        while let Some((gap, before)) = found.last().cloned() {
+            if (gap - to) * side >= 0.0 || self.control.is_cancelled() {
+                break;
+            }
+            // The next multiple of a step, beyond rounding.
+            let mut next = step * side * ((side * gap / step + 1e-6).floor() + 1.0);
+            if (next - to) * side > 0.0 {
+                next = to;
+            }
+            let start = before.onwards();
+            let mut met = self.met(next, &start, GRID_TRANSIENT);
+            for _ in 0..HALVINGS {
+                if !met.failed {
+                    break;
+                }
+                next = 0.5 * (gap + next);
+                met = self.met(next, &start, GRID_TRANSIENT);
+            }
+            let Place::On { stretch, .. } = self.place(next, met.clone()) else {
+                found.push((next, met));
+                continue;
+            };
+            let direction = direction(from, to);
+            let (begins, how) = self.stretches[stretch].end(reversed(direction)).clone();
+            let inside = (begins - gap) * side > 0.0 && (next - begins) * side >= 0.0;
+            let place = Place::On {
+                stretch,
+                gap: if inside { begins } else { next },
+            };
+            piece.jumps = !match &before.orbit {
+                Some(orbit) => self.goes_on(orbit, &place),
+                None => is_continuous(&how),
+            };
+            (piece.to, piece.end) = if inside { (begins, how) } else { (next, End::Closes) };
+            piece.uncertainty = if inside { 0.0 } else { (next - gap).abs() };
+            onwards = Some(place);
+            break;
+        }
+        piece.motion = Motion::OnGrid(found);
+        (piece, onwards)
+    }
+}
+
+/// Why nothing is known beyond an end.
+const NO_ORBIT: &str = "the branch that ends here has no orbit to start from";
+
+/// Part of an orbit's size within which two stable orbits at one distance are one.
+const SAME_ORBIT: f64 = 1e-9;
+
+fn is_same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
+    a.is_same_as(b) || a.distance_to(b).1 <= SAME_ORBIT * a.scale()
+}
+
+/// Whether a motion goes over into another at an end without a jump.
+const fn is_continuous(end: &End) -> bool {
+    match end {
+        End::Bifurcation { at, .. } => matches!(
+            at.kind,
+            BifurcationKind::Flip
+                | BifurcationKind::NeimarkSacker { .. }
+                | BifurcationKind::Crossing
+        ),
+        End::Meeting { .. } => true,
+        End::Range | End::Closes | End::Lost(_) => false,
+    }
+}
+
+/// The stable points of a branch in the order in which it was followed, and its end.
+fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
+    let first = branch.points.first().map_or(f64::NAN, |p| p.parameter);
+    let last_of = |points: &[BranchPoint]| points.last().map_or(first, |p| p.parameter);
+    let end = match &branch.end {
+        BranchEnd::RangeEnd => (last_of(&branch.points), End::Range),
+        BranchEnd::Unstable { .. } => {
+            let unstable = branch.points.pop();
+            let last = branch.points.len().saturating_sub(1);
+            let mut between: Vec<Bifurcation> = branch.bifurcations;
+            between.retain(|b| b.after_point == last);
+            let of_stability =
+                |b: &&Bifurcation| !matches!(b.kind, BifurcationKind::Grazing { .. });
+            let chosen = between.iter().find(of_stability).or(between.first());
+            match chosen {
+                Some(found) => {
+                    let unstable = unstable.map(|p| Box::new(p.orbit));
+                    let at = Box::new(found.clone());
+                    (found.parameter, End::Bifurcation { at, unstable })
+                }
+                None => {
+                    let reason = "the orbit is stable no longer".to_owned();
+                    (last_of(&branch.points), End::Lost(reason))
+                }
+            }
+        }
+        BranchEnd::Collapsed { period, parameter } => {
+            (*parameter, End::Meeting { period: *period })
+        }
+        BranchEnd::Grazing { parameter } => {
+            let grazing = branch.bifurcations.iter().rfind(|b| b.parameter == *parameter);
+            let end = match grazing {
+                Some(found) => End::Bifurcation {
+                    at: Box::new(found.clone()),
+                    unstable: None,
+                },
+                None => End::Lost(branch.end.to_string()),
+            };
+            (*parameter, end)
+        }
+        other => (last_of(&branch.points), End::Lost(other.to_string())),
+    };
+    (branch.points, end)
+}
+
+/// A state beside the orbit at an end: pushed from it by a part of its size, towards an unstable
+/// one, if there is one.
+fn pushed(orbit: &PeriodicOrbit, unstable: Option<&PeriodicOrbit>, push: f64) -> Vec<f64> {
+    let Some(state) = orbit.states.first() else {
+        return Vec::new();
+    };
+    let continuous = state.len() - orbit.discrete.min(state.len());
+    let push = push * orbit.scale();
+    let towards = unstable.and_then(|other| other.states.first());
+    let away: Vec<f64> = match towards {
+        Some(other) => other.iter().zip(state).map(|(x, y)| x - y).collect(),
+        None => state.clone(),
+    };
+    let length = away[..continuous].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let factor = if length > 0.0 { push / length } else { 0.0 };
+    let moved = |(k, (x, a)): (usize, (&f64, &f64))| {
+        if k < continuous { x + factor * a } else { *x }
+    };
+    state.iter().zip(&away).enumerate().map(moved).collect()
+}
+
+fn direction(from: f64, to: f64) -> Direction {
+    if to > from {
+        Direction::Increasing
+    } else {
+        Direction::Decreasing
+    }
+}
+
+const fn reversed(direction: Direction) -> Direction {
+    match direction {
+        Direction::Increasing => Direction::Decreasing,
+        Direction::Decreasing => Direction::Increasing,
+    }
+}
+
+const fn sign(direction: Direction) -> f64 {
+    match direction {
+        Direction::Increasing => 1.0,
+        Direction::Decreasing => -1.0,
+    }
+}

@@ -1,0 +1,406 @@
+//! The curve of a slow approach, written: rows, jumps, hysteresis and what coexists.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use nanotap_dynamics::{Control, PeriodicOrbit};
+use rayon::prelude::*;
+
+use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place};
+use super::ramp::ramp;
+use super::{
+    ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
+};
+use crate::case::{Case, CaseError};
+use crate::study::FreeMotion;
+use crate::study::branch::{BranchReport, BranchesThrough};
+use crate::study::simulate::Classification;
+
+/// What is reported of a curve.
+pub(super) struct Found {
+    pub(super) table: Vec<ApproachPoint>,
+    pub(super) jumps: Vec<StateJump>,
+    pub(super) coexisting: Vec<ApproachPoint>,
+    pub(super) hysteresis: Vec<Hysteresis>,
+    pub(super) branches: Option<BranchReport>,
+}
+
+/// Both ways of a slowly moved lever.
+pub(in crate::study) struct Ways {
+    pub(in crate::study) approach: Vec<Piece>,
+    pub(in crate::study) retract: Vec<Piece>,
+}
+
+impl Ways {
+    /// From the free motion to `from` and `to`, and back to `from`.
+    pub(in crate::study) fn of(
+        sweep: &mut DistanceSweep<'_>,
+        from: f64,
+        to: f64,
+    ) -> Result<(Self, Place), CaseError> {
+        let mut place = sweep.free()?;
+        if sweep.farthest() > from {
+            place = sweep.way(place, from, |_, _| false).1;
+        }
+        let first = place.clone();
+        let (approach, place) = sweep.way(place, to, |_, _| false);
+        let retract = match approach.last() {
+            Some(last) if last.to == to => sweep.way(place, from, |_, _| false).0,
+            _ => Vec::new(),
+        };
+        Ok((Self { approach, retract }, first))
+    }
+
+    fn each(&self) -> [(Way, &[Piece]); 2] {
+        [
+            (Way::Approach, &self.approach),
+            (Way::Retract, &self.retract),
+        ]
+    }
+}
+
+/// The curve at these distances, from far to near.
+pub(super) fn found(
+    curve: &Curve<'_>,
+    free: &FreeMotion,
+    distances: &[f64],
+    control: &Control<'_>,
+) -> Result<Found, ApproachError> {
+    let (case, options) = (curve.case, curve.options);
+    let (from, to) = (distances[0], distances[distances.len() - 1]);
+    let range = (to, from);
+    let mut sweep = DistanceSweep::new(case, range, free.reach, options.max_period, control)?;
+    let (ways, first) = match options.speed {
+        None => Ways::of(&mut sweep, from, to)?,
+        Some(_) => {
+            let mut place = sweep.free()?;
+            if sweep.farthest() > from {
+                place = sweep.way(place, from, |_, _| false).1;
+            }
+            let none = Ways {
+                approach: Vec::new(),
+                retract: Vec::new(),
+            };
+            (none, place)
+        }
+    };
+    let written = Written {
+        curve,
+        sweep: &sweep,
+        ways: &ways,
+        distances,
+    };
+    let table = match options.speed {
+        Some(speed) => ramp(curve, speed, distances, &sweep.state(&first), control)?,
+        None => written.table(control)?,
+    };
+    let coexisting = match options.speed {
+        None => written.coexisting(&table)?,
+        Some(_) => Vec::new(),
+    };
+    Ok(Found {
+        jumps: written.jumps()?,
+        hysteresis: written.hysteresis(free.amplitude)?,
+        branches: branches(curve, &sweep, range, control)?,
+        table,
+        coexisting,
+    })
+}
+
+/// The branches through every stretch of stable orbits.
+fn branches(
+    curve: &Curve<'_>,
+    sweep: &DistanceSweep<'_>,
+    (near, far): (f64, f64),
+    control: &Control<'_>,
+) -> Result<Option<BranchReport>, ApproachError> {
+    if !curve.options.branches {
+        return Ok(None);
+    }
+    let quiet = Control {
+        progress: None,
+        ..*control
+    };
+    let how = branching(curve.case.gap_key(), (far, near), curve.options);
+    let mut branches = BranchesThrough::new(curve.case, &how)?;
+    // A doubled branch is followed from its flip, as deep as the options say.
+    let is_doubled = |k: &usize| {
+        let ends = sweep.stretches[*k].ends.iter();
+        ends.into_iter().any(|(_, end)| matches!(end, End::Meeting { .. }))
+    };
+    let seeds = (0..sweep.stretches.len()).filter(|k| !is_doubled(k)).filter_map(|k| {
+        let stretch = &sweep.stretches[k];
+        let low = stretch.ends[0].0.max(near);
+        let high = stretch.ends[1].0.min(far);
+        let middle = 0.5 * (low + high);
+        let nearest = stretch.points.iter().min_by(|a, b| {
+            let apart = |gap: f64| (gap - middle).abs();
+            apart(a.parameter).total_cmp(&apart(b.parameter))
+        })?;
+        if (near..=far).contains(&nearest.parameter) {
+            return Some((nearest.parameter, nearest.orbit.clone()));
+        }
+        (low <= high).then(|| Some((middle, sweep.orbit_at(k, middle)?)))?
+    });
+    branches.follow(seeds.collect::<Vec<_>>(), &quiet);
+    let any = !branches.is_empty() && !control.is_cancelled();
+    Ok(any.then(|| branches.report(&quiet)))
+}
+
+/// A followed curve and the distances at which it is written.
+struct Written<'a> {
+    curve: &'a Curve<'a>,
+    sweep: &'a DistanceSweep<'a>,
+    ways: &'a Ways,
+    distances: &'a [f64],
+}
+
+/// Distances of an interval at which the two ways are compared, its ends included.
+const COMPARED: usize = 9;
+
+impl Written<'_> {
+    fn row(&self, way: Way, gap: f64, met: Met) -> Result<ApproachPoint, CaseError> {
+        let model = self.sweep.model(gap)?;
+        Ok(self.curve.observed(way, gap, &model, met))
+    }
+
+    /// The rows at the written distances, there and back: up to the first that was not reached,
+    /// where the work was stopped.
+    fn table(&self, control: &Control<'_>) -> Result<Vec<ApproachPoint>, CaseError> {
+        let count = self.distances.len();
+        let done = AtomicUsize::new(0);
+        let told = || {
+            if let Some(progress) = control.progress {
+                progress(done.fetch_add(1, Ordering::Relaxed) + 1, 2 * count);
+            }
+        };
+        let rows: Result<Vec<_>, CaseError> = self
+            .distances
+            .par_iter()
+            .with_max_len(1)
+            .map(|&gap| {
+                let on = |pieces: &[Piece]| pieces.iter().find(|p| p.holds(gap)).cloned();
+                let of = |way: Way, piece: Option<Piece>| match piece {
+                    Some(piece) if !control.is_cancelled() => {
+                        let met = self.sweep.motion_at(&piece, gap);
+                        self.row(way, gap, met).map(Some)
+                    }
+                    _ if control.is_cancelled() => Ok(None),
+                    _ => {
+                        let met = Met::undecided(NOT_FOLLOWED.to_owned(), &[]);
+                        self.row(way, gap, met).map(Some)
+                    }
+                };
+                let [there, back] = self.ways.each().map(|(_, pieces)| on(pieces));
+                let same = match (&there, &back) {
+                    (Some(a), Some(b)) => a.is_on_stretch_of(b),
+                    _ => false,
+                };
+                let there = of(Way::Approach, there)?;
+                told();
+                let back = if same {
+                    let same = there.clone();
+                    same.map(|row| ApproachPoint {
+                        way: Way::Retract,
+                        ..row
+                    })
+                } else {
+                    of(Way::Retract, back)?
+                };
+                told();
+                Ok((there, back))
+            })
+            .collect();
+        let (there, mut back): (Vec<_>, Vec<_>) = rows?.into_iter().unzip();
+        back.reverse();
+        Ok(there.into_iter().chain(back).map_while(|row| row).collect())
+    }
+
+    /// Orbits of stretches on which neither way is at a distance.
+    fn coexisting(&self, table: &[ApproachPoint]) -> Result<Vec<ApproachPoint>, CaseError> {
+        let rows: Result<Vec<Vec<_>>, CaseError> = self
+            .distances
+            .par_iter()
+            .with_max_len(1)
+            .map(|&gap| {
+                let here = || table.iter().filter(|p| p.gap.to_bits() == gap.to_bits());
+                let mut found: Vec<PeriodicOrbit> = Vec::new();
+                for (k, stretch) in self.sweep.stretches.iter().enumerate() {
+                    let used = |pieces: &[Piece]| {
+                        let is_on = |p: &Piece| matches!(p.motion, Motion::Periodic(s) if s == k);
+                        pieces.iter().any(|p| p.holds(gap) && is_on(p))
+                    };
+                    if !stretch.holds(gap) || self.ways.each().iter().any(|(_, w)| used(w)) {
+                        continue;
+                    }
+                    let orbit = self.sweep.orbit_at(k, gap).filter(PeriodicOrbit::is_stable);
+                    let Some(orbit) = orbit else { continue };
+                    let rows = here().filter_map(|p| p.orbit.as_ref());
+                    if !rows.chain(&found).any(|other| other.is_same_as(&orbit)) {
+                        found.push(orbit);
+                    }
+                }
+                let found = found.into_iter();
+                found
+                    .map(|orbit| self.row(Way::Neither, gap, Met::on(orbit)))
+                    .collect()
+            })
+            .collect();
+        Ok(rows?.into_iter().flatten().collect())
+    }
+
+    fn jumps(&self) -> Result<Vec<StateJump>, CaseError> {
+        let mut jumps = Vec::new();
+        for (way, pieces) in self.ways.each() {
+            for pair in pieces.windows(2).filter(|pair| pair[0].jumps) {
+                let (before, after) = (&pair[0], &pair[1]);
+                let view = self.curve.case.physical();
+                jumps.push(StateJump {
+                    way,
+                    gap: before.to,
+                    zc: view.map(|view| before.to * view.scales.length),
+                    uncertainty: before.uncertainty,
+                    reason: before.end.to_string(),
+                    before: self.row(way, before.to, self.sweep.motion_at(before, before.to))?,
+                    after: self.row(way, after.entered, self.sweep.motion_at(after, after.entered))?,
+                });
+            }
+        }
+        Ok(jumps)
+    }
+
+    /// The intervals in which the two ways show different motions.
+    fn hysteresis(&self, free_amplitude: f64) -> Result<Vec<Hysteresis>, CaseError> {
+        let (from, to) = (self.distances[0], self.distances[self.distances.len() - 1]);
+        let pieces = || self.ways.each().into_iter().flat_map(|(_, pieces)| pieces);
+        let mut ends: Vec<f64> = pieces().flat_map(|p| [p.from, p.to]).collect();
+        ends.sort_by(|a, b| b.total_cmp(a));
+        ends.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * (from - to));
+        let intervals: Result<Vec<_>, CaseError> = ends
+            .par_windows(2)
+            .with_max_len(1)
+            .map(|pair| Ok((pair, self.difference_between(pair[1], pair[0], free_amplitude)?)))
+            .collect();
+        let mut found: Vec<Hysteresis> = Vec::new();
+        for (pair, difference) in intervals? {
+            let Some(difference) = difference else { continue };
+            match found.last_mut() {
+                Some(last) if last.near == pair[0] => {
+                    last.near = pair[1];
+                    last.difference = last.difference.max(difference);
+                }
+                _ => found.push(Hysteresis {
+                    near: pair[1],
+                    far: pair[0],
+                    difference,
+                }),
+            }
+        }
+        Ok(found)
+    }
+
+    /// How much the two ways differ between two distances, on each of which they are on one piece.
+    fn difference_between(
+        &self,
+        near: f64,
+        far: f64,
+        free_amplitude: f64,
+    ) -> Result<Option<f64>, CaseError> {
+        let middle = 0.5 * (near + far);
+        let on = |(_, pieces): (Way, &[Piece])| pieces.iter().find(|p| p.holds(middle)).cloned();
+        let [Some(there), Some(back)] = self.ways.each().map(on) else {
+            return Ok(None);
+        };
+        let on_grid = |piece: &Piece| match &piece.motion {
+            Motion::Periodic(_) => None,
+            Motion::OnGrid(found) => {
+                let inside = found.iter().map(|(gap, _)| *gap);
+                Some(inside.filter(|gap| (near..=far).contains(gap)).collect::<Vec<_>>())
+            }
+        };
+        let gaps: Vec<f64> = match (on_grid(&there), on_grid(&back)) {
+            (Some(_), Some(_)) => return Ok(None),
+            (Some(gaps), None) | (None, Some(gaps)) => gaps,
+            (None, None) if there.is_on_stretch_of(&back) => return Ok(None),
+            (None, None) => (0..COMPARED)
+                .map(|k| k as f64 / (COMPARED - 1) as f64)
+                .map(|t| near * (1.0 - t) + far * t)
+                .collect(),
+        };
+        let mut largest: Option<f64> = None;
+        for gap in gaps {
+            let row = |way, piece| self.row(way, gap, self.sweep.motion_at(piece, gap));
+            let (a, b) = (row(Way::Approach, &there)?, row(Way::Retract, &back)?);
+            let apart = difference(&a, &b, free_amplitude);
+            largest = apart.map_or(largest, |x| Some(largest.map_or(x, |y| y.max(x))));
+        }
+        Ok(largest)
+    }
+}
+
+/// Why a row is undecided.
+const NOT_FOLLOWED: &str = "the lever was not followed so far: its motion changed too often";
+
+impl Piece {
+    fn is_on_stretch_of(&self, other: &Self) -> bool {
+        matches!((&self.motion, &other.motion),
+            (Motion::Periodic(a), Motion::Periodic(b)) if a == b)
+    }
+}
+
+/// The stable orbits at a case's own distance on which a slowly moved lever may be: coming from
+/// far, coming from the nearest distance, and those to which it jumps elsewhere and which reach
+/// as far as here. The case needs a drive that moves the tip.
+///
+/// # Errors
+/// When the case makes no sense.
+pub fn states_near(
+    case: &Case,
+    max_period: usize,
+    control: &Control<'_>,
+) -> Result<Vec<PeriodicOrbit>, CaseError> {
+    let at = case.get(case.gap_key());
+    states_at(case, &[at], max_period, control).map(|mut states| states.pop().unwrap_or_default())
+}
+
+/// As [`states_near`], at each of some distances.
+///
+/// # Errors
+/// As [`states_near`].
+pub fn states_at(
+    case: &Case,
+    distances: &[f64],
+    max_period: usize,
+    control: &Control<'_>,
+) -> Result<Vec<Vec<PeriodicOrbit>>, CaseError> {
+    let free = FreeMotion::of(&case.model()?);
+    let nothing = || vec![Vec::new(); distances.len()];
+    if !(free.reach > 0.0 && free.reach.is_finite()) {
+        return Ok(nothing());
+    }
+    let near = distances.iter().copied().fold(0.0, f64::min);
+    let far = distances.iter().copied().fold(near, f64::max);
+    if !(near.is_finite() && far.is_finite()) {
+        return Ok(nothing());
+    }
+    let far = far.max(super::BEYOND * free.reach);
+    let mut sweep = DistanceSweep::new(case, (near, far), free.reach, max_period, control)?;
+    Ways::of(&mut sweep, far, near)?;
+    Ok(distances
+        .iter()
+        .map(|&gap| {
+            let mut found: Vec<PeriodicOrbit> = Vec::new();
+            for (k, stretch) in sweep.stretches.iter().enumerate() {
+                let orbit = stretch.holds(gap).then(|| sweep.orbit_at(k, gap)).flatten();
+                if let Some(orbit) = orbit.filter(PeriodicOrbit::is_stable)
+                    && !found.iter().any(|other| other.is_same_as(&orbit))
+                {
+                    found.push(orbit);
+                }
+            }
+            found
+        })
+        .collect())
+}
+
+/// What a motion is, in the rows of a curve at a finite speed.
+pub(super) const MOVING: Classification = Classification::Transient;

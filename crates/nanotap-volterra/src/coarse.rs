@@ -886,6 +886,9 @@ impl Work {
         let mut fresh = true;
         let mut tried = 0;
         while end - self.now.time > 1e-13 * end {
+            if tried % 256 == 0 && tables.system.cancel().is_cancelled() {
+                return Err(VolterraError::Cancelled);
+            }
             tried += 1;
             if tried > tables.max_steps {
                 return Err(VolterraError::TooManySteps {

@@ -5,7 +5,6 @@
 //! where that fails, and of chaos and tori, the motion is classified on the map itself from a state
 //! that the coarse one came to. All starts that come to the same motion share the result.
 
-
 use crate::census::Outcome;
 use crate::classify::{
     Chaos, Classified, ClassifyOptions, Known, MotionKind, Torus, UndecidedReason, classify_on,

@@ -10,7 +10,7 @@ fn number(json: &Value, key: &str) -> f64 {
         .unwrap_or_else(|| panic!("{key} in {json}"))
 }
 
-fn vector(json: &Value) -> Vec<f64> {
+pub(crate) fn vector(json: &Value) -> Vec<f64> {
     json.as_array()
         .unwrap()
         .iter()

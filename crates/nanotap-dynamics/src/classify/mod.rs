@@ -15,7 +15,8 @@
 //! - periodic: closed, stable, approached;
 //! - transient chaos: the exponents were positive by more than five standard errors,
 //!   and then the run escaped to a periodic orbit;
-//! - chaotic: positive by more than five standard errors to the end. One run of T
+//! - chaotic: positive by more than five standard errors to the end, over the whole run
+//!   after its transient and over its last half. One run of T
 //!   periods without escape says that the mean lifetime is above T/3 at 95 %
 //!   (exponential lifetimes: e⁻³ ≈ 0.05) and no more; [`mod@crate::census`] pools runs;
 //! - quasi-periodic: the largest exponent is zero within its error, no orbit up to

@@ -29,8 +29,8 @@ const LONG_WORTH_TRYING: f64 = 1e-2;
 const LAST_WORTH_TRYING: f64 = 0.1;
 /// Periods after which the means of a run may tell that it is on chaos that is known.
 pub(crate) const RECOGNISABLE: usize = 256;
-/// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
-const TELLING: f64 = 0.2;
+/// Exponents are measured for so many times their budget at most, where chaotic transients end.
+const LONGEST_MEASUREMENT: usize = 4;
 /// Distance of a neighbour, in standard deviations of the motion.
 const NEIGHBOUR: f64 = 1e-9;
 /// How many times its distance grows on chaos.
@@ -531,10 +531,7 @@ impl<'a> Run<'a> {
         let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
         let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
         let deviations = means.deviations();
-        let telling = deviations
-            .iter()
-            .zip(&means.errors)
-            .all(|(deviation, error)| *error <= TELLING * deviation);
+        let telling = means.is_telling();
         let found = known.find(|k| telling && k.strobe.agree_with(&means));
         found.map(|spectrum| Resembled {
             spectrum: spectrum.clone(),
@@ -573,7 +570,9 @@ impl<'a> Run<'a> {
         MotionKind::Chaotic(chaos)
     }
 
-    /// Exponents of what does not close, looking for an escape after every doubling.
+    /// Exponents of what does not close, looking for an escape after every doubling. Where the last
+    /// half of the run differs from what was before, or is not chaotic where the whole run is, all
+    /// before it was a transient and is discarded.
     pub(super) fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
         let mut exponents = LyapunovRun::new(self.d);
@@ -581,12 +580,18 @@ impl<'a> Run<'a> {
             self.step_with(map, &mut exponents)?;
         }
         let mut before: Option<LyapunovSpectrum> = None;
-        let mut target = budget.min_periods.max(64);
+        let first = budget.min_periods.max(64);
+        let (mut measured, mut target, mut end) = (first / 2, first, budget.max_periods);
+        self.record(map, &mut exponents, measured)?;
+        let mut early = exponents.spectrum();
         let spectrum = loop {
-            while exponents.periods() < target {
-                self.step_with(map, &mut exponents)?;
-                exponents.record(&self.state);
+            let stretch = target - measured;
+            if 2 * stretch >= exponents.periods() {
+                early = exponents.spectrum();
+                exponents.begin_last_stretch();
             }
+            self.record(map, &mut exponents, stretch)?;
+            measured = target;
             let guesses = self.guesses_at_look();
             if let Some(kind) = self.close(map, guesses)? {
                 return Ok(match (kind, before.filter(is_chaotic)) {
@@ -598,21 +603,55 @@ impl<'a> Run<'a> {
                     (kind, _) => kind,
                 });
             }
+            let last = exponents.last_spectrum();
+            let calmed_down = is_chaotic(&exponents.spectrum()) && !stays_chaotic(&last);
+            if calmed_down {
+                end = (measured + budget.max_periods).min(LONGEST_MEASUREMENT * budget.max_periods);
+            }
+            if calmed_down || !early.agrees_with(&last) {
+                exponents.keep_last_stretch();
+            }
             let spectrum = exponents.spectrum();
-            let enough = || {
-                budget.is_met_by(&spectrum)
-                    || self.known.chaos.iter().any(|k| k.agrees_with(&spectrum))
-            };
-            if target >= budget.max_periods || (is_chaotic(&spectrum) && enough()) {
+            let known = self.known.chaos.iter();
+            let is_known = known.clone().any(|k| k.agrees_with(&spectrum));
+            if is_chaotic(&spectrum) {
+                let stays = stays_chaotic(&exponents.last_spectrum());
+                let mut tori = known.filter(|k| !is_chaotic(k));
+                let is_on_torus = tori.any(|k| k.strobe.agree_with(&last.strobe));
+                if stays
+                    && !is_on_torus
+                    && (budget.is_met_by(&spectrum) || is_known || measured >= end)
+                {
+                    return Ok(self.chaotic(spectrum));
+                }
+            } else if is_known && spectrum.is_telling() {
+                // Perhaps on a torus that is known.
+                let kind = self.neither_periodic_nor_chaotic(map, spectrum.clone())?;
+                if !matches!(kind, MotionKind::Undecided { .. }) {
+                    return Ok(kind);
+                }
+            }
+            if measured >= end {
                 break spectrum;
             }
             before = Some(spectrum);
-            target = (2 * target).min(budget.max_periods);
+            target = (measured + exponents.periods()).min(end);
         };
-        if is_chaotic(&spectrum) {
-            return Ok(self.chaotic(spectrum));
-        }
         self.neither_periodic_nor_chaotic(map, spectrum)
+    }
+
+    /// Runs so many periods more, which count.
+    fn record<M: StroboscopicMap>(
+        &mut self,
+        map: &mut M,
+        exponents: &mut LyapunovRun,
+        periods: usize,
+    ) -> Result<(), Stop> {
+        for _ in 0..periods {
+            self.step_with(map, exponents)?;
+            exponents.record(&self.state);
+        }
+        Ok(())
     }
 
     fn step_with<M: StroboscopicMap>(
@@ -642,8 +681,7 @@ impl<'a> Run<'a> {
         if let Some(kind) = self.close(map, Guesses::new(last_guesses))? {
             return Ok(kind);
         }
-        // The average of a bounded logarithm is off by its bound over the length.
-        let zero = (3.0 * error).max(10.0 / spectrum.periods as f64);
+        let zero = spectrum.zero();
         if exponent < -zero {
             return Ok(undecided(
                 UndecidedReason::NothingCloses {
@@ -680,11 +718,7 @@ impl<'a> Run<'a> {
         }
         // A torus of one dimension less than the state encloses a volume, which the map
         // would have to keep.
-        let neutral = spectrum
-            .exponents
-            .iter()
-            .take_while(|l| l.abs() <= zero)
-            .count();
+        let neutral = spectrum.neutral_directions();
         let contraction = map.log_determinant_bound();
         if neutral + 1 >= self.d && contraction < 0.0 {
             return Ok(undecided(
@@ -729,8 +763,17 @@ fn longest(options: &ClassifyOptions) -> usize {
 /// A largest exponent positive beyond doubt: by more than five standard errors, and
 /// with a total growth that no start of the frame explains.
 fn is_chaotic(spectrum: &LyapunovSpectrum) -> bool {
+    is_positive(spectrum, CLEAR, 20.0)
+}
+
+/// The same of the last half of a run, whose error is larger by a root of two, and growth half.
+fn stays_chaotic(last: &LyapunovSpectrum) -> bool {
+    is_positive(last, CLEAR * std::f64::consts::FRAC_1_SQRT_2, 10.0)
+}
+
+fn is_positive(spectrum: &LyapunovSpectrum, clear: f64, growth: f64) -> bool {
     let (exponent, error) = spectrum.largest();
-    exponent > CLEAR * error && exponent * spectrum.periods as f64 > 20.0
+    exponent > clear * error && exponent * spectrum.periods as f64 > growth
 }
 
 #[cfg(test)]

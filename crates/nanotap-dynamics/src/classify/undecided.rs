@@ -75,9 +75,10 @@ pub enum UndecidedReason {
         /// Periods run.
         observed: usize,
     },
-    /// The exponent is zero within errors, but averages do not converge as on a torus.
+    /// The exponent is not positive beyond doubt to the end, and averages do not converge as on a
+    /// torus.
     #[error(
-        "the largest exponent is zero within errors ({exponent:.3e} ± {error:.1e} per period), but Birkhoff averages agree to {digits:.1} digits only"
+        "neither a torus nor chaos can be shown: the largest exponent is {exponent:.3e} ± {error:.1e} per period, and Birkhoff averages agree to {digits:.1} digits only"
     )]
     NeitherTorusNorChaos {
         /// Largest exponent.

@@ -25,6 +25,8 @@ use crate::map::StroboscopicMap;
 pub use strobe_means::StrobeMeans;
 use strobe_means::{agree, sampled};
 
+/// Standard error of an exponent up to which exponents tell motions apart.
+const TELLING_ERROR: f64 = 0.01;
 /// Part of a Jacobian's largest entry below which a stretch is rounding.
 const ROUNDING: f64 = 1e-10;
 
@@ -94,6 +96,11 @@ impl LyapunovSpectrum {
         )
     }
 
+    /// True if exponents and means are known well enough to tell motions apart.
+    pub(crate) fn is_telling(&self) -> bool {
+        self.errors.iter().all(|e| *e <= TELLING_ERROR) && self.strobe.is_telling()
+    }
+
     /// True if two motions have the same exponents and the same means of the strobe states and
     /// their squares, within six standard errors of the difference (and what 1/T convergence
     /// leaves).
@@ -106,9 +113,25 @@ impl LyapunovSpectrum {
         }) && self.strobe.agree_with(&other.strobe)
     }
 
+    /// What an exponent of zero may differ from it: three standard errors of the largest, and what
+    /// a bounded logarithm leaves of an average over so many periods.
+    pub(crate) fn zero(&self) -> f64 {
+        (3.0 * self.largest().1).max(10.0 / self.periods as f64)
+    }
+
+    /// How many of the largest exponents are zero within [`Self::zero`]: the dimension of a torus.
+    pub fn neutral_directions(&self) -> usize {
+        let zero = self.zero();
+        self.exponents
+            .iter()
+            .take_while(|l| l.abs() <= zero)
+            .count()
+    }
+
     /// Kaplan–Yorke dimension of the strobe points: j + Σ_{i≤j}λ_i/|λ_{j+1}| for the
     /// last j with a non-negative sum; the dimension of the state if no sum is
-    /// negative, 0 if λ₁ is.
+    /// negative, 0 if λ₁ is. On a torus the first exponents are zero and measured with an error of
+    /// either sign: [`Self::neutral_directions`] is its dimension.
     pub fn kaplan_yorke_dimension(&self) -> f64 {
         let mut sum = 0.0;
         for (j, &exponent) in self.exponents.iter().enumerate() {
@@ -155,6 +178,8 @@ pub(crate) struct LyapunovRun {
     /// Logarithms of the stretches, the state and its squares, log|det DP|.
     sample: Vec<f64>,
     average: BlockAverage,
+    /// The same over the last stretch alone.
+    last: BlockAverage,
 }
 
 impl LyapunovRun {
@@ -170,6 +195,7 @@ impl LyapunovRun {
             jacobian: DMatrix::zeros(d, d),
             sample: vec![0.0; 3 * d + 1],
             average: BlockAverage::new(3 * d + 1),
+            last: BlockAverage::new(3 * d + 1),
         }
     }
 
@@ -207,6 +233,17 @@ impl LyapunovRun {
     pub(crate) fn record(&mut self, state: &[f64]) {
         sampled(state, &mut self.sample[self.d..3 * self.d]);
         self.average.push(&self.sample);
+        self.last.push(&self.sample);
+    }
+
+    /// Begins the last stretch here.
+    pub(crate) fn begin_last_stretch(&mut self) {
+        self.last = BlockAverage::new(3 * self.d + 1);
+    }
+
+    /// Discards everything before the last stretch.
+    pub(crate) fn keep_last_stretch(&mut self) {
+        self.average = self.last.clone();
     }
 
     /// One period of the state and the frame, not yet counted.
@@ -273,19 +310,28 @@ impl LyapunovRun {
     }
 
     pub(crate) fn spectrum(&self) -> LyapunovSpectrum {
+        self.spectrum_of(&self.average)
+    }
+
+    /// The spectrum over the last stretch alone.
+    pub(crate) fn last_spectrum(&self) -> LyapunovSpectrum {
+        self.spectrum_of(&self.last)
+    }
+
+    fn spectrum_of(&self, average: &BlockAverage) -> LyapunovSpectrum {
         let d = self.d;
-        let mean = self.average.mean();
-        let errors = self.average.standard_error();
+        let mean = average.mean();
+        let errors = average.standard_error();
         let mut order: Vec<usize> = (0..d).collect();
         order.sort_by(|&a, &b| mean[b].total_cmp(&mean[a]));
         LyapunovSpectrum {
             exponents: order.iter().map(|&i| mean[i]).collect(),
             errors: order.iter().map(|&i| errors[i]).collect(),
-            periods: self.periods(),
+            periods: average.count(),
             strobe: StrobeMeans {
                 means: mean[d..3 * d].to_vec(),
                 errors: errors[d..3 * d].to_vec(),
-                periods: self.periods(),
+                periods: average.count(),
             },
             log_determinant: mean[3 * d],
         }

@@ -2,6 +2,9 @@
 
 use super::block_average::BlockAverage;
 
+/// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
+const TELLING: f64 = 0.2;
+
 /// Means of the strobe states' d entries, then of their squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrobeMeans {
@@ -42,6 +45,13 @@ impl StrobeMeans {
         let deviations: Vec<f64> = variances.map(|v| v.max(0.0).sqrt()).collect();
         let least = 1e-6 * deviations.iter().fold(0.0f64, |m, v| m.max(*v));
         deviations.into_iter().map(|v| v.max(least)).collect()
+    }
+
+    /// True if the errors of the mean state are small enough for means to tell motions apart.
+    pub(crate) fn is_telling(&self) -> bool {
+        let deviations = self.deviations();
+        let mut pairs = deviations.iter().zip(&self.errors);
+        pairs.all(|(deviation, error)| *error <= TELLING * deviation)
     }
 
     /// True if all agree within six standard errors of the difference (and what 1/T

@@ -4,7 +4,9 @@ use nanotap_dynamics::{
     Chaos, ClassifyOptions, LyapunovOptions, MotionKind, UndecidedReason, classify, classify_beside,
 };
 
-use crate::systems::{Cubic, DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning};
+use crate::systems::{
+    Calming, Cubic, DelayedLogistic, Focus, Henon, Logistic, OpenTent, System, Turning,
+};
 
 fn period_of(verdict: &MotionKind) -> usize {
     match verdict {
@@ -230,4 +232,32 @@ fn chaos_that_is_known_is_told_from_other_motions() {
 
     let fixed = classify_beside(&mut System(Cubic(1.5)), &[0.5], &known, &options);
     assert_eq!(period_of(&fixed.kind), 1);
+}
+
+/// A turning circle whose third coordinate is chaotic (λ = ln 2) until it leaves through a narrow
+/// gap, between 1100 and 1500 periods: the exponents of the first periods that are measured are
+/// those of a transient, and the motion is a torus.
+#[test]
+fn a_torus_after_a_chaotic_transient_is_a_torus() {
+    let mut tried = 0;
+    for k in 0..400 {
+        let start = [1.0, 0.0, 0.1 + 1e-3 * f64::from(k)];
+        let mut z = start[2];
+        let left = (0..1500).find(|_| {
+            z = Calming::step(z);
+            z < 0.0
+        });
+        if left.is_none_or(|left| left < 1100) {
+            continue;
+        }
+        tried += 1;
+        let end = classify(&mut System(Calming), &start, &ClassifyOptions::default());
+        let MotionKind::QuasiPeriodic(torus) = &end.kind else {
+            panic!("{start:?}: {:?}", end.kind)
+        };
+        let (exponent, error) = torus.spectrum.largest();
+        assert!(exponent.abs() < 1e-3 && error < 1e-3, "{exponent} {error}");
+        assert_eq!(torus.spectrum.neutral_directions(), 1);
+    }
+    assert!(tried > 3, "{tried}");
 }

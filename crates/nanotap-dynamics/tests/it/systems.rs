@@ -210,6 +210,48 @@ impl Formula for Turning {
     }
 }
 
+/// A circle that turns by 2.4 rad, and z → r z (1 − z) with r = 4 + 4e-7, which leaves [0, 1] after
+/// some thousands of periods and is then drawn to −1.
+#[derive(Clone, Debug)]
+pub(crate) struct Calming;
+
+impl Calming {
+    const CIRCLE: Turning = Turning {
+        angle: 2.4,
+        gain: 0.2,
+    };
+    const R: f64 = 4.0 + 4e-7;
+
+    pub(crate) fn step(z: f64) -> f64 {
+        if z < 0.0 {
+            0.5 * (z - 1.0)
+        } else {
+            Self::R * z * (1.0 - z)
+        }
+    }
+}
+
+impl Formula for Calming {
+    const DIMENSION: usize = 3;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        Self::CIRCLE.image(x, out);
+        out[2] = Self::step(x[2]);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out.fill(0.0);
+        Self::CIRCLE.jacobian(x, out);
+        out[(2, 2)] = if x[2] < 0.0 {
+            0.5
+        } else {
+            Self::R * (1.0 - 2.0 * x[2])
+        };
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        Self::CIRCLE.derivative(x, out);
+        out[2] = 0.0;
+    }
+}
+
 /// x → ρ R(θ) x + (1, 0): one stable focus with multipliers ρ e^{±iθ}; ρ = 1 is an
 /// undamped oscillator. The parameter is ρ.
 #[derive(Clone, Debug)]

@@ -263,7 +263,10 @@ pub fn lyapunov(
         periods: spectrum.periods,
         sum: spectrum.exponents.iter().sum(),
         sum_by_trace: spectrum.log_determinant,
-        kaplan_yorke_dimension: spectrum.kaplan_yorke_dimension(),
+        kaplan_yorke_dimension: match named.classification {
+            Classification::QuasiPeriodic => spectrum.neutral_directions() as f64,
+            _ => spectrum.kaplan_yorke_dimension(),
+        },
         exponents: spectrum.exponents,
         errors: spectrum.errors,
         mean: spectrum.strobe.mean_state().to_vec(),

@@ -81,9 +81,11 @@ pub(crate) struct Tests {
 impl Tests {
     pub(crate) fn new<F: MapFamily>(solver: &mut BranchSolver<'_, F>, node: &Node) -> Option<Self> {
         let multipliers = Multipliers::of_product(&node.jacobians).ok()?.values;
+        let crossing = plus_one(&multipliers);
         Some(Self {
             fold: node.slope,
-            crossing: plus_one(&multipliers),
+            // Where a doubled branch begins, it crosses itself, a stroboscopic period later.
+            crossing: if node.slope == 0.0 { 0.0 } else { crossing },
             flip: minus_one(&multipliers),
             neimark_sacker: pair_on_circle(&multipliers).0,
             tangencies: solver.tangencies(node).ok()?,
@@ -114,6 +116,11 @@ fn negative(tangencies: &[OrbitTangency]) -> usize {
 /// Π(1 − μ), as sign times smallest factor.
 fn plus_one(multipliers: &[Complex<f64>]) -> f64 {
     real_product(multipliers, -1.0)
+}
+
+/// Π(1 + μ) over the multipliers of an orbit with these Jacobians: negative beyond a flip.
+pub(crate) fn flip_test(jacobians: &[nalgebra::DMatrix<f64>]) -> Option<f64> {
+    Some(minus_one(&Multipliers::of_product(jacobians).ok()?.values))
 }
 
 /// Π(1 + μ), as sign times smallest factor.

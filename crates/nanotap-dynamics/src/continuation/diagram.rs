@@ -251,7 +251,7 @@ impl Diagram {
             }
             // A few points tell whether the doubled branch is there already.
             let glimpse = ContinuationOptions {
-                max_points: 3,
+                max_points: 4,
                 ..options.continuation.clone()
             };
             match switch_at_flip(family, &flip, &glimpse, control) {

@@ -17,6 +17,10 @@ use crate::orbit::PeriodicOrbit;
 /// Scaled step at which a branch that keeps slipping onto one of shorter period is
 /// taken to have met it.
 const SHORTEST_MEETING: f64 = 1e-6;
+/// How far beyond −1 a multiplier may be at the first point after a flip.
+const FLIP_OVERSHOOT: f64 = 0.5;
+/// Scaled step at which a flip is taken as it is.
+const SHORTEST_FLIP_STEP: f64 = 1e-6;
 
 pub(crate) fn solver_for<'a, F: MapFamily>(
     family: &'a F,
@@ -179,6 +183,12 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             }
             continue;
         };
+        // A multiplier that passes −1 by far may have passed more flips than can be told.
+        let passes_flip = tests.flip > 0.0 && next_tests.flip < -FLIP_OVERSHOOT;
+        if passes_flip && !is_closed && step > SHORTEST_FLIP_STEP.max(options.min_step) {
+            step *= 0.5;
+            continue;
+        }
         let index = branch.points.len() - 1;
         if let Some((m, at, mut parameter)) = shortest_collapse(solver, &node, &next, taken) {
             // What happens before the meeting still counts.

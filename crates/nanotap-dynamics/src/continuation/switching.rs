@@ -3,12 +3,14 @@
 //! At a flip the linearised return map sends a vector v to −v. The doubled orbit is
 //! born along it: x_k + a v_k first, x_k − a v_k the second time round, with the
 //! parameter changing by O(a²) only (or O(a^{3/2}) where the flip is at a grazing).
-//! v comes from the antiperiodic Newton system, so long unstable orbits lose nothing.
+//! v comes from the antiperiodic Newton system, so long unstable orbits lose nothing. The
+//! branch's first point is the flip itself, and a is so small that no multiplier crosses −1
+//! before the second: far along a cascade a fixed step would pass the next flips unseen.
 //!
 //! Fails: where no size of a between a hundredth and a millionth of the orbit leads
 //! Newton to an orbit of doubled period.
 
-use crate::continuation::bifurcation::{Bifurcation, BifurcationKind};
+use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, flip_test};
 use crate::continuation::follow::{check, follow, solver_for};
 use crate::continuation::solver::Node;
 use crate::continuation::{Branch, ContinuationError, ContinuationOptions};
@@ -49,16 +51,20 @@ pub fn switch_at_flip<F: MapFamily>(
     }
     let mut points = flip.node.points.clone();
     points.extend_from_slice(&flip.node.points);
+    let mut jacobians = flip.node.jacobians.clone();
+    jacobians.extend_from_slice(&flip.node.jacobians);
     let start = Node {
         parameter: flip.parameter,
         points,
-        jacobians: Vec::new(),
+        jacobians,
         residual: 0.0,
         tangent,
         slope: 0.0,
         iterations: 0,
     };
+    let before = flip_test(&start.jacobians).unwrap_or(0.0);
     let mut amplitude = options.initial_step.min(1e-2);
+    let mut found = None;
     while amplitude >= 1e-6 {
         if let Ok(node) = solver.along(&start, amplitude) {
             let gap = solver.gap(&node, solver.n / 2);
@@ -69,13 +75,27 @@ pub fn switch_at_flip<F: MapFamily>(
             let share = dot(&gap, &expected) / dot(&expected, &expected);
             let inside = (options.range.0..=options.range.1).contains(&node.parameter);
             if inside && (0.5..1.5).contains(&share) && solver.size(&node.points) <= options.bound {
-                return follow(&mut solver, node, options, control);
+                found = Some(amplitude);
+                let change = flip_test(&node.jacobians).map_or(0.0, |after| (after - before).abs());
+                if change <= MULTIPLIER_STEP {
+                    break;
+                }
             }
         }
         amplitude *= 0.5;
     }
-    Err(failed("no orbit of doubled period was found near it"))
+    let initial_step =
+        found.ok_or_else(|| failed("no orbit of doubled period was found near it"))?;
+    let options = ContinuationOptions {
+        initial_step,
+        min_step: options.min_step.min(initial_step),
+        ..options.clone()
+    };
+    follow(&mut solver, start, &options, control)
 }
+
+/// By how much the distance of the multipliers from −1 may change over the first step.
+const MULTIPLIER_STEP: f64 = 0.5;
 
 /// v_0 … v_{n−1} with A_k v_k = v_{k+1}, v_n = −v_0.
 fn antiperiodic_vector(node: &Node, d: usize) -> Option<Vec<f64>> {

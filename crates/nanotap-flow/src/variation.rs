@@ -126,6 +126,8 @@ pub struct Variation<'a> {
     pub extrema: Vec<Varied<f64>>,
     /// Speeds; zero where there was no such switch.
     pub speeds: Vec<Varied<f64>>,
+    /// Sums of the speeds at these switches.
+    pub summed_speeds: Vec<Varied<f64>>,
     /// Sums of the squares of the speeds at these switches.
     pub squared_speeds: Vec<Varied<f64>>,
     /// How long the motion lasted.
@@ -207,6 +209,7 @@ impl<'a> Variation<'a> {
             fouriers: vec![Varied::default(); wanted.fouriers.len()],
             extrema: wanted.extrema.iter().map(extreme).collect(),
             speeds: vec![Varied::default(); wanted.speeds.len()],
+            summed_speeds: vec![Varied::default(); wanted.speeds.len()],
             squared_speeds: vec![Varied::default(); wanted.speeds.len()],
             duration: Varied::default(),
             outputs,
@@ -379,16 +382,18 @@ impl Observer for Variation<'_> {
             value: rate.value.abs(),
             change: (rate.change + curvature * by) * rate.value.signum(),
         };
-        let sums = self.speeds.iter_mut().zip(&mut self.squared_speeds);
-        for ((greatest, sum), pair) in sums.zip(&self.wanted.speeds) {
+        for (k, pair) in self.wanted.speeds.iter().enumerate() {
             if *pair != (from, view.switch.to) {
                 continue;
             }
-            if speed.value > greatest.value {
-                *greatest = speed;
+            if speed.value > self.speeds[k].value {
+                self.speeds[k] = speed;
             }
-            sum.value += speed.value * speed.value;
-            sum.change += 2.0 * speed.value * speed.change;
+            let (sum, squares) = (&mut self.summed_speeds[k], &mut self.squared_speeds[k]);
+            sum.value += speed.value;
+            sum.change += speed.change;
+            squares.value += speed.value * speed.value;
+            squares.change += 2.0 * speed.value * speed.change;
         }
         for (index, rate) in std::mem::take(&mut self.at_end) {
             self.extrema[index].change += rate * by;

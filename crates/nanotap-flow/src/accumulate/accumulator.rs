@@ -23,6 +23,8 @@ pub struct Switches {
     pub grazing: u64,
     /// The greatest speed at which the guard fell to zero.
     pub greatest_speed: f64,
+    /// `Σ v` of those speeds.
+    pub speeds: f64,
     /// `Σ v²` of those speeds.
     pub squared_speeds: f64,
 }
@@ -333,6 +335,7 @@ impl Observer for Accumulator {
         switches.count += 1;
         switches.grazing += u64::from(view.grazing);
         switches.greatest_speed = switches.greatest_speed.max(-view.rate);
+        switches.speeds -= view.rate;
         switches.squared_speeds += view.rate * view.rate;
     }
 

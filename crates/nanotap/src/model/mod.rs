@@ -82,9 +82,8 @@ pub struct Model {
     pub force: Vec<Output>,
     /// What feeds and drains energy: see [`Model::power`].
     pub(crate) power: PowersOnDemand,
-    /// What an impact takes, as a factor of the square of the gap's rate: ½ m (1 − r²)
-    /// for a rigid stop, 0 otherwise.
-    pub impact_loss: f64,
+    /// The rigid stop, if there is one.
+    pub rigid_stop: Option<RigidStop>,
     /// The beam's modes, if it is a beam.
     pub beam: Option<BeamOutputs>,
     /// How many numbers at the end of the state are the sample's.
@@ -96,6 +95,26 @@ pub struct Model {
     pub forgetting: Option<Forgetting>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
+}
+
+/// A rigid stop on which the tip bounces.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RigidStop {
+    /// The mass m that bounces.
+    pub mass: f64,
+    /// The coefficient of restitution r.
+    pub restitution: f64,
+    /// Tip displacement at the stop.
+    pub tip: f64,
+}
+
+impl RigidStop {
+    /// Impulse on the tip of an impact from regime `from` to `to` at unit speed: m (1 + r), or m
+    /// where the tip comes to rest on the stop.
+    pub fn impulse(&self, from: usize, to: usize) -> f64 {
+        let bounce = if from == to { self.restitution } else { 0.0 };
+        self.mass * (1.0 + bounce)
+    }
 }
 
 /// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
@@ -194,6 +213,20 @@ impl BeamOutputs {
 }
 
 impl Model {
+    /// The state at rest: at deflection 0, or on a rigid stop that stands before it.
+    pub fn rest(&self) -> Vec<f64> {
+        let mut state = vec![0.0; self.dimension()];
+        self.stop_at_wall(&mut state);
+        state
+    }
+
+    /// Puts a state that lies behind a rigid stop on it.
+    pub fn stop_at_wall(&self, state: &mut [f64]) {
+        if let (Some(stop), Some(x)) = (self.rigid_stop, state.first_mut()) {
+            *x = x.min(stop.tip);
+        }
+    }
+
     /// The cantilever of `case`, Eqs. (8)–(18).
     ///
     /// # Errors
@@ -219,7 +252,7 @@ impl Model {
             height: outputs.height,
             force: outputs.force,
             power: PowersOnDemand::of(galerkin),
-            impact_loss: 0.0,
+            rigid_stop: None,
             beam: Some(outputs.beam),
             memory: usize::from(law.has_memory),
             forgetting: outputs.forgetting,
@@ -251,7 +284,7 @@ impl Model {
             height: outputs.height,
             beam: Some(outputs.beam),
             power: PowersOnDemand::of(galerkin),
-            impact_loss: 0.0,
+            rigid_stop: None,
             memory: usize::from(memory),
             forgetting: None,
             second_phase,
@@ -479,7 +512,7 @@ pub(crate) fn cantilever_model_tangent(
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),
         second_phase: second_phase.to_radians(),
-        impact_loss: 0.0,
+        rigid_stop: RigidStop::default(),
     })
 }
 

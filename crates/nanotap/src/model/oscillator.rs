@@ -10,7 +10,7 @@ use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, HarmonicVector, Output, Reset, Sticking, System, Transition};
 use serde::Serialize;
 
-use crate::model::{Model, ModelError, ModelTangent, Powers, Product};
+use crate::model::{Model, ModelError, ModelTangent, Powers, Product, RigidStop};
 use crate::number::shortest;
 
 /// The stop.
@@ -276,7 +276,7 @@ impl Oscillator {
         let drive = Output::linear(RowDVector::zeros(2), 1).with_tone(0, 0.0, self.forcing);
         let zero = gap.scaled(0.0);
         // The soft stop pushes with its spring and damper, the wall with whatever keeps
-        // the mass still; the impulses of impacts are not forces.
+        // the mass still, and with the impulses of impacts, which are counted apart.
         let force = match self.stop {
             Stop::Soft { stiffness, damping } => gap.scaled(-stiffness).plus(damping, &speed),
             Stop::Rigid { .. } => drive.plus(-self.stiffness, &tip),
@@ -296,16 +296,23 @@ impl Oscillator {
                 product(0.5 * contact_stiffness, &gap, &gap),
             ],
         };
-        let (contact_stiffness, contact_damping, impact_loss) = match self.stop {
-            Stop::Soft { stiffness, damping } => (stiffness, damping, 0.0),
-            Stop::Rigid { restitution: r } => (0.0, 0.0, 0.5 * self.mass * (1.0 - r * r)),
+        let (contact_stiffness, contact_damping, rigid_stop) = match self.stop {
+            Stop::Soft { stiffness, damping } => (stiffness, damping, None),
+            Stop::Rigid { restitution } => {
+                let stop = RigidStop {
+                    mass: self.mass,
+                    restitution,
+                    tip: self.gap,
+                };
+                (0.0, 0.0, Some(stop))
+            }
         };
         Model {
             contact: vec![false, true],
             tip: tip.clone(),
             force: vec![zero, force],
             power: vec![power(0.0, 0.0), power(contact_stiffness, contact_damping)].into(),
-            impact_loss,
+            rigid_stop,
             beam: None,
             memory: 0,
             forgetting: None,
@@ -413,9 +420,12 @@ impl Oscillator {
                 .plus(-is(P::Stiffness), &model.tip),
         };
         tangent.beam_power = vec![[speed.scaled(is(P::Damping)), zero]];
-        if let Stop::Rigid { restitution: r } = self.stop {
-            tangent.impact_loss =
-                0.5 * (1.0 - r * r) * is(P::Mass) - self.mass * r * is(P::Restitution);
+        if let Stop::Rigid { .. } = self.stop {
+            tangent.rigid_stop = RigidStop {
+                mass: is(P::Mass),
+                restitution: is(P::Restitution),
+                tip: is(P::Gap),
+            };
         }
         Ok(tangent)
     }

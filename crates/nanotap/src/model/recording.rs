@@ -152,6 +152,19 @@ impl Recording {
         }
     }
 
+    /// When the tip hits a rigid stop, and the impulses on it.
+    pub fn impulses(&self, model: &Model) -> Vec<(f64, f64)> {
+        let (Self::Exact(trajectory), Some(stop)) = (self, model.rigid_stop) else {
+            return Vec::new();
+        };
+        let hits = trajectory
+            .events()
+            .iter()
+            .filter(|e| !model.contact[e.from]);
+        hits.map(|e| (e.time, -e.rate * stop.impulse(e.from, e.to)))
+            .collect()
+    }
+
     /// Flights and contacts, in order; a flight or a contact may be in several pieces.
     pub fn stretches(&self, model: &Model) -> Vec<Stretch> {
         match self {

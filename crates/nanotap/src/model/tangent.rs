@@ -3,7 +3,7 @@
 use nanotap_flow::Output;
 use nanotap_flow::sensitivity::SystemTangent;
 
-use crate::model::Model;
+use crate::model::{Model, RigidStop};
 
 /// The derivative of a [`Model`]: of its system and of what it shows, at constant state and
 /// drive phase. Tip and slope are the same for every value.
@@ -21,8 +21,8 @@ pub struct ModelTangent {
     pub(crate) beam_power: Vec<[Output; 2]>,
     /// Of the second tone's phase in rad.
     pub second_phase: f64,
-    /// Of what an impact takes.
-    pub impact_loss: f64,
+    /// Of the rigid stop.
+    pub rigid_stop: RigidStop,
 }
 
 impl ModelTangent {
@@ -37,7 +37,7 @@ impl ModelTangent {
             force: vec![zero.clone(); model.force.len()],
             beam_power: vec![[zero.clone(), zero]; products],
             second_phase: 0.0,
-            impact_loss: 0.0,
+            rigid_stop: RigidStop::default(),
         }
     }
 
@@ -60,6 +60,9 @@ impl ModelTangent {
             *mine = mine.plus(factor, &more);
         }
         self.second_phase += factor * other.second_phase;
-        self.impact_loss += factor * other.impact_loss;
+        let (stop, more) = (&mut self.rigid_stop, &other.rigid_stop);
+        stop.mass += factor * more.mass;
+        stop.restitution += factor * more.restitution;
+        stop.tip += factor * more.tip;
     }
 }

@@ -22,7 +22,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::clearance::Clearance;
 use super::measure::{beginnings, contact_regimes, frequency};
-use super::measured::{Beginnings, Found, Measured, Need, Signal, Tone};
+use super::measured::{Beginnings, Found, Impacts, Measured, Need, Signal, Tone};
 use super::number::Phasor;
 use super::table::{OBSERVABLES, Observable, Observables, Set};
 use super::value::Value;
@@ -514,19 +514,40 @@ impl<'a> Followed<'a> {
                 }),
             ..Gathered::default()
         };
-        for (speed, squares) in variation.speeds.iter().zip(&variation.squared_speeds) {
+        for speed in &variation.speeds {
             if speed.value > gathered.greatest_speed.value {
                 gathered.greatest_speed = *speed;
             }
-            gathered.squared_speeds.value += squares.value;
-            gathered.squared_speeds.change += squares.change;
         }
+        let impacts = self.impacts(&variation);
         gathered.integrals = variation.integrals;
         gathered.products = variation.products;
         gathered.fouriers = variation.fouriers;
         gathered.extrema = variation.extrema;
-        self.found = Some(self.read(&gathered, period));
+        let mut found = self.read(&gathered, period);
+        found.impacts = impacts;
+        self.found = Some(found);
         Ok(())
+    }
+
+    /// What impacts on a rigid stop did.
+    fn impacts(&self, variation: &Variation<'_>) -> Impacts<Dual> {
+        let Some(stop) = self.model.rigid_stop else {
+            return Impacts::default();
+        };
+        let by = self.tangent.rigid_stop;
+        let (mut bounced, mut stuck) = ([Dual::default(); 2], [Dual::default(); 2]);
+        for (k, (from, to)) in beginnings(self.model).enumerate() {
+            let sums = if from == to { &mut bounced } else { &mut stuck };
+            sums[0] = sums[0] + dual(variation.summed_speeds[k]);
+            sums[1] = sums[1] + dual(variation.squared_speeds[k]);
+        }
+        let stop = [
+            Dual::new(stop.mass, by.mass),
+            Dual::new(stop.restitution, by.restitution),
+            Dual::new(stop.tip, by.tip),
+        ];
+        Impacts::new(stop, bounced, stuck)
     }
 
     /// The same under a nonlinear force.
@@ -587,7 +608,6 @@ impl<'a> Followed<'a> {
             contact_time: dual(gathered.contact_time),
             contacts: Beginnings {
                 greatest_speed: dual(gathered.greatest_speed),
-                squared_speeds: dual(gathered.squared_speeds),
                 ..Beginnings::default()
             },
             stored: Dual::default(),
@@ -597,7 +617,7 @@ impl<'a> Followed<'a> {
                 xi,
                 period: 0.0,
             }),
-            impact_loss: Dual::new(self.model.impact_loss, self.tangent.impact_loss),
+            impacts: Impacts::default(),
             second_phase: Dual::new(self.model.second_phase, self.tangent.second_phase),
         }
     }

@@ -10,7 +10,7 @@ use super::clearance::SampledClearance;
 use super::contact_event::{ContactEvent, ContactEventKind};
 use super::energy::stored_by_lever;
 use super::measure::{Asked, frequency};
-use super::measured::{Beginnings, Found, Need, Signal};
+use super::measured::{Beginnings, Found, Impacts, Need, Signal};
 use super::number::Phasor;
 use super::table::{Observables, Set};
 use crate::model::Model;
@@ -209,7 +209,6 @@ impl<'a> Gatherer<'a> {
                     self.contacts.count += 1;
                     let speed = -switch.rate;
                     self.contacts.greatest_speed = self.contacts.greatest_speed.max(speed);
-                    self.contacts.squared_speeds += speed * speed;
                     ContactEventKind::ContactStart
                 }
                 (true, false) => ContactEventKind::ContactEnd,
@@ -258,7 +257,7 @@ impl<'a> Gatherer<'a> {
             contacts: self.contacts,
             stored: after.0 - before.0 + by_sample,
             stored_by_sample: by_sample,
-            impact_loss: 0.0,
+            impacts: Impacts::default(),
             second_phase: self.model.second_phase,
             clearance: self
                 .clearance

@@ -60,16 +60,27 @@ impl Spectrum {
             .into_iter()
             .flatten()
             .collect();
+        let impulses = recording.impulses(model);
+        let by_impulses = |omega: f64| -> Complex {
+            let turned = impulses.iter().map(|(time, impulse)| {
+                let (sin, cos) = nanotap_arithmetic::sin_cos(omega * time);
+                Complex::new(cos, -sin) * *impulse
+            });
+            turned.sum::<Complex>() * (2.0 / force.duration())
+        };
         let harmonics = Curve::fouriers(&curves, &frequencies)
             .into_iter()
             .enumerate()
-            .map(|(k, of)| Harmonic {
-                order: (k + 1) as f64 / repetition as f64,
-                tip: of[0].modulus(),
-                tip_phase: lag(of[0]),
-                force: of[1].modulus(),
-                force_phase: lag(of[1]),
-                slope: of.get(2).map(|slope| slope.modulus()),
+            .map(|(k, of)| {
+                let force = of[1] + by_impulses(frequencies[k]);
+                Harmonic {
+                    order: (k + 1) as f64 / repetition as f64,
+                    tip: of[0].modulus(),
+                    tip_phase: lag(of[0]),
+                    force: force.modulus(),
+                    force_phase: lag(force),
+                    slope: of.get(2).map(|slope| slope.modulus()),
+                }
             })
             .collect();
         let first = tip.fourier(model.frequency());

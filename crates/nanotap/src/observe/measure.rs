@@ -17,7 +17,7 @@ use nanotap_flow::{Complex, FlowError};
 use super::begins_contact;
 use super::clearance::ClearanceSearch;
 use super::energy::Ends;
-use super::measured::{Beginnings, Found, Measured, Need, Signal, Tone};
+use super::measured::{Beginnings, Found, Impacts, Measured, Need, Signal, Tone};
 use super::number::Phasor;
 use super::table::{Observables, Set};
 use crate::model::Model;
@@ -308,7 +308,7 @@ impl<'a> Measurement<'a> {
             stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(self.model)),
             stored_by_sample: 0.0,
             clearance,
-            impact_loss: self.model.impact_loss,
+            impacts: impacts(self.model, gathered),
             second_phase: self.model.second_phase,
         };
         Ok(found.observables(self.model, self.set))
@@ -347,9 +347,23 @@ fn contacts(model: &Model, gathered: &Accumulator) -> Beginnings<f64> {
         all.count += some.count;
         all.grazing += some.grazing;
         all.greatest_speed = all.greatest_speed.max(some.greatest_speed);
-        all.squared_speeds += some.squared_speeds;
     }
     all
+}
+
+/// What impacts on a rigid stop did.
+fn impacts(model: &Model, gathered: &Accumulator) -> Impacts<f64> {
+    let Some(stop) = model.rigid_stop else {
+        return Impacts::default();
+    };
+    let (mut bounced, mut stuck) = ([0.0; 2], [0.0; 2]);
+    for (from, to) in beginnings(model) {
+        let some = gathered.switches(from, to);
+        let sums = if from == to { &mut bounced } else { &mut stuck };
+        sums[0] += some.speeds;
+        sums[1] += some.squared_speeds;
+    }
+    Impacts::new([stop.mass, stop.restitution, stop.tip], bounced, stuck)
 }
 
 impl Observer for Measurement<'_> {

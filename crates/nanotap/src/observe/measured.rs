@@ -133,8 +133,8 @@ pub(super) struct Found<D> {
     /// The part of it that a nonlinear law stores.
     pub(super) stored_by_sample: D,
     pub(super) clearance: Option<Clearance<D>>,
-    /// What an impact takes, as a factor of the square of its speed.
-    pub(super) impact_loss: D,
+    /// What impacts on a rigid stop did.
+    pub(super) impacts: Impacts<D>,
     /// Phase of the second tone in rad.
     pub(super) second_phase: D,
 }
@@ -145,7 +145,33 @@ pub(super) struct Beginnings<D> {
     pub(super) count: u64,
     pub(super) grazing: u64,
     pub(super) greatest_speed: D,
-    pub(super) squared_speeds: D,
+}
+
+/// What impacts on a rigid stop did: nothing where there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Impacts<D> {
+    /// Sum of their impulses on the tip.
+    pub(super) impulse: D,
+    /// Integral of force times tip displacement over the impacts.
+    pub(super) virial: D,
+    /// Energy that they took.
+    pub(super) energy: D,
+}
+
+impl<D: Number> Impacts<D> {
+    /// Of a stop of mass, restitution and position `[m, r, x]`: `bounced` and `stuck` are the sums
+    /// of the speeds and of their squares at impacts that bounce, and at those after which the
+    /// tip rests on the stop.
+    pub(super) fn new([mass, restitution, tip]: [D; 3], bounced: [D; 2], stuck: [D; 2]) -> Self {
+        let one = D::from(1.0);
+        let impulse = mass * ((one + restitution) * bounced[0] + stuck[0]);
+        let kept = restitution * restitution;
+        Self {
+            impulse,
+            virial: impulse * tip,
+            energy: mass * ((one - kept) * bounced[1] + stuck[1]) * 0.5,
+        }
+    }
 }
 
 impl<'a, D: Number> Measured<'a, D> {
@@ -204,6 +230,17 @@ impl<'a, D: Number> Measured<'a, D> {
     /// `∫ a b dt`.
     fn product(&mut self, a: Signal, b: Signal) -> D {
         self.value(Need::Product(a, b)).re
+    }
+
+    /// The time mean of the force of the sample on the tip, impulses of a rigid stop included.
+    pub(super) fn mean_force(&mut self) -> D {
+        self.mean(Signal::Force) + self.gathered(|found| found.impacts.impulse) / self.duration()
+    }
+
+    /// The time mean of force times tip deflection, impulses of a rigid stop included.
+    pub(super) fn mean_virial(&mut self) -> D {
+        let impacts = self.gathered(|found| found.impacts.virial) / self.duration();
+        self.mean_product(Signal::Force, Signal::Tip) + impacts
     }
 
     /// The time mean of the product of two signals.
@@ -323,7 +360,7 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// What impacts on a rigid stop take.
     fn impacts(&self) -> D {
-        self.gathered(|found| found.impact_loss * found.contacts.squared_speeds)
+        self.gathered(|found| found.impacts.energy)
     }
 
     /// The component of the tip deflection at the second tone, if there is one, turned back by

@@ -244,13 +244,13 @@ observables! {
         |m| m.indentation();
     mean_force: f64, Force, common,
         "mean force", "time mean of the force of the sample on the tip",
-        |m| m.mean(Force);
+        |m| m.mean_force();
     dissipation as "E_dis": f64, Energy, common,
         "dissipation $E_{dis}$", "energy that the sample takes in one drive period",
         |m| m.dissipation();
     virial: f64, Energy, common,
         "virial ⟨$F W$⟩", "time mean of force times tip deflection, the force counted along it",
-        |m| m.along_tip() * m.mean_product(Force, Tip);
+        |m| m.along_tip() * m.mean_virial();
     contact_fraction: f64, Number, common,
         "part of the time in contact", "part of the time in contact",
         |m| m.contact_time() / m.duration();

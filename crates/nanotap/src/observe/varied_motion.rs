@@ -32,9 +32,8 @@ pub(super) struct Gathered {
     pub(super) products: Vec<Varied<f64>>,
     pub(super) fouriers: Vec<Varied<Complex>>,
     pub(super) extrema: Vec<Varied<f64>>,
-    /// Of the greatest speed at which a contact began, and of the sum of the squares.
+    /// Of the greatest speed at which a contact began.
     pub(super) greatest_speed: Varied<f64>,
-    pub(super) squared_speeds: Varied<f64>,
     pub(super) contact_time: Varied<f64>,
     pub(super) duration: Varied<f64>,
 }
@@ -144,9 +143,6 @@ pub(super) fn gather(
             let begins = |from: usize, to: usize| !touches[from] && touches[to];
             for speed in run.before_switches(rate, begins) {
                 for (gathered, change) in all.iter_mut().zip(speed.changes) {
-                    let squares = &mut gathered.squared_speeds;
-                    squares.value += speed.value * speed.value;
-                    squares.change += 2.0 * speed.value * change;
                     if -speed.value > gathered.greatest_speed.value {
                         gathered.greatest_speed = Varied {
                             value: -speed.value,

@@ -123,6 +123,11 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         f64::INFINITY
     }
 
+    /// From here on motions pass through a rigid stop that they hardly touch. Past its grazing an
+    /// orbit then goes on smoothly, as it would without the touch, so that the grazing can be
+    /// located and followed. A map without rigid stops stays as it is.
+    fn pass_touches(&mut self) {}
+
     /// Appends every local extremum of the switching functions over the period
     /// that starts at `state`, in order of phase, and replaces `state` by
     /// `P(state)`. A smooth system leaves `tangencies` as it is.

@@ -29,6 +29,12 @@ impl Flow {
         &self.system
     }
 
+    /// Passes through rigid stops where the motion would come back within a time `longest` of
+    /// itself. Past a grazing the flow then goes on smoothly, as it would without the stop.
+    pub fn pass_touches(&mut self, longest: f64) {
+        self.motion.longest_passed_touch = longest;
+    }
+
     /// What the searches for switches have cost so far.
     pub fn statistics(&self) -> Statistics {
         self.motion.statistics

@@ -4,12 +4,12 @@ use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::regime::Regime;
 use crate::simd::linear::{LinearMap, scale};
 use crate::simd::{ComplexVector, WIDTH, layout};
+use crate::system::System;
 use crate::{Complex, Flow, FlowError};
 use nalgebra::{DMatrix, DVector};
 
 /// Carries `∂q/∂x₀` along a flow, in modal coordinates: a column for each
-/// component of the initial state. The default is empty: [`Jacobian::begin`] makes it the
-/// identity.
+/// component of the initial state. The default is empty: [`Jacobian::begin`] starts it.
 #[derive(Clone, Debug, Default)]
 pub struct Jacobian {
     /// `∂q/∂x₀`, column by column.
@@ -20,18 +20,24 @@ pub struct Jacobian {
 }
 
 impl Jacobian {
-    /// The identity, for a flow that is in `regime`.
-    pub fn identity(regime: &Regime) -> Self {
-        let mut identity = Self::default();
-        identity.begin(regime);
-        identity
+    /// At the beginning of a flow of `system` that is in `regime`.
+    pub fn at_start(system: &System, regime: usize) -> Self {
+        let mut start = Self::default();
+        start.begin(system, regime);
+        start
     }
 
-    /// Becomes the identity, for a flow that is in `regime`.
-    pub fn begin(&mut self, regime: &Regime) {
+    /// Becomes the identity, for a flow of `system` that is in `regime`; zero where the motion
+    /// sticks to a rigid stop, to which every neighbour returns.
+    pub fn begin(&mut self, system: &System, regime: usize) {
+        let identity = system.regimes()[regime].prepared().packed_left();
         self.columns.clear();
-        self.columns
-            .extend_from_slice(regime.prepared().packed_left());
+        if system.sticks(regime) {
+            self.columns
+                .resize(identity.len(), ComplexVector::default());
+        } else {
+            self.columns.extend_from_slice(identity);
+        }
     }
 
     /// `∂x/∂x₀` (`n × n`) of a flow that is in `regime` now.
@@ -117,7 +123,7 @@ impl Flow {
         &mut self,
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), FlowError> {
-        let mut carried = Jacobian::identity(&self.system().regimes()[self.regime()]);
+        let mut carried = Jacobian::at_start(self.system(), self.regime());
         self.run_period(&mut carried)?;
         carried.to_state(&self.system().regimes()[self.regime()], jacobian);
         Ok(())

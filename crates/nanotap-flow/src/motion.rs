@@ -5,11 +5,11 @@
 
 use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::search::table::Followed;
-use crate::search::{BySteps, Crossing, Start, Statistics, on_table};
+use crate::search::{BySteps, Crossing, Start, Statistics, on_table, sign_changes};
 use crate::signal::Signal;
 use crate::simd::{self, ComplexVector, Library, Simd, Work, layout};
 use crate::system::{ON_SURFACE, Onset, Switch, System, Transition, rounding};
-use crate::{Complex, FlowError};
+use crate::{Complex, FlowError, Output};
 
 /// Where a motion of a [`System`] is, with the work space of going on.
 #[derive(Clone, Debug)]
@@ -33,6 +33,8 @@ pub(crate) struct Motion {
     scratch: Vec<f64>,
     pub(crate) statistics: Statistics,
     pub(crate) switches: u64,
+    /// Longest touch of a rigid stop that is passed through; 0 for none.
+    pub(crate) longest_passed_touch: f64,
 }
 
 /// Switches in a row, hardly any time passing, before chatter is refused.
@@ -40,6 +42,9 @@ const STALLED_SWITCHES: u32 = 1000;
 /// What counts as hardly any time, as a part of the fastest time scale: what switches again
 /// and again so soon does not come to rest in between.
 pub(crate) const BRIEF: f64 = 1e-6;
+/// A touch shorter than this part of the fastest time scale is passed for as long as its rate and
+/// acceleration say.
+const SHORTEST_TOUCH: f64 = 1e-6;
 /// An impact sequence ends in sticking when its flights last less than this part
 /// of the fastest time scale: what is left of it is below rounding (second order).
 const CHATTER_RESOLUTION: f64 = 1e-8;
@@ -67,6 +72,7 @@ impl Motion {
             scratch: vec![0.0; system.dimension()],
             statistics: Statistics::default(),
             switches: 0,
+            longest_passed_touch: 0.0,
         }
     }
 
@@ -295,6 +301,14 @@ impl Motion {
         if *stalled > STALLED_SWITCHES {
             return Err(FlowError::Accumulation { time: self.phase });
         }
+        if sticks && self.longest_passed_touch > 0.0 {
+            let left = (end - self.phase).min(self.longest_passed_touch);
+            if let Some(touch) = self.touch(system, transition, crossing, left) {
+                self.pass::<S, O>(system, touch, observer);
+                self.surface = Some((transition, Start::Surface { rate: None }));
+                return Ok(());
+            }
+        }
         self.switch::<S, O>(system, transition, crossing, observer);
         Ok(())
     }
@@ -485,6 +499,9 @@ impl Motion {
             .onset
             .and_then(|onset| self.onset(system, description, onset, crossing));
         self.change_basis::<S>(switch);
+        if stuck {
+            self.set_on_stop(system, &description.guard, switch.to);
+        }
         self.surface = onset.or_else(|| {
             reverse.map(|reverse| {
                 let start = if description.release {
@@ -499,6 +516,37 @@ impl Motion {
             })
         });
         self.regime = switch.to;
+    }
+
+    /// How long the guard of a rigid stop would stay below zero without the stop, if it rises again
+    /// within `longest`.
+    fn touch(
+        &mut self,
+        system: &System,
+        transition: usize,
+        crossing: Crossing,
+        longest: f64,
+    ) -> Option<f64> {
+        let regime = &system.regimes()[self.regime];
+        let guard = &system.prepared(self.regime)[transition].guard;
+        self.load_modal(regime.basis().len());
+        let of = |length| {
+            let drive = system.drive();
+            Signal::of(regime, drive, guard, &self.modal, self.phase, length)
+        };
+        let rate = of(longest).differentiated(longest);
+        let curvature = rate.differentiated(longest).at(0.0);
+        // To leading order.
+        let expected = -2.0 * crossing.rate / curvature;
+        if !(curvature > 0.0 && expected <= 0.5 * longest) {
+            return None;
+        }
+        if expected * system.fastest() <= SHORTEST_TOUCH {
+            return Some(expected.max(0.0));
+        }
+        let signal = of(2.0 * expected);
+        let changes = sign_changes(&signal, 2.0 * expected);
+        changes.into_iter().find(|at| *at >= 0.5 * expected)
     }
 
     /// How the guard of the next regime starts of which something is known; `None` where
@@ -548,6 +596,26 @@ impl Motion {
             .max(std::f64::consts::TAU / system.drive().period());
         // Flights last about 2|ġ|/a; a must keep its sign for far longer than that.
         pressed > 0.0 && -crossing.rate * fastest <= CHATTER_RESOLUTION * pressed
+    }
+
+    /// Puts a motion that comes to rest on a rigid stop exactly on it: motions that stick are then
+    /// one, whatever rounding was before.
+    fn set_on_stop(&mut self, system: &System, guard: &Output, to: usize) {
+        let (regime, drive) = (&system.regimes()[to], system.drive());
+        let mut state = std::mem::take(&mut self.scratch);
+        let modal = (0..regime.basis().len()).map(|k| self.coordinate(k));
+        regime.to_state(drive, modal, self.phase, &mut state);
+        let off = guard.at(drive, &state, self.phase) / guard.row.norm_squared();
+        for (x, row) in state.iter_mut().zip(guard.row.iter()) {
+            *x -= off * row;
+        }
+        let mut modal = vec![Complex::new(0.0, 0.0); regime.basis().len()];
+        let mut scratch = vec![0.0; state.len()];
+        regime.to_modal(drive, &state, self.phase, &mut scratch, &mut modal);
+        for (k, q) in modal.into_iter().enumerate() {
+            self.set_coordinate(k, q);
+        }
+        self.scratch = state;
     }
 
     #[inline(always)]

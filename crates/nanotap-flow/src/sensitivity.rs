@@ -255,7 +255,7 @@ impl Responses {
 
 impl<'a> Sensitivity<'a> {
     /// Zero sensitivities to the parameters of `tangents`, for a flow of `system` that
-    /// is in regime `regime`.
+    /// is in regime `regime` at phase 0; where the motion sticks to a rigid stop, those of the stop.
     pub fn new(system: &System, tangents: &'a [SystemTangent], regime: usize) -> Self {
         let sources = tangents
             .iter()
@@ -267,13 +267,23 @@ impl<'a> Sensitivity<'a> {
             })
             .collect();
         let m = system.regimes()[regime].basis().len();
-        Self {
+        let mut start = Self {
             tangents,
             sources,
             modal: vec![vec![Complex::new(0.0, 0.0); m]; tangents.len()],
             responses: Responses::default(),
             phasors: Vec::new(),
+        };
+        if let Some((from, stop)) = system.stop_of(regime) {
+            let row = &system.transitions()[from][stop].guard.row;
+            let zero = vec![0.0; system.dimension()];
+            for (p, tangent) in tangents.iter().enumerate() {
+                let moved = tangent.guards[from][stop].at(system.drive(), &zero, 0.0);
+                let state = row * (-moved / row.norm_squared());
+                start.begin(&system.regimes()[regime], p, state.as_slice());
+            }
         }
+        start
     }
 
     /// Begins with `∂x/∂θ_p = derivative` (length `n`) in `regime`, instead of with zero.
@@ -570,7 +580,7 @@ impl Flow {
     ) -> Result<(), FlowError> {
         let Self { system, motion } = self;
         let start = motion.regime;
-        let mut carried = crate::jacobian::Jacobian::identity(&system.regimes()[start]);
+        let mut carried = crate::jacobian::Jacobian::at_start(system, start);
         let mut sensitivity = Sensitivity::new(system, tangents, start);
         motion.run_period(system, &mut (&mut carried, &mut sensitivity))?;
         let regime = &system.regimes()[motion.regime];

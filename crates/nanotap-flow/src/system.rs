@@ -422,6 +422,20 @@ impl System {
         self.reaches[regime]
     }
 
+    /// The transition of a rigid stop, with the regime that it leaves, that ends in sticking in
+    /// `regime`; `None` where `regime` is not one in which the motion sticks.
+    pub(crate) fn stop_of(&self, regime: usize) -> Option<(usize, usize)> {
+        let sticks = |e: &Transition| e.sticking.as_ref().is_some_and(|s| s.regime == regime);
+        let mut out = self.transitions.iter().enumerate();
+        out.find_map(|(from, out)| Some((from, out.iter().position(sticks)?)))
+    }
+
+    /// Whether the motion sticks to a rigid stop in `regime`: whatever it was before, its state is
+    /// then that of the stop.
+    pub fn sticks(&self, regime: usize) -> bool {
+        self.stop_of(regime).is_some()
+    }
+
     /// The switch of a transition.
     pub fn switch_of(&self, regime: usize, transition: usize) -> Option<&Switch> {
         let prepared = self.switches.get(regime)?.get(transition)?;

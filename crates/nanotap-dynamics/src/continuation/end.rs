@@ -3,8 +3,13 @@
 use crate::continuation::bifurcation::{Bifurcation, BifurcationKind};
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::continuation::step::Rejected;
-use crate::continuation::{Branch, BranchEnd, BranchPoint};
+use crate::continuation::{Branch, BranchEnd, BranchPoint, OrbitTangency};
 use crate::map::MapFamily;
+
+/// Distance to a grazing, as a part of the range, within which it is what ends a branch.
+const NEAR: f64 = 1e-6;
+/// Distance of the grazing orbit, in units of the branch, from the branch's last one.
+const SAME_ORBIT: f64 = 1e-2;
 
 /// What stopped the branch at the shortest step: an extremum that reaches zero just
 /// there is a grazing that the orbit does not survive. The last few points may lie
@@ -17,11 +22,25 @@ pub(crate) fn dead_end<F: MapFamily>(
     why: &Rejected,
 ) -> BranchEnd {
     let count = branch.points.len();
+    let near = |parameter: f64| (parameter - node.parameter).abs() <= NEAR * solver.parameter_scale;
+    if let Some(touch) = locate_grazing(solver, node)
+        && near(touch.node.parameter)
+        && let Ok(orbit) = solver.orbit(&touch.node)
+    {
+        let parameter = touch.node.parameter;
+        branch.bifurcations.push(Bifurcation {
+            kind: BifurcationKind::Grazing { time: touch.time },
+            parameter,
+            uncertainty: touch.uncertainty,
+            orbit,
+            after_point: count - 1,
+            node: touch.node,
+        });
+        return BranchEnd::Grazing { parameter };
+    }
     let grazing = (count.saturating_sub(6).max(1)..count)
         .flat_map(|k| vanishing(solver, &branch.points[..=k]))
-        .filter(|(parameter, ..)| {
-            (parameter - node.parameter).abs() <= 1e-6 * solver.parameter_scale
-        })
+        .filter(|(parameter, ..)| near(*parameter))
         .min_by(|x, y| x.2.abs().total_cmp(&y.2.abs()));
     if let Some((parameter, time, _)) = grazing
         && let Ok(orbit) = solver.orbit(node)
@@ -40,6 +59,55 @@ pub(crate) fn dead_end<F: MapFamily>(
         parameter: node.parameter,
         reason: why.to_string(),
     }
+}
+
+/// An orbit that grazes.
+struct Touch {
+    node: Node,
+    /// When, in drive periods from its first state.
+    time: f64,
+    /// Last change of the parameter.
+    uncertainty: f64,
+}
+
+/// The orbit near `node` at which the extremum of a switching function that is nearest to zero
+/// vanishes, by the secant method. Touches are passed through, so that orbits depend smoothly on
+/// the parameter on both sides of the grazing.
+fn locate_grazing<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Option<Touch> {
+    let mut passing = solver.another();
+    passing.passes_touches = true;
+    let mut at = |from: &Node, parameter: f64, near: Option<OrbitTangency>| {
+        let node = passing.at_parameter(&from.points, parameter, true).ok()?;
+        let tangencies = passing.tangencies(&node).ok()?;
+        let apart = |t: &OrbitTangency| near.map_or(t.value.abs(), |n| (n.time - t.time).abs());
+        let nearest = |a: &OrbitTangency, b: &OrbitTangency| apart(a).total_cmp(&apart(b));
+        Some((tangencies.into_iter().min_by(nearest)?, node))
+    };
+    let (first, start) = at(node, node.parameter, None)?;
+    let mut below = (node.parameter, first.value);
+    let aside = node.parameter + 1e-7 * solver.parameter_scale;
+    let (mut here, mut found) = at(&start, aside, Some(first))?;
+    for _ in 0..20 {
+        let before = found.parameter;
+        let rate = (here.value - below.1) / (before - below.0);
+        below = (before, here.value);
+        let next = before - here.value / rate;
+        if !((next - node.parameter).abs() <= 1e3 * NEAR * solver.parameter_scale) {
+            return None;
+        }
+        (here, found) = at(&found, next, Some(here))?;
+        let uncertainty = (next - before).abs();
+        if uncertainty <= 1e-13 * next.abs().max(solver.parameter_scale) || here.value == below.1 {
+            let (time, same) = (here.time, (node.solution(), found.solution()));
+            let is_same = solver.separation(same.0, same.1) <= SAME_ORBIT;
+            return is_same.then_some(Touch {
+                node: found,
+                time,
+                uncertainty,
+            });
+        }
+    }
+    None
 }
 
 /// For every tangency of the last of some points: the parameter at which its value
@@ -83,7 +151,7 @@ mod tests {
 
     use super::*;
     use crate::continuation::solver::tests::{bare, solver};
-    use crate::continuation::{OrbitTangency, step};
+    use crate::continuation::step;
     use crate::orbit::{PeriodicOrbit, Stability};
 
     fn at(parameter: f64, tangencies: &[(f64, f64)]) -> BranchPoint {

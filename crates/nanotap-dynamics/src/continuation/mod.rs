@@ -197,7 +197,11 @@ impl BranchEnd {
                 shown(*parameter)
             ),
             Self::Grazing { parameter } => {
-                format!("the orbit ends where it grazes, at {}", shown(*parameter))
+                format!(
+                    "the orbit grazes at {}, where the multipliers of orbits with this contact grow \
+                     without bound",
+                    shown(*parameter)
+                )
             }
             Self::Fold => "the first fold".into(),
             Self::Repelling { parameter } => format!(

@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 
 use crate::failure::{MapFailure, advance_with_tangencies, finite};
-use crate::map::MapFamily;
+use crate::map::{MapFamily, StroboscopicMap};
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
 use crate::orbit::shooting::{
@@ -91,6 +91,8 @@ pub(crate) struct BranchSolver<'a, F: MapFamily> {
     system: BlockCyclic,
     /// The map at the parameter value last asked for.
     map: Option<(f64, F::Map)>,
+    /// Whether the map passes through rigid stops that are hardly touched.
+    pub(crate) passes_touches: bool,
 }
 
 impl<'a, F: MapFamily> BranchSolver<'a, F> {
@@ -118,6 +120,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             step: vec![0.0; n * d],
             system: BlockCyclic::new(d, n),
             map: None,
+            passes_touches: false,
         }
     }
 
@@ -145,10 +148,17 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         family: &F,
         known: &'b mut Option<(f64, F::Map)>,
         parameter: f64,
+        passes_touches: bool,
     ) -> Result<&'b mut F::Map, MapFailure> {
         let map = match known.take() {
             Some((at, map)) if at == parameter => map,
-            _ => family.at(parameter).map_err(MapFailure::refused)?,
+            _ => {
+                let mut map = family.at(parameter).map_err(MapFailure::refused)?;
+                if passes_touches {
+                    map.pass_touches();
+                }
+                map
+            }
         };
         Ok(&mut known.insert((parameter, map)).1)
     }
@@ -168,7 +178,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
 
     fn evaluate_points(&mut self, parameter: f64) -> Result<f64, MapFailure> {
         let (d, family) = (self.d, self.family);
-        let map = Self::map_at(family, &mut self.map, parameter)?;
+        let map = Self::map_at(family, &mut self.map, parameter, self.passes_touches)?;
         self.residuals.copy_from_slice(&self.points);
         let ends = self.residuals.chunks_exact_mut(d);
         let derivatives = self.derivatives.chunks_exact_mut(d);
@@ -405,7 +415,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
 
     /// Every tangency of an orbit, in order of time.
     pub(crate) fn tangencies(&mut self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
-        let map = Self::map_at(self.family, &mut self.map, node.parameter)?;
+        let (family, touches) = (self.family, self.passes_touches);
+        let map = Self::map_at(family, &mut self.map, node.parameter, touches)?;
         let points = node.points.chunks_exact(self.d);
         let mut periods: Vec<_> = points.map(|point| (point.to_vec(), Vec::new())).collect();
         side_by_side(map, &mut periods, &|map, (state, found)| {
@@ -453,7 +464,6 @@ pub(crate) mod tests {
     use std::convert::Infallible;
 
     use super::*;
-    use crate::map::StroboscopicMap;
 
     /// x → r x (1 − x), for the tests of this folder.
     #[derive(Clone)]

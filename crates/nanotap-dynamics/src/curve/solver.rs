@@ -5,13 +5,17 @@ use nalgebra::{DMatrix, DVector};
 use crate::continuation::{Bifurcation, BifurcationKind, ContinuationError, OrbitTangency};
 use crate::curve::{CurveOptions, CurvePoint};
 use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
-use crate::map::TwoParameterFamily;
+use crate::map::{StroboscopicMap, TwoParameterFamily};
 use crate::orbit::Multipliers;
 use crate::orbit::shooting::{MOST_SETTINGS, Segments, set_discrete_entries};
 use crate::vector::{distance, norm, unit};
 
 /// Part of the unit in which its branch was followed up to which an orbit has no size of its own.
 const NO_SIZE: f64 = 1e-6;
+
+/// Steps of differences, as parts of the scales.
+const LONGEST_DIFFERENCE: f64 = 1e-6;
+const SHORTEST_DIFFERENCE: f64 = 1e-8;
 
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.
 #[derive(Clone, Debug)]
@@ -98,10 +102,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     fn orbit_from(&self, u: &[f64]) -> Result<Trajectory, MapFailure> {
         let (d, n) = (self.d, self.n);
         let parameters = [u[d], u[d + 1]];
-        let mut map = self
-            .family
-            .at(parameters[0], parameters[1])
-            .map_err(MapFailure::refused)?;
+        let mut map = self.map_at(u)?;
         let mut segments = Segments::new(d, n);
         segments.discrete = d - self.continuous;
         let mut state = u[..d].to_vec();
@@ -154,9 +155,14 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     }
 
     pub(super) fn map_at(&self, u: &[f64]) -> Result<F::Map, MapFailure> {
-        self.family
+        let mut map = self
+            .family
             .at(u[self.d], u[self.d + 1])
-            .map_err(MapFailure::refused)
+            .map_err(MapFailure::refused)?;
+        if matches!(self.kind, BifurcationKind::Grazing { .. }) {
+            map.pass_touches();
+        }
+        Ok(map)
     }
 
     /// The function that vanishes on the locus, from the Jacobians of an orbit.
@@ -263,13 +269,25 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         Ok(nearest.map(|(_, t)| t))
     }
 
+    /// The step of the differences, in units of the scales: short against the distance to the next
+    /// grazing, near which derivatives of the map change fast.
+    fn difference_step(&self, map: &mut F::Map, x: &[f64]) -> f64 {
+        if let BifurcationKind::Grazing { .. } = self.kind {
+            return LONGEST_DIFFERENCE;
+        }
+        let all = self.all_tangencies(map, x).into_iter();
+        let closest = all.fold(f64::INFINITY, |m, t| m.min(t.value.abs())) / self.scales[0];
+        (0.01 * closest).clamp(SHORTEST_DIFFERENCE, LONGEST_DIFFERENCE)
+    }
+
     fn gradient(&self, u: &[f64]) -> Result<Vec<f64>, MapFailure> {
         let d = self.d;
         let mut here = self.map_at(u)?;
+        let step = self.difference_step(&mut here, &u[..d]);
         let mut shifted = u.to_vec();
         let mut gradient = Vec::with_capacity(u.len());
         for i in 0..u.len() {
-            let h = 1e-6 * self.scales[i];
+            let h = step * self.scales[i];
             let (high, low) = (u[i] + h, u[i] - h);
             let mut at = |value: f64| -> Result<f64, MapFailure> {
                 shifted[i] = value;
@@ -413,15 +431,20 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
 
     /// Every extremum of the switching functions along the orbit.
     pub(super) fn tangencies(&self, node: &CurveNode) -> Vec<OrbitTangency> {
+        match self.map_at(&node.u) {
+            Ok(mut map) => self.all_tangencies(&mut map, &node.u[..self.d]),
+            Err(_) => Vec::new(),
+        }
+    }
+
+    /// The same of the run from `x`, as far as it can be followed.
+    fn all_tangencies(&self, map: &mut F::Map, x: &[f64]) -> Vec<OrbitTangency> {
         let mut found = Vec::new();
-        let Ok(mut map) = self.map_at(&node.u) else {
-            return found;
-        };
-        let mut state = node.u[..self.d].to_vec();
+        let mut state = x.to_vec();
         let mut one = Vec::new();
         for k in 0..self.n {
             one.clear();
-            if advance_with_tangencies(&mut map, &mut state, &mut one).is_err() {
+            if advance_with_tangencies(map, &mut state, &mut one).is_err() {
                 break;
             }
             found.extend(one.iter().map(|t| OrbitTangency {

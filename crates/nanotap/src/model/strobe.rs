@@ -208,6 +208,13 @@ impl StroboscopicMap for Strobe {
         }
     }
 
+    fn pass_touches(&mut self) {
+        if let Engine::Exact(map) = &mut self.0 {
+            let period = map.flow.system().drive().period();
+            map.flow.pass_touches(LONGEST_TOUCH * period);
+        }
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -227,6 +234,9 @@ impl StroboscopicMap for Strobe {
         }
     }
 }
+
+/// The longest touch of a rigid stop that is passed through near a grazing, in drive periods.
+const LONGEST_TOUCH: f64 = 0.1;
 
 /// The most states that are advanced together.
 const TOGETHER: usize = 64;
@@ -251,6 +261,8 @@ struct ExactStrobe {
     gap: Arc<Output>,
     /// Whether tip and surface part at equal speeds.
     parts_at_rest: bool,
+    /// Whether the sample is a rigid stop.
+    is_rigid: bool,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
 }
@@ -264,6 +276,7 @@ impl ExactStrobe {
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
             parts_at_rest: model.forgetting.is_some(),
+            is_rigid: model.rigid_stop.is_some(),
             tangents: tangents.into(),
         }
     }
@@ -309,7 +322,7 @@ impl ExactStrobe {
     ) -> Result<(), FlowError> {
         // Threads that share the system count no references to it every period.
         let flow = &mut self.flow;
-        self.carried.begin(&flow.system().regimes()[flow.regime()]);
+        self.carried.begin(flow.system(), flow.regime());
         flow.run_period(&mut (&mut self.carried, observer))?;
         let regime = &flow.system().regimes()[flow.regime()];
         self.carried.to_state(regime, jacobian);
@@ -355,7 +368,8 @@ impl ExactStrobe {
         jacobian: &mut DMatrix<f64>,
     ) -> Result<f64, FlowError> {
         self.begin(state)?;
-        let mut sum = LogDeterminant(0.0);
+        let sticks = self.flow.system().sticks(self.flow.regime());
+        let mut sum = LogDeterminant(if sticks { f64::NAN } else { 0.0 });
         self.run_with_jacobian(&mut sum, jacobian)?;
         self.end(state);
         Ok(sum.0)
@@ -400,6 +414,7 @@ impl ExactStrobe {
         let mut collector = GapExtrema {
             gap: &self.gap,
             parts_at_rest: self.parts_at_rest,
+            is_rigid: self.is_rigid,
             switched: false,
             tangencies,
         };
@@ -416,7 +431,8 @@ fn log_impact(transition: &Transition) -> Option<f64> {
     Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))
 }
 
-/// Sums log|det| over a period: tr A · t in every regime, and the switches.
+/// Sums log|det| over a period: tr A · t in every regime, and the switches. Not a number of a motion
+/// that sticks, by which volumes vanish.
 struct LogDeterminant(f64);
 
 impl Observer for LogDeterminant {
@@ -425,6 +441,10 @@ impl Observer for LogDeterminant {
     }
 
     fn switch(&mut self, switch: &SwitchView<'_>) {
+        if switch.stuck {
+            self.0 = f64::NAN;
+            return;
+        }
         let transitions = &switch.system.transitions()[switch.switch.from];
         let impact = transitions.get(switch.transition).and_then(log_impact);
         let continuous = || switch.switch.log_determinant(switch.rate);
@@ -435,9 +455,12 @@ impl Observer for LogDeterminant {
 /// Collects the local extrema of the gap over a period.
 struct GapExtrema<'a> {
     gap: &'a Output,
-    /// Whether tip and surface part at equal speeds: the gap is then least, and zero, where they
+    /// Whether tip and surface part at equal speeds, as from a rigid stop to which the tip stuck: the gap is then least, and zero, where they
     /// part, which is no grazing.
     parts_at_rest: bool,
+    /// Whether nothing but a least gap can graze: the tops of ever lower flights of a chatter end in
+    /// rounding.
+    is_rigid: bool,
     /// Whether the stretch begins with a switch.
     switched: bool,
     tangencies: &'a mut Vec<Tangency>,
@@ -462,7 +485,11 @@ impl Observer for GapExtrema<'_> {
         let rate = signal.differentiated(segment.length);
         let period = system.drive().period();
         for s in sign_changes(&rate, segment.length) {
-            if self.parts_at_rest && self.switched && s < PARTING * period {
+            let parts_at_rest = self.parts_at_rest || self.is_rigid;
+            if parts_at_rest && self.switched && s < PARTING * period {
+                continue;
+            }
+            if self.is_rigid && rate.differentiated(segment.length).at(s) <= 0.0 {
                 continue;
             }
             let phase = (segment.phase + s) / period;
@@ -473,11 +500,12 @@ impl Observer for GapExtrema<'_> {
         }
     }
 
-    /// Where what only grazes breaks off, no extremum is left beyond a grazing: in its place is the
-    /// one that the gap would have had without the switch, ġ²/(2|g̈|) behind it.
+    /// Where what only grazes breaks off, and at impacts, no extremum is left beyond a grazing: in its
+    /// place is the one that the gap would have had without the switch, ġ²/(2|g̈|) behind it.
     fn switch(&mut self, switch: &SwitchView<'_>) {
         self.switched = true;
-        if !switch.switch.breaks_grazing() {
+        let (from, to) = (switch.switch.from, switch.switch.to);
+        if !(switch.switch.breaks_grazing() || from == to) {
             return;
         }
         let system = switch.system;

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::{Case, CaseError, Key, ParameterUnit, PlaneFamily};
+use crate::model::recording::Recording;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
@@ -628,7 +629,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         key,
         parameter_unit: None,
     };
-    let end = |branch: &Branch| branch.end.words(|value| case.shown(key, value));
+    let end = |branch: &Branch| end_of(case, key, branch);
     // A seed at an end of the range has nothing on one side, and a branch that was followed
     // from both of its ends is one.
     let branches = &diagram.branches;
@@ -694,6 +695,35 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         }
     }
     report
+}
+
+/// Why a branch ends, in words.
+fn end_of(case: &Case, key: Key, branch: &Branch) -> String {
+    let shown = |value| case.shown(key, value);
+    match branch.end {
+        BranchEnd::StepTooSmall { parameter, .. } if hits_at_phase_0(case, key, branch) => format!(
+            "an impact falls on drive phase 0 at {}, where the state at that phase jumps",
+            shown(parameter)
+        ),
+        _ => branch.end.words(shown),
+    }
+}
+
+/// Whether the last orbit of a branch hits a rigid stop just where a drive period begins.
+fn hits_at_phase_0(case: &Case, key: Key, branch: &Branch) -> bool {
+    /// Part of a drive period.
+    const JUST: f64 = 1e-6;
+    let hits = || {
+        let point = branch.points.last()?;
+        let model = case.with(key, point.parameter).model().ok()?;
+        let recording = Recording::of(&model, point.orbit.states.first()?, branch.period).ok()?;
+        let mut hits = recording.impulses(&model).into_iter();
+        Some(hits.any(|(time, _)| {
+            let periods = time / model.period();
+            (periods - periods.round()).abs() <= JUST
+        }))
+    };
+    hits().unwrap_or(false)
 }
 
 /// Whether two branches pass through just the same bifurcations, of which there are some.

@@ -358,6 +358,8 @@ fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Traject
                 .sum();
             (found - expected - log_remembered(model, forgetting, trajectory)).abs()
         }
+        // Both vanish where the motion sticks.
+        _ if orbit.log_determinant == expected => 0.0,
         _ => (orbit.log_determinant - expected).abs(),
     }
 }
@@ -416,6 +418,10 @@ fn flights(model: &Model, trajectory: &Trajectory) -> impl Iterator<Item = f64> 
 /// log|det DPⁿ| from Liouville's formula: every impact has determinant ±(product of the
 /// resets), every other switch that of its saltation, every segment e^{tr A · length}.
 fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
+    let mut segments = trajectory.segments().iter();
+    if segments.any(|s| model.system.sticks(s.regime)) {
+        return f64::NEG_INFINITY;
+    }
     // A memory that is forgotten is left out, and its jump with it.
     let forgets = model.forgetting.as_ref();
     let forgotten = match forgets {

@@ -15,7 +15,7 @@
 //! below. Constant parts of the response add to it, and the tip must be able to start
 //! twice as far off as the sample is.
 //!
-//! Of a rigid stop the part beyond the stop is cut off. A sample with a memory starts
+//! Of a rigid stop the part behind the stop is cut off. A sample with a memory starts
 //! relaxed: it would forget within a contact or two.
 
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -68,7 +68,7 @@ pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
         (lower[j], upper[j]) = (-half, half);
         (lower[n + j], upper[n + j]) = (-speed, speed);
     }
-    if let Some(stop) = rigid_stop(model) {
+    if let Some(stop) = model.rigid_stop.map(|stop| stop.tip) {
         let width = upper[0] - lower[0];
         upper[0] = upper[0].min(stop);
         if lower[0] >= upper[0] {
@@ -103,7 +103,11 @@ pub fn default_starts(model: &Model, seed: u64) -> Result<StartSet, StartBoxErro
         .iter()
         .filter(|r| r.matrix().amax() > 0.0)
         .map(|r| r.response().at(drive, 0.0).as_slice().to_vec())
-        .filter(|x| x.iter().all(|v| v.is_finite()));
+        .filter(|x| x.iter().all(|v| v.is_finite()))
+        .map(|mut state| {
+            model.stop_at_wall(&mut state);
+            state
+        });
     let given = std::iter::once(centre.clone()).chain(responses);
     Ok(StartSet::spread(&sides, &centre, &SIZES, seed)?.with_given(given))
 }
@@ -130,18 +134,6 @@ fn widening(swing: f64, damping: f64, omega: f64) -> f64 {
         f64::INFINITY
     };
     (2.0 * gain.sqrt()).clamp(WIDENING.0, WIDENING.1)
-}
-
-/// Where a rigid stop stands; starts beyond it make no sense.
-fn rigid_stop(model: &Model) -> Option<f64> {
-    let rigid = model
-        .system
-        .transitions()
-        .iter()
-        .flatten()
-        .any(|e| e.reset.is_some());
-    // gap = stop − x
-    (rigid && model.beam.is_none()).then_some(model.gap.constant)
 }
 
 /// A side of the box that somebody gave makes no sense.

@@ -1,9 +1,13 @@
 //! The one-degree-of-freedom impact oscillator: closed forms, known orbits, chatter and
 //! sticking, and the soft stop in the limit of infinite stiffness.
 
+use nalgebra::Complex;
+use nanotap::case::{Case, Key};
+use nanotap::control::Control;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::{Set, measure};
-use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap::study::branch::{BranchOptions, BranchReport, branch};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_flow::Trajectory;
 
 fn rigid(omega: f64, restitution: f64) -> Oscillator {
@@ -222,4 +226,262 @@ fn runs_that_impact_at_phase_zero_go_on() {
     }
     // Behind the wall by more than rounding is no state at all.
     assert!(map.advance(&mut [1e-9, 0.5]).is_err());
+}
+
+/// The oscillator of a wall at 1 with damping 0.1 and restitution 0.8.
+fn walled(forcing: f64, omega: f64) -> Oscillator {
+    Oscillator {
+        damping: 0.1,
+        forcing,
+        gap: 1.0,
+        ..rigid(omega, 0.8)
+    }
+}
+
+/// The period-1 orbit of an oscillator.
+fn settled(oscillator: Oscillator) -> OrbitReport {
+    let options = OrbitOptions {
+        period: Some(1),
+        ..OrbitOptions::default()
+    };
+    orbit(&oscillator.model().unwrap(), &options).unwrap()
+}
+
+/// The impulses of a rigid stop are part of the force. Fourier's coefficients of
+/// m ẍ + c ẋ + k x = F cos ωt − N are (k − m j²ω² + i c j ω) x_j = F δ_j1 − N_j for every harmonic j,
+/// so that ⟨N⟩ = −k ⟨x⟩ (0.4858 of the first orbit), bouncing, chattering to rest or stuck. The
+/// virial of impacts is their impulse times the position of the stop; the stop takes what the drive
+/// delivers and the damper leaves.
+#[test]
+fn impulses_count_in_every_observable_of_the_force() {
+    let sticks = Oscillator {
+        gap: -0.2,
+        stop: Stop::Rigid { restitution: 0.2 },
+        ..walled(1.0, 0.3)
+    };
+    let rests = Oscillator {
+        stiffness: 37.6001,
+        damping: 0.0115648,
+        forcing: 1.76317,
+        omega: 6.7038,
+        gap: -0.537534,
+        ..rigid(1.0, 0.293947)
+    };
+    for (oscillator, contact) in [(walled(1.0, 1.0), false), (sticks, true), (rests, true)] {
+        let report = settled(oscillator);
+        let seen = &report.observables;
+        let Oscillator {
+            mass,
+            stiffness,
+            damping,
+            forcing,
+            omega,
+            gap,
+            ..
+        } = oscillator;
+        let mean = -stiffness * seen.mean_deflection;
+        assert!(
+            (seen.mean_force - mean).abs() < 1e-10,
+            "{} {mean}",
+            seen.mean_force
+        );
+        assert!((seen.virial + mean * gap).abs() < 1e-10, "{}", seen.virial);
+        assert_eq!(seen.contact_fraction > 0.0, contact);
+        let energy = seen.energy_balance;
+        let taken = energy.drive_work - energy.beam_damping;
+        assert!((energy.sample_damping - taken).abs() < 1e-10, "{energy:?}");
+        assert!((seen.dissipation - taken).abs() < 1e-10, "{energy:?}");
+        // Re(c e^{iωt}) = A sin(ωt − φ).
+        let phasor = |amplitude: f64, lag: f64| {
+            let (sin, cos) = lag.to_radians().sin_cos();
+            Complex::new(-amplitude * sin, -amplitude * cos)
+        };
+        for harmonic in &report.spectrum.harmonics {
+            let order = harmonic.order;
+            let rate = order * omega;
+            let along = Complex::new(stiffness - mass * rate * rate, damping * rate);
+            let drive = if order == 1.0 { forcing } else { 0.0 };
+            let expected = -along * phasor(harmonic.tip, harmonic.tip_phase) + drive;
+            let found = phasor(harmonic.force, harmonic.force_phase);
+            assert!(
+                (found - expected).norm_sqr() < 1e-20,
+                "{order}: {found} {expected}"
+            );
+        }
+    }
+    let bounces = settled(walled(1.0, 1.0)).observables;
+    assert!((bounces.mean_force - 0.4858).abs() < 5e-5);
+    let impulse = 1.8 * bounces.impact_speed / std::f64::consts::TAU;
+    assert!((bounces.mean_force - impulse).abs() < 1e-12);
+}
+
+/// Pressed by a spring behind which the stop stands, the mass starts and rests on the stop, and
+/// every neighbour returns to it: both multipliers are 0.
+#[test]
+fn a_mass_rests_on_a_stop_before_it() {
+    let oscillator = Oscillator {
+        gap: -0.5,
+        ..walled(0.3, 1.3)
+    };
+    let model = oscillator.model().unwrap();
+    assert_eq!(model.rest(), [-0.5, 0.0]);
+    let report = settled(oscillator);
+    assert_eq!(report.state, [-0.5, 0.0]);
+    assert!(report.stable && report.multipliers.iter().all(|m| *m == [0.0, 0.0]));
+    assert_eq!(report.determinant_defect, 0.0);
+    assert_eq!(report.observables.contact_fraction, 1.0);
+    // The drive takes the mass off the stop when it exceeds k · 0.5.
+    let lifted = settled(Oscillator {
+        forcing: 0.6,
+        ..oscillator
+    });
+    assert!(lifted.observables.contact_fraction < 1.0 && lifted.observables.amplitude > 0.0);
+}
+
+fn followed(oscillator: Oscillator, options: &BranchOptions) -> BranchReport {
+    branch(&Case::from(oscillator), options, &Control::default()).unwrap()
+}
+
+/// The linear response touches the wall where F = √((k − mω²)² + c²ω²) · gap. The free orbit ends
+/// there from below, that with impacts from above, however the two lie to each other (a fold is
+/// beside the grazing at resonance), and the curve of the grazing is known over the whole window.
+#[test]
+fn grazing_is_named_from_both_sides_and_followed_in_two_parameters() {
+    for (from, to) in [(0.05, 1.0), (1.0, 0.01)] {
+        let report = followed(
+            walled(from, 1.0),
+            &BranchOptions::over(Key::Forcing, from, to),
+        );
+        let end = report.bifurcations.last().unwrap();
+        assert_eq!((end.kind, report.branches[0].complete), ("grazing", true));
+        assert!((end.parameter - 0.1).abs() < 1e-12, "{}", end.parameter);
+        let words = &report.branches[0].end;
+        assert!(
+            words.contains("grazes at 0.1") && words.contains("without bound"),
+            "{words}"
+        );
+        assert!(report.failures.is_empty());
+    }
+    type Window = (Key, (f64, f64), Key, (f64, f64));
+    let windows: [Window; 4] = [
+        (Key::Forcing, (0.05, 1.0), Key::OscillatorOmega, (0.2, 1.4)),
+        (Key::Forcing, (1.0, 0.01), Key::OscillatorOmega, (0.5, 1.4)),
+        (Key::OscillatorGap, (1.0, 0.2), Key::Damping, (0.01, 0.5)),
+        (Key::OscillatorGap, (1.0, 0.2), Key::Restitution, (0.1, 0.9)),
+    ];
+    for (first, (from, to), second, (low, high)) in windows {
+        let base = Case::from(walled(
+            if first == Key::OscillatorGap {
+                0.05
+            } else {
+                from
+            },
+            1.0,
+        ));
+        let options = BranchOptions {
+            second: Some((second, low, high)),
+            ..BranchOptions::over(first, from, to)
+        };
+        let report = branch(&base, &options, &Control::default()).unwrap();
+        let loci = report.loci.unwrap();
+        let curve = loci.curves.iter().find(|c| c.kind == "grazing").unwrap();
+        assert_eq!(curve.meets, [None, None], "{:?}", curve.ends);
+        let edges = |values: &[f64], ends: [f64; 2]| {
+            let last = values[values.len() - 1];
+            ends.iter()
+                .filter(|end| (values[0] - **end).abs().min((last - **end).abs()) < 1e-12)
+                .count()
+        };
+        assert_eq!(
+            edges(&curve.first, [from, to]) + edges(&curve.second, [low, high]),
+            2
+        );
+        for (x, y) in curve.first.iter().zip(&curve.second) {
+            let case = base.with(first, *x).with(second, *y);
+            let [k, m, c] = [Key::Stiffness, Key::Mass, Key::Damping].map(|key| case.get(key));
+            let omega = case.get(Key::OscillatorOmega);
+            let response = case.get(Key::Forcing) / (k - m * omega * omega).hypot(c * omega);
+            assert!(
+                (response / case.get(Key::OscillatorGap) - 1.0).abs() < 1e-12,
+                "{x} {y}"
+            );
+        }
+    }
+}
+
+/// A cascade of doublings at gap 0: over the narrow range Ω = 2.72 … 2.74 the flip of period 16 is
+/// found at 2.731834122, and runs at 2.7316 and 2.7319 settle on periods 16 and 32. Over a range that
+/// is 37 times as wide every doubled branch still begins at its flip and shows its own; the
+/// distances shrink towards Feigenbaum's 4.669.
+#[test]
+fn a_cascade_is_followed_to_its_end() {
+    let cascade = Oscillator {
+        omega: 2.0,
+        ..rigid(2.0, 0.8)
+    };
+    let options = BranchOptions {
+        doublings: 6,
+        max_step: 0.01,
+        ..BranchOptions::over(Key::OscillatorOmega, 2.0, 2.74)
+    };
+    let report = followed(cascade, &options);
+    let flips: Vec<f64> = (report.bifurcations.iter())
+        .filter(|b| b.kind == "flip")
+        .map(|b| b.parameter)
+        .collect();
+    let periods: Vec<usize> = report.branches.iter().map(|b| b.period).collect();
+    assert_eq!(periods, [1, 2, 4, 8, 16, 32, 64]);
+    assert!((flips[4] - 2.731834122).abs() < 1e-9, "{flips:?}");
+    let ratio = (flips[4] - flips[3]) / (flips[5] - flips[4]);
+    assert!((ratio - 4.669).abs() < 0.05, "{ratio}");
+    for (k, flip) in flips.iter().take(6).enumerate() {
+        let first = report.points.iter().find(|p| p.branch == k + 1).unwrap();
+        assert_eq!(first.parameter.to_bits(), flip.to_bits());
+    }
+    for (omega, period, branch) in [(2.7316, 16, 4), (2.7319, 32, 5)] {
+        let stable = (report.points.iter()).filter(|p| p.branch == branch && p.stable);
+        let near = stable.min_by(|a, b| {
+            let [a, b] = [a, b].map(|p| (p.parameter - omega).abs());
+            a.total_cmp(&b)
+        });
+        let options = OrbitOptions {
+            period: Some(period),
+            state: near.map(|p| p.state.clone()),
+            ..OrbitOptions::default()
+        };
+        let here = orbit(&Oscillator { omega, ..cascade }.model().unwrap(), &options).unwrap();
+        assert_eq!((here.period, here.stable), (period, true));
+    }
+}
+
+/// A mass that chatters to rest on the stop in every period is one motion whatever the rounding of
+/// its impacts, with multipliers 0, and its branch over the gap is one without grazings of flights
+/// that end in rounding.
+#[test]
+fn chatter_to_rest_is_one_motion() {
+    let chatter = Oscillator {
+        gap: -0.4,
+        ..walled(1.0, 0.3)
+    };
+    let model = chatter.model().unwrap();
+    let end = |start: [f64; 2]| {
+        let options = OrbitOptions {
+            state: Some(start.to_vec()),
+            ..OrbitOptions::default()
+        };
+        orbit(&model, &options).unwrap()
+    };
+    let (a, b) = (end([-0.4, 0.0]), end([-1.0, 0.3]));
+    assert_eq!(a.state, b.state);
+    assert!(a.multipliers.iter().all(|m| *m == [0.0, 0.0]));
+    // Flights shrink by 0.8 each until 1e-8 of a second is left of them.
+    let impacts = a.observables.contacts_per_period;
+    assert!((50.0..150.0).contains(&impacts), "{impacts}");
+    let report = followed(
+        chatter,
+        &BranchOptions::over(Key::OscillatorGap, -0.4, -0.3),
+    );
+    assert!(report.failures.is_empty() && report.branches[0].complete);
+    let kinds: Vec<_> = report.bifurcations.iter().map(|b| b.kind).collect();
+    assert!(kinds.is_empty(), "{kinds:?}");
 }

@@ -77,6 +77,14 @@ pub enum SimulateError {
         /// What was given.
         value: f64,
     },
+    /// The starting state lies behind a rigid stop.
+    #[error("the state's x = {x} lies behind the rigid stop at {stop}")]
+    BehindStop {
+        /// Its displacement.
+        x: f64,
+        /// Where the stop stands.
+        stop: f64,
+    },
     /// Nothing to record.
     #[error("at least one period must be recorded, 0 were asked for")]
     NoPeriods,
@@ -238,7 +246,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
     let n = model.dimension();
     let Some(state) = state else {
-        return Ok(vec![0.0; n]);
+        return Ok(model.rest());
     };
     let mut state = state.to_vec();
     if state.len() + model.memory == n {
@@ -264,8 +272,16 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
             value,
         });
     }
+    if let Some(stop) = model.rigid_stop.map(|stop| stop.tip)
+        && state[0] > stop + BEHIND_STOP * stop.abs().max(state[0].abs())
+    {
+        return Err(SimulateError::BehindStop { x: state[0], stop });
+    }
     Ok(state)
 }
+
+/// Part of a displacement by which a state counts as behind a rigid stop.
+const BEHIND_STOP: f64 = 1e-9;
 
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
@@ -571,6 +587,9 @@ impl From<SimulateError> for crate::Error {
         match error {
             SimulateError::State { .. } | SimulateError::StateValue { .. } => {
                 Self::input(error.to_string(), "count the numbers of {state}")
+            }
+            SimulateError::BehindStop { .. } => {
+                Self::input(error.to_string(), "give a {state} in front of the stop")
             }
             SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
             SimulateError::Flow(error) => error.into(),

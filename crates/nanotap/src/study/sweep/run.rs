@@ -56,17 +56,15 @@ impl Starts {
     /// The `index`-th one, for `model`.
     fn state(&self, index: usize, model: &Model) -> Vec<f64> {
         match self {
-            Self::Rest => vec![0.0; model.dimension()],
+            Self::Rest => model.rest(),
             Self::Given(state) => state.clone(),
             // A box that cannot be had was refused when the sweep was made.
-            Self::Seeded { seed, sides, .. } => box_with(model, sides).map_or_else(
-                |_| vec![0.0; model.dimension()],
-                |sides| sides.start(*seed, index as u64),
-            ),
+            Self::Seeded { seed, sides, .. } => box_with(model, sides)
+                .map_or_else(|_| model.rest(), |sides| sides.start(*seed, index as u64)),
             Self::Spread { seed, .. } => default_starts(model, *seed)
                 .ok()
                 .and_then(|starts| starts.start(index))
-                .unwrap_or_else(|| vec![0.0; model.dimension()]),
+                .unwrap_or_else(|| model.rest()),
         }
     }
 }
@@ -186,7 +184,9 @@ pub(super) fn along_line(
             || sweep.options.starts.state(start, &model),
             |state| {
                 let modes = (model.dimension() - model.memory) / 2;
-                with_modes(&state, model.memory, modes)
+                let mut state = with_modes(&state, model.memory, modes);
+                model.stop_at_wall(&mut state);
+                state
             },
         );
         let (outcome, end) = Runner::new(&case, &model, &sweep.options).run(&state);

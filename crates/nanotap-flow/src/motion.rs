@@ -538,7 +538,8 @@ impl Motion {
         let curvature = rate.differentiated(longest).at(0.0);
         // To leading order.
         let expected = -2.0 * crossing.rate / curvature;
-        if !(curvature > 0.0 && expected <= 0.5 * longest) {
+        let comes_back = curvature > 0.0 && expected <= 0.5 * longest;
+        if !comes_back {
             return None;
         }
         if expected * system.fastest() <= SHORTEST_TOUCH {

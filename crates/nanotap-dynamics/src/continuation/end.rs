@@ -92,7 +92,8 @@ fn locate_grazing<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Op
         let rate = (here.value - below.1) / (before - below.0);
         below = (before, here.value);
         let next = before - here.value / rate;
-        if !((next - node.parameter).abs() <= 1e3 * NEAR * solver.parameter_scale) {
+        let away = (next - node.parameter).abs() / solver.parameter_scale;
+        if away.is_nan() || away > 1e3 * NEAR {
             return None;
         }
         (here, found) = at(&found, next, Some(here))?;

@@ -299,7 +299,8 @@ fn unstable_orbits_are_told_in_si() {
         assert!(!physical[name].is_null(), "{name}");
     }
     let alone = ["orbit", "soft.toml", "--period", "1", "--json", "--state"];
-    let state: Vec<String> = vector(&orbit["state"]).iter().map(f64::to_string).collect();
+    let state = orbit["state"].as_array().unwrap().iter();
+    let state: Vec<String> = state.map(ToString::to_string).collect();
     let alone = folder
         .run(&[&alone[..], &[&state.join(",")]].concat())
         .json();

@@ -45,7 +45,7 @@ pub(crate) enum Followed<'a> {
 }
 
 /// A run that does not close.
-pub(crate) struct Unmeasured<'a>(Run<'a>);
+pub(crate) struct Unmeasured<'a>(Box<Run<'a>>);
 
 impl Unmeasured<'_> {
     pub(crate) fn measured<M: StroboscopicMap>(mut self, map: &mut M) -> RunEnd {
@@ -101,7 +101,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
                 }
                 Ok(AfterLook::Measure) if are_more => member.run.measure(map),
                 Ok(AfterLook::Measure) => {
-                    let run = Unmeasured(member.run);
+                    let run = Unmeasured(Box::new(member.run));
                     followed(member.number, Followed::Unmeasured(run));
                     continue;
                 }

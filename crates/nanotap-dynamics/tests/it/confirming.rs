@@ -2,11 +2,11 @@
 
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, DMatrix, MotionKind,
-    PeriodicOrbit, StartBox, StartSet, StroboscopicMap, census_of, classify,
+    AttractorKind, CancelFlag, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, DMatrix,
+    MotionKind, PeriodicOrbit, StartBox, StartSet, StroboscopicMap, census_of, classify,
 };
 
 use crate::systems::{Cubic, Formula, Logistic, Nested, System};
@@ -198,11 +198,11 @@ fn seeds_are_attractors_without_starts() {
 #[test]
 fn a_cancelled_census_of_chaos_ends_soon() {
     let map = Pair::new(Logistic(3.9), Logistic(3.9001));
-    let cancel = AtomicBool::new(false);
+    let cancel = CancelFlag::new();
     let at = AtomicUsize::new(0);
     let stop = |done, _| {
         if done == 100 {
-            cancel.store(true, Ordering::Relaxed);
+            cancel.cancel();
             at.store(map.periods().iter().sum(), Ordering::Relaxed);
         }
     };

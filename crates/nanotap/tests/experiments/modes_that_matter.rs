@@ -1,5 +1,6 @@
 //! Which modes matter.
 
+use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::convergence::convergence;
 use nanotap::study::orbit::OrbitOptions;
@@ -14,7 +15,14 @@ fn shares_of_a_free_lever_are_the_closed_form() {
         omega: 20.0,
         ..Cantilever::paper()
     };
-    let found = convergence(&case, 4, 0.01, &OrbitOptions::default()).unwrap();
+    let found = convergence(
+        &case,
+        4,
+        0.01,
+        &OrbitOptions::default(),
+        &Control::default(),
+    )
+    .unwrap();
     let modes = nanotap::model::beam::Modes::new(4).unwrap();
     let square = case.omega * case.omega;
     let response: Vec<nalgebra::Complex<f64>> = (0..4)
@@ -57,7 +65,7 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
         ..OrbitOptions::default()
     };
     let tolerance = 0.05;
-    let found = convergence(&case, 6, tolerance, &options).unwrap();
+    let found = convergence(&case, 6, tolerance, &options, &Control::default()).unwrap();
     let report = &found.readings;
     let sum = |of: fn(&nanotap::study::mode_share::ModeShare) -> f64| -> f64 {
         report.mode_shares.iter().map(of).sum()
@@ -91,7 +99,14 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
 /// What is chaotic has no single reading: the verdict says so.
 #[test]
 fn a_motion_that_is_no_orbit_is_left_undecided() {
-    let found = convergence(&Cantilever::paper(), 3, 0.01, &OrbitOptions::default()).unwrap();
+    let found = convergence(
+        &Cantilever::paper(),
+        3,
+        0.01,
+        &OrbitOptions::default(),
+        &Control::default(),
+    )
+    .unwrap();
     assert!(found.readings.reading_verdict.starts_with("undecided"));
     assert!(
         found.motions[2]

@@ -7,7 +7,7 @@ use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
-use nanotap_dynamics::Control;
+use nanotap_dynamics::{CancelFlag, Control};
 
 use crate::folder::{Folder, assert_same, bytes};
 

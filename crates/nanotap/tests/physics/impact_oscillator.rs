@@ -338,6 +338,9 @@ fn a_mass_rests_on_a_stop_before_it() {
     assert!(lifted.observables.contact_fraction < 1.0 && lifted.observables.amplitude > 0.0);
 }
 
+/// A first parameter and its range, and a second.
+type Window = (Key, (f64, f64), Key, (f64, f64));
+
 fn followed(oscillator: Oscillator, options: &BranchOptions) -> BranchReport {
     branch(&Case::from(oscillator), options, &Control::default()).unwrap()
 }
@@ -362,7 +365,6 @@ fn grazing_is_named_from_both_sides_and_followed_in_two_parameters() {
         );
         assert!(report.failures.is_empty());
     }
-    type Window = (Key, (f64, f64), Key, (f64, f64));
     let windows: [Window; 4] = [
         (Key::Forcing, (0.05, 1.0), Key::OscillatorOmega, (0.2, 1.4)),
         (Key::Forcing, (1.0, 0.01), Key::OscillatorOmega, (0.5, 1.4)),

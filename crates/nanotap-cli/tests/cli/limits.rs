@@ -35,6 +35,7 @@ fn needed(study: &str) -> &'static [&'static str] {
 fn beside(name: &str) -> &'static [&'static str] {
     match name {
         "strobe" | "events" => &["--periods", "2000000"],
+        "points" => &["--out", "points.csv"],
         "resolution" => &["--out", "series.csv"],
         "steps" => &["--method", "rk4"],
         _ => &[],
@@ -118,7 +119,14 @@ fn what_is_too_much_together_is_refused() {
         "500000 at most",
         "--strobe",
     ]);
-    let section = ["lyapunov", "case.toml", "--points", "2000000"];
+    let section = [
+        "lyapunov",
+        "case.toml",
+        "--points",
+        "2000000",
+        "--out",
+        "section.csv",
+    ];
     folder
         .run(&[&section[..], &many].concat())
         .refused(&["500000 at most", "--points"]);

@@ -57,6 +57,12 @@ pub mod system;
 pub mod trajectory;
 pub mod variation;
 
+/// The vector instructions of the inner loops, in words: results are the same with all, times are
+/// not.
+pub fn vector_instructions() -> &'static str {
+    simd::vector_instructions()
+}
+
 /// The complex numbers used throughout.
 pub type Complex = nalgebra::Complex<f64>;
 
@@ -67,7 +73,6 @@ pub use flow::{Flow, Observer};
 pub use harmonic::{HarmonicVector, Output};
 pub use prepared_basis::PreparedBasis;
 pub use regime::Regime;
-pub use simd::vector_instructions;
 pub use spectral::SpectralBasis;
 pub use system::{Onset, Reset, Sticking, System, Transition};
 pub use trajectory::{Event, Trajectory};

@@ -192,9 +192,8 @@ pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
     work.run::<Twice<Plain>>()
 }
 
-/// The vector instructions of the inner loops, in words: results are the same with all, times are
-/// not.
-pub fn vector_instructions() -> &'static str {
+/// See [`crate::vector_instructions`].
+pub(crate) fn vector_instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     match (avx512_available(), avx2_available()) {
         (true, true) => "AVX-512",

@@ -216,7 +216,7 @@ fn long_work_says_that_it_goes_on() {
         .map(|doubled| said_on_a_terminal(200_000 << doubled))
         .find(|text| !text.is_empty())
         .expect("a hundred million periods take longer than any machine keeps silent");
-    assert!(said.contains("working, 1 s so far"), "{said:?}");
+    assert!(said.contains("lyapunov: 1 s so far"), "{said:?}");
     assert!(said.ends_with("\r\u{1b}[K"), "{said:?}");
 }
 

@@ -184,7 +184,7 @@ follows! {
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
-    the_tip_mass: "tip-mass.md", 2 commands, 5 numbers;
+    the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;
     the_tutorial_of_the_dynamicist: "dynamicist.md", 7 commands, 31 numbers;
     the_tutorial_of_the_microscopist: "microscopist.md", 6 commands, 22 numbers;
 }

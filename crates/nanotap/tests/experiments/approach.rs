@@ -130,7 +130,7 @@ fn a_curve_is_the_same_on_any_number_of_threads() {
 /// every two decay times.
 #[test]
 fn a_coarse_curve_follows_the_motion_that_a_slow_run_comes_to() {
-    let case = studied(STIFF, &["cantilever.Q=100"]);
+    let case = studied(STIFF, &["cantilever.Q=200"]);
     let options = ApproachOptions {
         points: 9,
         branches: false,
@@ -149,7 +149,7 @@ fn a_coarse_curve_follows_the_motion_that_a_slow_run_comes_to() {
             let share = k as f64 / steps;
             let gap = at * (1.0 - share) + p.gap * share;
             model = case.with(case.gap_key(), gap).model().unwrap();
-            Strobe::new(&model).advance_by(&mut here, 60).unwrap();
+            Strobe::new(&model).advance_by(&mut here, 120).unwrap();
         }
         let mut map = Strobe::new(&model);
         map.advance_by(&mut here, 4000).unwrap();

@@ -106,6 +106,7 @@ impl Fold {
             case: base.with(swept.key, parameter),
             orbit,
         };
+        let grazing = branch.bifurcations.last().cloned();
         let mut bifurcations = branch.bifurcations.into_iter();
         // Over a stiff sample the fold is so near to the grazing that the branch's turn is not
         // seen, only that a multiplier passes +1, or nothing beyond the grazing at all.
@@ -122,6 +123,7 @@ impl Fold {
                     let last = branch.points.into_iter().next_back()?;
                     Some(at(parameter, last.orbit))
                 }
+                BranchEnd::Unstable { .. } => grazing.map(|b| at(b.parameter, b.orbit)),
                 _ => None,
             },
         }

@@ -142,15 +142,17 @@ fn the_census_at_high_frequency_is_complete() {
     }
 }
 
-/// Every start of a census goes where a long run from it goes: with a period 1 and a period 4 beside
-/// each other, and with the two states in attraction and repulsion, whose attractive one a tip
-/// nears from afar before it touches.
+/// Every start of a census goes where a long run from it goes: with a period 1 and a period 4 at one
+/// frequency, and with the two states in attraction and repulsion, whose attractive one a tip
+/// nears from afar before it touches. Under the nonlinear law of the latter, starts are followed on
+/// the coarse map: a long run on that map decides there, and of the exact runs those that start very
+/// near the boundary of the basins may go elsewhere.
 #[test]
 fn every_start_goes_where_a_long_run_from_it_does() {
     let bistable = stated(include_str!("../../../../docs/cases/bistable-lever.toml"));
     let paper = Model::cantilever(&at(20.0).with(Parameter::Alpha1, 0.0)).unwrap();
     let lever = bistable.model().unwrap();
-    for (model, count, long) in [(paper, 128, 1500), (lever, 32, 3000)] {
+    for (model, count, long, near_boundary) in [(paper, 128, 1500, 0), (lever, 32, 3000, 1)] {
         let starts = default_box(&model).unwrap().starts(1, count);
         let map = Strobe::new(&model);
         let found = census(
@@ -160,21 +162,31 @@ fn every_start_goes_where_a_long_run_from_it_does() {
             &Control::default(),
         );
         assert_eq!(found.attractors.len(), 2);
-        for (k, (start, outcome)) in starts.iter().zip(&found.outcomes_by_start).enumerate() {
-            let mut state = start.clone();
-            let mut map = map.clone();
+        let destination = |map: &Strobe, start: &[f64], tolerance: f64| {
+            let (mut map, mut state) = (map.clone(), start.to_vec());
             for _ in 0..long {
                 map.advance(&mut state).unwrap();
             }
-            let goes_to = found.attractors.iter().position(|a| match &a.kind {
-                AttractorKind::Periodic(orbit) => orbit.nearest(&state).1 < 1e-6 * orbit.scale(),
+            found.attractors.iter().position(|a| match &a.kind {
+                AttractorKind::Periodic(o) => o.nearest(&state).1 < tolerance * o.scale(),
                 _ => false,
-            });
+            })
+        };
+        let coarse = map.coarse();
+        let mut elsewhere = 0;
+        for (k, (start, outcome)) in starts.iter().zip(&found.outcomes_by_start).enumerate() {
             let StartOutcome::Attractor { index, .. } = outcome else {
                 panic!("start {k}: {outcome:?}");
             };
-            assert_eq!(Some(*index), goes_to, "start {k}");
+            if let Some(coarse) = &coarse {
+                // Within the error of the coarse map.
+                assert_eq!(Some(*index), destination(coarse, start, 1e-3), "start {k}");
+            }
+            let exact = destination(&map, start, 1e-6);
+            assert!(exact.is_some(), "start {k}");
+            elsewhere += usize::from(Some(*index) != exact);
         }
+        assert!(elsewhere <= near_boundary, "{elsewhere}");
     }
 }
 

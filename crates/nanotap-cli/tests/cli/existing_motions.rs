@@ -1,6 +1,5 @@
 //! `nanotap attractors` and `lyapunov`.
 
-use crate::motions::vector;
 use crate::util::Folder;
 
 fn number(json: &serde_json::Value, key: &str) -> f64 {

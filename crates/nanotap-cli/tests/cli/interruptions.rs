@@ -58,7 +58,6 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
     Some(match study {
         "modes" => return None,
         "simulate" => vec!["case.toml", "--transient", "100000000"],
-        "orbit" => vec!["case.toml", "--period", "10000"],
         "attractors" => vec!["case.toml", "--starts", "1000000"],
         "branch" => vec![
             "case.toml",
@@ -89,8 +88,8 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
         ],
         "basin" => vec!["case.toml", "--x", "a1=-1:1:2000", "--y", "v1=-1:1:2000"],
         "lyapunov" => vec!["case.toml", "--periods", "100000000"],
-        "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
-        other => panic!("say how long work of {other} is asked for"),
+        "orbit" | "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
+        other => panic!("say how long work of {other} is requested"),
     })
 }
 

@@ -668,10 +668,9 @@ fn with_modes(state: &[f64], model: &Model) -> Vec<f64> {
     let dimension = model.dimension();
     let [own, wanted] = [state.len(), dimension].map(|n| n.saturating_sub(model.memory) / 2);
     let mut resized = vec![0.0; dimension];
-    for k in 0..own.min(wanted) {
-        resized[k] = state[k];
-        resized[wanted + k] = state[own + k];
-    }
+    let shared = own.min(wanted);
+    resized[..shared].copy_from_slice(&state[..shared]);
+    resized[wanted..wanted + shared].copy_from_slice(&state[own..own + shared]);
     for (to, from) in resized[2 * wanted..].iter_mut().zip(&state[2 * own..]) {
         *to = *from;
     }

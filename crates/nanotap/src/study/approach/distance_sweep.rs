@@ -834,16 +834,13 @@ fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
             let of_stability =
                 |b: &&Bifurcation| !matches!(b.kind, BifurcationKind::Grazing { .. });
             let chosen = between.iter().find(of_stability).or(between.first());
-            match chosen {
-                Some(found) => {
-                    let unstable = unstable.map(|p| Box::new(p.orbit));
-                    let at = Box::new(found.clone());
-                    (found.parameter, End::Bifurcation { at, unstable })
-                }
-                None => {
-                    let reason = "the orbit is stable no longer".to_owned();
-                    (last_of(&branch.points), End::Lost(reason))
-                }
+            if let Some(found) = chosen {
+                let unstable = unstable.map(|p| Box::new(p.orbit));
+                let at = Box::new(found.clone());
+                (found.parameter, End::Bifurcation { at, unstable })
+            } else {
+                let reason = "the orbit is stable no longer".to_owned();
+                (last_of(&branch.points), End::Lost(reason))
             }
         }
         BranchEnd::Collapsed { period, parameter } => {

@@ -69,19 +69,18 @@ pub(super) fn found(
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let range = (to, from);
     let mut sweep = DistanceSweep::new(case, range, free.reach, options.max_period, control)?;
-    let (ways, first) = match options.speed {
-        None => Ways::of(&mut sweep, from, to)?,
-        Some(_) => {
-            let mut place = sweep.free()?;
-            if sweep.farthest() > from {
-                place = sweep.way(place, from, |_, _| false).1;
-            }
-            let none = Ways {
-                approach: Vec::new(),
-                retract: Vec::new(),
-            };
-            (none, place)
+    let (ways, first) = if options.speed.is_none() {
+        Ways::of(&mut sweep, from, to)?
+    } else {
+        let mut place = sweep.free()?;
+        if sweep.farthest() > from {
+            place = sweep.way(place, from, |_, _| false).1;
         }
+        let none = Ways {
+            approach: Vec::new(),
+            retract: Vec::new(),
+        };
+        (none, place)
     };
     let written = Written {
         curve,

@@ -88,7 +88,7 @@ def simulate(
     case : Case
         What is studied.
     periods : int
-        Drive periods recorded (1 to 10000000).
+        Drive periods recorded (1 to 2000000).
     transient : int | None
         Drive periods discarded first; without it, as many as the motion is measured
         to need; 0: from the start (0 to 100000000).
@@ -96,10 +96,10 @@ def simulate(
         State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v);
         without it, rest.
     strobe : int
-        How many of the last states at drive phase 0 to keep (0 to 10000000).
+        How many of the last states at drive phase 0 to keep (0 to 1000000).
     events : int
         How many contacts and releases to list at most, the first ones (0 to
-        1000000000).
+        1000000).
     max_period : int
         Longest period looked for (1 to 10000).
     observables : Sequence[str] | None
@@ -280,7 +280,7 @@ def attractors(
         size, from the resonant response down to below the gap, go on until the
         share of starts that may lead to motions not found is below `unseen`, or
         5000 starts or 2,000,000 drive periods (600,000 under a nonlinear law) are
-        done (1 to 10000000).
+        done (1 to 1000000).
     unseen : float | None
         Share of starts that may lead to motions not found, with 95 % confidence, at
         which no more are drawn. Without it, 0.01 under a nonlinear law and 0.002
@@ -375,7 +375,7 @@ def branch(
         Of the `diagram`: values of the parameter at which a census is taken (2 to
         10000).
     starts : int
-        Of the `diagram`: starts at each (1 to 1000000).
+        Of the `diagram`: starts at each (1 to 100000).
     seed : int
         Of the `diagram`: seed of the starts.
     second : Mapping[str, tuple[float | str, float | str]] | str | None
@@ -450,7 +450,7 @@ def approach(
     to : float | str | None
         Distance at which to turn back; without it, 0.
     points : int
-        Distances each way (2 to 1000000).
+        Distances each way (2 to 20000).
     branches : bool
         Also continue the branches that coexist, stable and unstable.
     switch : int
@@ -632,7 +632,7 @@ def sweep(
         twice.
     starts : int | None
         Quasi-random starts at each value, spread over a box of states; without it,
-        one start from rest (1 to 10000000).
+        one start from rest (1 to 1000000).
     seed : int
         Seed of the starts.
     box : Box
@@ -721,7 +721,7 @@ def window(
         omega=2,2.5,4; twice, the first is the horizontal axis.
     starts : int
         Starts of the census at each point: rest, the linear responses, and draws of
-        every size (1 to 10000000).
+        every size (1 to 1000000).
     seed : int
         Seed of the starts.
     max_period : int
@@ -792,7 +792,7 @@ def basin(
         States on the attractors, or what a census found; without it, a census in
         the slice finds them.
     starts : int
-        Starts of the census (1 to 10000000).
+        Starts of the census (1 to 1000000).
     seed : int
         Seed of the census.
     periods : int
@@ -865,7 +865,7 @@ def lyapunov(
     phase : float
         Drive phase of the section in degrees.
     points : int
-        Points of the section (0 to 10000000).
+        Points of the section (0 to 2000000).
 
     Returns
     -------

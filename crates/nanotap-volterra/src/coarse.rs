@@ -30,7 +30,7 @@ const LEVELS: usize = 20;
 const FIRST_LEVEL: usize = 2;
 /// How much a step may change the gap's rate by its estimated error, as a part of the drive's
 /// frequency times the size of the motion.
-pub const TOLERANCE: f64 = 3e-5;
+pub const TOLERANCE: f64 = 2e-5;
 /// A step with less than this part of the allowed error is followed by one twice as long.
 const GROWTH: f64 = 1.0 / 12.0;
 /// Part of the amplitude that counts as the size of the motion where the gap is smaller.

@@ -19,7 +19,7 @@ pub(crate) const INTERRUPTED: u8 = 130;
 
 /// Set by the first Ctrl-C or SIGTERM.
 static STOP: LazyLock<CancelFlag> = LazyLock::new(CancelFlag::new);
-/// Nothing is said on a terminal of work shorter than this.
+/// On a terminal, work shorter than this reports nothing.
 const PATIENCE: Duration = Duration::from_millis(700);
 /// Time between two writes of the line on a terminal.
 const INTERVAL: Duration = Duration::from_millis(200);
@@ -32,7 +32,7 @@ const STOPPING: Duration = Duration::from_millis(900);
 /// The same of work that keeps what is finished.
 const KEEPING: Duration = Duration::from_secs(5);
 
-/// What is said of the work; one program has one line.
+/// The progress line; a program has one.
 static LINE: Mutex<Line> = Mutex::new(Line {
     work: None,
     saving: false,
@@ -176,7 +176,7 @@ pub(crate) fn listen() -> Result<(), Failure> {
     .map_err(|error| Failure::numerics(format!("cannot listen for Ctrl-C: {error}")))
 }
 
-/// Ends the program where work that was told to stop does not.
+/// Ends the program if cancelled work does not end by itself.
 fn end_late() {
     let begun = Instant::now();
     thread::sleep(STOPPING);
@@ -210,7 +210,7 @@ impl Line {
         true
     }
 
-    /// Writes a line of its own; whether to go on.
+    /// Writes a separate line; returns whether to go on.
     fn append(&self, begun: Instant) -> bool {
         if !self.ended {
             let _ = writeln!(std::io::stderr(), "{}", self.words(begun));

@@ -20,7 +20,7 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// How long a message is looked for before its thread goes to sleep: to be woken takes as long as
 /// many a motion, and the next of many calls mostly comes before.
 const AWAKE: Duration = Duration::from_micros(250);
-/// How long work that was told to stop may take to do so. What takes longer is left
+/// How long cancelled work may take to end. What takes longer is left
 /// alone to end by itself: it holds nothing of Python's.
 const PATIENCE: Duration = Duration::from_millis(900);
 /// The same of work that reports its progress: what it has done is worth waiting for.

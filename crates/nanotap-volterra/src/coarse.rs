@@ -45,7 +45,7 @@ const RESOLVED: f64 = 1.5;
 const UNRESOLVED: f64 = 1e-4;
 /// The most steps tried in one oscillation of the fastest tone.
 const MAX_STEPS: u64 = 20_000;
-/// Switches at one instant beyond which the law is said to switch without end.
+/// Switches at one instant after which the law is reported to switch endlessly.
 const MAX_SWITCHES_AT_ONCE: usize = 64;
 /// A law of more branches that knows its branch from gap and rate is evaluated without
 /// locating the switches between them.

@@ -11,7 +11,7 @@ use crate::step::{Quality, Solver, Statistics, Step, gap_scale};
 use crate::system::System;
 use std::sync::Arc;
 
-/// Switches at one instant beyond which the law is said to switch without end.
+/// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;

@@ -274,7 +274,7 @@ fn what_makes_no_sense_is_refused() {
     );
 }
 
-/// Of a physical case an unstable orbit is told in SI too, with all that is observed of it.
+/// Unstable orbits of a physical case are reported in SI too, with all observables.
 #[test]
 fn unstable_orbits_are_told_in_si() {
     let folder = Folder::new();

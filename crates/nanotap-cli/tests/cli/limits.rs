@@ -31,7 +31,7 @@ fn needed(study: &str) -> &'static [&'static str] {
     }
 }
 
-/// Counts that the option `name` stands beside, for it to count.
+/// Options that the option `name` needs in order to have an effect.
 fn beside(name: &str) -> &'static [&'static str] {
     match name {
         "strobe" | "events" => &["--periods", "2000000"],

@@ -68,7 +68,7 @@ pub enum ShootingError {
         "an orbit of period {period} in {dimension} variables takes too much memory; its period can be {limit} at most"
     )]
     TooLarge {
-        /// Period asked for.
+        /// Requested period, in drive periods.
         period: usize,
         /// Dimension of the map.
         dimension: usize,
@@ -83,7 +83,7 @@ pub enum ShootingError {
         "Newton found no period-{period} orbit: residual {residual:.3e} after {iterations} steps ({reason})"
     )]
     Diverged {
-        /// Period asked for.
+        /// Requested period, in drive periods.
         period: usize,
         /// Newton steps taken.
         iterations: usize,
@@ -97,7 +97,7 @@ pub enum ShootingError {
         "the period-{period} orbit is not isolated: the multiplier nearest +1 is {distance:.3e} from it (residual {residual:.3e})"
     )]
     Singular {
-        /// Period asked for.
+        /// Requested period, in drive periods.
         period: usize,
         /// Distance of the nearest multiplier from +1 where Newton stopped.
         distance: f64,

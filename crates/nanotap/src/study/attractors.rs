@@ -258,7 +258,7 @@ impl Attractors {
         }
     }
 
-    /// The same with every motion told in SI too, of the case `view`.
+    /// The same, with every motion in SI too, in the units of `view`.
     #[must_use]
     pub fn in_si(mut self, view: &Physical) -> Self {
         for attractor in &mut self.attractors {

@@ -144,7 +144,7 @@ pub struct OrbitReport {
 }
 
 impl OrbitReport {
-    /// Tries to prove it. What is proved of its stability stands in place of what the multipliers
+    /// Tries to prove it. A proved stability replaces what the multipliers
     /// leave open next to the unit circle.
     pub fn prove(&mut self, prover: &Prover) {
         let proof = prover.report(&self.trajectory, self.period);

@@ -3,7 +3,7 @@
 //! A lever that is brought near slowly stays on its branch of stable orbits until that ends: at
 //! a fold, at a bifurcation that destabilises it, where it grazes and does not go on, or where
 //! its law has no motion any more. So branches are continued, and a run is needed only at their
-//! ends: it starts beside the last stable orbit just beyond the end, and where it goes the lever
+//! ends: it starts near the last stable orbit, just beyond the end, and where it goes the lever
 //! jumps. At a flip with a stable doubled branch beyond it the lever goes on along that one. A
 //! motion that does not close is followed on a grid of distances that depends on the case alone,
 //! until an orbit is found there, whose branch is then continued back to its beginning as well.
@@ -37,7 +37,7 @@ const LONGEST_BRANCH: usize = 8;
 const SAME_PLACE: f64 = 1e-7;
 /// Distances beyond a fold, in the scale of distances, at which the jump is followed, and how far
 /// from the orbit at the fold the run starts, as a part of its size, towards the unstable side.
-/// The farther ones are for where the nearer leave the run beside the fold for too long.
+/// The farther ones serve where the run from the nearer ones stays near the fold for too long.
 const BEYOND_FOLD: [(f64, f64); 2] = [(1e-4, 0.05), (1e-3, 0.1)];
 /// The same beyond other ends, where a disturbance grows in proportion to the distance.
 const BEYOND_END: (f64, f64) = (1e-3, 0.01);
@@ -259,7 +259,7 @@ impl<'a> DistanceSweep<'a> {
         self.case.with(self.case.gap_key(), gap).model()
     }
 
-    /// The motion far from the sample: the orbit that Newton closes beside the free response, or
+    /// The motion far from the sample: the orbit that Newton closes near the free response, or
     /// where a run from rest goes.
     pub(in crate::study) fn free(&mut self) -> Result<Place, CaseError> {
         let gap = self.range.1;
@@ -462,7 +462,7 @@ impl<'a> DistanceSweep<'a> {
                 }
             }
         }
-        // Beside an end, and where the chord leads elsewhere: step by step from the nearer point.
+        // Near an end, and where the chord leads elsewhere: step by step from the nearer point.
         let nearest = [below, above].into_iter().flatten();
         let nearest = nearest.min_by(|a, b| {
             let apart = |p: &BranchPoint| (p.parameter - gap).abs();
@@ -865,7 +865,7 @@ fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
     (branch.points, end)
 }
 
-/// A state beside the orbit at an end: pushed from it by a part of its size, towards an unstable
+/// A state near the orbit at an end: pushed from it by a part of its size, towards an unstable
 /// one, if there is one.
 fn pushed(orbit: &PeriodicOrbit, unstable: Option<&PeriodicOrbit>, push: f64) -> Vec<f64> {
     let Some(state) = orbit.states.first() else {

@@ -20,7 +20,7 @@
 //! drive, as in frequency modulation: see [`frequency_modulation`].
 //! Orbits are then continued from distance to distance.
 //!
-//! Fails: of branches that no motion on the way lies on nothing is known.
+//! Limits: branches that no motion of approach or retract lies on are not found.
 
 pub(in crate::study) mod distance_sweep;
 pub mod frequency_modulation;
@@ -293,7 +293,7 @@ pub struct ApproachReport {
     pub free_phase: f64,
     /// Distance at which the free motion begins to touch.
     pub free_reach: f64,
-    /// The motions at the distances asked for, in the order of the way: there, then back.
+    /// The motions at the requested distances: those of the approach, then those of the retract.
     pub table: Vec<ApproachPoint>,
     /// Where the lever changes from one motion to another by a jump, in the order of the way.
     pub jumps: Vec<StateJump>,

@@ -7,7 +7,7 @@
 //! ([`nanotap_dynamics::orbits_shared`]). Where starts of all sizes are drawn at each value, the
 //! states of a slowly moved lever there ([`states_near`]) are tried as well: one approach
 //! serves all distances of a line of values, and of many lines or values some are chosen, whose
-//! states neighbours lead to in turn. What that finds is kept beside the dataset, in
+//! states neighbours lead to in turn. What that finds is stored with the dataset, in
 //! `neighbours.json`: the runs stay what they are.
 //!
 //! Fails: where the number of modes varies, or no strobe states were kept, nothing is tried;

@@ -119,7 +119,7 @@ impl LyapunovSpectrum {
         (3.0 * self.largest().1).max(10.0 / self.periods as f64)
     }
 
-    /// How many of the largest exponents are zero within [`Self::zero`]: the dimension of a torus.
+    /// How many of the largest exponents are zero within `zero`: the dimension of a torus.
     pub fn neutral_directions(&self) -> usize {
         let zero = self.zero();
         self.exponents

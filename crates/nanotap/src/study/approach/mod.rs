@@ -1,5 +1,5 @@
 //! Approach and retract curves: the sample is brought near and taken away so slowly that the
-//! lever always settles ([`distance_sweep`]). Branches of stable orbits are continued in the
+//! lever always settles (`distance_sweep.rs`). Branches of stable orbits are continued in the
 //! distance, and where one ends the flow from there gives the motion to which the lever jumps.
 //! So jumps and hysteresis are those of the branches: they do not depend on the distances at
 //! which the curve is written. Through every stretch of stable orbits found, branches are

@@ -335,8 +335,10 @@ class Orbit(_Observed, Result):
     def __repr__(self) -> str:
         # Of chosen observables these two need not be there.
         low, high = (getattr(self, end, None) for end in ("tip_min", "tip_max"))
-        swing = "" if low is None and high is None else (
-            f", W from {_number(low)} to {_number(high)}"
+        swing = (
+            ""
+            if low is None and high is None
+            else (f", W from {_number(low)} to {_number(high)}")
         )
         return (
             f"Orbit(period={self.period}, {self.stability}, largest multiplier "

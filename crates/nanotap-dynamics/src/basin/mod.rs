@@ -52,10 +52,10 @@ pub struct Slice {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum BasinError {
     /// The slice does not fit the map, or an axis is invalid.
-    #[error("bad slice: {0}")]
+    #[error("invalid slice: {0}")]
     Slice(String),
     /// The map failed on an attractor.
-    #[error("an attractor could not be followed")]
+    #[error("the map failed on an attractor")]
     Map(#[from] MapFailure),
 }
 
@@ -70,14 +70,14 @@ impl Slice {
         for axis in [&x, &y] {
             if axis.coordinate >= origin.len() {
                 return Err(BasinError::Slice(format!(
-                    "coordinate {} of a state of {} (they count from 0)",
+                    "coordinate {} does not exist: the state has {} coordinates, counted from 0",
                     axis.coordinate,
                     origin.len()
                 )));
             }
             if axis.count == 0 || !axis.from.is_finite() || !axis.to.is_finite() {
                 return Err(BasinError::Slice(format!(
-                    "{} points from {} to {}: one point at least, between finite numbers",
+                    "an axis needs at least 1 point and finite ends, got {} points from {} to {}",
                     axis.count, axis.from, axis.to
                 )));
             }
@@ -179,7 +179,7 @@ impl Basins {
         let d = map.dimension();
         if slice.origin.len() != d {
             return Err(BasinError::Slice(format!(
-                "the origin has {} numbers, {d} are needed",
+                "the origin has length {}, expected {d}",
                 slice.origin.len()
             )));
         }

@@ -142,7 +142,7 @@ fn check(options: &CurveOptions, first: f64, second: f64) -> Result<(), Continua
         let usable = range.0 < range.1 && (range.1 - range.0).is_finite();
         if !usable || !(range.0..=range.1).contains(&value) {
             return Err(ContinuationError::BadOptions(format!(
-                "the start {value} must lie in a finite range that runs upwards, {} … {} given",
+                "the starting value {value} must lie in a finite range with ascending ends, got {} … {}",
                 range.0, range.1
             )));
         }
@@ -150,7 +150,7 @@ fn check(options: &CurveOptions, first: f64, second: f64) -> Result<(), Continua
     let steps = [options.min_step, options.initial_step, options.max_step];
     if !(steps[0] > 0.0 && steps[0] <= steps[1] && steps[1] <= steps[2] && steps[2].is_finite()) {
         return Err(ContinuationError::BadOptions(format!(
-            "steps must satisfy 0 < min ≤ initial ≤ max, {steps:?} given"
+            "steps must satisfy 0 < min ≤ initial ≤ max, got {steps:?}"
         )));
     }
     Ok(())

@@ -53,7 +53,7 @@ pub(crate) fn check(
     let (low, high) = options.range;
     if !(low < high && (high - low).is_finite()) {
         return bad(format!(
-            "the range {low} … {high} must run upwards between finite numbers"
+            "the range needs finite ends in ascending order, got {low} … {high}"
         ));
     }
     if !(low..=high).contains(&parameter) {
@@ -64,7 +64,7 @@ pub(crate) fn check(
     let steps = [options.min_step, options.initial_step, options.max_step];
     if !(steps[0] > 0.0 && steps[0] <= steps[1] && steps[1] <= steps[2] && steps[2].is_finite()) {
         return bad(format!(
-            "steps must satisfy 0 < min ≤ initial ≤ max, {steps:?} given"
+            "steps must satisfy 0 < min ≤ initial ≤ max, got {steps:?}"
         ));
     }
     for scale in [options.state_scale, options.parameter_scale]
@@ -72,12 +72,12 @@ pub(crate) fn check(
         .flatten()
     {
         if !(scale > 0.0 && scale.is_finite()) {
-            return bad(format!("a scale must be positive, {scale} given"));
+            return bad(format!("a scale must be positive, got {scale}"));
         }
     }
     if options.max_angle.is_nan() || options.max_angle <= 0.0 {
         return bad(format!(
-            "the largest angle must be positive, {} given",
+            "the largest angle must be positive, got {}",
             options.max_angle
         ));
     }

@@ -186,7 +186,7 @@ impl BranchEnd {
             Self::Closed => "the branch is closed".into(),
             Self::Collapsed { period, parameter } => {
                 format!(
-                    "the branch meets one of period {period} at {}",
+                    "the branch meets a branch of period {period} at {}",
                     shown(*parameter)
                 )
             }
@@ -209,7 +209,7 @@ impl BranchEnd {
                 format!("the orbit is not stable beyond {}", shown(*parameter))
             }
             Self::Repelling { parameter } => format!(
-                "the orbit repels too strongly to be met beyond {}",
+                "the orbit is too unstable to be followed beyond {}",
                 shown(*parameter)
             ),
             Self::PointLimit => "the allowed number of points".into(),
@@ -244,10 +244,10 @@ impl fmt::Display for BranchEnd {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ContinuationError {
     /// Invalid options.
-    #[error("bad continuation options: {0}")]
+    #[error("invalid continuation options: {0}")]
     BadOptions(String),
     /// The given orbit is not an orbit at this parameter value.
-    #[error("no orbit could be corrected at parameter {parameter}: {reason}")]
+    #[error("the corrector found no orbit at parameter {parameter}: {reason}")]
     NoStart {
         /// Parameter value.
         parameter: f64,
@@ -255,7 +255,7 @@ pub enum ContinuationError {
         reason: String,
     },
     /// The given bifurcation is not a flip.
-    #[error("branches are switched at flips only")]
+    #[error("branch switching needs a flip")]
     NotAFlip,
     /// The map failed at the first point.
     #[error(transparent)]

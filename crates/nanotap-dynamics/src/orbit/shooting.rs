@@ -60,11 +60,11 @@ impl Default for ShootingOptions {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ShootingError {
     /// The guess does not fit the map.
-    #[error("bad guess: {0}")]
+    #[error("invalid initial guess: {0}")]
     BadGuess(String),
     /// The Jacobians of the orbit would need gigabytes of memory.
     #[error(
-        "an orbit of period {period} in {dimension} variables takes too much memory; its period can be {limit} at most"
+        "an orbit of period {period} in {dimension} variables needs too much memory; the largest period is {limit}"
     )]
     TooLarge {
         /// Requested period, in drive periods.
@@ -75,7 +75,7 @@ pub enum ShootingError {
         limit: usize,
     },
     /// The map failed at the guess.
-    #[error("the map could not be followed from the guess")]
+    #[error("the map failed at the initial guess")]
     Map(#[from] MapFailure),
     /// Newton stalled where there is no orbit.
     #[error(
@@ -199,7 +199,7 @@ fn check<M: StroboscopicMap>(
     check_size(d, period)?;
     if values.len() != rows * d {
         return Err(ShootingError::BadGuess(format!(
-            "{} numbers given, {} needed ({rows} states of {d})",
+            "got {} numbers, expected {} ({rows} states of dimension {d})",
             values.len(),
             rows * d
         )));

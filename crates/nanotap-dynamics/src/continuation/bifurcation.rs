@@ -217,8 +217,8 @@ fn locate_zero<F: MapFamily>(
             break;
         }
         // The bordered system is singular where branches cross: try a point near it.
-        let beside = at + 1e-3 * (high - at);
-        let Some((at, node)) = [at, beside]
+        let nearby = at + 1e-3 * (high - at);
+        let Some((at, node)) = [at, nearby]
             .into_iter()
             .find_map(|at| Some((at, solver.along_cubic(from, at, [&below, &above]).ok()?)))
         else {

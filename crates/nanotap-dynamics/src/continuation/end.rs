@@ -180,8 +180,8 @@ mod tests {
         }
     }
 
-    /// Two extrema that fall in proportion to the parameter, and two at the same time, each matched
-    /// with the one of its own value. A point that is too near to give a rate is skipped.
+    /// Two extrema that fall in proportion to the parameter, and two at the same time, each one matched
+    /// with the one of equal value. A point that is too near to give a rate is skipped.
     #[test]
     fn extrema_are_extrapolated_to_zero() {
         let points = [

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn an_orbit_is_the_same_to_the_last_digit_on_any_number_of_threads() {
+    fn an_orbit_is_the_same_to_the_last_digit_for_any_number_of_threads() {
         let closed = |costly: bool| {
             let options = ShootingOptions::default();
             close_orbit(&mut Quadratic { costly }, &[0.0], 3, &options).unwrap()
@@ -114,18 +114,21 @@ mod tests {
     }
 
     #[test]
-    fn every_period_is_computed_and_the_first_failure_told() {
+    fn every_period_is_computed_and_the_first_failure_returned() {
         let starts: Vec<f64> = (0..37).map(|k| f64::from(k) * 0.1).collect();
         for threads in [1, 2, 5] {
             let mut ends = starts.clone();
-            let told = in_pool(threads, || {
+            let result = in_pool(threads, || {
                 let mut map = Quadratic { costly: true };
                 for_each_period(&mut map, &mut ends, &|map, end| {
                     map.advance(std::slice::from_mut(end))
                         .map_err(MapFailure::refused)
                 })
             });
-            assert!(told.unwrap_err().to_string().ends_with("1.6"), "{threads}");
+            assert!(
+                result.unwrap_err().to_string().ends_with("1.6"),
+                "{threads}"
+            );
             for (end, start) in ends.iter().zip(&starts).take(16) {
                 assert_eq!(*end, 1.0 - 1.76 * start * start);
             }

@@ -1,5 +1,5 @@
-//! Headers and chunks that somebody or something has changed: whatever stands in them, a dataset
-//! opens, is refused with a reason, or reads as what is left of it.
+//! Damaged headers and chunks: a dataset opens, is refused with a reason, or reads as far as it is
+//! intact.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use crate::folder::{Folder, bytes};
 
-/// Two frequencies, a run each.
+/// Two frequencies with one run each.
 fn small(path: &Path) {
     let subject = Case::from(Cantilever {
         modes: 1,
@@ -48,7 +48,7 @@ fn read(path: &Path) {
     let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
 }
 
-/// What somebody may write in place of a value.
+/// Values that may replace a value of a header.
 fn hostile() -> impl Strategy<Value = Value> {
     prop::sample::select(vec![
         json!(null),
@@ -72,8 +72,7 @@ fn hostile() -> impl Strategy<Value = Value> {
     ])
 }
 
-/// Puts `put` in place of the value that comes `at` many values after the first; `None` takes a
-/// whole entry away.
+/// Replaces the value at position `at` by `put`; `None` removes the entry.
 fn change(value: &mut Value, at: &mut usize, put: Option<&Value>) -> bool {
     if *at == 0 {
         *value = put.cloned().unwrap_or_default();
@@ -94,7 +93,7 @@ fn change(value: &mut Value, at: &mut usize, put: Option<&Value>) -> bool {
     }
 }
 
-/// A whole dataset, made once a process.
+/// An intact dataset, created once per process.
 fn whole() -> &'static (Folder, BTreeMap<PathBuf, Vec<u8>>) {
     static WHOLE: OnceLock<(Folder, BTreeMap<PathBuf, Vec<u8>>)> = OnceLock::new();
     WHOLE.get_or_init(|| {
@@ -105,16 +104,16 @@ fn whole() -> &'static (Folder, BTreeMap<PathBuf, Vec<u8>>) {
     })
 }
 
-/// Tests that run beside each other in one process have one folder.
-fn alone() -> MutexGuard<'static, ()> {
+/// Tests of one process that share a folder run in sequence.
+fn folder_lock() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reads it with one file changed by `damage`, and puts the file back.
+/// Reads the dataset with one file changed by `damage`, and restores the file.
 fn damaged(file: &Path, damage: impl FnOnce(Vec<u8>) -> Vec<u8>) {
     let (folder, files) = whole();
-    let _turn = alone();
+    let _turn = folder_lock();
     let path = folder.join("data");
     let content = &files[file];
     std::fs::write(path.join(file), damage(content.clone())).unwrap();
@@ -156,11 +155,11 @@ proptest! {
     }
 }
 
-/// An untouched one is read: what the others meet is no mistake of theirs.
+/// An intact dataset is read: failures of the others are due to their damage.
 #[test]
-fn the_whole_one_is_read() {
+fn an_intact_dataset_is_read() {
     let (folder, files) = whole();
-    let _turn = alone();
+    let _turn = folder_lock();
     let path = folder.join("data");
     let store = Store::open(&path).unwrap();
     store.require_all().unwrap();

@@ -8,7 +8,8 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Work, table};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Over, Sweep, SweepOptions, summary};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Summary, Sweep, SweepOptions};
 use nanotap_dynamics::Control;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -21,8 +22,7 @@ fn small(path: &Path) {
         modes: 1,
         ..Cantilever::paper()
     });
-    let over = vec![Over::parse("omega=18:20:2", &subject).unwrap()];
-    let sweep = Sweep::new(subject, SweepOptions::new(over)).unwrap();
+    let sweep = Sweep::new(&subject, SweepOptions::over(["omega=18:20:2"])).unwrap();
     let store = Store::create_or_resume(path, sweep.schema().clone()).unwrap();
     let work = Work {
         share: Share::WHOLE,
@@ -44,7 +44,7 @@ fn read(path: &Path) {
             let _ = store.read_chunk(&block, variable);
         }
     }
-    let _ = summary(&store);
+    let _ = Summary::of(&store);
     let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
 }
 
@@ -187,6 +187,6 @@ fn the_whole_one_is_read() {
     let path = folder.join("data");
     let store = Store::open(&path).unwrap();
     store.require_all().unwrap();
-    assert_eq!(summary(&store).unwrap().runs % 2, 0);
+    assert_eq!(Summary::of(&store).unwrap().runs % 2, 0);
     assert!(files.contains_key(Path::new(".zmetadata")));
 }

@@ -41,7 +41,6 @@ use nanotap_dynamics::Control;
 
 use nanotap::case::CaseError;
 use nanotap::case::near_name::near_name;
-use nanotap::study::orbit::OrbitError;
 
 pub use check::{About, Check, Verdict};
 use runs::Runs;
@@ -82,7 +81,7 @@ pub enum PaperError {
         /// Description of the orbit.
         what: String,
         /// Reason of the failure.
-        source: OrbitError,
+        source: nanotap::Error,
     },
     /// A computation that should succeed failed.
     #[error("{what}: {why}")]

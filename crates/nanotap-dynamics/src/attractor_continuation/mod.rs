@@ -7,7 +7,7 @@
 //! classified too. An attractor already found at the neighbouring value is not tried again in the
 //! other direction. New attractors are tried at their neighbours in turn, until no value gains one
 //! (global continuation, as Datseris, Luiz Rossi and Wagemakers, Chaos 33, 073151, 2023, with
-//! Newton in index of recurrences).
+//! Newton in place of recurrences).
 //!
 //! Attractors at neighbouring values that continue each other (Newton from either one closes the
 //! other, at a small distance) form a branch.

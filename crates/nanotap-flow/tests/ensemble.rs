@@ -104,9 +104,9 @@ fn together(system: &Arc<System>, states: &[f64], periods: &[usize]) -> Vec<f64>
 /// where neighbours diverge by chaos.
 fn rounding(system: &Arc<System>, states: &[f64], periods: &[usize]) -> f64 {
     let ends = alone(system, states, periods);
-    let beside: Vec<f64> = states.iter().map(|x| x * (1.0 + 1e-14)).collect();
-    let parted = alone(system, &beside, periods);
-    let apart = ends.iter().zip(&parted).map(|(a, b)| (a - b).abs());
+    let perturbed: Vec<f64> = states.iter().map(|x| x * (1.0 + 1e-14)).collect();
+    let separated = alone(system, &perturbed, periods);
+    let apart = ends.iter().zip(&separated).map(|(a, b)| (a - b).abs());
     let size = ends.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     1e-9 * size + 1e3 * apart.fold(0.0, f64::max)
 }

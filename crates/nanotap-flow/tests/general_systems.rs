@@ -235,11 +235,11 @@ fn undamped_resonance_is_refused_with_a_reason() {
         "{refused:?}"
     );
     assert!(refused.unwrap_err().to_string().contains("add damping"));
-    let beside = build(2.0 + 1e-6, 0.0).unwrap();
+    let nearby = build(2.0 + 1e-6, 0.0).unwrap();
     // x = sin ωt / (4 − ω²)
     let omega = 2.0 + 1e-6;
     let expected = 1.0 / (4.0 - omega * omega);
-    assert!((beside.response().tones[0][0].im / -expected - 1.0).abs() < 1e-6);
+    assert!((nearby.response().tones[0][0].im / -expected - 1.0).abs() < 1e-6);
     assert!(build(2.0, 1e-9).is_ok());
 }
 

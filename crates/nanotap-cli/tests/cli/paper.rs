@@ -26,7 +26,7 @@ fn a_quick_part_of_the_report_is_written() {
     let html = read("report.html");
     assert!(
         html.contains("<svg") && html.contains("fig15"),
-        "pictures stand in the page"
+        "the page contains the figures"
     );
     assert!(read("report.md").contains("| eq25 |"));
     for picture in json["pictures"].as_array().unwrap() {

@@ -203,8 +203,8 @@ fn replaced_keys_are_reported() {
         assert_eq!(run.code, 0, "{}", run.stderr);
         assert!(run.stderr.contains(said), "{}", run.stderr);
         let away = ["--set", "sample.hamaker="];
-        let told = folder.run(&[&[command], &set[..], &away[..]].concat());
-        assert!(!told.stderr.contains("place"), "{}", told.stderr);
+        let outcome = folder.run(&[&[command], &set[..], &away[..]].concat());
+        assert!(!outcome.stderr.contains("place"), "{}", outcome.stderr);
     }
 }
 

@@ -218,13 +218,13 @@ fn known_chaos_is_distinguished_from_other_motions() {
     let lower = chaotic(classify(&mut map, &[-0.3], &options).kind);
     let known = [lower.spectrum.clone(), upper.spectrum.clone()];
 
-    let beside = classify_beside(&mut map, &[0.5], &known, &options);
+    let recognised = classify_beside(&mut map, &[0.5], &known, &options);
     let measured = &options.lyapunov;
     let least = options.max_transient + measured.alignment + measured.min_periods;
-    assert!(beside.periods >= least, "{}", beside.periods);
-    let second = chaotic(beside.kind);
+    assert!(recognised.periods >= least, "{}", recognised.periods);
+    let second = chaotic(recognised.kind);
     assert_eq!(second.spectrum, upper.spectrum);
-    assert_eq!(second.observed, beside.periods);
+    assert_eq!(second.observed, recognised.periods);
 
     let unlike = classify_beside(&mut map, &[0.5], &known[..1], &options);
     assert_ne!(chaotic(unlike.kind).spectrum, lower.spectrum);

@@ -189,9 +189,9 @@ fn chaos_near_a_stable_orbit_is_observed_for_several_transients() {
         "{recognised:?}"
     );
     let both = starts(&[-0.9, -1.5], &[0.9, 1.5], 60);
-    let beside = taken(ChaosAndRest, &both, &options);
-    assert_eq!(beside.attractors.len(), 2);
-    let watched = watched_periods(&beside);
+    let census = taken(ChaosAndRest, &both, &options);
+    assert_eq!(census.attractors.len(), 2);
+    let watched = watched_periods(&census);
     assert!(!watched.is_empty());
     assert!(
         watched.iter().all(|&periods| periods >= 8 * 64),

@@ -99,8 +99,8 @@ fn a_periodic_window_is_complete() {
 /// Three columns of two rows: 0 1 2 above 3 4 5.
 #[test]
 fn neighbours_of_a_grid_value() {
-    let beside = grid_neighbours(&[3, 2]);
-    let found: Vec<_> = (0..6).map(beside).collect();
+    let neighbours = grid_neighbours(&[3, 2]);
+    let found: Vec<_> = (0..6).map(neighbours).collect();
     let exact: [&[usize]; 6] = [&[1, 3], &[0, 2, 4], &[1, 5], &[4, 0], &[3, 5, 1], &[4, 2]];
     assert_eq!(found, exact);
     let along = grid_neighbours(&[3]);

@@ -1100,13 +1100,13 @@ fn curves_of_amplitude_and_of_frequency_shifts_do_not_mix() {
         ],
         lines: Vec::new(),
     };
-    let mut beside = shifts.clone();
-    beside
+    let mut mixed = shifts.clone();
+    mixed
         .columns
         .push(("mean_deflection (pm)".to_owned(), numbers([0.1, 0.2, 0.3])));
     for (tables, named) in [
         (vec![shifts, amplitudes], "amplitude"),
-        (vec![beside], "mean_deflection"),
+        (vec![mixed], "mean_deflection"),
     ] {
         let asked = request(tables, &["sample.modulus"]);
         let refused = fit(&truth, &asked, &Control::default()).unwrap_err();

@@ -101,9 +101,9 @@ fn a_conservative_law_needs_no_additional_drive() {
         let found = point.modulation.unwrap();
         assert_eq!(point.observables.unwrap().dissipation, 0.0);
         let balance = again(&case, point).observables.energy_balance;
-        let told = free.free_loss * found.drive_ratio;
-        assert!((balance.drive_work / told - 1.0).abs() < 1e-9);
-        assert!((balance.beam_damping / told - 1.0).abs() < 1e-9);
+        let reported = free.free_loss * found.drive_ratio;
+        assert!((balance.drive_work / reported - 1.0).abs() < 1e-9);
+        assert!((balance.beam_damping / reported - 1.0).abs() < 1e-9);
         if point.observables.unwrap().contact_fraction == 0.0 {
             let harmonics = found.drive_ratio - 1.0 - found.relative_shift;
             assert!(
@@ -146,16 +146,16 @@ fn the_drive_gives_the_dissipation_of_a_viscous_sample() {
         assert!((amplitude - 1.0).abs() < 1e-9, "{amplitude}");
         let taken = orbit.observables.dissipation;
         let balance = orbit.observables.energy_balance;
-        let told = free.free_loss * found.drive_ratio - balance.beam_damping;
+        let reported = free.free_loss * found.drive_ratio - balance.beam_damping;
         assert!(
-            (told - taken).abs() < 1e-9 * free.free_loss,
-            "{told} {taken}"
+            (reported - taken).abs() < 1e-9 * free.free_loss,
+            "{reported} {taken}"
         );
         let damping = (1.0 + found.relative_shift) * (1.0 + harmonics(&orbit));
-        let told = free.free_loss * (found.drive_ratio - damping);
+        let reported = free.free_loss * (found.drive_ratio - damping);
         assert!(
-            (told - taken).abs() < 1e-7 * free.free_loss,
-            "{told} {taken}"
+            (reported - taken).abs() < 1e-7 * free.free_loss,
+            "{reported} {taken}"
         );
         most = most.max(taken / free.free_loss);
     }
@@ -373,10 +373,10 @@ fn a_shift_has_its_distances() {
     assert!(at(-5e4).is_empty());
     // The motion there is that of the orbit study with the reported drive.
     let (one, drive) = (&found[1], found[1].modulation_si.unwrap());
-    let (seen, told) = (again(&case, one).observables, one.observables.unwrap());
-    assert!(told.peak_force > 0.0);
-    assert!((seen.peak_force / told.peak_force - 1.0).abs() < 1e-6);
-    assert!((seen.first_harmonic / told.first_harmonic - 1.0).abs() < 1e-8);
+    let (seen, reported) = (again(&case, one).observables, one.observables.unwrap());
+    assert!(reported.peak_force > 0.0);
+    assert!((seen.peak_force / reported.peak_force - 1.0).abs() < 1e-6);
+    assert!((seen.first_harmonic / reported.first_harmonic - 1.0).abs() < 1e-8);
     let force = drive.drive_strength / scales.force;
     assert!((force / one.modulation.unwrap().drive_strength - 1.0).abs() < 1e-14);
 }
@@ -434,8 +434,11 @@ fn a_neck_at_drive_phase_0_loses_no_orbit() {
         ..FrequencyModulationOptions::default()
     };
     let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
-    let told = report.modulation.as_ref().unwrap();
-    assert!(told.ended.is_empty() && told.jumps.is_empty(), "{told:?}");
+    let reported = report.modulation.as_ref().unwrap();
+    assert!(
+        reported.ended.is_empty() && reported.jumps.is_empty(),
+        "{reported:?}"
+    );
     assert!(report.returned && report.hysteresis.is_empty());
     let necks = |p: &&ApproachPoint| p.orbit.as_ref().unwrap().states[0].last() == Some(&1.0);
     let count = report.table.iter().filter(necks).count();

@@ -141,10 +141,10 @@ fn error(random: &mut Random, case: &Cantilever) -> Option<(f64, usize)> {
     let taylor = taylor::run(&model.system, &x, regime, rate, until)?;
     // The same from a state with a relative error of 1e-8: the growth of errors.
     let scale = x.iter().map(|v| v.abs()).fold(0.0, f64::max);
-    let beside: Vec<f64> = x.iter().map(|v| v + 1e-8 * scale * random.next()).collect();
-    let beside = taylor::run(&model.system, &beside, regime, rate, until)?;
+    let perturbed: Vec<f64> = x.iter().map(|v| v + 1e-8 * scale * random.next()).collect();
+    let perturbed = taylor::run(&model.system, &perturbed, regime, rate, until)?;
     let switches = taylor.switches.len();
-    if beside.switches.len() != switches {
+    if perturbed.switches.len() != switches {
         return None;
     }
     let end = exact.state_at(until).unwrap();
@@ -161,7 +161,7 @@ fn error(random: &mut Random, case: &Cantilever) -> Option<(f64, usize)> {
             .into_iter()
             .fold(0.0, f64::max)
     };
-    let stretched = (apart(beside.state.as_slice()) / 1e-8).max(1.0);
+    let stretched = (apart(perturbed.state.as_slice()) / 1e-8).max(1.0);
     let times = exact.events().iter().map(|event| event.time);
     let times: Vec<f64> = times.filter(|time| *time <= until).collect();
     assert_eq!(

@@ -391,9 +391,9 @@ fn orbits_keep_their_volumes_and_energies() {
         let mut map = Strobe::new(&model);
         let mut jacobian = DMatrix::zeros(7, 7);
         let mut state = found.state.clone();
-        let told = map.advance_with_jacobian_and_determinant(&mut state, &mut jacobian);
+        let reported = map.advance_with_jacobian_and_determinant(&mut state, &mut jacobian);
         let plain = jacobian.determinant().abs().ln();
-        assert!((told.unwrap().unwrap() - plain).abs() < 1e-8 * plain.abs());
+        assert!((reported.unwrap().unwrap() - plain).abs() < 1e-8 * plain.abs());
         assert_eq!(map.log_determinant_bound(), f64::INFINITY);
     }
     assert!(contacts > 2.0);

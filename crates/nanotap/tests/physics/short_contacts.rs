@@ -90,7 +90,7 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
     }
     println!(
         "{touches} short contacts found, none missed, the shortest {shortest:.1e} of a period; {misses} near \
-         misses told apart; {:.1} evaluations a period",
+         misses distinguished; {:.1} evaluations per period",
         evaluations as f64 / f64::from(touches + misses)
     );
     assert!(touches > 2000 && shortest < 2e-8, "{touches} {shortest:e}");

@@ -48,9 +48,6 @@ fn read(path: &Path) {
     let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
 }
 
-<<<<<<< HEAD
-/// Values that may replace a value of a header.
-=======
 /// A store is not written through a symbolic link in it: the link's target stays as it was.
 #[cfg(unix)]
 #[test]
@@ -74,8 +71,7 @@ fn links_inside_a_store_are_refused() {
     assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
 }
 
-/// What somebody may write in place of a value.
->>>>>>> main
+/// Values that may replace a value of a header.
 fn hostile() -> impl Strategy<Value = Value> {
     prop::sample::select(vec![
         json!(null),

@@ -41,7 +41,7 @@ def modes(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     points : int
         Points along the beam in the table of mode shapes (2 to 1000000).
 
@@ -53,9 +53,9 @@ def modes(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "points": points,
@@ -86,7 +86,7 @@ def simulate(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods recorded (1 to 2000000).
     transient : int | None
@@ -139,9 +139,9 @@ def simulate(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "periods": periods,
@@ -207,7 +207,7 @@ def orbit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int | None
         Its period in drive periods; without it, that of the motion to which a run
         converges (1 to 10000).
@@ -241,9 +241,9 @@ def orbit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "period": period,
@@ -274,7 +274,7 @@ def attractors(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     starts : int | None
         Starts, spread evenly over one box of states. Without it, starts of every
         size, from the resonant response down to below the gap, go on until the
@@ -313,9 +313,9 @@ def attractors(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "starts": starts,
@@ -352,7 +352,7 @@ def branch(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     parameter : str
         The parameter, as the case file calls it (omega, alpha4, gap …); of a
         physical case also a quantity of it (drive.frequency, gap.tip,
@@ -400,9 +400,9 @@ def branch(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "parameter": parameter,
@@ -443,7 +443,7 @@ def approach(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     from_ : float | str | None
         Distance at which to begin, in units of the case ("30 nm") or as alpha5;
         without it, 1.25 times what the free tip swings towards the sample.
@@ -494,9 +494,9 @@ def approach(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "from": from_,
@@ -536,7 +536,7 @@ def fit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
@@ -580,9 +580,9 @@ def fit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "data": data,
@@ -624,7 +624,7 @@ def sweep(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in omega=2:4:400 (first, last, how many), or
         alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
@@ -678,9 +678,9 @@ def sweep(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "over": over,
@@ -714,7 +714,7 @@ def window(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in gap.tip=5nm:25nm:41,
         drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
@@ -746,9 +746,9 @@ def window(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "over": over,
@@ -780,7 +780,7 @@ def basin(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     x : str | Mapping[str, Any]
         The horizontal axis, as in a1=-1:1:200: entry of the state, first value,
         last value, how many (a1…aN, v1…vN; oscillator: x, v).
@@ -820,9 +820,9 @@ def basin(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "x": x,
@@ -851,7 +851,7 @@ def lyapunov(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods averaged over (1 to 100000000).
     transient : int
@@ -874,9 +874,9 @@ def lyapunov(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "periods": periods,
@@ -900,7 +900,7 @@ def convergence(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     largest : int
         Largest number of modes (2 to 50).
     tolerance : float
@@ -917,9 +917,9 @@ def convergence(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "largest": largest,
@@ -943,7 +943,7 @@ def contact_laws(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int
         Period of the orbits compared (1 to 10000).
     arm : float | None
@@ -966,9 +966,9 @@ def contact_laws(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = {
         "period": period,

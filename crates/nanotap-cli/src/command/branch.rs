@@ -8,7 +8,6 @@ use nanotap::case::physical::Kind;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{Set, columns, time_series};
-use nanotap::study::Study as _;
 use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy, PointReport};
 use nanotap::study::orbit::spectral_radius;
 
@@ -65,11 +64,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
-    let mut report = progress::study::<BranchStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| BranchStudy::run(&case, &options, control))
-    })??;
+    let mut report = progress::study::<BranchStudy>(&case, &options, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
     }

@@ -6,13 +6,13 @@ use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::{ModeTable, ModesStudy, damping_ratio};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
 /// Mode shapes and frequencies, in free flight and in contact.
@@ -20,8 +20,7 @@ pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let table =
-        progress::study::<ModesStudy, _>(|control| ModesStudy::run(&case, &request, control))?;
+    let table = progress::study::<ModesStudy>(&case, &request, &ThreadsArgument::default())?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     arguments.out.write(|| shapes(&beam, request.points))?;
     arguments.plot.draw(|| shapes_figure(&beam))?;

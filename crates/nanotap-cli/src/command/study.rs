@@ -68,11 +68,7 @@ fn command_of(entry: &StudyEntry) -> Command {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let entry = arguments.entry;
-    let case = if entry.any_distance {
-        GivenCase::with_any_distance(&arguments.case, output)?
-    } else {
-        GivenCase::of(&arguments.case, output)?
-    };
+    let case = GivenCase::for_study(&arguments.case, entry.any_distance, output)?;
     let request = Value::Object(arguments.given.clone());
     let document = progress::watched(entry.name, entry.counted, entry.partial, |control| {
         entry.document(&case, request, control)

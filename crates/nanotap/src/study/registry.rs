@@ -43,7 +43,7 @@ use crate::Error;
 use crate::case::Case;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
-pub use crate::study::{DatasetPlan, DatasetStudy, Document, Study};
+pub use crate::study::{DatasetPlan, DatasetStudy, Document, STUDIES, Study};
 
 /// A study without its types.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +76,7 @@ pub enum Run {
 }
 
 impl StudyEntry {
-    const fn of<S: Study>() -> Self {
+    pub(super) const fn of<S: Study>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -98,7 +98,7 @@ impl StudyEntry {
         }
     }
 
-    const fn dataset<S: DatasetStudy>() -> Self {
+    pub(super) const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -152,23 +152,6 @@ impl StudyEntry {
         }
     }
 }
-
-/// Every study.
-pub static STUDIES: &[StudyEntry] = &[
-    StudyEntry::of::<super::modes::ModesStudy>(),
-    StudyEntry::of::<super::simulate::SimulateStudy>(),
-    StudyEntry::of::<super::orbit::OrbitStudy>(),
-    StudyEntry::of::<super::attractors::AttractorsStudy>(),
-    StudyEntry::of::<super::branch::BranchStudy>(),
-    StudyEntry::of::<super::approach::ApproachStudy>(),
-    StudyEntry::of::<super::fit::FitStudy>(),
-    StudyEntry::dataset::<super::sweep::SweepStudy>(),
-    StudyEntry::dataset::<super::window::WindowStudy>(),
-    StudyEntry::dataset::<super::basin::BasinStudy>(),
-    StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
-    StudyEntry::of::<super::convergence::ConvergenceStudy>(),
-    StudyEntry::of::<super::contact_laws::ContactLawsStudy>(),
-];
 
 /// The study that is called `name`.
 pub fn study(name: &str) -> Option<&'static StudyEntry> {

@@ -21,7 +21,9 @@ use crate::dataset::{Store, StoreError, Values};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
+use crate::study::sweep::{
+    FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours,
+};
 use crate::study::value::Axes;
 use crate::study::{DatasetPlan, DatasetStudy};
 

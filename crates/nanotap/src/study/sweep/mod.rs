@@ -82,9 +82,7 @@ impl Sweep {
         options: SweepOptions,
         starts: Starts,
     ) -> Result<Self, Error> {
-        let over = options.over.0.iter();
-        let over = over.map(|axis| Over::parse(axis, case));
-        let over: Vec<Over> = over.collect::<Result<_, _>>()?;
+        let over = options.over.parse(case)?;
         check::check(case, &options, &over, &starts)?;
         // What the case says of a parameter that varies does not matter, and must not
         // make two datasets differ.

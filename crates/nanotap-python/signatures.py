@@ -395,9 +395,9 @@ def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -
         "    Raises",
         "    ------",
         "    ValueError",
-        "        Something that was asked for is not right.",
+        "        An argument is not valid.",
         "    RuntimeError",
-        "        The computation did not succeed.",
+        "        The computation failed.",
     ]
     first = textwrap.fill(f"{about}.", 84, subsequent_indent="    ")
     return f'    """{first}\n\n' + "\n".join(lines) + '\n    """'

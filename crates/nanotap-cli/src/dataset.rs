@@ -1,4 +1,4 @@
-//! Datasets at the terminal: where they go, work on them, what is said of failures.
+//! Datasets at the terminal: destination, computation, report.
 
 use std::path::{Path, PathBuf};
 

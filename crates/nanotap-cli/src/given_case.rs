@@ -1,4 +1,4 @@
-//! The case of a command at the terminal: remarks are said, wrong names and values become
+//! The case of a command at the terminal: remarks are printed, wrong names and values become
 //! failures with advice.
 
 use std::ops::Deref;

@@ -1,4 +1,4 @@
-//! The terminal door: parsing, formatting, files. No physics and no numerics here.
+//! The command-line interface: parsing, formatting, files. No physics and no numerics here.
 //!
 //! Exit codes: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM.
 

@@ -138,7 +138,7 @@ pub(crate) fn watched<R>(
     };
     line().work = Some(counted(0, 0));
     let report = |done: usize, total: usize| {
-        // Whoever cannot have the line at once leaves it to the next.
+        // A thread that does not get the line at once skips this report.
         if let Ok(mut line) = LINE.try_lock() {
             line.work = Some(counted(done, total));
         }

@@ -177,13 +177,13 @@ pub(super) fn failures(report: &BranchReport, at: impl Fn(f64) -> String) -> Str
 }
 
 fn text(case: &GivenCase, report: &BranchReport) -> String {
-    let told = |key, value: f64, digits| {
+    let of_key = |key, value: f64, digits| {
         case.parameter_unit(key).map_or_else(
             || number::significant(value, digits),
             |unit| unit.kind.format_digits(unit.si * value, digits),
         )
     };
-    let shown = |value, digits| told(report.key, value, digits);
+    let shown = |value, digits| of_key(report.key, value, digits);
     let length = |value: f64| {
         case.units().si(Kind::Length).map_or_else(
             || number::significant(value, 5),
@@ -284,7 +284,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         let range = |key, values: &[f64]| {
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
             let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            format!("{} … {}", told(key, low, 6), told(key, high, 6))
+            format!("{} … {}", of_key(key, low, 6), of_key(key, high, 6))
         };
         for curve in &loci.curves {
             table.row([

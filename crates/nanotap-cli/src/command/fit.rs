@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
 }
 
-/// Where the case of one curve is written: `best-CURVE.toml` beside `best.toml`.
+/// Where the case of one curve is written: `best-CURVE.toml` next to `best.toml`.
 fn of_curve(path: &Path, curve: &str, index: usize) -> PathBuf {
     let name = Path::new(curve)
         .file_stem()

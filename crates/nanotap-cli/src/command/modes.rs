@@ -89,20 +89,20 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
         number::significant(100.0 * table.static_excess, 2)
     )));
     if let Some(quality) = table.quality.as_ref().filter(|q| q.len() > 1) {
-        let told = |(k, q): (usize, &f64)| format!("Q{} = {}", k + 1, number::significant(*q, 4));
-        let told: Vec<String> = quality.iter().take(3).enumerate().map(told).collect();
+        let value = |(k, q): (usize, &f64)| format!("Q{} = {}", k + 1, number::significant(*q, 4));
+        let values: Vec<String> = quality.iter().take(3).enumerate().map(value).collect();
         text.push_str(&motion::paragraph(&format!(
             "In free flight {}. Without numbers of their own higher modes are damped in proportion \
              to their mass, which gives them several times the Q of real levers in air: \
              cantilever.Q2, Q3, f2, f3 and k2 take what was measured.",
-            told.join(", ")
+            values.join(", ")
         )));
     }
     text
 }
 
 fn frequencies(galerkin: &[f64], exact: &[f64], eigenvalues: Option<&[[f64; 2]]>) -> String {
-    // Where each mode oscillates there is one eigenvalue a mode, and it stands in its row.
+    // Where each mode oscillates there is one eigenvalue a mode, shown in its row.
     let paired = eigenvalues.filter(|list| list.len() == galerkin.len());
     let mut table = Table::new([
         ("mode", Align::Right),

@@ -1,5 +1,5 @@
-//! A study that has no text of its own: every study of the registry is a command, with the flags
-//! of its request, and prints its document.
+//! Studies without a hand-written text: every study of the registry is a command, with the flags of
+//! its options, and prints its document.
 
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use nanotap::study::registry::{STUDIES, StudyEntry, study};

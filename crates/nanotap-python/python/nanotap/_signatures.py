@@ -53,9 +53,9 @@ def modes(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("modes", locals())
     return _motions.modes(case, options)
@@ -137,9 +137,9 @@ def simulate(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("simulate", locals())
     return _motions.simulate(case, options, series, threads, progress, parameters)
@@ -227,9 +227,9 @@ def orbit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("orbit", locals())
     return _motions.orbit(case, options, threads, progress, parameters)
@@ -291,9 +291,9 @@ def attractors(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("attractors", locals())
     return _studies.attractors(case, options, threads, progress)
@@ -370,9 +370,9 @@ def branch(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("branch", locals())
     return _studies.branch(case, options, threads, progress)
@@ -451,9 +451,9 @@ def approach(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
@@ -525,9 +525,9 @@ def fit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("fit", locals())
     return _studies.fit(case, options, threads, progress)
@@ -610,9 +610,9 @@ def sweep(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("sweep", locals())
     return _datasets.sweep(case, options, out, chunk, threads, client, progress)
@@ -667,9 +667,9 @@ def window(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("window", locals())
     return _datasets.window(case, options, out, threads, client, progress)
@@ -736,9 +736,9 @@ def basin(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("basin", locals())
     return _datasets.basin(case, options, out, chunk, threads, client, progress)
@@ -781,9 +781,9 @@ def lyapunov(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)
@@ -817,9 +817,9 @@ def convergence(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("convergence", locals())
     return _studies.convergence(case, options)
@@ -862,9 +862,9 @@ def contact_laws(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
     options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)

@@ -1,8 +1,7 @@
 //! Every study by name, from JSON to JSON: what the front ends iterate over.
 //!
-//! A case and the JSON of a request go in, with who is told of the progress and what stops the
-//! work; the JSON of a document comes out. What may be asked for, and what comes out, is in the
-//! entry's schemas.
+//! Input: a case, the options as JSON, a function called with the progress, a flag that cancels the
+//! work. Output: a document as JSON. The entry has the schemas of options and document.
 //!
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,4 +1,4 @@
-//! One run, as the command does it, beside its bare propagation.
+//! One run, as the command does it, and its bare propagation.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

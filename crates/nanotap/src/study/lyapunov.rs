@@ -57,7 +57,7 @@ pub struct LyapunovReport {
     pub period: Option<usize>,
     /// Why it was named so.
     pub evidence: String,
-    /// Drive periods thrown away first.
+    /// Drive periods discarded first.
     pub transient: usize,
     /// Drive periods averaged over.
     pub periods: usize,

@@ -60,13 +60,13 @@ pub struct OrbitReport {
     /// Harmonics, distortion and phase.
     #[serde(flatten)]
     pub spectrum: Spectrum,
-    /// Derivatives by the keys that were asked for.
+    /// Derivatives by the requested keys.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<&'static str, Derivative>,
     /// What of the range of a nonlinear force law it leaves.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
-    /// What was proved of it, if that was asked for.
+    /// The proof, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<ProofReport>,
     /// Its full length, for figures.

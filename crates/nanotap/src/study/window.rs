@@ -1,7 +1,7 @@
 //! The operating window: where, over two parameters, the lever taps with one motion and no
 //! other, and where a second state, subharmonics or chaos threaten.
 //!
-//! Every point is a census of its own: motions from rest, from the linear responses and from
+//! Every point has a census: motions from rest, from the linear responses and from
 //! seeded starts of every size, each named as in a [sweep](crate::study::sweep), whose datasets,
 //! chunks and resumption serve here too. Then come the states of a lever that is moved slowly,
 //! coming from far and from the nearest distance ([`approach`](crate::study::approach)), and the
@@ -217,7 +217,7 @@ impl Window {
         })
     }
 
-    /// The same, kept beside the dataset in `window.json`.
+    /// The same, stored with the dataset in `window.json`.
     ///
     /// # Errors
     /// As [`Window::of`], and when the file system refuses.

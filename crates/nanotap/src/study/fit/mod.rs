@@ -62,7 +62,7 @@ const MOST_STARTS: usize = 1000;
 /// Longest period of the orbits.
 const MOST_PERIOD: usize = 64;
 
-/// What a fit is asked for.
+/// Options of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FitOptions {
@@ -249,7 +249,7 @@ pub fn residuals(
     })
 }
 
-/// Names, of which several may stand in one text.
+/// Names; one text may have several, separated by commas.
 fn names(given: &[String]) -> Vec<String> {
     let parts = given.iter().flat_map(|text| text.split(','));
     let names = parts.map(str::trim).filter(|name| !name.is_empty());

@@ -75,7 +75,7 @@ pub(super) struct Outcome {
     pub(super) classification: Classification,
     /// Minimal period, 0 if it is not periodic.
     pub(super) period: usize,
-    /// Periods thrown away.
+    /// Periods discarded.
     pub(super) transient: usize,
     pub(super) observables: Observables,
     /// Largest modulus of a multiplier of the orbit.

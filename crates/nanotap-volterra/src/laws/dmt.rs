@@ -5,7 +5,7 @@
 //! modulation by García and San Paulo, Phys. Rev. B 60, 1999). The adhesion is `4πRγ` with
 //! `γ = H/(24π a0²)`.
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{Shape, contact_ways, deep, reduced_modulus};
 use crate::laws::entry::{

@@ -5,7 +5,7 @@
 //! 2005), `ε` the absolute permittivity of the medium. In contact (`d < a0`) each stays as it
 //! is at `a0`, so that neither jumps there.
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{

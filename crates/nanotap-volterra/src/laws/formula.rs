@@ -3,7 +3,7 @@
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]
 
-use crate::dual::{Dual, Scalar};
+use nanotap_arithmetic::{Dual, Scalar};
 use crate::law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
 use crate::laws::entry::Entry;
 use crate::linear::wide_registers;

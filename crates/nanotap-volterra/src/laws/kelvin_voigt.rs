@@ -7,7 +7,7 @@
 //! then where the tip is not: no force, until the tip is outside or presses again; a surface
 //! that pulls stays until `d = a0`.
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{Shape, deep};
 use crate::laws::entry::{

@@ -4,7 +4,7 @@
 //! Derjaguin's approximation (Israelachvili, Intermolecular and Surface Forces; Basso,
 //! Giarré, Dahleh, Mezić, ACC 1998).
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::laws::entry::{Dimension, Entry, Part, RADIUS, Range, own};
 use crate::laws::formula::{Formula, Way};
 

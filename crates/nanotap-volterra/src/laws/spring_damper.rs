@@ -3,7 +3,7 @@
 //! `F = k δ − c ḋ` for `δ = a0 − d > 0`; contact begins and ends at `d = a0`, where the damper
 //! makes the force jump.
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Part, Range, own};

@@ -4,7 +4,7 @@
 //! Hamaker, Physica 4, 1937; Israelachvili, Intermolecular and Surface Forces). In contact
 //! (`d < a0`) the force stays as it is at `a0`.
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::{Shape, contact_ways};
 use crate::laws::entry::{CONTACT_DISTANCE, Entry, HALF_ANGLE, HAMAKER, Part, RADIUS};

@@ -4,7 +4,7 @@
 //! `−η √(Rδ) ḋ` in contact (Garcia, Gómez et al.; used by dForce) and `−γ₀ e^{−d/x} ḋ` at any
 //! gap (Gotsmann, Seidel, Anczykowski, Fuchs, Phys. Rev. B 60, 1999).
 
-use crate::dual::Scalar;
+use nanotap_arithmetic::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, RADIUS, Range, VISCOSITY, own};

@@ -333,7 +333,7 @@ fn tip_changes(
     let of = |gathered: &Gathered| {
         let integral = phasor(gathered.fouriers[0]);
         let component = integral.times(Dual::constant(2.0) / dual(gathered.duration));
-        [component.norm().derivative, component.lag().derivative]
+        [component.norm().derivative(), component.lag().derivative()]
     };
     Ok(gathered.iter().map(of).collect())
 }

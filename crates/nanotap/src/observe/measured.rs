@@ -271,7 +271,7 @@ impl<'a, D: Number> Measured<'a, D> {
         if whole > 0 {
             whole as f64
         } else {
-            self.duration().plain() / self.model.period()
+            self.duration().value() / self.model.period()
         }
     }
 
@@ -285,6 +285,13 @@ impl<'a, D: Number> Measured<'a, D> {
         self.found
             .as_ref()
             .map_or_else(Beginnings::default, |found| found.contacts)
+    }
+
+    /// The time mean of the force while tip and sample touch; `None` without contact.
+    pub(super) fn mean_contact_force(&mut self) -> Option<D> {
+        let impulse = self.mean(Signal::Force) * self.duration();
+        let time = self.contact_time();
+        (time.value() > 0.0).then(|| impulse / time)
     }
 
     /// Whether the model is a beam.
@@ -309,7 +316,7 @@ impl<'a, D: Number> Measured<'a, D> {
     pub(super) fn least_force(&mut self) -> D {
         const ROUNDING: f64 = 1e-12;
         let (least, peak) = (self.least(Signal::Force), self.peak_force());
-        if least.plain().abs() <= ROUNDING * peak.plain() {
+        if least.value().abs() <= ROUNDING * peak.value() {
             0.0.into()
         } else {
             least
@@ -337,15 +344,15 @@ impl<'a, D: Number> Measured<'a, D> {
         let (force, depth) = if self.model.nonlinear.is_some() {
             // An attraction stores without contact.
             let [near, far] = self.range(Signal::Height);
-            let pull = -self.least(Signal::Force).plain();
+            let pull = -self.least(Signal::Force).value();
             (
-                self.peak_force().plain().max(pull),
-                (far.plain() - near.plain()),
+                self.peak_force().value().max(pull),
+                (far.value() - near.value()),
             )
         } else {
-            (self.peak_force().plain(), self.indentation().plain())
+            (self.peak_force().value(), self.indentation().value())
         };
-        if above_rounding(work.plain(), force, depth) == 0.0 {
+        if above_rounding(work.value(), force, depth) == 0.0 {
             0.0.into()
         } else {
             work

@@ -22,7 +22,7 @@ use super::{Dimension, EnergyBalance};
 use crate::case::physical::Scales;
 use crate::model::contact::dual::Dual;
 
-use Signal::{Force, Height, Slope, Tip};
+use Signal::{Height, Slope, Tip};
 
 /// One observable.
 #[derive(Debug)]
@@ -319,7 +319,7 @@ observables! {
         "root mean square of the tip deflection about its mean",
         |m| {
             let mean = m.mean(Tip);
-            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).sqrt()
+            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).root()
         };
     gap_range: [f64; 2], Length, rare,
         "gap", "least and greatest height of the tip over the undeformed surface",
@@ -329,11 +329,7 @@ observables! {
         |m| m.least_force();
     contact_force: Option<f64>, Force, rare,
         "mean force in contact", "time mean of the force of the sample on the tip while they touch",
-        |m| {
-            let impulse = m.mean(Force) * m.duration();
-            let time = m.contact_time();
-            (time.plain() > 0.0).then(|| impulse / time)
-        };
+        |m| m.mean_contact_force();
     drive_power: f64, Power, rare,
         "power of the drive", "mean power of the drive",
         |m| m.energy_balance().drive_work / m.duration();

@@ -56,6 +56,12 @@ pub trait Scalar:
         let t = crate::tan(self.value());
         self.chain(t, 1.0 + t * t)
     }
+    /// Sine and cosine of an angle in rad.
+    #[must_use]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = crate::sin_cos(self.value());
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
     /// `x²`.
     #[must_use]
     fn square(self) -> Self {
@@ -98,13 +104,6 @@ impl<const K: usize> Dual<K> {
             value,
             slopes: [0.0; K],
         }
-    }
-
-    /// Sine and cosine of an angle in rad.
-    #[must_use]
-    pub fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = crate::sin_cos(self.value);
-        (self.chain(sin, cos), self.chain(cos, -sin))
     }
 
     #[inline]

@@ -15,6 +15,7 @@ use crate::model::contact::dual::Dual;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::measured_modes::Correction;
 use crate::model::parameter::Parameter;
+use nanotap_arithmetic::Scalar as _;
 
 /// The two linear regimes of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -22,8 +22,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::dual::Dual;
-use nanotap_arithmetic::Scalar as _;
 use crate::model::parameter::Parameter;
+use nanotap_arithmetic::Scalar as _;
 
 /// What a measured mode adds: a term of rank one to each matrix, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use std::ops::Div;
 
+use nalgebra::Complex;
 use nanotap_arithmetic::{Dual, Scalar};
-use nanotap_flow::Complex;
 
 /// A real number, with or without a derivative.
 pub(super) trait Number: Scalar + Default + From<f64> + Div<f64, Output = Self> {
@@ -82,8 +82,8 @@ pub(super) struct Phasor<D> {
     pub(super) im: D,
 }
 
-impl From<Complex> for Phasor<f64> {
-    fn from(c: Complex) -> Self {
+impl<D> From<Complex<D>> for Phasor<D> {
+    fn from(c: Complex<D>) -> Self {
         Self { re: c.re, im: c.im }
     }
 }

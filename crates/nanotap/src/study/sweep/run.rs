@@ -348,7 +348,7 @@ impl<'a> Runner<'a> {
 
     fn watch(&self, from: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {
         let watcher = self.watcher.as_ref().map_err(Clone::clone)?;
-        watcher.watch(from, periods, kept)
+        watcher.record(from, periods, kept)
     }
 
     /// Records the motion from `from`; with `period`, one turn of that orbit stands for

@@ -335,7 +335,7 @@ impl Map {
     ///
     /// # Errors
     /// When the state does not fit, the motion cannot be followed, or the span makes no sense
-    /// or is longer than [`motion::MOST_PERIODS`].
+    /// or is longer than [`motion::MAX_PERIODS`].
     pub fn flow(&self, state: &[f64], from: f64, length: f64) -> Result<Motion, MapError> {
         self.fits(state, 1)?;
         Motion::follow(&self.model, state, from, length)

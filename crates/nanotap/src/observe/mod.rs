@@ -57,5 +57,5 @@ fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
 
 /// Whether a switch begins a contact: from flight into contact, or an impact.
 pub fn begins_contact(model: &Model, from: usize, to: usize) -> bool {
-    !model.contact[from] && (model.contact[to] || from == to)
+    !model.touches(from) && (model.touches(to) || from == to)
 }

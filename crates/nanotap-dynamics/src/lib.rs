@@ -61,7 +61,7 @@ pub use global::{
     GlobalAttractor, GlobalOptions, GlobalValue, attractors_along, grid_neighbours, orbits_shared,
 };
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, StrobeMeans, lyapunov_spectrum};
-pub use map::{MapFamily, StroboscopicMap, Tangency, TwoParameterFamily};
+pub use map::{MapFamily, Scheduling, StroboscopicMap, Tangency, TwoParameterFamily};
 pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
 pub use orbit::{

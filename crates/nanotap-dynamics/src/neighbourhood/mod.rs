@@ -377,6 +377,8 @@ mod tests {
         Still,
     }
 
+    impl crate::Scheduling for Line {}
+
     impl StroboscopicMap for Line {
         type Error = Infallible;
 
@@ -496,6 +498,8 @@ mod tests {
     /// contracting every vector where a block of them still contracts.
     #[derive(Clone)]
     struct Twist;
+
+    impl crate::Scheduling for Twist {}
 
     impl StroboscopicMap for Twist {
         type Error = Infallible;

@@ -35,7 +35,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use nanotap_dynamics::{
-    Control, PeriodicOrbit, ShootingError, ShootingOptions, StroboscopicMap as _, close_orbit,
+    Control, PeriodicOrbit, Scheduling as _, ShootingError, ShootingOptions, StroboscopicMap as _,
+    close_orbit,
 };
 use nanotap_flow::FlowError;
 use nanotap_volterra::VolterraError;

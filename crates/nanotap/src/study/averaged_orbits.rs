@@ -6,7 +6,7 @@
 //!
 //! Fails by omission: subharmonic motions, and motions with strong harmonics of the gap.
 
-use nanotap_dynamics::{PeriodicOrbit, ShootingOptions, StroboscopicMap, close_orbit};
+use nanotap_dynamics::{PeriodicOrbit, Scheduling as _, ShootingOptions, close_orbit};
 
 use crate::model::Model;
 use crate::model::strobe::Strobe;

@@ -1,7 +1,9 @@
 //! Lyapunov spectrum and Poincaré section of any motion.
 
 use nalgebra::DMatrix;
-use nanotap_dynamics::{ClassifyOptions, StroboscopicMap, Tangency, classify, lyapunov_spectrum};
+use nanotap_dynamics::{
+    ClassifyOptions, Scheduling, StroboscopicMap, Tangency, classify, lyapunov_spectrum,
+};
 use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -131,6 +133,8 @@ impl Stoppable<'_> {
         Ok(())
     }
 }
+
+impl Scheduling for Stoppable<'_> {}
 
 impl StroboscopicMap for Stoppable<'_> {
     type Error = Unfinished;

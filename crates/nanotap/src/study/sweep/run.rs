@@ -1,8 +1,8 @@
 //! One run of a sweep, and the runs of one piece of work.
 
 use nanotap_dynamics::{
-    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap,
-    classify_beside,
+    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, Scheduling as _,
+    StroboscopicMap, classify_beside,
 };
 
 use super::{Sweep, SweepOptions};
@@ -269,7 +269,7 @@ impl<'a> Runner<'a> {
         cancelled: &impl Fn() -> bool,
     ) -> Option<Vec<Outcome>> {
         let mut outcomes = Vec::with_capacity(starts.len());
-        for starts in starts.chunks(self.map.side_by_side()) {
+        for starts in starts.chunks(self.map.batch_size()) {
             let mut states = starts.concat();
             let mut failures = vec![None; starts.len()];
             for done in (0..transient).step_by(UNINTERRUPTED) {

@@ -37,6 +37,7 @@ pub mod lyapunov;
 pub mod map;
 pub mod neighbourhood;
 pub mod orbit;
+mod same_motion;
 mod vector;
 
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
@@ -68,3 +69,4 @@ pub use orbit::{
     DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
     ShootingOptions, Stability, check_size, close_orbit, close_orbit_from_points, find_orbits,
 };
+pub use same_motion::SameMotion;

@@ -330,7 +330,7 @@ fn closed<M: StroboscopicMap>(
     if !closed.is_stable() {
         return None;
     }
-    let continued = is_continuation(orbit, &closed);
+    let continued = orbit.is_near(&closed, CONTINUITY);
     let state = closed.states[0].clone();
     Some((AttractorKind::Periodic(closed), state, continued))
 }
@@ -360,12 +360,6 @@ fn arrived<M: StroboscopicMap>(
         MotionKind::Unbounded | MotionKind::Undecided { .. } => return None,
     };
     Some((kind, classified.state, continued))
-}
-
-/// True if the second orbit is the first moved by little of its size.
-fn is_continuation(orbit: &PeriodicOrbit, closed: &PeriodicOrbit) -> bool {
-    let size = orbit.scale().max(closed.scale());
-    orbit.distance_to(closed).1 <= CONTINUITY * size
 }
 
 /// Gives linked attractors one number, in the order of the grid.

@@ -41,7 +41,7 @@ def modes(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     points : int
         Points along the beam in the table of mode shapes (2 to 1000000).
 
@@ -53,7 +53,7 @@ def modes(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -84,7 +84,7 @@ def simulate(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods recorded (1 to 2000000).
     transient : int | None
@@ -137,7 +137,7 @@ def simulate(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -193,7 +193,7 @@ def orbit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int | None
         Its period in drive periods; without it, that of the motion to which a run
         converges (1 to 10000).
@@ -227,7 +227,7 @@ def orbit(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -252,7 +252,7 @@ def attractors(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     starts : int | None
         Starts, spread evenly over one box of states. Without it, starts of every
         size, from the resonant response down to below the gap, go on until the
@@ -291,7 +291,7 @@ def attractors(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -322,7 +322,7 @@ def branch(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     parameter : str
         The parameter, as the case file calls it (omega, alpha4, gap …); of a
         physical case also a quantity of it (drive.frequency, gap.tip,
@@ -370,7 +370,7 @@ def branch(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -400,7 +400,7 @@ def approach(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     from_ : float | str | None
         Distance at which to begin, in units of the case ("30 nm") or as alpha5;
         without it, 1.25 times what the free tip swings towards the sample.
@@ -451,7 +451,7 @@ def approach(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -481,7 +481,7 @@ def fit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
@@ -525,7 +525,7 @@ def fit(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -556,7 +556,7 @@ def sweep(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in omega=2:4:400 (first, last, how many), or
         alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
@@ -610,7 +610,7 @@ def sweep(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -635,7 +635,7 @@ def window(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in gap.tip=5nm:25nm:41,
         drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
@@ -667,7 +667,7 @@ def window(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -696,7 +696,7 @@ def basin(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     x : str | Mapping[str, Any]
         The horizontal axis, as in a1=-1:1:200: entry of the state, first value,
         last value, how many (a1…aN, v1…vN; oscillator: x, v).
@@ -736,7 +736,7 @@ def basin(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -758,7 +758,7 @@ def lyapunov(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods averaged over (1 to 100000000).
     transient : int
@@ -781,7 +781,7 @@ def lyapunov(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -800,7 +800,7 @@ def convergence(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     largest : int
         Largest number of modes (2 to 50).
     tolerance : float
@@ -817,7 +817,7 @@ def convergence(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -839,7 +839,7 @@ def contact_laws(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int
         Period of the orbits compared (1 to 10000).
     arm : float | None
@@ -862,7 +862,7 @@ def contact_laws(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """

@@ -325,12 +325,12 @@ fn force_rows(table: &mut Table, force: &SampleForce) {
             &format!("of gap and force, from {} to {}", gap(*first), gap(*last)),
         ]);
     }
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for (parameter, key, value) in force.parameters() {
-        if told.contains(&key) {
+        if shown.contains(&key) {
             continue;
         }
-        told.push(key);
+        shown.push(key);
         let value = if value.is_infinite() {
             "rigid".to_owned()
         } else {

@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _datasets, _motions, _studies
+from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
@@ -57,9 +57,7 @@ def modes(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "points": points,
-    }
+    options = _arguments.options("modes", locals())
     return _motions.modes(case, options)
 
 def simulate(
@@ -143,19 +141,7 @@ def simulate(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "strobe": strobe,
-        "events": events,
-        "max_period": max_period,
-        "observables": observables,
-        "resolution": resolution,
-        "method": method,
-        "steps": steps,
-        "switching": switching,
-    }
+    options = _arguments.options("simulate", locals())
     return _motions.simulate(case, options, series, threads, progress, parameters)
 
 @overload
@@ -245,15 +231,7 @@ def orbit(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "period": period,
-        "state": state,
-        "harmonics": harmonics,
-        "observables": observables,
-        "resolution": resolution,
-        "derivatives": derivatives,
-        "prove": prove,
-    }
+    options = _arguments.options("orbit", locals())
     return _motions.orbit(case, options, threads, progress, parameters)
 
 def attractors(
@@ -317,15 +295,7 @@ def attractors(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "starts": starts,
-        "unseen": unseen,
-        "seed": seed,
-        "box": box,
-        "max_period": max_period,
-        "unstable": unstable,
-        "prove": prove,
-    }
+    options = _arguments.options("attractors", locals())
     return _studies.attractors(case, options, threads, progress)
 
 def branch(
@@ -404,20 +374,7 @@ def branch(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "parameter": parameter,
-        "from": from_,
-        "to": to,
-        "period": period,
-        "state": state,
-        "switch": switch,
-        "diagram": diagram,
-        "values": values,
-        "starts": starts,
-        "seed": seed,
-        "second": second,
-        "max_step": max_step,
-    }
+    options = _arguments.options("branch", locals())
     return _studies.branch(case, options, threads, progress)
 
 def approach(
@@ -498,19 +455,7 @@ def approach(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "from": from_,
-        "to": to,
-        "points": points,
-        "branches": branches,
-        "switch": switch,
-        "max_period": max_period,
-        "speed": speed,
-        "fm": fm,
-        "phase": phase,
-        "shift": shift,
-        "closest": closest,
-    }
+    options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
 
 def fit(
@@ -584,20 +529,7 @@ def fit(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "data": data,
-        "free": free,
-        "per_curve": per_curve,
-        "bounds": bounds,
-        "columns": columns,
-        "laws": laws,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-        "jumps": jumps,
-        "phase": phase,
-        "profile": profile,
-    }
+    options = _arguments.options("fit", locals())
     return _studies.fit(case, options, threads, progress)
 
 def sweep(
@@ -682,18 +614,7 @@ def sweep(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "box": box,
-        "state": state,
-        "follow": follow,
-        "periods": periods,
-        "strobe": strobe,
-        "transient": transient,
-        "max_period": max_period,
-    }
+    options = _arguments.options("sweep", locals())
     return _datasets.sweep(case, options, out, chunk, threads, client, progress)
 
 def window(
@@ -750,12 +671,7 @@ def window(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-    }
+    options = _arguments.options("window", locals())
     return _datasets.window(case, options, out, threads, client, progress)
 
 def basin(
@@ -824,16 +740,7 @@ def basin(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "x": x,
-        "y": y,
-        "state": state,
-        "attractors": attractors,
-        "starts": starts,
-        "seed": seed,
-        "periods": periods,
-        "max_period": max_period,
-    }
+    options = _arguments.options("basin", locals())
     return _datasets.basin(case, options, out, chunk, threads, client, progress)
 
 def lyapunov(
@@ -878,14 +785,7 @@ def lyapunov(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "section": section,
-        "phase": phase,
-        "points": points,
-    }
+    options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)
 
 def convergence(
@@ -921,11 +821,7 @@ def convergence(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "largest": largest,
-        "tolerance": tolerance,
-        "period": period,
-    }
+    options = _arguments.options("convergence", locals())
     return _studies.convergence(case, options)
 
 def contact_laws(
@@ -970,10 +866,5 @@ def contact_laws(
     RuntimeError
         The computation failed.
     """
-    options = {
-        "period": period,
-        "arm": arm,
-        "from": from_,
-        "to": to,
-    }
+    options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)

@@ -106,7 +106,7 @@ pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Err
     } else {
         case.alpha6
     };
-    // What a surface of its own would be, only a case that has one says.
+    // Only a case with a moving surface defines one.
     let moves = case.contact == ContactLaw::MovingSurface;
     Ok(ContactLaw::ALL
         .into_iter()

@@ -44,6 +44,24 @@ use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
 use crate::model::cantilever::Cantilever;
+use registry::StudyEntry;
+
+/// Every study.
+pub static STUDIES: &[StudyEntry] = &[
+    StudyEntry::of::<modes::ModesStudy>(),
+    StudyEntry::of::<simulate::SimulateStudy>(),
+    StudyEntry::of::<orbit::OrbitStudy>(),
+    StudyEntry::of::<attractors::AttractorsStudy>(),
+    StudyEntry::of::<branch::BranchStudy>(),
+    StudyEntry::of::<approach::ApproachStudy>(),
+    StudyEntry::of::<fit::FitStudy>(),
+    StudyEntry::dataset::<sweep::SweepStudy>(),
+    StudyEntry::dataset::<window::WindowStudy>(),
+    StudyEntry::dataset::<basin::BasinStudy>(),
+    StudyEntry::of::<lyapunov::LyapunovStudy>(),
+    StudyEntry::of::<convergence::ConvergenceStudy>(),
+    StudyEntry::of::<contact_laws::ContactLawsStudy>(),
+];
 
 /// A study whose report is a document.
 pub trait Study {

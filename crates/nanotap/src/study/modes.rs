@@ -36,7 +36,7 @@ pub struct ModeTable {
     /// `None` where not every mode oscillates.
     pub quality: Option<Vec<f64>>,
     /// Eigenvalues [Re, Im ≥ 0] of the damped Galerkin equations in free flight, by
-    /// ascending size; `None` where they are too nearly defective to be told apart.
+    /// ascending size; `None` where they are too nearly defective to be separated.
     pub free_eigenvalues: Option<Vec<[f64; 2]>>,
     /// The same in contact.
     pub contact_eigenvalues: Option<Vec<[f64; 2]>>,

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 use nanotap_dynamics::{
-    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingOptions,
-    StroboscopicMap as _, check_size, classify, close_orbit, close_orbit_from_points, find_orbits,
+    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, Scheduling as _,
+    ShootingOptions, StroboscopicMap as _, check_size, classify, close_orbit,
+    close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
@@ -60,13 +61,13 @@ pub struct OrbitReport {
     /// Harmonics, distortion and phase.
     #[serde(flatten)]
     pub spectrum: Spectrum,
-    /// Derivatives by the keys that were asked for.
+    /// Derivatives by the requested keys.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<&'static str, Derivative>,
     /// What of the range of a nonlinear force law it leaves.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
-    /// What was proved of it, if that was asked for.
+    /// The proof, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<ProofReport>,
     /// Its full length, for figures.

@@ -1,8 +1,7 @@
 //! Every study by name, from JSON to JSON: what the front ends iterate over.
 //!
-//! A case and the JSON of a request go in, with who is told of the progress and what stops the
-//! work; the JSON of a document comes out. What may be asked for, and what comes out, is in the
-//! entry's schemas.
+//! Input: a case, the options as JSON, a function called with the progress, a flag that cancels the
+//! work. Output: a document as JSON. The entry has the schemas of options and document.
 //!
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};
@@ -43,7 +42,7 @@ use crate::Error;
 use crate::case::Case;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
-pub use crate::study::{DatasetPlan, DatasetStudy, Document, Study};
+pub use crate::study::{DatasetPlan, DatasetStudy, Document, STUDIES, Study};
 
 /// A study without its types.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +75,7 @@ pub enum Run {
 }
 
 impl StudyEntry {
-    const fn of<S: Study>() -> Self {
+    pub(super) const fn of<S: Study>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -98,7 +97,7 @@ impl StudyEntry {
         }
     }
 
-    const fn dataset<S: DatasetStudy>() -> Self {
+    pub(super) const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -152,23 +151,6 @@ impl StudyEntry {
         }
     }
 }
-
-/// Every study.
-pub static STUDIES: &[StudyEntry] = &[
-    StudyEntry::of::<super::modes::ModesStudy>(),
-    StudyEntry::of::<super::simulate::SimulateStudy>(),
-    StudyEntry::of::<super::orbit::OrbitStudy>(),
-    StudyEntry::of::<super::attractors::AttractorsStudy>(),
-    StudyEntry::of::<super::branch::BranchStudy>(),
-    StudyEntry::of::<super::approach::ApproachStudy>(),
-    StudyEntry::of::<super::fit::FitStudy>(),
-    StudyEntry::dataset::<super::sweep::SweepStudy>(),
-    StudyEntry::dataset::<super::window::WindowStudy>(),
-    StudyEntry::dataset::<super::basin::BasinStudy>(),
-    StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
-    StudyEntry::of::<super::convergence::ConvergenceStudy>(),
-    StudyEntry::of::<super::contact_laws::ContactLawsStudy>(),
-];
 
 /// The study that is called `name`.
 pub fn study(name: &str) -> Option<&'static StudyEntry> {

@@ -83,8 +83,7 @@ impl RowCases<'_> {
             let mut map = Strobe::new(&model);
             let one = |candidate: &Candidate| {
                 let orbit = newton_continuation(&mut map, &candidate.orbit)?;
-                let near = orbit.distance_to(&candidate.orbit).1
-                    <= MAX_CONTINUATION_DISTANCE * candidate.orbit.scale();
+                let near = orbit.is_near(&candidate.orbit, MAX_CONTINUATION_DISTANCE);
                 (orbit.is_stable() && near).then_some(Candidate {
                     branch: candidate.branch,
                     orbit,
@@ -108,8 +107,7 @@ impl RowCases<'_> {
             };
             runs += 1;
             let found = self.settle(row, Some(&state));
-            let new =
-                found.filter(|o| !rows[row].iter().any(|known| is_same_orbit(&known.orbit, o)));
+            let new = found.filter(|o| !rows[row].iter().any(|known| known.orbit.is_same_as(o)));
             let Some(orbit) = new else {
                 row += apart;
                 continue;
@@ -159,7 +157,7 @@ impl RowCases<'_> {
             };
             let known = rows[pair[1]]
                 .iter()
-                .any(|known| is_same_orbit(&known.orbit, &orbit));
+                .any(|known| known.orbit.is_same_as(&orbit));
             if known {
                 return;
             }
@@ -199,7 +197,7 @@ impl RowCases<'_> {
             state = orbit.states.first().cloned();
             let known = rows[row]
                 .iter()
-                .find(|known| is_same_orbit(&known.orbit, &orbit));
+                .find(|known| known.orbit.is_same_as(&orbit));
             let candidate = if let Some(known) = known {
                 known.clone()
             } else {
@@ -229,7 +227,7 @@ impl RowCases<'_> {
         let mut there = rows[near].iter();
         let continues = there.find(|candidate| {
             let found = self.follow(&self.places[near], here, &candidate.orbit, MAX_HALVINGS);
-            found.is_some_and(|found| is_same_orbit(&found, orbit))
+            found.is_some_and(|found| found.is_same_as(orbit))
         });
         continues.map(|candidate| candidate.branch)
     }
@@ -247,9 +245,7 @@ impl RowCases<'_> {
             newton_continuation(&mut Strobe::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
-        let near = |found: &PeriodicOrbit| {
-            found.distance_to(orbit).1 <= MAX_CONTINUATION_DISTANCE * orbit.scale()
-        };
+        let near = |found: &PeriodicOrbit| found.is_near(orbit, MAX_CONTINUATION_DISTANCE);
         let closed = closed.filter(|found| found.is_stable() && near(found));
         if closed.is_some() || halvings == 0 {
             return closed;
@@ -307,12 +303,6 @@ pub(super) fn newton_continuation(
     close_orbit_from_points(map, &points, orbit.period, &ShootingOptions::default())
         .ok()
         .filter(|found| found.period == orbit.period)
-}
-
-/// True if two orbits are the same: the threshold is far above rounding and far below the distance
-/// of two branches.
-fn is_same_orbit(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
-    a.is_same_as(b) || a.distance_to(b).1 <= 1e-7 * a.scale()
 }
 
 /// Lowest cost of a path to a candidate, and the row and candidate before it.

@@ -134,17 +134,17 @@ impl Data {
                 "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
             ));
         }
-        let besides = data
+        let observed = data
             .columns
             .iter()
             .find(|c| c.quantity.observable().is_some());
-        if let (true, Some(besides)) = (data.is_modulated(), besides) {
+        if let (true, Some(observed)) = (data.is_modulated(), observed) {
             return Err(Error::option(
                 "data",
                 format!(
                     "`{}` cannot be combined with a curve under frequency modulation, which holds amplitude \
                      and phase",
-                    besides.name
+                    observed.name
                 ),
                 "select {columns}: frequency_shift, drive_ratio",
             ));

@@ -411,10 +411,10 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     for (curve, rows) in found.candidates.iter().enumerate() {
         for (row, candidates) in rows.iter().enumerate() {
             let at = problem.place(x, curve, &data.curves[curve].rows[row]);
-            let besides = candidates
+            let others_here = candidates
                 .iter()
                 .filter(|c| c.branch != chosen[first + row]);
-            for candidate in besides {
+            for candidate in others_here {
                 let values = problem.values(x, curve, &at, candidate);
                 let Some(values) = values else { continue };
                 let columns = data.columns.iter().zip(values).enumerate();

@@ -184,12 +184,12 @@ impl Problem<'_> {
                 } else {
                     x[k].abs()
                 };
-            let beside = |side: f64| {
+            let at_side = |side: f64| {
                 let mut x = x.to_vec();
                 x[k] += side * step;
                 self.cases(&x)
             };
-            let (low, high) = (beside(-1.0), beside(1.0));
+            let (low, high) = (at_side(-1.0), at_side(1.0));
             for (curve, effects) in all.iter_mut().enumerate() {
                 let slope = (high[curve].get(strength) - low[curve].get(strength)) / (2.0 * step);
                 if key == Key::DriveFreeAmplitude {

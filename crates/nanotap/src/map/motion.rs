@@ -171,7 +171,7 @@ impl Motion {
         let force = at(&model.force[regime]);
         let guard = out.first().map_or(f64::NAN, |out| at(&out.guard));
         // In contact the surface is where the tip holds it: see `time_series`.
-        if model.forgetting.is_some() && contact {
+        if model.memory_reset.is_some() && contact {
             let memory = state.len() - model.memory;
             state[memory] = gap;
         }

@@ -18,7 +18,6 @@ pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;
 mod grazed;
-pub mod higher_modes;
 mod measured_modes;
 mod motion_error;
 pub mod nonlinear;
@@ -91,9 +90,9 @@ pub struct Model {
     pub memory: usize,
     /// Phase of a second tone in rad.
     pub second_phase: f64,
-    /// What a sample's memory that is overwritten at the end of each contact does to
-    /// volumes of states.
-    pub forgetting: Option<Forgetting>,
+    /// How an internal variable of the surface that is overwritten at the end of each contact
+    /// changes volumes of states.
+    pub memory_reset: Option<MemoryReset>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
     /// State at drive phase 0 from which a motion starts when no other is given; `None`: rest.
@@ -120,13 +119,13 @@ impl RigidStop {
     }
 }
 
-/// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
-/// the beam when it is met again.
+/// An internal variable `s` of the surface that is overwritten when contact ends, decays in flight,
+/// and acts on the beam when the tip meets the surface again.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forgetting {
-    /// Its rate in flight, ≤ 0.
+pub struct MemoryReset {
+    /// Its rate in flight, in 1/time of the model, ≤ 0.
     pub rate: f64,
-    /// How much the state changes per change of `s` where contact begins.
+    /// Change of the state per change of `s` where contact begins.
     pub kick: nalgebra::DVector<f64>,
 }
 
@@ -241,7 +240,7 @@ impl Model {
             return Self::under(law, galerkin, &drive);
         }
         let law = case.contact_law(None);
-        let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
+        let beam = Beam::new(&galerkin, &drive, law.internal)?;
         let regimes = vec![
             beam.regime(Regime::Free, &law.flight, true)?,
             beam.regime(Regime::Contact, &law.contact, law.plain_contact)?,
@@ -257,9 +256,9 @@ impl Model {
             power: PowersOnDemand::of(galerkin),
             rigid_stop: None,
             beam: Some(outputs.beam),
-            memory: usize::from(law.has_memory),
-            forgetting: outputs.forgetting,
-            second_phase: case.tone2_phase.to_radians(),
+            memory: law.internal,
+            memory_reset: outputs.memory_reset,
+            second_phase: case.get(Parameter::Tone2Phase).to_radians(),
             nonlinear: None,
             start: None,
             system,
@@ -272,14 +271,14 @@ impl Model {
             let flight = contact::no_sample(memory).flight;
             beam.regime(Regime::Free, &flight, true)
         };
-        let bare = Beam::new(&galerkin, drive, false)?;
-        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, false)?, drive)?;
-        let memory = nonlinear.remembers;
+        let bare = Beam::new(&galerkin, drive, 0)?;
+        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, 0)?, drive)?;
+        let memory = nonlinear.discrete_entries();
         let beam = Beam::new(&galerkin, drive, memory)?;
         let regime = free(&beam, memory)?;
         let outputs = beam.outputs(&contact::no_sample(memory));
         let system = System::new(drive.clone(), vec![regime], vec![Vec::new()])?;
-        let second_phase = galerkin.case.tone2_phase.to_radians();
+        let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
         Ok(Self {
             contact: vec![false],
             tip: outputs.tip,
@@ -289,8 +288,8 @@ impl Model {
             beam: Some(outputs.beam),
             power: PowersOnDemand::of(galerkin),
             rigid_stop: None,
-            memory: usize::from(memory),
-            forgetting: None,
+            memory,
+            memory_reset: None,
             second_phase,
             nonlinear: Some(Arc::new(nonlinear)),
             start: None,
@@ -314,14 +313,14 @@ impl Model {
             };
             let drive = self.system.drive();
             if self.nonlinear.is_some() {
-                let flight = contact::no_sample(self.memory > 0).flight;
+                let flight = contact::no_sample(self.memory).flight;
                 let free = &self.system.regimes()[0];
-                return Beam::new(galerkin, drive, self.memory > 0)
+                return Beam::new(galerkin, drive, self.memory)
                     .map(|beam| vec![beam.powers_in(free, &flight)])
                     .unwrap_or_default();
             }
             let law = galerkin.case.contact_law(None);
-            Beam::new(galerkin, drive, law.has_memory)
+            Beam::new(galerkin, drive, law.internal)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
@@ -484,25 +483,25 @@ pub fn cantilever_tangent(
     }
     if model.nonlinear.is_some() {
         // Free flight alone.
-        let memory = model.memory > 0;
+        let memory = model.memory;
         let beam = Beam::new(&galerkin, model.system.drive(), memory)?;
         let change = beam.derivative(parameter);
         tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
         return Ok(tangent);
     }
     let law = case.contact_law(Some(parameter));
-    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
-    for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
-        tangent.regimes[r] = change.regime(&beam, answer);
+    for (r, response) in [&law.flight, &law.contact].into_iter().enumerate() {
+        tangent.regimes[r] = change.regime(&beam, response);
     }
     tangent.guards = vec![
         vec![change.combined(&beam, &law.gap)],
-        vec![change.combined(&beam, &law.hold)],
+        vec![change.combined(&beam, &law.release_guard)],
     ];
-    if let Some(left) = &law.left {
-        let change = change.combined(&beam, left);
-        tangent.resets[1][0] = Some(beam.memory_jump(&change, 0.0));
+    if let Some(values) = &law.release_reset {
+        let changes = values.iter().map(|value| change.combined(&beam, value));
+        tangent.resets[1][0] = Some(beam.memory_jump(changes, 0.0));
     }
     Ok(tangent)
 }
@@ -518,11 +517,11 @@ pub(crate) fn cantilever_model_tangent(
 ) -> Result<ModelTangent, ModelError> {
     let galerkin = model.equations_of(case)?;
     let law = if model.nonlinear.is_some() {
-        contact::no_sample(model.memory > 0)
+        contact::no_sample(model.memory)
     } else {
         case.contact_law(Some(parameter))
     };
-    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
     let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
     Ok(ModelTangent {
@@ -531,7 +530,7 @@ pub(crate) fn cantilever_model_tangent(
         force: [&law.flight, &law.contact]
             .iter()
             .take(model.force.len())
-            .map(|answer| change.combined(&beam, &answer.force))
+            .map(|response| change.combined(&beam, &response.force))
             .collect(),
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),

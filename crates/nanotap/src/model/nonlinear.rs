@@ -472,7 +472,7 @@ impl Variation {
         }
         let galerkin = Galerkin::new(case)?;
         let drive = model.system.drive();
-        let beam = Beam::new(&galerkin, drive, false)?;
+        let beam = Beam::new(&galerkin, drive, 0)?;
         let n = nonlinear.system.dimension();
         let mut change = Change {
             law: law.to_vec(),

@@ -307,7 +307,7 @@ impl ExactStrobe {
             last: Vec::new(),
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
-            parts_at_rest: model.forgetting.is_some(),
+            parts_at_rest: model.memory_reset.is_some(),
             is_rigid: model.rigid_stop.is_some(),
             tangents: tangents.into(),
         }

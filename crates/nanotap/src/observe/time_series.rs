@@ -146,7 +146,7 @@ impl Outputs {
         row.extend_from_slice(state);
         // In contact the surface is where the tip holds it. A memory that the end of the contact
         // sets anew knows nothing of that.
-        if model.forgetting.is_some() && contact {
+        if model.memory_reset.is_some() && contact {
             row[COLUMNS.len() + model.dimension() - model.memory] = at(&model.height);
         }
         row

@@ -307,10 +307,7 @@ fn the_last_exponent_of_a_standard_linear_solid_is_what_the_trace_leaves() {
         let case = Cantilever {
             modes: 2,
             alpha6: 0.0,
-            contact: ContactLaw::StandardLinearSolid,
-            relaxation_stiffness: 20.0,
-            relaxation_time: time,
-            ..at(2.6)
+            ..at(2.6).on(ContactLaw::StandardLinearSolid, &[20.0, time])
         };
         let options = LyapunovOptions {
             periods: 200,

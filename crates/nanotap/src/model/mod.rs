@@ -150,6 +150,8 @@ pub(crate) struct PowersOnDemand {
     known: OnceLock<Vec<Powers>>,
     /// What they follow from, where they are not known from the start.
     equations: Option<Arc<Galerkin>>,
+    /// Gap of the model, where it is another than that of the equations.
+    gap: Option<f64>,
 }
 
 impl PowersOnDemand {
@@ -158,7 +160,18 @@ impl PowersOnDemand {
         Self {
             known: OnceLock::new(),
             equations: Some(Arc::new(equations)),
+            gap: None,
         }
+    }
+
+    /// The equations at the model's gap.
+    fn equations(&self) -> Option<Arc<Galerkin>> {
+        let known = self.equations.as_ref()?;
+        let Some(gap) = self.gap else {
+            return Some(Arc::clone(known));
+        };
+        let case = known.case.clone().with(Parameter::Alpha5, gap);
+        Galerkin::new(&case).ok().map(Arc::new)
     }
 }
 
@@ -167,6 +180,7 @@ impl From<Vec<Powers>> for PowersOnDemand {
         Self {
             known: known.into(),
             equations: None,
+            gap: None,
         }
     }
 }
@@ -174,7 +188,8 @@ impl From<Vec<Powers>> for PowersOnDemand {
 impl PartialEq for PowersOnDemand {
     /// Whether they are the same, worked out or not.
     fn eq(&self, other: &Self) -> bool {
-        self.equations == other.equations && (self.equations.is_some() || self.known == other.known)
+        let of = |powers: &Self| (powers.equations.clone(), powers.gap);
+        of(self) == of(other) && (self.equations.is_some() || self.known == other.known)
     }
 }
 
@@ -299,8 +314,8 @@ impl Model {
 
     /// The equations of the cantilever that this is the model of.
     fn equations_of(&self, case: &Cantilever) -> Result<Arc<Galerkin>, ModelError> {
-        match &self.power.equations {
-            Some(known) => Ok(Arc::clone(known)),
+        match self.power.equations() {
+            Some(known) => Ok(known),
             None => Ok(Arc::new(Galerkin::new(case)?)),
         }
     }
@@ -308,22 +323,53 @@ impl Model {
     /// What feeds and drains energy; an entry a regime.
     pub fn power(&self) -> &[Powers] {
         self.power.known.get_or_init(|| {
-            let Some(galerkin) = &self.power.equations else {
+            let Some(galerkin) = self.power.equations() else {
                 return Vec::new();
             };
             let drive = self.system.drive();
             if self.nonlinear.is_some() {
                 let flight = contact::no_sample(self.memory).flight;
                 let free = &self.system.regimes()[0];
-                return Beam::new(galerkin, drive, self.memory)
+                return Beam::new(&galerkin, drive, self.memory)
                     .map(|beam| vec![beam.powers_in(free, &flight)])
                     .unwrap_or_default();
             }
             let law = galerkin.case.contact_law(None);
-            Beam::new(galerkin, drive, law.internal)
+            Beam::new(&galerkin, drive, law.internal)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
+    }
+
+    /// Calls `visit` with every constant of its outputs: the numbers that move with the gap, apart
+    /// from those of its system.
+    pub(crate) fn each_output_constant(&mut self, visit: &mut impl FnMut(&mut f64)) {
+        let outputs = [&mut self.gap, &mut self.height].into_iter();
+        for output in outputs.chain(&mut self.force) {
+            visit(&mut output.constant);
+        }
+        if let Some(stop) = &mut self.rigid_stop {
+            visit(&mut stop.tip);
+        }
+        if self.power.equations.is_some() {
+            return;
+        }
+        for powers in self.power.known.get_mut().into_iter().flatten() {
+            let products = [&mut powers.drive, &mut powers.beam, &mut powers.sample];
+            let products = products.into_iter().chain([&mut powers.stored]).flatten();
+            for product in products {
+                visit(&mut product.a.constant);
+                visit(&mut product.b.constant);
+            }
+        }
+    }
+
+    /// Tells what follows from the equations that the gap is another.
+    pub(crate) fn set_gap_of_equations(&mut self, gap: f64) {
+        if self.power.equations.is_some() {
+            self.power.known = OnceLock::new();
+            self.power.gap = Some(gap);
+        }
     }
 
     /// Where the undriven system can rest, the tip farthest away first: of a piecewise-linear one

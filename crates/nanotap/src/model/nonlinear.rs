@@ -118,6 +118,11 @@ impl Nonlinear {
         self
     }
 
+    /// Changes the gap.
+    pub(crate) fn set_gap(&mut self, gap: f64) -> Result<(), MotionError> {
+        Ok(Arc::make_mut(&mut self.system).set_offset(gap)?)
+    }
+
     /// The branch of the law in a state of the model at drive phase 0: the one that it
     /// remembers, if that can be.
     fn branch(&self, state: &[f64]) -> usize {
@@ -584,6 +589,12 @@ impl NonlinearStrobe {
     /// The lever.
     pub(crate) fn nonlinear(&self) -> &Arc<Nonlinear> {
         &self.nonlinear
+    }
+
+    /// Changes the gap; the next motion starts anew.
+    pub(crate) fn set_gap(&mut self, gap: f64) -> Result<(), MotionError> {
+        Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
+        Ok(self.flow.system_mut().set_offset(gap)?)
     }
 
     pub(crate) fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {

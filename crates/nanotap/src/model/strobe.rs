@@ -67,6 +67,40 @@ impl Strobe {
         }
     }
 
+    /// Changes the gap: of a piecewise-linear model by `visit`, which sets the constants of its
+    /// system in turn and then that of its gap, of one under a nonlinear force to `gap`. The next
+    /// motion starts anew.
+    ///
+    /// # Errors
+    /// When the gap is not finite.
+    pub(crate) fn move_gap(
+        &mut self,
+        gap: f64,
+        visit: &mut impl FnMut(&mut f64),
+    ) -> Result<(), MotionError> {
+        match &mut self.0 {
+            Engine::Exact(map) => {
+                if !gap.is_finite() {
+                    return Err(FlowError::NotFinite { what: "the gap" }.into());
+                }
+                map.last.clear();
+                map.ensemble = None;
+                map.flow.system_mut().each_constant(visit);
+                visit(&mut Arc::make_mut(&mut map.gap).constant);
+                Ok(())
+            }
+            Engine::Nonlinear(map) => map.set_gap(gap),
+            Engine::Coarse(map) => {
+                let mut nonlinear = Arc::clone(map.nonlinear());
+                Arc::make_mut(&mut nonlinear).set_gap(gap)?;
+                if let Some(coarse) = CoarseStrobe::new(&nonlinear) {
+                    **map = coarse;
+                }
+                Ok(())
+            }
+        }
+    }
+
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
     pub fn evaluations(&self) -> u64 {
         match &self.0 {

@@ -6,6 +6,7 @@
 //! an entry here, or in the file of its contact law, and the place where the equations read it.
 
 use std::fmt;
+use std::sync::LazyLock;
 
 use serde::{Serialize, Serializer};
 
@@ -111,36 +112,110 @@ pub enum SampleKey {
 }
 
 impl ParameterEntry {
-    /// A number from 0 up that always applies, has no default, and nothing else to say.
-    pub const PLAIN: Self = Self {
-        name: "",
-        alias: None,
-        symbol: "",
-        meaning: "",
-        default: None,
-        example: 1.0,
-        range: (0.0, LARGEST_ALPHA),
-        unit: Unit::Number,
-        formula: "",
-        quantity: "",
-        by_force: None,
-        applies: Applies::Always,
-        always_written: false,
-        stated_by: None,
-    };
-
-    /// The same for a second tone or a measured mode, 0 by default.
-    const fn optional(self, applies: Applies) -> Self {
+    /// A number from 0 up that always applies and has no default.
+    pub(crate) const fn new(
+        name: &'static str,
+        symbol: &'static str,
+        meaning: &'static str,
+    ) -> Self {
         Self {
-            default: Some(0.0),
-            applies,
+            name,
+            alias: None,
+            symbol,
+            meaning,
+            default: None,
+            example: 1.0,
+            range: (0.0, LARGEST_ALPHA),
+            unit: Unit::Number,
+            formula: "",
+            quantity: "",
+            by_force: None,
+            applies: Applies::Always,
+            always_written: false,
+            stated_by: None,
+        }
+    }
+
+    /// With a quantity and its formula.
+    pub(crate) const fn of(
+        self,
+        unit: Unit,
+        quantity: &'static str,
+        formula: &'static str,
+    ) -> Self {
+        Self {
+            unit,
+            quantity,
+            formula,
+            ..self
+        }
+    }
+
+    /// With quantity and formula where a force drives the lever.
+    const fn by_force(self, quantity: &'static str, formula: &'static str) -> Self {
+        Self {
+            by_force: Some((formula, quantity)),
+            ..self
+        }
+    }
+
+    const fn also(self, alias: &'static str) -> Self {
+        Self {
+            alias: Some(alias),
+            ..self
+        }
+    }
+
+    pub(crate) const fn or(self, default: f64) -> Self {
+        Self {
+            default: Some(default),
+            ..self
+        }
+    }
+
+    pub(crate) const fn such_as(self, example: f64) -> Self {
+        Self { example, ..self }
+    }
+
+    const fn within(self, range: (f64, f64)) -> Self {
+        Self { range, ..self }
+    }
+
+    const fn when(self, applies: Applies) -> Self {
+        Self { applies, ..self }
+    }
+
+    pub(crate) const fn always_written(self) -> Self {
+        Self {
+            always_written: true,
+            ..self
+        }
+    }
+
+    pub(crate) const fn stated_by(self, key: SampleKey) -> Self {
+        Self {
+            stated_by: Some(key),
             ..self
         }
     }
 }
 
+const fn number(name: &'static str, symbol: &'static str, meaning: &'static str) -> ParameterEntry {
+    ParameterEntry::new(name, symbol, meaning)
+}
+
 const SIGNED: (f64, f64) = (-LARGEST_ALPHA, LARGEST_ALPHA);
-const PLAIN: ParameterEntry = ParameterEntry::PLAIN;
+
+/// A measured number of a mode.
+const fn measured(
+    name: &'static str,
+    symbol: &'static str,
+    meaning: &'static str,
+) -> ParameterEntry {
+    number(name, symbol, meaning)
+        .or(0.0)
+        .when(Applies::Measured)
+}
 
 macro_rules! parameters {
     ($($group:ident from $first:expr => { $($key:ident = $entry:expr;)* })*) => {
@@ -160,184 +235,60 @@ macro_rules! parameters {
 
 parameters! {
     Paper from 0 => {
-        Alpha1 = ParameterEntry {
-            name: "alpha1",
-            alias: Some("tip_mass_ratio"),
-            symbol: "α₁",
-            meaning: "tip mass over beam mass, M/(mL)",
-            example: 0.1,
-            unit: Unit::Mass,
-            formula: "M/(mL)",
-            quantity: "tip mass M",
-            ..PLAIN
-        };
-        Alpha2 = ParameterEntry {
-            name: "alpha2",
-            alias: Some("drive_amplitude"),
-            symbol: "α₂",
-            meaning: "drive amplitude over beam gap, f/g0",
-            example: 0.1,
-            unit: Unit::Drive,
-            formula: "f/g0",
-            quantity: "base amplitude f",
-            by_force: Some(("F L^3/(EI g0) = 3 F/(k g0)", "amplitude of the drive's force F")),
-            ..PLAIN
-        };
-        Alpha3 = ParameterEntry {
-            name: "alpha3",
-            alias: Some("beam_damping"),
-            symbol: "α₃",
-            meaning: "viscous damping of the beam, C·√(L⁴/(m·EI))",
-            example: 0.1,
-            unit: Unit::Damping,
-            formula: "C sqrt(L^4/(m EI)) = (C L) T/(m L)",
-            quantity: "damping of the whole beam C L",
-            ..PLAIN
-        };
-        Alpha4 = ParameterEntry {
-            name: "alpha4",
-            alias: Some("contact_stiffness"),
-            symbol: "α₄",
-            meaning: "contact stiffness over bending stiffness, K1·L³/(EI)",
-            example: 20.0,
-            unit: Unit::Stiffness,
-            formula: "K1 L^3/(EI) = 3 K1/k",
-            quantity: "contact stiffness K1",
-            applies: Applies::Spring,
-            ..PLAIN
-        };
-        Alpha5 = ParameterEntry {
-            name: "alpha5",
-            alias: Some("gap"),
-            symbol: "α₅",
-            meaning: "tip gap over beam gap, g1/g0 (negative: pressed in at rest)",
-            default: Some(0.0),
-            range: SIGNED,
-            unit: Unit::Length,
-            formula: "g1/g0",
-            quantity: "tip gap g1",
-            ..PLAIN
-        };
-        Alpha6 = ParameterEntry {
-            name: "alpha6",
-            alias: Some("contact_damping"),
-            symbol: "α₆",
-            meaning: "viscous damping of the contact, (C1/L)·√(L⁴/(m·EI))",
-            example: 0.2,
-            unit: Unit::Damping,
-            formula: "(C1/L) sqrt(L^4/(m EI)) = C1 T/(m L)",
-            quantity: "contact damping C1",
-            applies: Applies::Damper,
-            ..PLAIN
-        };
-        Omega = ParameterEntry {
-            name: "omega",
-            alias: Some("drive_frequency"),
-            symbol: "Ω",
-            meaning: "drive frequency, ω·√(mL⁴/(EI))",
-            example: 2.6,
-            range: OMEGA_RANGE,
-            unit: Unit::Frequency,
-            formula: "omega sqrt(m L^4/(EI)) = 2 pi f T",
-            quantity: "drive frequency",
-            ..PLAIN
-        };
+        Alpha1 = number("alpha1", "α₁", "tip mass over beam mass, M/(mL)")
+            .also("tip_mass_ratio").such_as(0.1)
+            .of(Unit::Mass, "tip mass M", "M/(mL)");
+        Alpha2 = number("alpha2", "α₂", "drive amplitude over beam gap, f/g0")
+            .also("drive_amplitude").such_as(0.1)
+            .of(Unit::Drive, "base amplitude f", "f/g0")
+            .by_force("amplitude of the drive's force F", "F L^3/(EI g0) = 3 F/(k g0)");
+        Alpha3 = number("alpha3", "α₃", "viscous damping of the beam, C·√(L⁴/(m·EI))")
+            .also("beam_damping").such_as(0.1)
+            .of(Unit::Damping, "damping of the whole beam C L", "C sqrt(L^4/(m EI)) = (C L) T/(m L)");
+        Alpha4 = number("alpha4", "α₄", "contact stiffness over bending stiffness, K1·L³/(EI)")
+            .also("contact_stiffness").when(Applies::Spring).such_as(20.0)
+            .of(Unit::Stiffness, "contact stiffness K1", "K1 L^3/(EI) = 3 K1/k");
+        Alpha5 = number("alpha5", "α₅", "tip gap over beam gap, g1/g0 (negative: pressed in at rest)")
+            .also("gap").or(0.0).within(SIGNED)
+            .of(Unit::Length, "tip gap g1", "g1/g0");
+        Alpha6 = number("alpha6", "α₆", "viscous damping of the contact, (C1/L)·√(L⁴/(m·EI))")
+            .also("contact_damping").when(Applies::Damper).such_as(0.2)
+            .of(Unit::Damping, "contact damping C1", "(C1/L) sqrt(L^4/(m EI)) = C1 T/(m L)");
+        Omega = number("omega", "Ω", "drive frequency, ω·√(mL⁴/(EI))")
+            .also("drive_frequency").such_as(2.6).within(OMEGA_RANGE)
+            .of(Unit::Frequency, "drive frequency", "omega sqrt(m L^4/(EI)) = 2 pi f T");
     }
     Further from Parameter::PAPER + contact::NUMBERS => {
-        Tone2Amplitude = ParameterEntry {
-            name: "tone2_amplitude",
-            alias: Some("second_tone_amplitude"),
-            symbol: "A₂",
-            meaning: "amplitude of the second tone, measured as alpha2",
-            unit: Unit::Drive,
-            formula: "f2/g0",
-            quantity: "base amplitude of the second tone",
-            by_force: Some(("F2 L^3/(EI g0) = 3 F2/(k g0)", "force of the second tone F2")),
-            always_written: true,
-            ..PLAIN.optional(Applies::SecondTone)
-        };
-        Tone2Phase = ParameterEntry {
-            name: "tone2_phase",
-            alias: Some("second_tone_phase"),
-            symbol: "θ₂",
-            meaning: "phase of the second tone in degrees",
-            range: SIGNED,
-            unit: Unit::Degrees,
-            formula: "degrees",
-            quantity: "phase of the second tone",
-            always_written: true,
-            ..PLAIN.optional(Applies::SecondTone)
-        };
-        Mode2Frequency = ParameterEntry {
-            name: "mode2_frequency",
-            symbol: "Ω₂",
-            meaning: "measured frequency of the second free mode, as omega (0: the beam's own)",
-            unit: Unit::Frequency,
-            formula: "2 pi f2 T",
-            quantity: "frequency of the second mode",
-            ..PLAIN.optional(Applies::Measured)
-        };
-        Mode3Frequency = ParameterEntry {
-            name: "mode3_frequency",
-            symbol: "Ω₃",
-            meaning: "measured frequency of the third free mode, as omega (0: the beam's own)",
-            unit: Unit::Frequency,
-            formula: "2 pi f3 T",
-            quantity: "frequency of the third mode",
-            ..PLAIN.optional(Applies::Measured)
-        };
-        Mode2Quality = ParameterEntry {
-            name: "mode2_quality",
-            symbol: "Q₂",
-            meaning: "measured quality factor of the second free mode (0: as beam_damping has it)",
-            formula: "Q2",
-            quantity: "quality factor of the second mode",
-            ..PLAIN.optional(Applies::Measured)
-        };
-        Mode3Quality = ParameterEntry {
-            name: "mode3_quality",
-            symbol: "Q₃",
-            meaning: "measured quality factor of the third free mode (0: as beam_damping has it)",
-            formula: "Q3",
-            quantity: "quality factor of the third mode",
-            ..PLAIN.optional(Applies::Measured)
-        };
-        Mode2Stiffness = ParameterEntry {
-            name: "mode2_stiffness",
-            symbol: "k₂",
-            meaning: "measured stiffness of the second free mode at the tip, k2·L³/(EI) (0: the beam's own)",
-            unit: Unit::Stiffness,
-            formula: "k2 L^3/(EI) = 3 k2/k",
-            quantity: "stiffness of the second mode",
-            ..PLAIN.optional(Applies::Measured)
-        };
-        Mode3Stiffness = ParameterEntry {
-            name: "mode3_stiffness",
-            symbol: "k₃",
-            meaning: "measured stiffness of the third free mode at the tip, k3·L³/(EI) (0: the beam's own)",
-            unit: Unit::Stiffness,
-            formula: "k3 L^3/(EI) = 3 k3/k",
-            quantity: "stiffness of the third mode",
-            ..PLAIN.optional(Applies::Measured)
-        };
+        Tone2Amplitude = number("tone2_amplitude", "A₂", "amplitude of the second tone, measured as alpha2")
+            .also("second_tone_amplitude").or(0.0).when(Applies::SecondTone).always_written()
+            .of(Unit::Drive, "base amplitude of the second tone", "f2/g0")
+            .by_force("force of the second tone F2", "F2 L^3/(EI g0) = 3 F2/(k g0)");
+        Tone2Phase = number("tone2_phase", "θ₂", "phase of the second tone in degrees")
+            .also("second_tone_phase").or(0.0).when(Applies::SecondTone).within(SIGNED).always_written()
+            .of(Unit::Degrees, "phase of the second tone", "degrees");
+        Mode2Frequency = measured("mode2_frequency", "Ω₂", "measured frequency of the second free mode, as omega (0: the beam's own)")
+            .of(Unit::Frequency, "frequency of the second mode", "2 pi f2 T");
+        Mode3Frequency = measured("mode3_frequency", "Ω₃", "measured frequency of the third free mode, as omega (0: the beam's own)")
+            .of(Unit::Frequency, "frequency of the third mode", "2 pi f3 T");
+        Mode2Quality = measured("mode2_quality", "Q₂", "measured quality factor of the second free mode (0: as beam_damping has it)")
+            .of(Unit::Number, "quality factor of the second mode", "Q2");
+        Mode3Quality = measured("mode3_quality", "Q₃", "measured quality factor of the third free mode (0: as beam_damping has it)")
+            .of(Unit::Number, "quality factor of the third mode", "Q3");
+        Mode2Stiffness = measured("mode2_stiffness", "k₂", "measured stiffness of the second free mode at the tip, k2·L³/(EI) (0: the beam's own)")
+            .of(Unit::Stiffness, "stiffness of the second mode", "k2 L^3/(EI) = 3 k2/k");
+        Mode3Stiffness = measured("mode3_stiffness", "k₃", "measured stiffness of the third free mode at the tip, k3·L³/(EI) (0: the beam's own)")
+            .of(Unit::Stiffness, "stiffness of the third mode", "k3 L^3/(EI) = 3 k3/k");
     }
 }
 
-static TABLE: [ParameterEntry; Parameter::COUNT] = {
-    let mut table = [PLAIN; Parameter::COUNT];
-    let mut k = 0;
-    while k < table.len() {
-        table[k] = if k < Parameter::PAPER {
-            Paper::ENTRIES[k]
-        } else if k < Parameter::PAPER + contact::NUMBERS {
-            contact::number(k - Parameter::PAPER)
-        } else {
-            Further::ENTRIES[k - Parameter::PAPER - contact::NUMBERS]
-        };
-        k += 1;
-    }
-    table
-};
+static TABLE: LazyLock<Vec<ParameterEntry>> = LazyLock::new(|| {
+    let groups = [
+        Paper::ENTRIES.to_vec(),
+        contact::numbers(),
+        Further::ENTRIES.to_vec(),
+    ];
+    groups.concat()
+});
 
 impl Parameter {
     /// The paper's parameters, which every case has: α1 to α6 and then Ω.
@@ -364,11 +315,6 @@ impl Parameter {
     /// How many parameters there are.
     pub const COUNT: usize = Self::PAPER + contact::NUMBERS + Further::ENTRIES.len();
 
-    /// The parameter at a place of the table.
-    pub(crate) const fn at(index: usize) -> Self {
-        Self(index as u8)
-    }
-
     /// All parameters: the paper's, those of contact laws, and the others.
     pub fn every() -> impl DoubleEndedIterator<Item = Self> + Clone {
         (0..Self::COUNT as u8).map(Self)
@@ -391,12 +337,12 @@ impl Parameter {
     }
 
     /// Entry of the table.
-    pub const fn entry(self) -> &'static ParameterEntry {
+    pub fn entry(self) -> &'static ParameterEntry {
         &TABLE[self.index()]
     }
 
     /// Name in messages, case files and data: `alpha1` … `alpha6`, `omega`.
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         self.entry().name
     }
 }

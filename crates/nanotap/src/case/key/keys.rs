@@ -6,6 +6,8 @@
 //! [parameters](crate::model::parameter), keys of a contact law from the law's file. A new
 //! physical quantity is an entry here, and the line of the mapping that reads it.
 
+use std::sync::LazyLock;
+
 use super::{
     Alternatives, Default, Entry, Key, Laws, Means, ModelKind, Range, Section, Takes, kind_of,
 };
@@ -13,7 +15,7 @@ use crate::case::DEFAULT_MODES;
 use crate::case::quantity::Kind;
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::CosineTerm;
-use crate::model::contact::ContactLaw;
+use crate::model::contact::{ContactLaw, OWN_KEYS};
 use crate::model::drive_form::Actuation;
 use crate::model::oscillator::OscillatorParameter as Of;
 use crate::model::parameter::{Parameter, SampleKey};
@@ -41,7 +43,7 @@ const PLAIN: Entry = Entry {
 };
 
 /// The key of a parameter of the cantilever.
-const fn number(parameter: Parameter) -> Entry {
+fn number(parameter: Parameter) -> Entry {
     let entry = parameter.entry();
     Entry {
         name: entry.name,
@@ -60,7 +62,7 @@ const fn number(parameter: Parameter) -> Entry {
 }
 
 /// The key of `[sample]` that states a number of one contact law alone.
-const fn of_law(parameter: Parameter) -> Option<Entry> {
+fn of_law(parameter: Parameter) -> Option<Entry> {
     let entry = parameter.entry();
     let Some(SampleKey::Own { meaning, zero }) = entry.stated_by else {
         return None;
@@ -227,46 +229,15 @@ impl Key {
     pub const Omega: Self = Self::of(Parameter::Omega);
 }
 
-/// How many keys state a number of one contact law alone.
-const OF_LAWS: usize = {
-    let (mut k, mut count) = (0, 0);
-    while k < Parameter::COUNT {
-        count += of_law(Parameter::at(k)).is_some() as usize;
-        k += 1;
-    }
-    count
-};
-
 /// Where the keys after those of contact laws begin.
-const AFTER_LAWS: usize = Parameter::COUNT + Before::ENTRIES.len() + OF_LAWS;
+const AFTER_LAWS: usize = Parameter::COUNT + Before::ENTRIES.len() + OWN_KEYS;
 
-pub(super) static TABLE: [Entry; AFTER_LAWS + After::ENTRIES.len()] = {
-    let mut table = [PLAIN; AFTER_LAWS + After::ENTRIES.len()];
-    let (mut k, mut at) = (0, 0);
-    while k < Parameter::COUNT {
-        table[at] = number(Parameter::at(k));
-        (k, at) = (k + 1, at + 1);
-    }
-    k = 0;
-    while k < Before::ENTRIES.len() {
-        table[at] = Before::ENTRIES[k];
-        (k, at) = (k + 1, at + 1);
-    }
-    k = 0;
-    while k < Parameter::COUNT {
-        if let Some(entry) = of_law(Parameter::at(k)) {
-            table[at] = entry;
-            at += 1;
-        }
-        k += 1;
-    }
-    k = 0;
-    while k < After::ENTRIES.len() {
-        table[at] = After::ENTRIES[k];
-        (k, at) = (k + 1, at + 1);
-    }
-    table
-};
+pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+    let numbers = Parameter::every().map(number);
+    let before = numbers.chain(Before::ENTRIES.iter().copied());
+    let of_laws = before.chain(Parameter::every().filter_map(of_law));
+    of_laws.chain(After::ENTRIES.iter().copied()).collect()
+});
 
 use Kind::{
     Angle, ChargeDensity, Damping, Density, Energy, Force, Frequency, Length, Mass, Number,

@@ -19,7 +19,7 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
-use crate::model::parameter::{Applies, Parameter, ParameterEntry};
+use crate::model::parameter::{Applies, Parameter, ParameterEntry, SampleKey};
 use dual::Dual;
 use entry::{Damper, Entry, Numbers};
 use law::Law;
@@ -54,29 +54,37 @@ laws! {
 }
 
 /// How many numbers only one of the laws has.
-pub(crate) const NUMBERS: usize = numbers_before(ContactLaw::ALL.len());
+pub(crate) const NUMBERS: usize = count(ContactLaw::ALL.len(), false);
 
-/// How many numbers the first `count` laws have for themselves.
-const fn numbers_before(count: usize) -> usize {
-    let (mut k, mut sum) = (0, 0);
-    while k < count {
-        sum += ContactLaw::ALL[k].entry().numbers.len();
-        k += 1;
+/// How many of these have a key of their own among physical quantities.
+pub(crate) const OWN_KEYS: usize = count(ContactLaw::ALL.len(), true);
+
+/// How many numbers only one of the first `laws` laws has, or how many of these have their own key.
+const fn count(laws: usize, with_key: bool) -> usize {
+    let (mut law, mut sum) = (0, 0);
+    while law < laws {
+        let numbers = ContactLaw::ALL[law].entry().numbers;
+        let mut k = 0;
+        while k < numbers.len() {
+            let own = matches!(numbers[k].stated_by, Some(SampleKey::Own { .. }));
+            sum += (own || !with_key) as usize;
+            k += 1;
+        }
+        law += 1;
     }
     sum
 }
 
-/// Number `k` of all that only one of the laws has.
-pub(crate) const fn number(k: usize) -> ParameterEntry {
-    let mut of = 0;
-    while numbers_before(of + 1) <= k {
-        of += 1;
-    }
-    let law = ContactLaw::ALL[of];
-    ParameterEntry {
-        applies: Applies::Law(law),
-        ..law.entry().numbers[k - numbers_before(of)]
-    }
+/// The numbers that only one of the laws has, law by law.
+pub(crate) fn numbers() -> Vec<ParameterEntry> {
+    let of_law = |law: ContactLaw| {
+        let numbers = law.entry().numbers.iter();
+        numbers.map(move |number| ParameterEntry {
+            applies: Applies::Law(law),
+            ..*number
+        })
+    };
+    ContactLaw::ALL.into_iter().flat_map(of_law).collect()
 }
 
 impl ContactLaw {
@@ -97,7 +105,7 @@ impl ContactLaw {
 
     /// How many numbers the laws before it have for themselves.
     pub(crate) const fn first_number(self) -> usize {
-        numbers_before(self as usize)
+        count(self as usize, false)
     }
 
     /// The equations with these numbers.

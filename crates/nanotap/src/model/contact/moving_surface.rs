@@ -37,44 +37,17 @@ pub(super) static ENTRY: Entry = Entry {
         none: "sample.damping is not given: only the surface's own motion dissipates",
     },
     numbers: &[
-        ParameterEntry {
-            name: "surface_stiffness",
-            symbol: "kₛ",
-            meaning: "a moving surface's own stiffness over bending stiffness, ks·L³/(EI)",
-            example: 10.0,
-            unit: Unit::Stiffness,
-            formula: "ks L^3/(EI) = 3 ks/k",
-            quantity: "the surface's own stiffness ks",
-            stated_by: Some(SampleKey::Own {
-                meaning: "a moving surface's own stiffness",
-                zero: false,
-            }),
-            ..ParameterEntry::PLAIN
-        },
-        ParameterEntry {
-            name: "surface_damping",
-            symbol: "ηₛ",
-            meaning: "a moving surface's own damping, (ηs/L)·√(L⁴/(m·EI))",
-            unit: Unit::Damping,
-            formula: "(etas/L) sqrt(L^4/(m EI)) = etas T/(m L)",
-            quantity: "the surface's own damping etas",
-            stated_by: Some(SampleKey::Own {
-                meaning: "a moving surface's own damping",
-                zero: false,
-            }),
-            ..ParameterEntry::PLAIN
-        },
-        ParameterEntry {
-            name: "adhesion_force",
-            symbol: "F",
-            meaning: "force that pulls a touching tip to a moving surface, F·L³/(EI·g0)",
-            default: Some(0.0),
-            unit: Unit::Force,
-            formula: "F L^3/(EI g0) = 3 F/(k g0)",
-            quantity: "adhesion force F",
-            stated_by: Some(SampleKey::Shared),
-            ..ParameterEntry::PLAIN
-        },
+        ParameterEntry::new("surface_stiffness", "kₛ", "a moving surface's own stiffness over bending stiffness, ks·L³/(EI)")
+            .such_as(10.0)
+            .of(Unit::Stiffness, "the surface's own stiffness ks", "ks L^3/(EI) = 3 ks/k")
+            .stated_by(SampleKey::Own { meaning: "a moving surface's own stiffness", zero: false }),
+        ParameterEntry::new("surface_damping", "ηₛ", "a moving surface's own damping, (ηs/L)·√(L⁴/(m·EI))")
+            .of(Unit::Damping, "the surface's own damping etas", "(etas/L) sqrt(L^4/(m EI)) = etas T/(m L)")
+            .stated_by(SampleKey::Own { meaning: "a moving surface's own damping", zero: false }),
+        ParameterEntry::new("adhesion_force", "F", "force that pulls a touching tip to a moving surface, F·L³/(EI·g0)")
+            .or(0.0)
+            .of(Unit::Force, "adhesion force F", "F L^3/(EI g0) = 3 F/(k g0)")
+            .stated_by(SampleKey::Shared),
     ],
     needs: "a moving surface has a spring and a damper of its own, as in \
             surface_stiffness = \"2 N/m\" and surface_damping = \"1e-6 N s/m\"",

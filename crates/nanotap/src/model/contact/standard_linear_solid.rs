@@ -32,36 +32,14 @@ pub(super) static ENTRY: Entry = Entry {
         arm: |own| [own[0], own[0] * own[1]],
     },
     numbers: &[
-        ParameterEntry {
-            name: "relaxation_stiffness",
-            symbol: "kₘ",
-            meaning: "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)",
-            example: 20.0,
-            unit: Unit::Stiffness,
-            formula: "km L^3/(EI) = 3 km/k",
-            quantity: "stiffness of the relaxing arm km",
-            always_written: true,
-            stated_by: Some(SampleKey::Own {
-                meaning: "stiffness of a standard linear solid's relaxing arm",
-                zero: true,
-            }),
-            ..ParameterEntry::PLAIN
-        },
-        ParameterEntry {
-            name: "relaxation_time",
-            symbol: "τₘ",
-            meaning: "time in which the arm's force decays, over √(mL⁴/(EI))",
-            example: 0.1,
-            unit: Unit::Time,
-            formula: "time/T",
-            quantity: "relaxation time of the arm",
-            always_written: true,
-            stated_by: Some(SampleKey::Own {
-                meaning: "time in which the arm's force decays",
-                zero: true,
-            }),
-            ..ParameterEntry::PLAIN
-        },
+        ParameterEntry::new("relaxation_stiffness", "kₘ", "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)")
+            .such_as(20.0).always_written()
+            .of(Unit::Stiffness, "stiffness of the relaxing arm km", "km L^3/(EI) = 3 km/k")
+            .stated_by(SampleKey::Own { meaning: "stiffness of a standard linear solid's relaxing arm", zero: true }),
+        ParameterEntry::new("relaxation_time", "τₘ", "time in which the arm's force decays, over √(mL⁴/(EI))")
+            .such_as(0.1).always_written()
+            .of(Unit::Time, "relaxation time of the arm", "time/T")
+            .stated_by(SampleKey::Own { meaning: "time in which the arm's force decays", zero: true }),
     ],
     needs: "a standard linear solid has a relaxing arm of this stiffness, as in \
             relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",

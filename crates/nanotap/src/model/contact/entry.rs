@@ -62,6 +62,6 @@ pub(crate) struct Numbers<'a> {
 }
 
 /// No objection to any number.
-pub(super) const fn any(_: &[f64], _: usize) -> Option<&'static str> {
+pub(crate) const fn any(_: &[f64], _: usize) -> Option<&'static str> {
     None
 }

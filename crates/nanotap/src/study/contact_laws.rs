@@ -333,7 +333,7 @@ pub struct ContactLawsRequest {
     /// Period of the orbits compared
     #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
     pub period: usize,
-    /// Stiffness of the standard linear solid's arm; without it, the case's, or twice alpha4
+    /// Stiffness of the relaxing arm; without it, the case's, or twice alpha4
     #[schemars(extend("x-value" = "K"))]
     pub arm: Option<f64>,
     /// Lowest drive frequency to which the orbits are followed

@@ -21,6 +21,12 @@ pub enum FigureError {
         /// Error of the operating system.
         source: std::io::Error,
     },
+    /// The figure's SVG could not be converted to PNG or PDF.
+    #[error("cannot convert the figure from SVG: {reason}")]
+    Conversion {
+        /// The converter's message.
+        reason: String,
+    },
     /// A figure could not be read from JSON or written as JSON.
     #[error("this is no figure in JSON: {0}")]
     Json(serde_json::Error),

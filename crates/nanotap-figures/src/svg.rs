@@ -11,18 +11,35 @@ use base64::Engine as _;
 
 use crate::MADE_BY;
 use crate::colour::Colour;
+use crate::convert;
 use crate::font::Glyph;
-use crate::pixels;
 use crate::raster::{EMBEDDED_DPI, Raster};
 use crate::scene::{Item, Scene};
-use crate::shape::{Path, Point, Rect, Segment};
+use crate::shape::{Path, Point, Rect, Segment, Stroke};
 use crate::text::PlacedWords;
 
 /// Placeholder for the page's own prefix of identifiers until the whole page is known.
 const PREFIX: char = '\u{1}';
+/// Lines with more corners are drawn in pieces on a layer where they become pixels: the time to
+/// stroke a path grows with the square of the number of its corners.
+const LONG_STROKE: usize = 500;
 
-pub(crate) fn write(scene: &Scene) -> String {
-    let mut page = Page::default();
+/// What the SVG is written for.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Target {
+    /// A vector format: shapes that are too heavy for it become pixels of 600 dots per inch.
+    Vectors,
+    /// Pixels of this resolution. The ground is theirs.
+    Pixels { dpi: f64 },
+}
+
+pub(crate) fn write(scene: &Scene, target: Target) -> String {
+    let mut page = Page {
+        target,
+        body: String::new(),
+        glyphs: BTreeSet::new(),
+        clips: Vec::new(),
+    };
     for item in &scene.items {
         page.item(item);
     }
@@ -40,10 +57,12 @@ pub(crate) fn write(scene: &Scene) -> String {
     svg.push_str("<defs>\n");
     svg.push_str(&page.definitions());
     svg.push_str("</defs>\n");
-    let _ = writeln!(
-        svg,
-        "<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"
-    );
+    if target == Target::Vectors {
+        let _ = writeln!(
+            svg,
+            "<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"
+        );
+    }
     svg.push_str(&page.body);
     svg.push_str("</svg>\n");
     // Several figures in one HTML page must not share identifiers.
@@ -59,8 +78,8 @@ fn fingerprint(bytes: &[u8]) -> u32 {
     })
 }
 
-#[derive(Default)]
 struct Page {
+    target: Target,
     body: String,
     glyphs: BTreeSet<Glyph>,
     clips: Vec<Rect>,
@@ -102,18 +121,20 @@ impl Page {
                 self.body.push_str(">\n");
             }
             Item::Close => self.body.push_str("</g>\n"),
-            Item::Path(path) if path.is_heavy() => {
-                if let Some(raster) = pixels::path_raster(path, EMBEDDED_DPI) {
-                    self.raster(&raster);
-                }
-            }
-            Item::Path(path) => self.path(path),
+            Item::Path(path) => self.long_or_short(path),
             Item::Words(words) => self.words(words),
-            Item::Raster(raster) => self.raster(&raster.magnified()),
+            Item::Raster(raster) => match self.target {
+                Target::Vectors => self.raster(&raster.magnified()),
+                Target::Pixels { .. } => self.raster(raster),
+            },
             Item::Cloud(cloud) => {
-                if let Some(path) = cloud.path() {
+                let (path, dpi) = match self.target {
+                    Target::Vectors => (cloud.path(), EMBEDDED_DPI),
+                    Target::Pixels { dpi } => (None, dpi),
+                };
+                if let Some(path) = path {
                     self.path(&path);
-                } else if let Some(raster) = cloud.raster(EMBEDDED_DPI) {
+                } else if let Some(raster) = cloud.raster(dpi) {
                     self.raster(&raster);
                 }
             }
@@ -130,6 +151,45 @@ impl Page {
                 self.clips.len() - 1
             });
         format!(" clip-path=\"url(#{PREFIX}c{index})\"")
+    }
+
+    /// Draws a path: one with many corners as pixels or in pieces.
+    fn long_or_short(&mut self, path: &Path) {
+        if self.target == Target::Vectors {
+            match path
+                .is_heavy()
+                .then(|| convert::path_raster(path, EMBEDDED_DPI))
+            {
+                Some(Some(raster)) => self.raster(&raster),
+                _ => self.path(path),
+            }
+            return;
+        }
+        let Some(stroke) = path
+            .stroke
+            .as_ref()
+            .filter(|_| path.segments.len() > LONG_STROKE)
+        else {
+            return self.path(path);
+        };
+        let clip = path.clip.map(|rect| self.clip(rect)).unwrap_or_default();
+        let _ = writeln!(
+            self.body,
+            "<g{clip} opacity=\"{}\">",
+            number(stroke.colour.opacity())
+        );
+        for segments in pieces(&path.segments) {
+            self.path(&Path {
+                segments,
+                fill: None,
+                stroke: Some(Stroke {
+                    colour: stroke.colour.alpha(1.0),
+                    ..stroke.clone()
+                }),
+                clip: None,
+            });
+        }
+        self.body.push_str("</g>\n");
     }
 
     fn path(&mut self, path: &Path) {
@@ -225,7 +285,7 @@ impl Page {
         let _ = writeln!(
             self.body,
             "<g{clip}><image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" \
-             image-rendering=\"pixelated\" xlink:href=\"data:image/png;base64,{data}\"/></g>",
+             style=\"image-rendering:pixelated\" xlink:href=\"data:image/png;base64,{data}\"/></g>",
             number(raster.rect.left),
             number(raster.rect.top),
             number(raster.rect.width()),
@@ -236,6 +296,23 @@ impl Page {
 
 fn glyph_name(glyph: Glyph) -> String {
     format!("{PREFIX}{}{}", glyph.cut.letter(), glyph.id)
+}
+
+/// A long line as lines of at most [`LONG_STROKE`] corners.
+fn pieces(segments: &[Segment]) -> Vec<Vec<Segment>> {
+    let mut all: Vec<Vec<Segment>> = vec![Vec::new()];
+    for segment in segments {
+        let piece = all.last().map_or(&[][..], Vec::as_slice);
+        if let (true, Segment::Line(_), Some(Segment::Move(last) | Segment::Line(last))) =
+            (piece.len() >= LONG_STROKE, segment, piece.last())
+        {
+            all.push(vec![Segment::Move(*last)]);
+        }
+        if let Some(piece) = all.last_mut() {
+            piece.push(*segment);
+        }
+    }
+    all
 }
 
 /// A length in mm, to the micrometre.

@@ -8,7 +8,7 @@ use resvg::usvg::{Options, Tree};
 
 use crate::MADE_BY;
 use crate::colour::Colour;
-use crate::raster::{self, Raster};
+use crate::raster::{self, EMBEDDED_DPI, Raster};
 use crate::scene::{Item, Scene};
 use crate::shape::{Path, Point, Rect};
 use crate::svg::{self, Target};
@@ -38,7 +38,7 @@ pub(crate) fn png(scene: &Scene, dpi: f64) -> Result<Vec<u8>, String> {
 /// # Errors
 /// If the SVG cannot be converted.
 pub(crate) fn pdf(scene: &Scene) -> Result<Vec<u8>, String> {
-    let tree = tree(&svg::write(scene, Target::Vectors), POINTS_PER_INCH)?;
+    let tree = tree(&svg::write(scene, Target::Pdf), POINTS_PER_INCH)?;
     let (chunk, drawing) = svg2pdf::to_chunk(&tree, svg2pdf::ConversionOptions::default())
         .map_err(|error| error.to_string())?;
     let shifted = |object: Ref| Ref::new(object.get() + INFO.get());
@@ -81,9 +81,10 @@ fn with_sorted_resources(pdf: &[u8]) -> Vec<u8> {
     lines.join(&b'\n')
 }
 
-/// A stroked path alone, as pixels on a transparent ground; `None` without stroke, clip or pixels.
-pub(crate) fn path_raster(path: &Path, dpi: f64) -> Option<Raster> {
-    let scale = dpi / 25.4;
+/// A stroked path alone, as pixels of 600 dots per inch on a transparent ground; `None` without
+/// stroke, clip or pixels.
+pub(crate) fn path_raster(path: &Path) -> Option<Raster> {
+    let scale = EMBEDDED_DPI / 25.4;
     let clip = path.clip?;
     let colour = path.stroke.as_ref()?.colour;
     let corner = Point::new(
@@ -101,7 +102,7 @@ pub(crate) fn path_raster(path: &Path, dpi: f64) -> Option<Raster> {
             ..path.clone()
         })],
     };
-    let layer = pixels(&scene, Color::TRANSPARENT, dpi).ok()?;
+    let layer = pixels(&scene, Color::TRANSPARENT, EMBEDDED_DPI).ok()?;
     Some(Raster {
         rect: Rect {
             left: corner.x,
@@ -183,7 +184,7 @@ mod tests {
             title: String::new(),
             items: vec![Item::Path(curl())],
         };
-        let whole = tree(&svg::write(&scene, Target::Vectors), 254.0).unwrap();
+        let whole = tree(&svg::write(&scene, Target::Svg), 254.0).unwrap();
         let mut page = Pixmap::new(200, 200).unwrap();
         resvg::render(&whole, Transform::identity(), &mut page.as_mut());
         let whole = colours(&page);
@@ -213,7 +214,7 @@ mod tests {
             clip: Some(clip),
             ..curl()
         };
-        let raster = path_raster(&path, 600.0).unwrap();
+        let raster = path_raster(&path).unwrap();
         let at = |x: f64, y: f64| {
             let place = |value: f64, from: f64| ((value - from) * 600.0 / 25.4) as usize;
             let (column, row) = (place(x, raster.rect.left), place(y, raster.rect.top));

@@ -63,7 +63,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_svg(&self) -> Result<String, FigureError> {
-        Ok(svg::write(&self.scene()?.0, Target::Vectors))
+        Ok(svg::write(&self.scene()?.0, Target::Svg))
     }
 
     /// The figure as SVG, with the positions of its panels and axes. A page needs them to find the
@@ -73,7 +73,7 @@ impl Figure {
     /// If the figure cannot be drawn.
     pub fn to_svg_with_map(&self) -> Result<(String, Vec<PanelMap>), FigureError> {
         let (scene, map) = self.scene()?;
-        Ok((svg::write(&scene, Target::Vectors), map))
+        Ok((svg::write(&scene, Target::Svg), map))
     }
 
     /// The figure as JSON, with everything resolved that does not depend on its size: the range of

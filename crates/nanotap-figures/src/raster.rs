@@ -95,7 +95,13 @@ pub(crate) fn encode(pixels: &[Colour], columns: usize, rows: usize, dpi: Option
         if palette.iter().any(|c| c.a < 255) {
             encoder.set_trns(palette.iter().map(|c| c.a).collect::<Vec<u8>>());
         }
-        indices
+        if palette.len() > 16 {
+            indices
+        } else {
+            encoder.set_depth(png::BitDepth::Four);
+            let rows = indices.chunks(columns);
+            rows.flat_map(|row| row.chunks(2).map(pair)).collect()
+        }
     } else {
         let opaque = pixels.iter().all(|c| c.a == 255);
         encoder.set_color(if opaque {
@@ -149,6 +155,11 @@ fn palette(pixels: &[Colour]) -> Option<(Vec<Colour>, Vec<u8>)> {
         })
         .collect();
     Some((numbers.into_keys().collect(), indices))
+}
+
+/// Two palette numbers in one byte.
+fn pair(indices: &[u8]) -> u8 {
+    indices[0] << 4 | indices.get(1).copied().unwrap_or(0)
 }
 
 #[cfg(test)]

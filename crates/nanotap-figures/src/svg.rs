@@ -27,10 +27,22 @@ const LONG_STROKE: usize = 500;
 /// What the SVG is written for.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Target {
-    /// A vector format: shapes that are too heavy for it become pixels of 600 dots per inch.
-    Vectors,
-    /// Pixels of this resolution. The ground is theirs.
+    /// An SVG file. Shapes that are too heavy become pixels of 600 dots per inch.
+    Svg,
+    /// Conversion to PDF: the same, with each text as one shape.
+    Pdf,
+    /// Conversion to pixels of this resolution, which have their ground.
     Pixels { dpi: f64 },
+}
+
+impl Target {
+    /// Resolution of the pixels; `None` for a vector format.
+    fn dpi(self) -> Option<f64> {
+        match self {
+            Target::Pixels { dpi } => Some(dpi),
+            Target::Svg | Target::Pdf => None,
+        }
+    }
 }
 
 pub(crate) fn write(scene: &Scene, target: Target) -> String {
@@ -57,7 +69,7 @@ pub(crate) fn write(scene: &Scene, target: Target) -> String {
     svg.push_str("<defs>\n");
     svg.push_str(&page.definitions());
     svg.push_str("</defs>\n");
-    if target == Target::Vectors {
+    if target.dpi().is_none() {
         let _ = writeln!(
             svg,
             "<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"
@@ -122,19 +134,20 @@ impl Page {
             }
             Item::Close => self.body.push_str("</g>\n"),
             Item::Path(path) => self.long_or_short(path),
-            Item::Words(words) => self.words(words),
-            Item::Raster(raster) => match self.target {
-                Target::Vectors => self.raster(&raster.magnified()),
-                Target::Pixels { .. } => self.raster(raster),
-            },
+            Item::Words(words) if self.target == Target::Svg => self.words(words),
+            Item::Words(words) => self.path(&Path {
+                segments: words.outline(),
+                fill: Some(words.colour),
+                stroke: None,
+                clip: None,
+            }),
+            Item::Raster(raster) if self.target.dpi().is_some() => self.raster(raster),
+            Item::Raster(raster) => self.raster(&raster.magnified()),
             Item::Cloud(cloud) => {
-                let (path, dpi) = match self.target {
-                    Target::Vectors => (cloud.path(), EMBEDDED_DPI),
-                    Target::Pixels { dpi } => (None, dpi),
-                };
-                if let Some(path) = path {
+                let dpi = self.target.dpi();
+                if let Some(path) = cloud.path().filter(|_| dpi.is_none()) {
                     self.path(&path);
-                } else if let Some(raster) = cloud.raster(dpi) {
+                } else if let Some(raster) = cloud.raster(dpi.unwrap_or(EMBEDDED_DPI)) {
                     self.raster(&raster);
                 }
             }
@@ -155,23 +168,21 @@ impl Page {
 
     /// Draws a path: one with many corners as pixels or in pieces.
     fn long_or_short(&mut self, path: &Path) {
-        if self.target == Target::Vectors {
-            match path
-                .is_heavy()
-                .then(|| convert::path_raster(path, EMBEDDED_DPI))
-            {
+        if self.target.dpi().is_none() {
+            match path.is_heavy().then(|| convert::path_raster(path)) {
                 Some(Some(raster)) => self.raster(&raster),
                 _ => self.path(path),
             }
-            return;
+        } else if let Some(stroke) = &path.stroke
+            && path.segments.len() > LONG_STROKE
+        {
+            self.in_pieces(path, stroke);
+        } else {
+            self.path(path);
         }
-        let Some(stroke) = path
-            .stroke
-            .as_ref()
-            .filter(|_| path.segments.len() > LONG_STROKE)
-        else {
-            return self.path(path);
-        };
+    }
+
+    fn in_pieces(&mut self, path: &Path, stroke: &Stroke) {
         let clip = path.clip.map(|rect| self.clip(rect)).unwrap_or_default();
         let _ = writeln!(
             self.body,

@@ -17,7 +17,7 @@ mod wheel;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use steps::{OTHERS, STEPS, Step};
+use steps::{OTHER_TASKS, STEPS, Step};
 use tally::Tally;
 use tools::Workspace;
 
@@ -43,7 +43,7 @@ fn select(arguments: &[String]) -> Result<(Vec<&'static Step>, &[String]), Strin
             "help" | "-h" | "--help" => return Ok((Vec::new(), &[])),
             "test" => selected.extend(STEPS),
             name => {
-                let mut all = STEPS.iter().chain(OTHERS);
+                let mut all = STEPS.iter().chain(OTHER_TASKS);
                 let step = all
                     .find(|step| step.name == name)
                     .ok_or_else(|| format!("no task is called `{name}`"))?;
@@ -65,7 +65,7 @@ fn usage() -> String {
     format!(
         "usage: cargo xtask <task>...\n\n  test         all of these checks:\n{}\n  other tasks:\n{}",
         lines(STEPS),
-        lines(OTHERS)
+        lines(OTHER_TASKS)
     )
 }
 

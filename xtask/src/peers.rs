@@ -52,7 +52,7 @@ fn environment(workspace: &Workspace) -> Result<Environment, String> {
             for package in lines.filter(|line| !line.is_empty() && !line.starts_with('#')) {
                 let mut install = environment.pip();
                 if !succeeds(root, install.args(["--only-binary=:all:", package]))? {
-                    println!("going on without {package}");
+                    println!("continuing without {package}");
                 }
             }
             Ok(())

@@ -44,7 +44,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "lint",
-        about: "clippy, warnings refused",
+        about: "clippy without warnings",
         takes_options: false,
         run: |workspace, _| lint(workspace),
     },
@@ -68,7 +68,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "doc",
-        about: "the documentation builds without a warning",
+        about: "the API documentation, without warnings",
         takes_options: false,
         run: |workspace, _| doc(workspace),
     },
@@ -81,7 +81,7 @@ pub(crate) static STEPS: &[Step] = &[
 ];
 
 /// Tasks that are not checks.
-pub(crate) static OTHERS: &[Step] = &[
+pub(crate) static OTHER_TASKS: &[Step] = &[
     Step {
         name: "wheel",
         about: "build the Python package in target/wheels",

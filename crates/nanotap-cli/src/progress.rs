@@ -10,7 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use nanotap::control::{CancelFlag, Control};
-use nanotap::study::kind::Study;
+use nanotap::study::Study;
 
 use crate::failure::Failure;
 

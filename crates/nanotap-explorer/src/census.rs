@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::State;
 use nanotap::control::Control;
-use nanotap::study::attractors::{Attractors, AttractorsRequest, AttractorsStudy};
+use nanotap::study::attractors::{Attractors, AttractorsOptions, AttractorsStudy};
 use nanotap::study::orbit::OrbitReport;
 use nanotap::study::registry::Study as _;
 use serde::Deserialize;
@@ -42,9 +42,9 @@ pub(crate) async fn attractors(
 fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Refusal> {
     let case = census.case.case(app, control)?;
     model_of(&case)?;
-    let request = AttractorsRequest {
+    let request = AttractorsOptions {
         unstable: if census.unstable { UNSTABLE } else { 0 },
-        ..AttractorsRequest::default()
+        ..AttractorsOptions::default()
     };
     let found = AttractorsStudy::run(&case, &request, control)?;
     let stable = found.attractors.iter().filter_map(|one| {

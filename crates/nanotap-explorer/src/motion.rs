@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use nanotap::ErrorKind;
 use nanotap::case::Case;
 use nanotap::case::quantity::Kind;
 use nanotap::control::Control;
@@ -12,10 +13,10 @@ use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Dimension, OBSERVABLES, Observables};
-use nanotap::study::orbit::{OrbitError, OrbitReport, OrbitRequest, orbit, spectral_radius};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{
-    Method, SimulateReport, SimulateRequest, SimulateStudy, Simulation, simulate,
+    Method, SimulateOptions, SimulateReport, SimulateStudy, Simulation, simulate,
 };
 use nanotap::study::value::Steps;
 use nanotap_figures::Figure;
@@ -41,19 +42,19 @@ pub(crate) enum Motion {
 
 impl Motion {
     pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, Refusal> {
-        let request = OrbitRequest {
+        let request = OrbitOptions {
             period: start.period,
             state: start.state.clone(),
-            ..OrbitRequest::default()
+            ..OrbitOptions::default()
         };
-        match orbit(model, &request.options()) {
+        match orbit(model, &request) {
             Ok(found) => Ok(Self::Orbit(Box::new(found))),
-            Err(OrbitError::NotPeriodic { .. }) => {
-                let request = SimulateRequest {
+            Err(error) if start.period.is_none() && error.kind == ErrorKind::Numerics => {
+                let request = SimulateOptions {
                     state: start.state.clone(),
-                    ..SimulateRequest::default()
+                    ..SimulateOptions::default()
                 };
-                let run = simulate(model, &request.options()).map_err(Refusal::of)?;
+                let run = simulate(model, &request).map_err(Refusal::of)?;
                 Ok(Self::Run(Box::new(run)))
             }
             Err(error) => Err(Refusal::of(error)),
@@ -212,12 +213,12 @@ fn fixed_step(
     if steps == 0 {
         return Ok(None);
     }
-    let request = SimulateRequest {
+    let request = SimulateOptions {
         method: Method::Rk4,
         steps: Steps([steps, steps]),
         periods: FIXED_PERIODS,
         state,
-        ..SimulateRequest::default()
+        ..SimulateOptions::default()
     };
     let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,

@@ -14,8 +14,8 @@ use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
 use nanotap::observe::time_series::state_names;
-use nanotap::study::approach::{ApproachRequest, ApproachStudy};
-use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy};
+use nanotap::study::approach::{ApproachOptions, ApproachStudy};
+use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy};
 use nanotap::study::registry::{Study as _, study as study_named};
 use nanotap::study::request::read;
 use nanotap::study::sweep::Over;
@@ -163,10 +163,10 @@ impl Studied<'_> {
     ) -> Result<T, Refusal> {
         let entry = study_named(name)
             .ok_or_else(|| Refusal::failed(format!("there is no study `{name}`")))?;
-        let recipe = entry.recipe(case, Value::Object(request.clone()), self.control)?;
+        let plan = entry.plan(case, Value::Object(request.clone()), self.control)?;
         let scratch = Scratch::within(&self.app.scratch)?;
         let store =
-            Store::create_or_resume(&scratch.path().join("data.zarr"), recipe.schema().clone())
+            Store::create_or_resume(&scratch.path().join("data.zarr"), plan.schema().clone())
                 .map_err(Refusal::of)?;
         let work = Work {
             share: Share::WHOLE,
@@ -176,7 +176,7 @@ impl Studied<'_> {
                 progress: None,
             },
         };
-        recipe.compute(&store, &work).map_err(Refusal::of)?;
+        plan.compute(&store, &work).map_err(Refusal::of)?;
         use_it(&store)
     }
 
@@ -287,7 +287,7 @@ impl Studied<'_> {
             "diagram": true,
             "values": values,
         }));
-        let asked: BranchRequest = read(Value::Object(request.clone()))?;
+        let asked: BranchOptions = read(Value::Object(request.clone()))?;
         Ok((BranchStudy::run(case, &asked, self.control)?, request))
     }
 
@@ -332,7 +332,7 @@ impl Studied<'_> {
                     request.insert(end.into(), text.into());
                 }
             }
-            let asked: ApproachRequest = read(Value::Object(request.clone()))?;
+            let asked: ApproachOptions = read(Value::Object(request.clone()))?;
             let report = ApproachStudy::run(&case, &asked, self.control)?;
             let units = case.units();
             let (factor, _) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));

@@ -1,9 +1,8 @@
 //! Why something could not be done: one type for every front end.
 //!
-//! Inside the library each part has typed errors of its own; where they leave it they become an
-//! [`Error`] by one conversion each, which stands beside the typed error. An error has a
-//! [kind](ErrorKind), from which the terminal takes its exit code and Python its exception, and
-//! problems, each with its place and with what would be right.
+//! Studies return an [`Error`]. The model, the case and the dataset have typed errors, each with one
+//! conversion to an [`Error`] next to it. An error has a [kind](ErrorKind), from which the terminal
+//! takes its exit code and Python its exception, and problems, each with its place and a remedy.
 //!
 //! A message names an option of a study in braces: "look near a {state}". [`Error::written`]
 //! puts it as the reader types it, `--state` at the terminal and `state=` in Python.
@@ -123,6 +122,12 @@ impl Error {
         Self::new(ErrorKind::Files, message)
     }
 
+    /// The first problem's message, without its place and remedy.
+    pub fn message(&self) -> String {
+        let message = self.problems.first().map_or("", |problem| &problem.message);
+        replaced(message, &str::to_owned)
+    }
+
     /// The same, at an option of a study.
     #[must_use]
     pub fn at(mut self, option: &str) -> Self {
@@ -229,6 +234,49 @@ impl From<nanotap_flow::FlowError> for Error {
             nanotap_flow::FlowError::Cancelled => Self::stopped(),
             error => Self::numerics(error.to_string()),
         }
+    }
+}
+
+impl From<nanotap_volterra::VolterraError> for Error {
+    fn from(error: nanotap_volterra::VolterraError) -> Self {
+        match error {
+            nanotap_volterra::VolterraError::Cancelled => Self::stopped(),
+            error => Self::numerics(error.to_string()),
+        }
+    }
+}
+
+impl From<nanotap_dynamics::ShootingError> for Error {
+    fn from(error: nanotap_dynamics::ShootingError) -> Self {
+        match error {
+            nanotap_dynamics::ShootingError::TooLarge { .. } => {
+                Self::input(error.to_string(), "give a shorter {period} or fewer modes")
+            }
+            error => Self::numerics(error.to_string()),
+        }
+    }
+}
+
+/// Conversions of errors of computations that were asked for correctly.
+macro_rules! numerics {
+    ($($error:path),*) => {$(
+        impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                Self::numerics(error.to_string())
+            }
+        }
+    )*};
+}
+
+numerics!(
+    nanotap_dynamics::ContinuationError,
+    nanotap_dynamics::MultiplierError,
+    crate::model::spectrum::SpectrumError
+);
+
+impl From<nanotap_dynamics::StartBoxError> for Error {
+    fn from(error: nanotap_dynamics::StartBoxError) -> Self {
+        Self::input(error.to_string(), "change it with {box}")
     }
 }
 

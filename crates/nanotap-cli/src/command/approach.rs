@@ -12,7 +12,7 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};
-use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
 use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::Classification;
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<ApproachRequest>,
+    request: Request<ApproachOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,

@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use clap::Args;
 use nanotap::figure::basin::figure;
-use nanotap::study::basin::{Basin, BasinOptions, BasinRequest, Shares, shares};
+use nanotap::study::Computation as _;
+use nanotap::study::basin::{Basin, BasinOptions, Shares, SliceRange, shares};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -28,7 +29,7 @@ pub(crate) struct Arguments {
     attractors: Option<PathBuf>,
 
     #[command(flatten)]
-    request: Request<BasinRequest>,
+    request: Request<BasinOptions>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -38,14 +39,14 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let begun = Instant::now();
-    let mut request = arguments.request.read()?;
-    request.attractors = arguments.attractors.as_deref().map(states).transpose()?;
-    let options = request.options()?;
+    let mut options = arguments.request.read()?;
+    options.attractors = arguments.attractors.as_deref().map(states).transpose()?;
+    let axes = options.axes()?;
     let case = GivenCase::of(&arguments.case, output)?;
     let dataset = &arguments.dataset;
     let name = derived_name(
         arguments.case.file.as_deref(),
-        &["basin", &options.x.name, &options.y.name],
+        &["basin", &axes[0].name, &axes[1].name],
     );
     let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
     arguments.plot.check()?;
@@ -62,9 +63,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         |store, work| basin.compute(store, work),
     )?;
     let plot = arguments.plot.plot.as_deref();
-    let seed = request.seed;
+    let seed = options.seed;
     let done = DatasetReport::of(&store, destination, plot, begun, seed, shares, figure)?;
-    output.study(&case, &done, |done| text(&case, &options, done))
+    output.study(&case, &done, |done| text(&case, &axes, done))
 }
 
 /// The states on the attractors that a file of `nanotap attractors --json` names.
@@ -98,15 +99,15 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(case: &GivenCase, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
+fn text(case: &GivenCase, [x, y]: &[SliceRange; 2], done: &DatasetReport<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
         case.title(),
         case.summary(),
-        options.x.count,
-        options.y.count,
-        options.x.name,
-        options.y.name
+        x.count,
+        y.count,
+        x.name,
+        y.name
     );
     done.text(&heading, parts)
 }

@@ -8,7 +8,8 @@ use nanotap::case::physical::Kind;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{Set, columns, time_series};
-use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
+use nanotap::study::Study as _;
+use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy, PointReport};
 use nanotap::study::orbit::spectral_radius;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -30,7 +31,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<BranchRequest>,
+    request: Request<BranchOptions>,
 
     /// What --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
@@ -56,19 +57,18 @@ fn shown() -> impl TypedValueParser<Value = Shown> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
+    let mut options = arguments.request.read()?;
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    let mut options = request.options(&case)?;
-    case.say_held(&[options.key], output);
+    case.say_held(&[options.range(&case)?.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
     let mut report = progress::study::<BranchStudy, _>(|control| {
         arguments
             .threads
-            .install(|| followed(&case, &options, control))
+            .install(|| BranchStudy::run(&case, &options, control))
     })??;
     if report.cancelled {
         output.warning("stopped before it was done");

@@ -13,7 +13,7 @@ use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::table::shown_phase;
-use nanotap::study::kind::cantilever as cantilever_of;
+use nanotap::study::cantilever as cantilever_of;
 use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase};
 

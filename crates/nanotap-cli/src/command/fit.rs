@@ -7,7 +7,7 @@ use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::fit::fit_figure;
 use nanotap::number::shortest;
-use nanotap::study::fit::{FitReport, FitRequest, FitStudy, FittedParameter, Table as Data};
+use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table as Data};
 use nanotap::study::registry::Study as _;
 use serde::Serialize;
 
@@ -36,7 +36,7 @@ pub(crate) struct Arguments {
     also: Vec<PathBuf>,
 
     #[command(flatten)]
-    request: Request<FitRequest>,
+    request: Request<FitOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,

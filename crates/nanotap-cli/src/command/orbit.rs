@@ -6,7 +6,7 @@ use clap::Args;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{PhysicalMotion, Set, time_series};
-use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitReport, OrbitRequest, OrbitStudy};
+use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
 use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<OrbitRequest>,
+    request: Request<OrbitOptions>,
 
     /// Write the harmonics to this file (.csv)
     #[arg(long, value_name = "PATH")]

@@ -6,7 +6,8 @@ use clap::{Args, ValueEnum};
 use nanotap::case::Key;
 use nanotap::case::physical::Kind;
 use nanotap::figure::sweep::{figure, response};
-use nanotap::study::sweep::{Follow, Over, Summary, Sweep, SweepRequest, summary};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Follow, Over, Summary, Sweep, SweepOptions};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -24,7 +25,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<SweepRequest>,
+    request: Request<SweepOptions>,
 
     /// What --plot shows; without it the response over drive.frequency or over two parameters of
     /// a physical case, else the diagram
@@ -49,11 +50,11 @@ enum Show {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
+    let options = arguments.request.read()?;
     let begun = Instant::now();
     let case = GivenCase::of(&arguments.case, output)?;
-    let sweep = request.sweep(&case)?;
-    let keys: Vec<Key> = sweep.options().over.iter().map(|o| o.key).collect();
+    let sweep = Sweep::new(&case, options)?;
+    let keys: Vec<Key> = sweep.over().iter().map(|o| o.key).collect();
     case.say_held(&keys, output);
     let names: Vec<&str> = keys.iter().map(|key| key.path()).collect();
     let name = derived_name(
@@ -77,8 +78,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     )?;
     let shown = arguments.show.unwrap_or_else(|| {
         // A resonance curve is what one sees of the drive's frequency.
-        let key = sweep.options().over[0].key.path();
-        let two = sweep.options().over.len() == 2;
+        let key = sweep.over()[0].key.path();
+        let two = sweep.over().len() == 2;
         if key.starts_with("drive.frequency") || (two && case.physical().is_some()) {
             Show::Response
         } else {
@@ -90,15 +91,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Show::Response => response,
     };
     let plot = arguments.plot.plot.as_deref();
-    let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, summary, drawn)?;
+    let seed = sweep.options().seed;
+    let done = DatasetReport::of(&store, destination, plot, begun, seed, Summary::of, drawn)?;
     output.study(&case, &done, |done| text(&case, &sweep, done))
 }
 
 fn text(case: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
-    let options = sweep.options();
-    let ranges: Vec<String> = options
-        .over
+    let ranges: Vec<String> = sweep
+        .over()
         .iter()
         .map(|over| {
             format!(

@@ -8,7 +8,8 @@ use std::time::Instant;
 use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::window::figure;
-use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap::study::Computation as _;
+use nanotap::study::window::{Condition, Window, WindowOptions};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -27,7 +28,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<WindowRequest>,
+    request: Request<WindowOptions>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -41,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let names = request.over.names();
     let case = GivenCase::of(&arguments.case, output)?;
     let sweep = request.sweep(&case)?;
-    let keys: Vec<Key> = sweep.options().over.iter().map(|over| over.key).collect();
+    let keys: Vec<Key> = sweep.over().iter().map(|over| over.key).collect();
     case.say_held(&keys, output);
     let name = derived_name(
         arguments.case.file.as_deref(),

@@ -37,7 +37,7 @@ fn run(bencher: Bencher<'_, '_>, modes: usize, observables: Set) {
     let options = SimulateOptions {
         periods: PERIODS,
         transient: Some(0),
-        observables,
+        observables: Some(observables),
         ..SimulateOptions::default()
     };
     bencher

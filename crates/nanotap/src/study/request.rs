@@ -30,6 +30,10 @@ pub fn answer_schema<T: JsonSchema>() -> Schema {
 pub fn schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let mut schema = settings.into_generator().into_root_schema_for::<T>();
+    // The title is part of what the terminal prints.
+    if let Some(name) = T::schema_name().strip_suffix("Options") {
+        schema.insert("title".into(), format!("{name}Request").into());
+    }
     let required: Vec<Value> = properties(&schema)
         .filter(Property::is_required)
         .map(|property| property.name.into())

@@ -5,33 +5,51 @@ use nanotap_dynamics::Control;
 use super::average::sader_jarvis;
 use super::walk::{HeldWalk, Stepped};
 use super::{
-    Averages, Driven, Ended, FreeOscillation, Held, HeldOrbit, Jump, Modulated, ModulationReport,
-    OPEN_LOOP,
+    Averages, Driven, Ended, FreeOscillation, FrequencyModulationOptions, Held, HeldOrbit, Jump,
+    Modulated, ModulationReport, OPEN_LOOP,
 };
 use crate::case::{Case, Key};
 use crate::model::contact::ContactLaw;
 use crate::observe::{PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
-    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Way, beam_clearance, distances,
-    hysteresis,
+    ApproachPoint, ApproachReport, Distances, Way, beam_clearance, hysteresis,
 };
 use crate::study::simulate::Classification;
+use crate::study::value::value;
+use crate::{Error, ErrorKind};
 
 /// How far beyond the first distance the free oscillation is put, if Newton needs a way there.
 const BEYOND: f64 = 8.0;
 
-/// Brings the sample near and takes it away while amplitude and `phase` are held.
+/// Computes the curve of frequency shifts of `case`, both ways.
 ///
 /// # Errors
-/// [`ApproachError`] when the options make no sense for the case, or there is no orbit where the
-/// curve begins.
-pub fn modulated_approach(
+/// When the options are not valid for the case, or there is no orbit where the curve begins.
+pub fn frequency_modulation(
     case: &Case,
-    options: &ApproachOptions,
-    phase: f64,
+    options: &FrequencyModulationOptions,
     control: &Control<'_>,
-) -> Result<ApproachReport, ApproachError> {
+) -> Result<ApproachReport, Error> {
+    curve(case, options, control).map_err(|error| match error.kind {
+        ErrorKind::Numerics => error.remedy("begin farther away, with {from}"),
+        _ => error,
+    })
+}
+
+fn curve(
+    case: &Case,
+    options: &FrequencyModulationOptions,
+    control: &Control<'_>,
+) -> Result<ApproachReport, Error> {
+    let distance = |option, given: &Option<_>| value(case, case.gap_key(), option, given.as_ref());
+    let phase = options.phase;
+    let closest = distance("closest", &options.closest)?;
+    let shift = value(case, case.drive_keys()[0], "shift", options.shift.as_ref())?;
+    let (from, to) = (
+        distance("from", &options.from)?,
+        distance("to", &options.to)?,
+    );
     let model = case.model()?;
     let held = Held {
         amplitude: FreeMotion::of(&model).amplitude,
@@ -44,10 +62,16 @@ pub fn modulated_approach(
         phase,
         reach: free.reach,
     };
-    let distances = distances(&far, options)?;
+    let points = options.points;
+    let distances = Distances {
+        from,
+        to,
+        points,
+        closest,
+    };
+    let distances = distances.values(&far)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let reach = free.reach / free.amplitude;
-    let closest = options.closest;
     // Where the least distance is kept, the amplitude of the first distance is held up to there.
     let free = closest.map_or(free.clone(), |closest| {
         free.with_amplitude((from - closest) / reach)
@@ -85,7 +109,7 @@ pub fn modulated_approach(
                 break;
             }
             let stepped = match walk.step(gap, control) {
-                Err(error) if table.is_empty() => return Err(error.into()),
+                Err(error) if table.is_empty() => return Err(error),
                 stepped => stepped,
             };
             let orbit = match stepped {
@@ -107,7 +131,7 @@ pub fn modulated_approach(
                     failed.get_or_insert_with(|| Ended {
                         way,
                         gap: walk.gap(),
-                        reason: error.to_string(),
+                        reason: error.message(),
                     });
                     missed += 1;
                     if missed > MISSED {
@@ -140,9 +164,7 @@ pub fn modulated_approach(
     for point in &mut table {
         curve.tell_in_si(point);
     }
-    let setpoints = options
-        .shift
-        .map(|shift| curve.setpoints(held, shift, &table, control));
+    let setpoints = shift.map(|shift| curve.setpoints(held, shift, &table, control));
     Ok(ApproachReport {
         jumps: Vec::new(),
         parameter: case.gap_key().path(),
@@ -293,10 +315,9 @@ impl Curve<'_> {
         gap: f64,
         orbit: HeldOrbit,
         amplitude: f64,
-    ) -> Result<ApproachPoint, ApproachError> {
+    ) -> Result<ApproachPoint, Error> {
         let view = self.case.physical();
-        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)
-            .map_err(super::HeldError::from)?;
+        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
         let modulation = self.modulated(&orbit, amplitude, gap);
         Ok(ApproachPoint {
             way,

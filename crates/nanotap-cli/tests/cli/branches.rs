@@ -156,7 +156,7 @@ fn the_doubled_branch_joins_both_flips() {
     // It begins at one flip of its parent and ends at the other.
     let end = branches[1]["end"].as_str().unwrap();
     assert!(
-        end.contains("meets one of period 1 at 2.505040698"),
+        end.contains("meets a branch of period 1 at 2.505040698"),
         "{end}"
     );
     let doubled: Vec<&Value> = json["points"]

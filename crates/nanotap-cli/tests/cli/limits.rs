@@ -104,7 +104,7 @@ fn counts_that_are_too_large_together_are_refused() {
     let orbit = ["orbit", "case.toml", "--period", "10000"];
     folder
         .run(&[&orbit[..], &many].concat())
-        .refused(&["10000", "100 variables", "1677 at most"]);
+        .refused(&["10000", "100 variables", "the largest period is 1677"]);
     let states = [
         "simulate",
         "case.toml",

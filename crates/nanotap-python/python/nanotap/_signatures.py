@@ -843,8 +843,7 @@ def contact_laws(
     period : int
         Period of the orbits compared (1 to 10000).
     arm : float | None
-        Stiffness of the standard linear solid's arm; without it, the case's, or
-        twice alpha4.
+        Stiffness of the relaxing arm; without it, the case's, or twice alpha4.
     from_ : float | str | None
         Lowest drive frequency to which the orbits are followed.
     to : float | str | None

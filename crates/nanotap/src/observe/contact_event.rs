@@ -45,7 +45,7 @@ impl<'a> Contacts<'a> {
     /// For a motion of `model` that is about to run.
     pub fn of(model: &'a Model) -> Self {
         let drive = model.system.drive();
-        let gap = if model.forgetting.is_some() {
+        let gap = if model.memory_reset.is_some() {
             &model.height
         } else {
             &model.gap

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use nanotap::control::Control;
+use nanotap::model::parameter::Parameter;
 use nanotap::study::approach::{ApproachOptions, Way, approach};
 use nanotap::study::setpoint::solve_setpoint;
 
@@ -19,7 +20,7 @@ fn largest_deviation(set: &[&str]) -> f64 {
         resolved.lever.f0,
         resolved.lever.quality_factor,
     );
-    let ratio = resolved.parameters.drive_frequency / f0;
+    let ratio = resolved.parameters.get(Parameter::Omega) / f0;
     let at_resonance = ratio * resolved.free_amplitude / resolved.free_phase.to_radians().sin();
     let options = ApproachOptions {
         points: 25,

@@ -159,7 +159,10 @@ fn keys_that_cannot_vary_are_refused_by_name() {
     // Numbers of the equations may vary together with quantities.
     let both = lever.with(key, 340e3).with(Key::Alpha4, 3.0);
     assert_eq!(both.get(Key::Alpha4), 3.0);
-    assert_eq!(both.physical().unwrap().parameters.drive_frequency, 340e3);
+    assert_eq!(
+        both.physical().unwrap().parameters.get(Parameter::Omega),
+        340e3
+    );
     let none = lever.with(key, -1.0).model().unwrap_err().to_string();
     assert!(
         none.contains("drive.frequency") && none.contains("above zero"),

@@ -3,6 +3,7 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
+use nanotap::model::parameter::Parameter;
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::{at_setpoint, solve_setpoint};
 use nanotap::study::simulate::{SimulateOptions, simulate};
@@ -39,7 +40,7 @@ fn every_solution_has_the_amplitude_of_the_setpoint() {
     assert!(zc > 14e-9 && zc < 16e-9, "{zc}");
     let (at, _) = at_setpoint(lever, &Control::default()).unwrap();
     let resolved = at.physical().unwrap();
-    assert!((resolved.parameters.tip_gap / zc - 1.0).abs() < 1e-12);
+    assert!((resolved.parameters.get(Parameter::Alpha5) / zc - 1.0).abs() < 1e-12);
     let found = orbit(&at.model().unwrap(), &OrbitOptions::default()).unwrap();
     let ratio = found.observables.first_harmonic * resolved.scales.length / 20e-9;
     assert!((ratio - 0.8).abs() < 1e-9, "{ratio}");

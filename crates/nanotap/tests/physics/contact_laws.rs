@@ -4,7 +4,6 @@ use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::{Set, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
@@ -16,28 +15,24 @@ use crate::located_runge_kutta::Independent;
 
 /// The paper's case on a sample of a law, with the paper's spring and damper.
 pub(crate) fn on(law: ContactLaw, omega: f64) -> Cantilever {
-    let case = Cantilever {
-        contact: law,
-        omega,
-        ..Cantilever::paper()
-    };
+    let case = Cantilever::paper().with(Parameter::Omega, omega);
     match law {
-        ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => case,
-        ContactLaw::StandardLinearSolid => Cantilever {
-            alpha6: 0.0,
-            relaxation_stiffness: 40.0,
-            relaxation_time: 0.05,
-            ..case
-        },
-        ContactLaw::MovingSurface => Cantilever {
-            surface: MovingSurface {
-                stiffness: 60.0,
-                damping: 8.0,
-                adhesion: 0.4,
-            },
-            ..case
-        },
+        ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => case.on(law, &[]),
+        ContactLaw::StandardLinearSolid => case.with(Parameter::Alpha6, 0.0).on(law, &[40.0, 0.05]),
+        ContactLaw::MovingSurface => case.on(law, &[60.0, 8.0, 0.4]),
     }
+}
+
+/// The numbers that only the law of a case has.
+pub(crate) fn own_numbers(case: &Cantilever) -> Vec<f64> {
+    Parameter::of_law(case.contact)
+        .map(|own| case.get(own))
+        .collect()
+}
+
+/// The parameter of this name.
+pub(crate) fn parameter(name: &str) -> Parameter {
+    Parameter::find(name).unwrap()
 }
 
 /// States, contacts, peak force and dissipated energy, in flight as well, compared with an
@@ -158,18 +153,14 @@ proptest! {
     ) {
         let law = ContactLaw::ALL[law];
         let mut case = Cantilever { modes, omega, alpha4: stiffness, alpha5: gap, ..Cantilever::paper() };
-        case.contact = law;
-        if law == ContactLaw::StandardLinearSolid {
-            case.alpha6 = 0.0;
-            case.relaxation_stiffness = 3.0 * damping;
-            case.relaxation_time = 0.1 * damping;
-        } else {
-            case.alpha6 = damping;
-        }
-        if law == ContactLaw::MovingSurface {
-            let adhesion = 3.0 * gap.max(0.0);
-            case.surface = MovingSurface { stiffness: 1.0 + 0.5 * stiffness, damping, adhesion };
-        }
+        case.alpha6 = if law == ContactLaw::StandardLinearSolid { 0.0 } else { damping };
+        case = case.on(law, &match law {
+            ContactLaw::StandardLinearSolid => vec![3.0 * damping, 0.1 * damping],
+            ContactLaw::MovingSurface => {
+                vec![1.0 + 0.5 * stiffness, damping, 3.0 * gap.max(0.0)]
+            }
+            _ => Vec::new(),
+        });
         let model = Model::cantilever(&case).unwrap();
         let mut state = vec![0.0; model.dimension()];
         (state[0], state[modes]) = (a, v);
@@ -210,11 +201,9 @@ fn without_a_damper_every_law_is_the_papers_spring() {
         contact: ContactLaw::KelvinVoigt,
         ..spring.clone()
     };
-    let solid = Cantilever {
-        contact: ContactLaw::StandardLinearSolid,
-        relaxation_stiffness: 30.0,
-        ..spring.clone()
-    };
+    let solid = spring
+        .clone()
+        .on(ContactLaw::StandardLinearSolid, &[30.0, 0.0]);
     let [expected, recovered, relaxed] = [spring, recovers, solid].map(|case| {
         let subject = Case::from(case);
         let mut state = vec![0.0; subject.model().unwrap().dimension()];
@@ -236,7 +225,7 @@ fn a_case_has_the_parameters_of_its_law() {
     let solid = names(ContactLaw::StandardLinearSolid);
     assert!(solid.contains(&"relaxation_time") && !solid.contains(&"alpha6"));
     assert!(of(ContactLaw::SpringDamper).key("relaxation_time").is_err());
-    let wrong = Cantilever::paper().with(Parameter::RelaxationTime, 0.1);
+    let wrong = Cantilever::paper().with(parameter("relaxation_time"), 0.1);
     let refused = Model::cantilever(&wrong).unwrap_err().to_string();
     assert!(refused.contains("standard-linear-solid"), "{refused}");
 }

@@ -7,7 +7,6 @@ use std::f64::consts::TAU;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap_flow::{System, Trajectory};
 
 use crate::taylor;
@@ -49,7 +48,7 @@ fn beam(random: &mut Random, number: usize) -> Cantilever {
     let contact = ContactLaw::ALL[number % ContactLaw::ALL.len()];
     let solid = contact == ContactLaw::StandardLinearSolid;
     let alpha4 = random.log(1e-3, 1e6);
-    Cantilever {
+    let mut case = Cantilever {
         modes: 1 + (20.0 * random.part().powi(2)) as usize,
         alpha1: if random.next() > 0.0 {
             random.log(1e-3, 1.0)
@@ -66,24 +65,23 @@ fn beam(random: &mut Random, number: usize) -> Cantilever {
             alpha4.sqrt() * random.log(0.05, 1.0)
         },
         omega: random.log(0.5, 60.0),
-        relaxation_stiffness: if solid {
-            alpha4 * random.log(0.1, 10.0)
-        } else {
-            0.0
-        },
-        relaxation_time: if solid { random.log(1e-2, 1.0) } else { 0.0 },
-        contact,
-        surface: if contact == ContactLaw::MovingSurface {
-            MovingSurface {
-                stiffness: alpha4 * random.log(0.1, 10.0),
-                damping: alpha4.sqrt() * random.log(0.05, 1.0),
-                adhesion: alpha4 * random.log(1e-4, 1e-1),
-            }
-        } else {
-            MovingSurface::NONE
-        },
         ..Cantilever::paper()
-    }
+    };
+    case = case.on(
+        contact,
+        &match contact {
+            ContactLaw::StandardLinearSolid => {
+                vec![alpha4 * random.log(0.1, 10.0), random.log(1e-2, 1.0)]
+            }
+            ContactLaw::MovingSurface => vec![
+                alpha4 * random.log(0.1, 10.0),
+                alpha4.sqrt() * random.log(0.05, 1.0),
+                alpha4 * random.log(1e-4, 1e-1),
+            ],
+            _ => Vec::new(),
+        },
+    );
+    case
 }
 
 /// Deflections of the size of the gap, less for fast modes; the sample at rest and the tip above

@@ -12,12 +12,12 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::{Complex, Flow};
 
-use crate::contact_laws::on;
+use crate::contact_laws::{on, own_numbers};
 use crate::derivatives::{advance, worst};
 
 /// Two tones, the second at 25/4 of the first, with this actuation.
 fn two_tones(actuation: Actuation) -> Cantilever {
-    Cantilever {
+    let case = Cantilever {
         actuation,
         alpha2: if actuation == Actuation::Base {
             0.1
@@ -25,15 +25,16 @@ fn two_tones(actuation: Actuation) -> Cantilever {
             0.6
         },
         tone2_ratio: Some("25/4".parse().unwrap()),
-        tone2_amplitude: if actuation == Actuation::Base {
-            0.01
-        } else {
-            0.4
-        },
-        tone2_phase: 35.0,
         omega: 3.1,
         ..Cantilever::paper()
-    }
+    };
+    let amplitude = if actuation == Actuation::Base {
+        0.01
+    } else {
+        0.4
+    };
+    case.with(Parameter::Tone2Amplitude, amplitude)
+        .with(Parameter::Tone2Phase, 35.0)
 }
 
 /// Far from the sample the motion is the sum of the responses to both tones, each with the
@@ -52,7 +53,7 @@ fn tones_superpose_in_free_flight() {
         let tones = [
             (case.alpha2, case.omega, o.first_harmonic, o.phase),
             (
-                case.tone2_amplitude,
+                case.get(Parameter::Tone2Amplitude),
                 6.25 * case.omega,
                 o.tone2_response.unwrap(),
                 o.tone2_lag.unwrap(),
@@ -115,13 +116,9 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
             let sample = on(law, 3.1);
             let case = Cantilever {
                 modes: 2,
-                contact: law,
                 alpha5: 0.03,
                 alpha6: sample.alpha6,
-                relaxation_stiffness: sample.relaxation_stiffness,
-                relaxation_time: sample.relaxation_time,
-                surface: sample.surface,
-                ..two_tones(actuation)
+                ..two_tones(actuation).on(law, &own_numbers(&sample))
             };
             let subject = Case::from(case);
             let model = subject.model().unwrap();
@@ -163,9 +160,10 @@ fn phases_and_times_agree() {
         (end, flow.switches())
     };
     let start = [0.05, 0.01, 0.0, -0.2, 0.1, 0.0];
-    let turned = case
-        .clone()
-        .with(Parameter::Tone2Phase, case.tone2_phase + 180.0);
+    let turned = case.clone().with(
+        Parameter::Tone2Phase,
+        case.get(Parameter::Tone2Phase) + 180.0,
+    );
     let (later, switches) = run(&case, &start, first);
     let (now, _) = run(&turned, &start, 0.0);
     assert!(switches > 0);
@@ -176,8 +174,7 @@ fn phases_and_times_agree() {
     let silent = case.clone().with(Parameter::Tone2Amplitude, 0.0);
     let single = Cantilever {
         tone2_ratio: None,
-        tone2_phase: 0.0,
-        ..silent.clone()
+        ..silent.clone().with(Parameter::Tone2Phase, 0.0)
     };
     let (a, b) = (run(&silent, &start, 0.0).0, run(&single, &start, 0.0).0);
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-13));

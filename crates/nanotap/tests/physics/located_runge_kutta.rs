@@ -7,6 +7,9 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::galerkin::Galerkin;
 
+use crate::contact_laws::parameter;
+use crate::moving_surface::MovingSurface;
+
 /// State of the beam and the sample.
 #[derive(Clone)]
 pub(crate) struct Motion {
@@ -30,6 +33,11 @@ pub(crate) struct Independent {
 
 /// Rates of (beam, surface, damper, dissipated energy).
 type Rates = (DVector<f64>, [f64; 3]);
+
+/// Stiffness and relaxation time of a standard linear solid's arm.
+fn arm(case: &Cantilever) -> [f64; 2] {
+    ["relaxation_stiffness", "relaxation_time"].map(|of| case.get(parameter(of)))
+}
 
 impl Independent {
     pub(crate) fn new(case: &Cantilever) -> Self {
@@ -56,19 +64,17 @@ impl Independent {
         let (c, damper) = (&self.case, m.damper);
         match c.contact {
             ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => -c.alpha4 * h - c.alpha6 * v,
-            ContactLaw::StandardLinearSolid => {
-                -c.alpha4 * h + c.relaxation_stiffness * (-h - damper)
-            }
+            ContactLaw::StandardLinearSolid => -c.alpha4 * h + arm(c)[0] * (-h - damper),
             ContactLaw::MovingSurface => {
                 let rate = v - self.surface_speed(h, v, m);
-                -c.surface.adhesion - c.alpha4 * (h - m.surface) - c.alpha6 * rate
+                -MovingSurface::of(c).adhesion - c.alpha4 * (h - m.surface) - c.alpha6 * rate
             }
         }
     }
 
     /// Speed of a surface in contact, from the balance of the two dampers and springs.
     fn surface_speed(&self, h: f64, v: f64, m: &Motion) -> f64 {
-        let (c, own) = (&self.case, self.case.surface);
+        let (c, own) = (&self.case, MovingSurface::of(&self.case));
         let springs = -own.stiffness * m.surface;
         if m.touching {
             let held = own.adhesion + c.alpha4 * (h - m.surface) + c.alpha6 * v;
@@ -86,7 +92,8 @@ impl Independent {
             ContactLaw::KelvinVoigt | ContactLaw::MovingSurface => m.surface,
             // α4 u + k (u + w) = 0
             ContactLaw::StandardLinearSolid => {
-                -c.relaxation_stiffness * m.damper / (c.alpha4 + c.relaxation_stiffness)
+                let [stiffness, _] = arm(c);
+                -stiffness * m.damper / (c.alpha4 + stiffness)
             }
         }
     }
@@ -122,14 +129,15 @@ impl Independent {
             }
             ContactLaw::StandardLinearSolid => {
                 let at = if m.touching { h } else { self.free_surface(m) };
-                let speed = (-at - m.damper) / c.relaxation_time;
-                let viscosity = c.relaxation_stiffness * c.relaxation_time;
+                let [stiffness, time] = arm(c);
+                let speed = (-at - m.damper) / time;
+                let viscosity = stiffness * time;
                 (0.0, speed, viscosity * speed * speed)
             }
             ContactLaw::MovingSurface => {
                 let speed = self.surface_speed(h, v, m);
                 let rate = if m.touching { v - speed } else { 0.0 };
-                let lost = c.surface.damping * speed * speed + c.alpha6 * rate * rate;
+                let lost = MovingSurface::of(c).damping * speed * speed + c.alpha6 * rate * rate;
                 (speed, 0.0, lost)
             }
         };

@@ -306,10 +306,7 @@ fn the_last_exponent_of_a_standard_linear_solid_follows_from_the_trace() {
         let case = Cantilever {
             modes: 2,
             alpha6: 0.0,
-            contact: ContactLaw::StandardLinearSolid,
-            relaxation_stiffness: 20.0,
-            relaxation_time: time,
-            ..at(2.6)
+            ..at(2.6).on(ContactLaw::StandardLinearSolid, &[20.0, time])
         };
         let options = LyapunovOptions {
             periods: 200,

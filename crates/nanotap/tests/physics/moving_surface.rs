@@ -7,7 +7,6 @@ use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::galerkin::Galerkin;
 use nanotap::model::parameter::Parameter;
 use nanotap::model::strobe::Strobe;
@@ -16,18 +15,41 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{Control, StroboscopicMap};
 use proptest::prelude::*;
 
+use crate::contact_laws::parameter;
 use crate::derivatives::{advance, worst, worst_over};
 use crate::{stated, taylor};
 
 /// A lever on a moving surface, driven as in the paper.
 fn lever(modes: usize, omega: f64, surface: MovingSurface) -> Cantilever {
-    Cantilever {
+    let case = Cantilever {
         modes,
         omega,
         alpha5: 0.05,
-        contact: ContactLaw::MovingSurface,
-        surface,
         ..Cantilever::paper()
+    };
+    case.on(ContactLaw::MovingSurface, &surface.numbers())
+}
+
+/// The numbers that only this law has.
+#[derive(Clone, Copy)]
+pub(crate) struct MovingSurface {
+    pub(crate) stiffness: f64,
+    pub(crate) damping: f64,
+    pub(crate) adhesion: f64,
+}
+
+impl MovingSurface {
+    pub(crate) fn of(case: &Cantilever) -> Self {
+        let of = |name| case.get(parameter(name));
+        Self {
+            stiffness: of("surface_stiffness"),
+            damping: of("surface_damping"),
+            adhesion: of("adhesion_force"),
+        }
+    }
+
+    fn numbers(self) -> [f64; 3] {
+        [self.stiffness, self.damping, self.adhesion]
     }
 }
 
@@ -84,7 +106,7 @@ impl Taylor {
         let mut rate = DVector::zeros(size);
         rate.rows_mut(n, n).copy_from(&p);
         rate[cosine] = case.alpha2 * case.omega;
-        let own = case.surface;
+        let own = MovingSurface::of(case);
         let mut gap = height;
         gap[2 * n] -= 1.0;
         // In contact η_s ṡ + k_s s = F + k_v g + η_v (V̇ − ṡ) = −f.
@@ -283,8 +305,7 @@ proptest! {
         let scaled = Cantilever {
             alpha2: factor * case.alpha2,
             alpha5: factor * case.alpha5,
-            surface: MovingSurface { adhesion: factor * SURFACE.adhesion, ..SURFACE },
-            ..case.clone()
+            ..case.clone().with(parameter("adhesion_force"), factor * SURFACE.adhesion)
         };
         let start = [0.05, 0.0, 0.0, v, 0.0, 0.0, 0.0];
         let large = start.map(|x| factor * x);
@@ -468,7 +489,7 @@ fn branches_end_where_their_orbits_graze() {
     let at = grazes(&followed(40e-9, 25e-9));
     let view = case.physical().unwrap();
     // The base moves by the drive's amplitude; the tip lags by 90°.
-    let base = view.parameters.drive_amplitude * view.free_phase.to_radians().cos();
+    let base = view.parameters.get(Parameter::Alpha2) * view.free_phase.to_radians().cos();
     assert!((at - view.free_amplitude - base).abs() < 1e-13, "{at:e}");
 }
 
@@ -514,17 +535,17 @@ fn the_rest_position_follows_from_springs_in_series() {
 #[test]
 fn invalid_moving_surfaces_are_refused() {
     let refused = |case: Cantilever| Model::cantilever(&case).unwrap_err().to_string();
-    for (parameter, value) in [
-        (Parameter::SurfaceStiffness, 0.0),
-        (Parameter::SurfaceStiffness, -1.0),
-        (Parameter::SurfaceDamping, 0.0),
-        (Parameter::AdhesionForce, -0.1),
-        (Parameter::AdhesionForce, f64::NAN),
+    for (number, value) in [
+        (parameter("surface_stiffness"), 0.0),
+        (parameter("surface_stiffness"), -1.0),
+        (parameter("surface_damping"), 0.0),
+        (parameter("adhesion_force"), -0.1),
+        (parameter("adhesion_force"), f64::NAN),
     ] {
-        let words = refused(lever(2, 3.0, SURFACE).with(parameter, value));
-        assert!(words.contains(parameter.name()), "{words}");
+        let words = refused(lever(2, 3.0, SURFACE).with(number, value));
+        assert!(words.contains(number.name()), "{words}");
     }
-    let words = refused(Cantilever::paper().with(Parameter::AdhesionForce, 0.1));
+    let words = refused(Cantilever::paper().with(parameter("adhesion_force"), 0.1));
     assert!(words.contains("moving-surface"), "{words}");
     let case = Case::from(lever(2, 3.0, SURFACE));
     let keys: Vec<&str> = case.keys().iter().map(|key| key.name()).collect();
@@ -537,5 +558,5 @@ fn invalid_moving_surfaces_are_refused() {
         assert!(keys.contains(&key), "{key}");
     }
     assert!(!keys.contains(&"relaxation_time"));
-    assert_eq!(case.get(Key::AdhesionForce), 0.4);
+    assert_eq!(case.get(Key::of(parameter("adhesion_force"))), 0.4);
 }

@@ -4,7 +4,6 @@
 use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::strobe::Strobe;
@@ -154,21 +153,14 @@ fn of_surfaces_with_memory() {
         ..Cantilever::paper()
     };
     let solid = Cantilever {
-        contact: ContactLaw::StandardLinearSolid,
         alpha6: 0.0,
-        relaxation_stiffness: 8.0,
-        relaxation_time: 0.05,
-        ..kelvin_voigt.clone()
+        ..kelvin_voigt
+            .clone()
+            .on(ContactLaw::StandardLinearSolid, &[8.0, 0.05])
     };
-    let moving = Cantilever {
-        contact: ContactLaw::MovingSurface,
-        surface: MovingSurface {
-            stiffness: 60.0,
-            damping: 8.0,
-            adhesion: 0.4,
-        },
-        ..kelvin_voigt.clone()
-    };
+    let moving = kelvin_voigt
+        .clone()
+        .on(ContactLaw::MovingSurface, &[60.0, 8.0, 0.4]);
     for (case, step) in [(kelvin_voigt, 5e-4), (solid, 1e-4), (moving, 2e-4)] {
         let case = Case::from(case);
         let mut keys = case.keys();

@@ -11,7 +11,7 @@ use nanotap::observe::{Set, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 
-use crate::contact_laws::on;
+use crate::contact_laws::{on, parameter};
 use crate::derivatives::advance;
 
 fn solid() -> Cantilever {
@@ -38,13 +38,13 @@ fn limits_of_the_relaxation_time_are_springs() {
     };
     let (relaxed, instantaneous) = (after(&spring(20.0), 30), after(&spring(60.0), 30));
     for (time, expected) in [(1e-6, &relaxed), (0.0, &relaxed), (1e6, &instantaneous)] {
-        let found = after(&solid().with(Parameter::RelaxationTime, time), 30);
+        let found = after(&solid().with(parameter("relaxation_time"), time), 30);
         assert!(
             distance(&found, expected) < 2e-3,
             "{time}: {found:?} {expected:?}"
         );
         let nearer = if time < 1.0 { time * 0.1 } else { time * 10.0 };
-        let near = after(&solid().with(Parameter::RelaxationTime, nearer), 30);
+        let near = after(&solid().with(parameter("relaxation_time"), nearer), 30);
         assert!(distance(&near, expected) <= 0.2 * distance(&found, expected) + 1e-12);
     }
 }
@@ -55,11 +55,8 @@ fn a_stiff_arm_is_a_kelvin_voigt_surface() {
     let expected = after(&on(ContactLaw::KelvinVoigt, 20.0), 30);
     let mut last = f64::INFINITY;
     for stiffness in [1e3, 1e4, 1e5, 1e6] {
-        let case = Cantilever {
-            relaxation_stiffness: stiffness,
-            relaxation_time: Cantilever::paper().alpha6 / stiffness,
-            ..solid()
-        };
+        let time = Cantilever::paper().alpha6 / stiffness;
+        let case = solid().on(ContactLaw::StandardLinearSolid, &[stiffness, time]);
         let found = distance(&after(&case, 30)[..6], &expected[..6]);
         assert!(found < 0.2 * last, "{stiffness}: {found}");
         last = found;
@@ -76,8 +73,7 @@ fn harmonic_indentation_dissipates_according_to_the_loss_modulus() {
         let case = Cantilever {
             alpha2: 1e-3,
             alpha5: -0.4,
-            relaxation_time: time,
-            ..on(ContactLaw::StandardLinearSolid, omega)
+            ..on(ContactLaw::StandardLinearSolid, omega).with(parameter("relaxation_time"), time)
         };
         let model = Model::cantilever(&case).unwrap();
         let options = OrbitOptions {
@@ -90,7 +86,7 @@ fn harmonic_indentation_dissipates_according_to_the_loss_modulus() {
         let force = found.trajectory.force(&model);
         let (indented, pushed) = (-height.fourier(omega), force.fourier(omega));
         let turn = omega * time;
-        let arm = case.relaxation_stiffness;
+        let arm = case.get(parameter("relaxation_stiffness"));
         let lost = TAU / 2.0 * indented.norm_sqr() * arm * turn / (1.0 + turn * turn);
         let taken = found.observables.energy_balance.sample_damping;
         assert!(
@@ -107,15 +103,15 @@ fn harmonic_indentation_dissipates_according_to_the_loss_modulus() {
 /// τ (α4 + k)/α4, slower than the force relaxes.
 #[test]
 fn the_free_surface_recovers_with_its_retardation_time() {
-    let case = solid().with(Parameter::RelaxationTime, 0.3);
+    let case = solid().with(parameter("relaxation_time"), 0.3);
     let model = Model::cantilever(&case).unwrap();
     let run = Trajectory::record(&model.system, &after(&case, 30), 12).unwrap();
     let surface = |t: f64| {
         let gap = run.signal(&model.gap).at(t).unwrap();
         run.signal(&model.height).at(t).unwrap() - gap
     };
-    let retardation =
-        case.relaxation_time * (case.alpha4 + case.relaxation_stiffness) / case.alpha4;
+    let [arm, time] = ["relaxation_stiffness", "relaxation_time"].map(|of| case.get(parameter(of)));
+    let retardation = time * (case.alpha4 + arm) / case.alpha4;
     let mut flights = 0;
     for pair in run.events().windows(2).filter(|p| !model.contact[p[0].to]) {
         let (start, end) = (pair[0].time + 1e-9, pair[1].time - 1e-9);

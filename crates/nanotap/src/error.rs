@@ -23,16 +23,16 @@ pub enum ErrorKind {
     Stopped,
 }
 
-/// A text that problems point into.
+/// A text to which problems point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceText {
-    /// What the reader calls it: the path as it was given.
+    /// Name for messages: the path as given.
     pub name: String,
     /// The whole text.
     pub text: String,
 }
 
-/// Where a problem lies.
+/// Place of a problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ErrorPlace {
     /// Nowhere in particular, or all of the file.
@@ -45,7 +45,7 @@ pub enum ErrorPlace {
     Span(Range<usize>),
 }
 
-/// One thing that is wrong.
+/// A problem of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorProblem {
     /// Where.

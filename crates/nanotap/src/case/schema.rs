@@ -1,4 +1,4 @@
-//! The JSON schema of a case, made of the table of keys.
+//! The JSON schema of a case, from the table of keys.
 
 use schemars::{Schema, json_schema};
 use serde_json::{Map, Value, json};

@@ -25,7 +25,7 @@ impl LawName {
         self.0.text()
     }
 
-    /// Whether a key can be stated beside this law.
+    /// True if a key can be stated with this law.
     pub(crate) fn takes(&self, key: Key) -> bool {
         if !keys_of_contacts().any(|of_some| of_some == key) {
             return true;

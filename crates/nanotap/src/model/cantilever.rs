@@ -326,7 +326,7 @@ pub struct CantileverError {
     pub key: &'static str,
     /// The value given.
     pub value: f64,
-    /// What would be right.
+    /// The remedy.
     pub reason: Reason,
 }
 

@@ -96,7 +96,7 @@ pub enum RatioError {
     /// Not a ratio at all.
     #[error("\"{given}\" is no ratio of frequencies; write it as in \"25/4\", with whole numbers")]
     Form {
-        /// What was given.
+        /// The given text.
         given: String,
     },
     /// Zero, or too large.

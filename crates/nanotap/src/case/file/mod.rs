@@ -8,9 +8,9 @@
 //! most `modes` and `cosine_term`. The keys are those of the table in
 //! [`key`](crate::case::key).
 //!
-//! Nothing is guessed: unknown keys, values of the wrong kind or out of range, missing
-//! and repeated keys are all reported at once, each with its place and a remedy. What is set
-//! beside a file replaces there what says the same in another way.
+//! Nothing is guessed: unknown keys, values of the wrong type or out of range, missing and repeated
+//! keys are all reported at once, each with its place and a remedy. An override also replaces
+//! alternatives of its key in the file.
 
 mod document;
 mod problem;
@@ -33,7 +33,7 @@ use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
 
-/// No case file comes near; a larger file is something else.
+/// Case files are much smaller.
 const LARGEST_FILE: u64 = 1 << 20;
 
 /// A dimensionless cantilever as a case file, every key written out.
@@ -67,8 +67,8 @@ pub fn to_toml(case: &Cantilever) -> String {
 }
 
 impl Case {
-    /// The case as a file that is read back as the same: every number of the equations, or what
-    /// was stated in physical quantities.
+    /// The case as a file that is read back as the same case: all numbers of the equations, or the
+    /// stated physical quantities.
     pub fn to_toml(&self) -> String {
         use std::fmt::Write as _;
         let quantities = match &self.what {
@@ -103,11 +103,11 @@ impl Case {
     }
 }
 
-/// Reads the text of a case file. A force curve that it names, by a path relative to it, stands
-/// in the text as an array: nothing else of a case is ever read from disk.
+/// Reads the text of a case file. A force table that it names, by a path relative to the case file,
+/// becomes an array in the text: nothing else of a case is read from disk.
 ///
 /// # Errors
-/// When there is none, it cannot be read or is no text, or its force curve is none.
+/// If the file or its force table does not exist, cannot be read or is invalid.
 pub fn read(path: &Path) -> Result<Source, CaseFileError> {
     let source = text_of(path)?;
     let Some((span, name)) = table_named(&source.text) else {
@@ -122,11 +122,10 @@ pub fn read(path: &Path) -> Result<Source, CaseFileError> {
     Ok(Source { text, ..source })
 }
 
-/// The `key=value` words of a command line, with the rows of the force curve that one of them
-/// names in place of its name.
+/// Replaces the name of a force table in the `key=value` words of a command line by its rows.
 ///
 /// # Errors
-/// When it is no force curve.
+/// If it is not a force table.
 pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
     let key = Key::SampleTable.path();
     let word = |word: &String| {
@@ -147,7 +146,7 @@ pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
     words.iter().map(word).collect()
 }
 
-/// The force curve in a file, named at `place`.
+/// Reads the force table in a file, named at `place`.
 fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
     ForceTable::read(path).map_err(|error| {
         let help = if error.remedy.is_empty() {
@@ -161,7 +160,7 @@ fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
     })
 }
 
-/// The file that the text of a case names as its force curve, and where.
+/// The file that the text of a case names as its force table, and its place.
 fn table_named(text: &str) -> Option<(std::ops::Range<usize>, String)> {
     let (tables, _) = DeTable::parse_recoverable(text);
     let section = tables.get_ref().get(Key::SampleTable.section().name())?;

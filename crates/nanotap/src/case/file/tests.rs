@@ -50,7 +50,7 @@ fn dimensionless(text: &str, overrides: &[&str]) -> Cantilever {
     case.cantilever().unwrap().clone()
 }
 
-/// The words of the refusal of `text` with `overrides`.
+/// The error message for `text` with `overrides`.
 fn refusal(text: &str, overrides: &[&str]) -> String {
     parse(text, overrides).unwrap_err().to_string()
 }
@@ -472,8 +472,8 @@ fn a_case_written_out_is_read_back() {
     assert_eq!(dimensionless(&to_toml(&case), &[]), case);
 }
 
-/// What is set beside a file replaces what says the same there; two ways side by side, and one
-/// key by two names, are refused.
+/// An override replaces alternatives in the file; two alternatives together, and one key under two
+/// names, are refused.
 #[test]
 fn the_same_said_twice_is_refused_or_replaced() {
     let text = "[cantilever]\nk = \"2.8 N/m\"\nf0 = \"75 kHz\"\nQ = 200\n\
@@ -513,7 +513,7 @@ fn the_same_said_twice_is_refused_or_replaced() {
     );
 }
 
-/// However long a hopeless file is, it is refused at once, with the first of its problems.
+/// A long file with many problems is refused quickly, with the first of them.
 #[test]
 fn fifty_thousand_unknown_keys_are_refused_at_once() {
     use std::fmt::Write as _;

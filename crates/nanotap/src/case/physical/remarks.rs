@@ -1,4 +1,4 @@
-//! What had to be assumed in mapping a case, and what puts it in doubt.
+//! Assumptions and warnings about the mapping of a case.
 
 use super::reader::Reader;
 use super::remark::Remark;

@@ -33,7 +33,7 @@
 //!
 //! A sweep, a window and basins leave a dataset: [`StudyEntry::plan`] gives what computes it
 //! chunk by chunk. A figure is drawn from the report itself, by the study's function in
-//! [`figure`](crate::figure).
+//! `figure`.
 
 use nanotap_dynamics::Control;
 use schemars::Schema;
@@ -43,7 +43,9 @@ use crate::Error;
 use crate::case::Case;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
-pub use crate::study::{DatasetPlan, DatasetStudy, Document, Study};
+#[cfg(feature = "dataset")]
+pub use crate::study::{DatasetPlan, DatasetStudy};
+pub use crate::study::{Document, Study};
 
 /// A study without its types.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +74,7 @@ pub enum Run {
     /// To the JSON of its document.
     Document(fn(&Case, Value, &Control<'_>) -> Result<String, Error>),
     /// To what is to be computed into a dataset.
+    #[cfg(feature = "dataset")]
     Dataset(fn(&Case, Value, &Control<'_>) -> Result<DatasetPlan, Error>),
 }
 
@@ -98,6 +101,7 @@ impl StudyEntry {
         }
     }
 
+    #[cfg(feature = "dataset")]
     const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
@@ -126,6 +130,7 @@ impl StudyEntry {
     ) -> Result<String, Error> {
         match self.run {
             Run::Document(run) => run(case, request, control),
+            #[cfg(feature = "dataset")]
             Run::Dataset(_) => Err(Error::input(
                 format!("{} leaves a dataset, not a document", self.name),
                 "compute its plan into a folder",
@@ -137,6 +142,7 @@ impl StudyEntry {
     ///
     /// # Errors
     /// Those of the study; and when its report is a document.
+    #[cfg(feature = "dataset")]
     pub fn plan(
         &self,
         case: &Case,
@@ -161,9 +167,13 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<super::attractors::AttractorsStudy>(),
     StudyEntry::of::<super::branch::BranchStudy>(),
     StudyEntry::of::<super::approach::ApproachStudy>(),
+    #[cfg(feature = "fit")]
     StudyEntry::of::<super::fit::FitStudy>(),
+    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<super::sweep::SweepStudy>(),
+    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<super::window::WindowStudy>(),
+    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<super::basin::BasinStudy>(),
     StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
     StudyEntry::of::<super::convergence::ConvergenceStudy>(),

@@ -10,9 +10,11 @@
 //! [`CancelFlag`] is here because every crate with long computations polls it.
 
 mod cancel;
+mod dual;
 mod eigenvalues;
 
 pub use cancel::CancelFlag;
+pub use dual::{Dual, Scalar};
 pub use eigenvalues::eigenvalues;
 
 use nalgebra::{Complex, DMatrix};

@@ -22,7 +22,7 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 /// What this command was asked to write.
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// How the tables begin that commands write, and what stands in those of datasets.
+/// Beginnings of the tables that commands write, and columns of those of datasets.
 const TABLES: [&str; 12] = [
     "tau,tip,tip_rate",
     "order,tip,tip_lag_degrees",

@@ -25,11 +25,12 @@ pub(crate) struct StudyArguments<S: Study> {
 }
 
 impl<S: Study> StudyArguments<S> {
-    /// What is asked for of which case, once it is known that table and picture can be written.
+    /// The options and the case, once it is known that table and picture can be written.
     pub(crate) fn read(&self, output: &Output) -> Result<(S::Options, GivenCase), Failure> {
-        let request = self.request.read()?;
+        let options = self.request.read()?;
         self.out.check()?;
         self.plot.check()?;
-        Ok((request, GivenCase::of(&self.case, output)?))
+        let case = GivenCase::for_study(&self.case, S::ANY_DISTANCE, output)?;
+        Ok((options, case))
     }
 }

@@ -37,6 +37,7 @@ pub mod lyapunov;
 pub mod map;
 pub mod neighbourhood;
 pub mod orbit;
+mod same_motion;
 mod vector;
 
 pub use attractor_continuation::{
@@ -62,10 +63,11 @@ pub use continuation::{
 pub use control::{CancelFlag, Control};
 pub use failure::MapFailure;
 pub use lyapunov::{LyapunovOptions, LyapunovSpectrum, StrobeMeans, lyapunov_spectrum};
-pub use map::{MapFamily, StroboscopicMap, Tangency, TwoParameterFamily};
+pub use map::{MapFamily, Scheduling, StroboscopicMap, Tangency, TwoParameterFamily};
 pub use nalgebra::{Complex, DMatrix};
 pub use neighbourhood::Neighbourhood;
 pub use orbit::{
     DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
     ShootingOptions, Stability, check_size, close_orbit, close_orbit_from_points, find_orbits,
 };
+pub use same_motion::SameMotion;

@@ -15,12 +15,63 @@ pub struct Tangency {
     pub value: f64,
 }
 
+/// Success, or the error of a map.
+pub type Advanced<M> = Result<(), <M as StroboscopicMap>::Error>;
+
+/// How the evaluations of a map are best arranged: in batches, on several threads, or on a cheaper map.
+/// The defaults suit a map that is cheap and takes one state at a time: `impl Scheduling for MyMap {}`.
+pub trait Scheduling: Sized {
+    /// Whether a period takes so much longer than to wake a thread that the periods of an orbit are
+    /// worth computing in parallel.
+    fn is_costly(&self) -> bool {
+        false
+    }
+
+    /// A cheaper, approximate map of the same state, for following transients; `None` where this
+    /// map is cheap itself. Nothing is reported from it.
+    fn coarse(&self) -> Option<Self> {
+        None
+    }
+
+    /// Number of states in a batch of [`advance_each`](Self::advance_each); 1 where it takes them in
+    /// sequence.
+    fn batch_size(&self) -> usize {
+        1
+    }
+
+    /// Replaces each of `states` (row by row, of length `dimension`) by `Pᵏ` of it, with `k` from
+    /// `periods`, whose length is the number of states. A batch may be faster than
+    /// [`advance_by`](StroboscopicMap::advance_by) of each; the result of one state does not depend on the
+    /// others, and differs from that by rounding only. A state that cannot be followed is of no
+    /// use afterwards.
+    fn advance_each(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Advanced<Self>>
+    where
+        Self: StroboscopicMap,
+    {
+        in_sequence(self, states, periods)
+    }
+
+    /// As [`advance_each`](Self::advance_each), and puts the states at the ends of all periods of each
+    /// state, row by row, into its entry of `passed`, as far as it can be followed.
+    fn advance_each_through(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+        passed: &mut [Vec<f64>],
+    ) -> Vec<Advanced<Self>>
+    where
+        Self: StroboscopicMap,
+    {
+        in_sequence_through(self, states, periods, passed)
+    }
+}
+
 /// The stroboscopic map of a periodically forced system.
 ///
 /// An implementation owns its work space, hence `&mut self`. A parallel analysis clones the map
 /// once per task, so a clone must be cheap (shared, immutable data in an `Arc`). The same state
 /// must give the same bits on every clone and in every call.
-pub trait StroboscopicMap: Clone + Send + Sync {
+pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// Why a period could not be computed.
     type Error: std::error::Error + Send + Sync + 'static;
 
@@ -37,24 +88,6 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         0
     }
 
-    /// Whether a period takes so much longer than to wake a thread that the periods of an orbit are
-    /// worth computing side by side.
-    fn is_costly(&self) -> bool {
-        false
-    }
-
-    /// A cheaper, approximate map of the same state, for following transients; `None` where this
-    /// map is cheap itself. Nothing is reported from it.
-    fn coarse(&self) -> Option<Self> {
-        None
-    }
-
-    /// How many motions at a time are best given to [`advance_each`](Self::advance_each): one where
-    /// they go one after the other.
-    fn side_by_side(&self) -> usize {
-        1
-    }
-
     /// Replaces `state` (length `dimension`) by `P(state)`.
     ///
     /// # Errors
@@ -68,30 +101,6 @@ pub trait StroboscopicMap: Clone + Send + Sync {
     /// When a period cannot be computed.
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), Self::Error> {
         (0..periods).try_for_each(|_| self.advance(state))
-    }
-
-    /// Replaces each of `states` (of length `dimension`, one after the other) by `Pᵏ` of it, with `k`
-    /// from `periods`, which says how many there are. A flow that takes several at a time may be faster
-    /// than [`advance_by`](Self::advance_by) of each; what comes of one does not depend on the
-    /// others, and differs from that by rounding only. A
-    /// state that cannot be followed is of no use afterwards.
-    fn advance_each(
-        &mut self,
-        states: &mut [f64],
-        periods: &[usize],
-    ) -> Vec<Result<(), Self::Error>> {
-        one_after_another(self, states, periods)
-    }
-
-    /// As [`advance_each`](Self::advance_each), and puts the states at the ends of all periods, those
-    /// of one state one after the other, into its place in `passed`, as far as it can be followed.
-    fn advance_each_through(
-        &mut self,
-        states: &mut [f64],
-        periods: &[usize],
-        passed: &mut [Vec<f64>],
-    ) -> Vec<Result<(), Self::Error>> {
-        one_after_another_through(self, states, periods, passed)
     }
 
     /// Replaces `state` by `P(state)` and `jacobian` (`dimension × dimension`)
@@ -149,24 +158,24 @@ pub trait StroboscopicMap: Clone + Send + Sync {
     }
 }
 
-/// [`StroboscopicMap::advance_each`] of a map that takes one at a time.
-pub fn one_after_another<M: StroboscopicMap>(
+/// [`Scheduling::advance_each`], one state at a time.
+pub fn in_sequence<M: StroboscopicMap>(
     map: &mut M,
     states: &mut [f64],
     periods: &[usize],
-) -> Vec<Result<(), M::Error>> {
+) -> Vec<Advanced<M>> {
     let each = states.chunks_exact_mut(map.dimension()).zip(periods);
     each.map(|(state, &periods)| map.advance_by(state, periods))
         .collect()
 }
 
-/// [`StroboscopicMap::advance_each_through`] of a map that takes one at a time.
-pub fn one_after_another_through<M: StroboscopicMap>(
+/// [`Scheduling::advance_each_through`], one state at a time.
+pub fn in_sequence_through<M: StroboscopicMap>(
     map: &mut M,
     states: &mut [f64],
     periods: &[usize],
     passed: &mut [Vec<f64>],
-) -> Vec<Result<(), M::Error>> {
+) -> Vec<Advanced<M>> {
     let each = states.chunks_exact_mut(map.dimension()).zip(periods);
     each.zip(passed)
         .map(|((state, &periods), passed)| {

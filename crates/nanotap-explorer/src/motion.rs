@@ -22,10 +22,10 @@ use nanotap::study::value::Steps;
 use nanotap_figures::Figure;
 use serde_json::{Value, json};
 
-use crate::answer::Refusal;
-use crate::asked::{Asked, Start, model_of};
+use crate::api_error::ApiError;
 use crate::figures::{Views, drawn, viewed};
 use crate::film::film;
+use crate::motion_request::{MotionRequest, Start, model_of};
 use crate::{App, commands, forms, knobs};
 
 /// Largest number of drive periods in the film and the figures of a motion without a period.
@@ -41,7 +41,7 @@ pub(crate) enum Motion {
 }
 
 impl Motion {
-    pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, Refusal> {
+    pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, ApiError> {
         let request = OrbitOptions {
             period: start.period,
             state: start.state.clone(),
@@ -54,10 +54,10 @@ impl Motion {
                     state: start.state.clone(),
                     ..SimulateOptions::default()
                 };
-                let run = simulate(model, &request).map_err(Refusal::of)?;
+                let run = simulate(model, &request).map_err(ApiError::of)?;
                 Ok(Self::Run(Box::new(run)))
             }
-            Err(error) => Err(Refusal::of(error)),
+            Err(error) => Err(ApiError::of(error)),
         }
     }
 
@@ -125,22 +125,22 @@ impl Motion {
 
 pub(crate) async fn motion(
     State(app): State<Arc<App>>,
-    Json(asked): Json<Asked>,
-) -> Result<Json<Value>, Refusal> {
+    Json(request): Json<MotionRequest>,
+) -> Result<Json<Value>, ApiError> {
     let shared = Arc::clone(&app);
     app.workers
-        .run(move |control| answer(&shared, &asked, control))
+        .run(move |control| answer(&shared, &request, control))
         .await
         .map(Json)
 }
 
-fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refusal> {
+fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<Value, ApiError> {
     let (case, base) = (
-        asked.case.case(app, control)?,
-        asked.case.base(app, control)?,
+        request.case.case(app, control)?,
+        request.case.base(app, control)?,
     );
     let model = model_of(&case)?;
-    let start = Start::parse(&asked.start)?;
+    let start = Start::parse(&request.start)?;
     let motion = Motion::find(&model, &start)?;
     let remarks: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
     Ok(json!({
@@ -150,18 +150,18 @@ fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refu
         "keys": knobs::of(&case, &base),
         "observables": rows(&case, motion.observables()),
         "start": Start::text(None, motion.state()),
-        "figure": unlettered(motion.figure(&model, &case), &asked.views, "portrait")?,
-        "contact": unlettered(motion.contact_figure(&model, &case), &asked.views, "contact")?,
+        "figure": unlettered(motion.figure(&model, &case), &request.views, "portrait")?,
+        "contact": unlettered(motion.contact_figure(&model, &case), &request.views, "contact")?,
         "film": film(&case, &model, motion.state(), motion.periods())?,
-        "fixed_step": fixed_step(&case, &model, asked.steps, start.state, control)?,
+        "fixed_step": fixed_step(&case, &model, request.steps, start.state, control)?,
         "forms": forms::forms(&case, &base, &model),
-        "command": commands::command(app, asked, motion.study())?,
-        "python": commands::python(app, asked, motion.study())?,
+        "command": commands::command(app, request, motion.study())?,
+        "python": commands::python(app, request, motion.study())?,
     }))
 }
 
 /// The figure without panel letters, which are for publications; the page has headings.
-fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, Refusal> {
+fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, ApiError> {
     let figure = figure.letters(false);
     match views.get(name) {
         Some(views) => drawn(&viewed(figure, views)),
@@ -209,7 +209,7 @@ fn fixed_step(
     steps: u32,
     state: Option<Vec<f64>>,
     control: &Control<'_>,
-) -> Result<Option<Value>, Refusal> {
+) -> Result<Option<Value>, ApiError> {
     if steps == 0 {
         return Ok(None);
     }

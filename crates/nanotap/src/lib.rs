@@ -1,10 +1,10 @@
 //! Tapping-mode atomic force microscopy, exactly: beam modes, Galerkin matrices,
 //! contact laws, observables and studies.
 //!
-//! The modules depend on each other in this order: a [`model`] holds the equations; a [`case`]
-//! describes lever, sample and drive, and maps to a model; [`observe`] computes the observables of a
-//! motion; a [`map`](mod@map) is for users' own algorithms; a [`study`] runs and reports; a `figure`
-//! shows a report; a `dataset` stores many motions on disk.
+//! The modules depend on each other in this order: a [`model`] holds the equations; a [`case`] is the
+//! user's input and maps to a model; [`observe`] computes the observables of a motion; a
+//! [`map`](mod@map) is for your own algorithms; a [`study`] runs and reports; a `figure` shows a
+//! report; a `dataset` keeps many motions on disk.
 //!
 //! Features, all on by default: `dataset` (sweeps, windows and basins), `figures` (SVG, PNG, PDF),
 //! `fit`, `fm` (frequency modulation) and `proof` (proofs of orbits). Without them the crate has

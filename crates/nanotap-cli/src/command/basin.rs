@@ -1,21 +1,20 @@
 //! `nanotap basin`: basins of attraction on a slice of initial states.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::Args;
 use nanotap::figure::basin::figure;
-use nanotap::study::Computation as _;
-use nanotap::study::basin::{Basin, BasinOptions, Shares, SliceRange, shares};
+use nanotap::study::DatasetStudy as _;
+use nanotap::study::basin::{BasinOptions, BasinStudy, Shares, SliceRange};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
+use crate::number;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{number, progress};
 
 /// Basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
@@ -38,33 +37,24 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let begun = Instant::now();
     let mut options = arguments.request.read()?;
     options.attractors = arguments.attractors.as_deref().map(states).transpose()?;
     let axes = options.axes()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    let dataset = &arguments.dataset;
     let name = derived_name(
         arguments.case.file.as_deref(),
         &["basin", &axes[0].name, &axes[1].name],
     );
-    let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
-    arguments.plot.check()?;
-    let basin = progress::watched("basin", "starts of the census", false, |control| {
-        dataset
-            .threads
-            .install(|| Basin::new(&case, &options, control))
-    })??;
-    let store = dataset.compute(
-        &destination.store,
-        basin.schema(),
-        ["basin", "rows"],
+    let done = arguments.dataset.run::<BasinStudy>(
+        &case,
+        &options,
+        &name,
+        BasinStudy::COUNTED,
+        options.seed,
+        &arguments.plot,
+        figure,
         output,
-        |store, work| basin.compute(store, work),
     )?;
-    let plot = arguments.plot.plot.as_deref();
-    let seed = options.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, shares, figure)?;
     output.study(&case, &done, |done| text(&case, &axes, done))
 }
 

@@ -330,7 +330,7 @@ fn close_from<M: StroboscopicMap>(
     if !closed.is_stable() {
         return None;
     }
-    let continued = is_continuation(orbit, &closed);
+    let continued = orbit.is_near(&closed, MAX_DISPLACEMENT);
     let state = closed.states[0].clone();
     Some((AttractorKind::Periodic(closed), state, continued))
 }
@@ -360,12 +360,6 @@ fn classify_from<M: StroboscopicMap>(
         MotionKind::Unbounded | MotionKind::Undecided { .. } => return None,
     };
     Some((kind, classified.state, continued))
-}
-
-/// True if the distance of the two orbits is small compared with their size.
-fn is_continuation(orbit: &PeriodicOrbit, closed: &PeriodicOrbit) -> bool {
-    let size = orbit.scale().max(closed.scale());
-    orbit.distance_to(closed).1 <= MAX_DISPLACEMENT * size
 }
 
 /// Assigns one number to linked attractors, in the order of the grid.

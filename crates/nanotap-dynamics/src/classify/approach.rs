@@ -267,6 +267,8 @@ pub(super) mod tests {
     #[derive(Clone)]
     pub(in crate::classify) struct Line(pub(in crate::classify) fn(f64) -> f64);
 
+    impl crate::Scheduling for Line {}
+
     impl StroboscopicMap for Line {
         type Error = Infallible;
 

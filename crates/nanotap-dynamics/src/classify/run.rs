@@ -791,6 +791,8 @@ pub(super) mod tests {
     #[derive(Clone)]
     pub(in crate::classify) struct Logistic(pub(in crate::classify) f64);
 
+    impl crate::Scheduling for Logistic {}
+
     impl StroboscopicMap for Logistic {
         type Error = std::convert::Infallible;
 

@@ -468,6 +468,8 @@ pub(crate) mod tests {
     #[derive(Clone)]
     pub(crate) struct Logistic(pub(crate) f64);
 
+    impl crate::Scheduling for Logistic {}
+
     impl StroboscopicMap for Logistic {
         type Error = Infallible;
 

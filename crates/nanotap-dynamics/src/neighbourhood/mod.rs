@@ -379,6 +379,8 @@ mod tests {
         Still,
     }
 
+    impl crate::Scheduling for Line {}
+
     impl StroboscopicMap for Line {
         type Error = Infallible;
 
@@ -498,6 +500,8 @@ mod tests {
     /// single return does not contract every vector, while a block of returns does.
     #[derive(Clone)]
     struct Twist;
+
+    impl crate::Scheduling for Twist {}
 
     impl StroboscopicMap for Twist {
         type Error = Infallible;

@@ -16,6 +16,7 @@ pub use shooting::{
     close_orbit_from_points,
 };
 
+use crate::same_motion::SameMotion;
 use crate::vector::{distance, norm};
 
 /// A periodic orbit with its accuracy and stability.
@@ -109,13 +110,15 @@ impl PeriodicOrbit {
         best
     }
 
-    /// True if the two are the same orbit up to a cyclic shift: closer than ten times the sum of
-    /// their error estimates.
-    ///
-    /// Fails only near a fold or flip, where two orbits are closer than the error estimates, which
-    /// grow there.
+    /// True if the two are one orbit: see [`SameMotion`](crate::SameMotion).
     pub fn is_same_as(&self, other: &Self) -> bool {
-        self.distance_to(other).1 <= 10.0 * (self.error + other.error)
+        SameMotion::orbits(self, other)
+    }
+
+    /// Whether the other orbit differs by at most this part of the size of the larger one, as a
+    /// continuation at a nearby parameter does.
+    pub fn is_near(&self, other: &Self, part: f64) -> bool {
+        self.distance_to(other).1 <= part * self.scale().max(other.scale())
     }
 
     /// The same orbit starting from its lexicographically smallest state, independent of the phase

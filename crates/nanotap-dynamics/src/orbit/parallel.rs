@@ -61,6 +61,12 @@ mod tests {
         costly: bool,
     }
 
+    impl crate::Scheduling for Quadratic {
+        fn is_costly(&self) -> bool {
+            self.costly
+        }
+    }
+
     impl StroboscopicMap for Quadratic {
         type Error = std::io::Error;
 
@@ -70,10 +76,6 @@ mod tests {
 
         fn period(&self) -> f64 {
             1.0
-        }
-
-        fn is_costly(&self) -> bool {
-            self.costly
         }
 
         fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {

@@ -230,7 +230,7 @@ impl Basin {
         let given = options.attractors.is_some();
         let mut attractors = found.attractors;
         let mut basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
-        // States that somebody gave are what points are to be told apart by.
+        // Given states are the only attractors that points are assigned to.
         while !given && !control.is_cancelled() {
             let strangers = strangers(&map, &slice, &basins);
             let taken = census(&map, &strangers, &how, control).attractors;
@@ -292,7 +292,7 @@ impl Basin {
         let end = (y + 1) * length;
         let mut map = map.clone();
         let mut labels = Vec::with_capacity(length);
-        // A row may take minutes: whoever stops it need not wait for its end.
+        // A row may take minutes: cancelled work does not wait for its end.
         for start in (y * length..end).step_by(UNSTOPPED) {
             if control.is_cancelled() {
                 return None;

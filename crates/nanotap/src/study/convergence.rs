@@ -125,7 +125,7 @@ pub fn convergence(
 }
 
 /// The state of the motion with one mode less, the new mode at rest: a guess near which
-/// the same motion is looked for. Only where a period was asked for or found.
+/// the same motion is looked for. Only where a period was given or found.
 fn carried(previous: Option<&Option<OrbitReport>>, modes: usize) -> Option<Vec<f64>> {
     let previous = previous?.as_ref()?;
     let memory = previous.state.len() - 2 * (modes - 1);

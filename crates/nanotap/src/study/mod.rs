@@ -51,6 +51,28 @@ use crate::case::document::CaseDocument;
 #[cfg(feature = "dataset")]
 use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
 use crate::model::cantilever::Cantilever;
+use registry::StudyEntry;
+
+/// Every study.
+pub static STUDIES: &[StudyEntry] = &[
+    StudyEntry::of::<modes::ModesStudy>(),
+    StudyEntry::of::<simulate::SimulateStudy>(),
+    StudyEntry::of::<orbit::OrbitStudy>(),
+    StudyEntry::of::<attractors::AttractorsStudy>(),
+    StudyEntry::of::<branch::BranchStudy>(),
+    StudyEntry::of::<approach::ApproachStudy>(),
+    #[cfg(feature = "fit")]
+    StudyEntry::of::<fit::FitStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::dataset::<sweep::SweepStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::dataset::<window::WindowStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::dataset::<basin::BasinStudy>(),
+    StudyEntry::of::<lyapunov::LyapunovStudy>(),
+    StudyEntry::of::<convergence::ConvergenceStudy>(),
+    StudyEntry::of::<contact_laws::ContactLawsStudy>(),
+];
 
 /// A study whose report is a document.
 pub trait Study {

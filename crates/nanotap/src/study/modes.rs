@@ -36,7 +36,7 @@ pub struct ModeTable {
     /// `None` where not every mode oscillates.
     pub quality: Option<Vec<f64>>,
     /// Eigenvalues [Re, Im ≥ 0] of the damped Galerkin equations in free flight, by
-    /// ascending size; `None` where they are too nearly defective to be told apart.
+    /// ascending size; `None` where they are too nearly defective to be separated.
     pub free_eigenvalues: Option<Vec<[f64; 2]>>,
     /// The same in contact.
     pub contact_eigenvalues: Option<Vec<[f64; 2]>>,
@@ -51,10 +51,10 @@ impl ModeTable {
         case.validate()?;
         let beam = Modes::new(case.modes).map_err(CantileverError::from)?;
         // Measured modes fill the matrices.
-        let dense = if case.higher_modes.is_empty() {
-            None
-        } else {
+        let dense = if case.has_measured_modes() {
             Some(Galerkin::new(case)?)
+        } else {
+            None
         };
         let galerkin = |regime| match &dense {
             Some(equations) => Ok(spectrum::dense_frequencies(equations, regime)),

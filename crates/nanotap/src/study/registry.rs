@@ -1,8 +1,7 @@
 //! Every study by name, from JSON to JSON: what the front ends iterate over.
 //!
-//! A case and the JSON of a request go in, with who is told of the progress and what stops the
-//! work; the JSON of a document comes out. What may be asked for, and what comes out, is in the
-//! entry's schemas.
+//! Input: a case, the options as JSON, a function called with the progress, a flag that cancels the
+//! work. Output: a document as JSON. The entry has the schemas of options and document.
 //!
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};
@@ -45,7 +44,7 @@ use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
 #[cfg(feature = "dataset")]
 pub use crate::study::{DatasetPlan, DatasetStudy};
-pub use crate::study::{Document, Study};
+pub use crate::study::{Document, STUDIES, Study};
 
 /// A study without its types.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +78,7 @@ pub enum Run {
 }
 
 impl StudyEntry {
-    const fn of<S: Study>() -> Self {
+    pub(super) const fn of<S: Study>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -102,7 +101,7 @@ impl StudyEntry {
     }
 
     #[cfg(feature = "dataset")]
-    const fn dataset<S: DatasetStudy>() -> Self {
+    pub(super) const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -158,27 +157,6 @@ impl StudyEntry {
         }
     }
 }
-
-/// Every study.
-pub static STUDIES: &[StudyEntry] = &[
-    StudyEntry::of::<super::modes::ModesStudy>(),
-    StudyEntry::of::<super::simulate::SimulateStudy>(),
-    StudyEntry::of::<super::orbit::OrbitStudy>(),
-    StudyEntry::of::<super::attractors::AttractorsStudy>(),
-    StudyEntry::of::<super::branch::BranchStudy>(),
-    StudyEntry::of::<super::approach::ApproachStudy>(),
-    #[cfg(feature = "fit")]
-    StudyEntry::of::<super::fit::FitStudy>(),
-    #[cfg(feature = "dataset")]
-    StudyEntry::dataset::<super::sweep::SweepStudy>(),
-    #[cfg(feature = "dataset")]
-    StudyEntry::dataset::<super::window::WindowStudy>(),
-    #[cfg(feature = "dataset")]
-    StudyEntry::dataset::<super::basin::BasinStudy>(),
-    StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
-    StudyEntry::of::<super::convergence::ConvergenceStudy>(),
-    StudyEntry::of::<super::contact_laws::ContactLawsStudy>(),
-];
 
 /// The study that is called `name`.
 pub fn study(name: &str) -> Option<&'static StudyEntry> {

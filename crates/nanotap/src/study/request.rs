@@ -1,11 +1,11 @@
-//! What a study is asked for: a plain struct whose fields, with their documentation, defaults
+//! The options of a study: a plain struct whose fields, with their documentation, defaults
 //! and ranges, are declared once. Every front end reads the declaration from its JSON schema:
 //! the terminal makes flags of it, Python keyword arguments, and both give back JSON, which
 //! [`read`] checks and turns into the struct.
 //!
-//! Beside JSON schema's own words a property may have `x-value` (what the terminal calls a
+//! In addition to JSON schema's words a property may have `x-value` (what the terminal calls a
 //! value in its help), `x-bare` (the value of a flag that is given without one) and
-//! `x-required`; of one with `x-own` the terminal has an option of its own.
+//! `x-required`; for one with `x-own` the terminal has a hand-written option.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

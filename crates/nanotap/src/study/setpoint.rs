@@ -287,7 +287,7 @@ fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 
 
 impl Search<'_> {
     /// The distance in words.
-    fn told(&self, gap: f64) -> String {
+    fn shown(&self, gap: f64) -> String {
         self.case.physical().map_or_else(
             || gap.to_string(),
             |view| Kind::Length.format(gap * view.scales.length),
@@ -308,7 +308,7 @@ impl Search<'_> {
                     "on approach the motion is {what} at gap.tip = {}, before the setpoint A/A0 = \
                      {} is reached: it has no amplitude to hold; change drive.setpoint, or give \
                      gap.tip",
-                    self.told(piece.from),
+                    self.shown(piece.from),
                     self.ratio
                 ))));
                 return true;
@@ -349,8 +349,8 @@ impl Search<'_> {
                         self.ratio,
                         above / self.free.amplitude,
                         amplitude / self.free.amplitude,
-                        self.told(from),
-                        self.told(*gap)
+                        self.shown(from),
+                        self.shown(*gap)
                     )))
                 };
                 let crossed = before.as_ref().map(|last| {

@@ -1,4 +1,4 @@
-//! The box of initial states that a census or a basin looks at when nobody says another.
+//! The default box of initial states of a census or a basin.
 //!
 //! It is derived from the linear response, so that it fits motions of any size, from the
 //! paper's (of order 1) to an experiment's (1e-6 of the beam's height). With

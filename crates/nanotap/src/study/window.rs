@@ -1,7 +1,7 @@
 //! The operating window: where, over two parameters, the lever taps with one motion and no
 //! other, and where a second state, subharmonics or chaos threaten.
 //!
-//! Every point is a census of its own: motions from rest, from the linear responses and from
+//! Every point has a census: motions from rest, from the linear responses and from
 //! seeded starts of every size, each named as in a [sweep](crate::study::sweep), whose datasets,
 //! chunks and resumption serve here too. Then come the states of a lever that is moved slowly,
 //! coming from far and from the nearest distance ([`approach`](crate::study::approach)), and the
@@ -11,7 +11,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nanotap_dynamics::Control;
+use nanotap_dynamics::{Control, SameMotion};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
@@ -217,7 +217,7 @@ impl Window {
         })
     }
 
-    /// The same, kept beside the dataset in `window.json`.
+    /// The same, stored with the dataset in `window.json`.
     ///
     /// # Errors
     /// As [`Window::of`], and when the file system refuses.
@@ -228,9 +228,6 @@ impl Window {
         Ok(window)
     }
 }
-
-/// Relative difference beyond which two orbits are two.
-const DIFFERENT: f64 = 1e-6;
 
 /// What the motions of one point come to. What is there counts before what could not be named.
 fn condition(motions: &[Seen]) -> Condition {
@@ -247,8 +244,8 @@ fn condition(motions: &[Seen]) -> Condition {
     }
     let orbits: Vec<&Seen> = motions.iter().filter(|m| m.period == 1).collect();
     let differ = |a: &Seen, b: &Seen| {
-        let apart = |x: f64, y: f64| (x - y).abs() > DIFFERENT * x.abs().max(y.abs());
-        apart(a.amplitude, b.amplitude) || apart(a.maximum, b.maximum)
+        let same = SameMotion::numbers;
+        !same(a.amplitude, b.amplitude) || !same(a.maximum, b.maximum)
     };
     if orbits
         .first()

@@ -176,7 +176,7 @@ impl Written<'_> {
     fn table(&self, control: &Control<'_>) -> Result<Vec<ApproachPoint>, CaseError> {
         let count = self.distances.len();
         let done = AtomicUsize::new(0);
-        let told = || {
+        let report = || {
             if let Some(progress) = control.progress {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, 2 * count);
             }
@@ -204,7 +204,7 @@ impl Written<'_> {
                     _ => false,
                 };
                 let there = of(Way::Approach, there)?;
-                told();
+                report();
                 let back = if same {
                     let same = there.clone();
                     same.map(|row| ApproachPoint {
@@ -214,7 +214,7 @@ impl Written<'_> {
                 } else {
                     of(Way::Retract, back)?
                 };
-                told();
+                report();
                 Ok((there, back))
             })
             .collect();

@@ -9,7 +9,7 @@ use super::{
     Modulated, ModulationReport, OPEN_LOOP,
 };
 use crate::case::{Case, Key};
-use crate::model::contact::ContactLaw;
+use crate::model::cantilever::Cantilever;
 use crate::observe::{PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
@@ -162,7 +162,7 @@ fn curve(
         invert(&mut table, &free);
     }
     for point in &mut table {
-        curve.tell_in_si(point);
+        curve.add_si(point);
     }
     let setpoints = shift.map(|shift| curve.setpoints(held, shift, &table, control));
     Ok(ApproachReport {
@@ -231,7 +231,7 @@ impl Curve<'_> {
             let way = pair[0].way;
             let (gap, held, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
             let mut point = self.point(way, gap, orbit, held.amplitude).ok()?;
-            self.tell_in_si(&mut point);
+            self.add_si(&mut point);
             Some(point)
         });
         found.collect()
@@ -279,14 +279,12 @@ impl Curve<'_> {
         (off.abs() <= 1e-6 * shift.abs()).then(|| (gap, walk.held(gap), orbit))
     }
 
-    /// What frequency modulation tells of an orbit of this amplitude.
+    /// The numbers of frequency modulation of an orbit of this amplitude.
     fn modulated(&self, orbit: &HeldOrbit, amplitude: f64, gap: f64) -> Modulated {
-        // A rigid stop has no static force, and a moving surface one of its own height.
-        let moves = self
-            .case
-            .cantilever()
-            .is_some_and(|c| c.contact == ContactLaw::MovingSurface && c.law.is_none());
-        let known = !self.case.has_rigid_stop() && !moves;
+        // A rigid stop has no static force; that of a surface that attracts depends on where it is.
+        let cantilever = self.case.cantilever();
+        let attracts = cantilever.is_some_and(Cantilever::has_attractive_surface);
+        let known = !self.case.has_rigid_stop() && !attracts;
         let averages = known.then(|| self.averages(amplitude));
         let free = self.free.with_amplitude(amplitude);
         Modulated::of(orbit, &free, averages.as_ref(), gap)
@@ -302,8 +300,8 @@ impl Curve<'_> {
         Averages::new(&self.model, spring, swing, self.free.stiffness)
     }
 
-    /// Adds what frequency modulation tells in SI.
-    fn tell_in_si(&self, point: &mut ApproachPoint) {
+    /// Adds the numbers of frequency modulation in SI.
+    fn add_si(&self, point: &mut ApproachPoint) {
         if let Some(view) = self.case.physical() {
             point.modulation_si = point.modulation.map(|m| m.in_si(view));
         }

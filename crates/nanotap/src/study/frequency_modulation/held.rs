@@ -176,7 +176,7 @@ impl Held {
     /// the case's own drive keep their dependence on it, as in [`close`](Self::close).
     ///
     /// # Errors
-    /// When the case makes no sense beside the value of a key, or where the orbit turns back.
+    /// When the case is not valid next to the value of a key, or where the orbit turns back.
     pub(crate) fn changes(
         self,
         case: &Case,
@@ -395,7 +395,7 @@ mod tests {
     use super::*;
     use crate::study::frequency_modulation::FreeOscillation;
 
-    /// Newton's matrix against central differences of the equations, beside an orbit that is not
+    /// Newton's matrix against central differences of the equations, near an orbit that is not
     /// closed, in the exact engine and under a nonlinear force, driven at the base.
     #[test]
     fn newtons_matrix_is_the_derivative_of_the_equations() {
@@ -436,7 +436,7 @@ mod tests {
             let n = matrix.nrows();
             for column in 0..n {
                 let step = 1e-5;
-                let beside = |side: f64| {
+                let at_side = |side: f64| {
                     let mut change = DVector::zeros(n);
                     change[column] = side * step;
                     let there = held.at(&case, at.moved(&change, 1.0), &[]).unwrap();
@@ -446,7 +446,7 @@ mod tests {
                     }
                     residual
                 };
-                let difference = (beside(1.0) - beside(-1.0)) / (2.0 * step);
+                let difference = (at_side(1.0) - at_side(-1.0)) / (2.0 * step);
                 let error = (difference - matrix.column(column)).amax();
                 let size = matrix.column(column).amax();
                 assert!(

@@ -2,7 +2,7 @@
 //! frequency and the strength of the drive.
 //!
 //! What the instrument settles on is a periodic orbit whose frequency and drive strength are
-//! unknowns beside its state: [`HeldOrbit`]. How far the frequency is from that of the free lever
+//! unknowns in addition to its state: [`HeldOrbit`]. How far the frequency is from that of the free lever
 //! at the same amplitude and phase ([`FreeOscillation`]) is the frequency shift; how much stronger
 //! the drive is than there, the excitation, tells what the sample takes.
 //!
@@ -43,7 +43,7 @@ use crate::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way
 use crate::study::limits::MOST_DISTANCES;
 use crate::study::value::Amount;
 
-/// What frequency modulation tells at one distance.
+/// Frequency modulation at one distance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Modulated {
     /// Frequency of the drive, in the model's unit.
@@ -56,7 +56,7 @@ pub struct Modulated {
     pub relative_shift: f64,
     /// Strength of the drive over that of the free lever: the excitation channel.
     pub drive_ratio: f64,
-    /// Energy that the sample takes in a period as the excitation tells it,
+    /// Energy that the sample takes in a period, from the excitation,
     /// E₀ (drive ratio − f/f₀) with what the free lever loses in a period, in the model's unit.
     pub drive_dissipation: f64,
     /// Least distance of a sinusoidal oscillation, a driven base's motion included, in the model's
@@ -114,7 +114,7 @@ pub struct ModulatedInSi {
     pub drive_strength: f64,
     /// Frequency shift Δf, Hz.
     pub frequency_shift: f64,
-    /// Energy that the sample takes in a period as the excitation tells it, J.
+    /// Energy that the sample takes in a period, from the excitation, J.
     pub drive_dissipation: f64,
     /// The same in eV.
     #[serde(rename = "drive_dissipation_eV")]
@@ -148,7 +148,7 @@ impl Modulated {
     }
 }
 
-/// One of the numbers that frequency modulation tells, as a column of a table or an axis.
+/// One of the numbers of frequency modulation, as a column of a table or an axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ModulatedColumn {
     /// Its name in tables.

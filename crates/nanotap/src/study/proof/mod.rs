@@ -1,4 +1,5 @@
-//! Proofs of periodic orbits: what Newton found becomes a theorem, or is said not to.
+//! Proofs of periodic orbits: a theorem about the orbit that Newton found, or the reason why there
+//! is none.
 //!
 //! A proof is about the model's dimensionless numbers, each standing for every decimal number
 //! that is read as it; see [`enclosed`](crate::model::enclosed) for the equations and nanotap-proof

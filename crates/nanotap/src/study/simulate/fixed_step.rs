@@ -1,11 +1,11 @@
-//! The paper's own method beside the exact flow: fourth-order Runge–Kutta with a fixed
+//! The paper's method, to compare with the exact flow: fourth-order Runge–Kutta with a fixed
 //! step in each regime, switching on the grid.
 //!
 //! It is there to show what it does wrong. Its contacts begin and end up to a step late,
 //! which acts like a small force that differs from period to period: what looks like a
 //! subharmonic of a high period can be a product of the step. Therefore the period read off its
-//! strobe points is called apparent, and what the exact flow makes of the same motion
-//! stands beside it.
+//! strobe points is called apparent, and is reported
+//! with the verdict of the exact flow on the same motion.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -47,7 +47,7 @@ pub struct FixedStepRun {
     pub switching: &'static str,
     /// Drive periods recorded.
     pub periods: usize,
-    /// Drive periods thrown away first.
+    /// Drive periods discarded first.
     pub transient: usize,
     /// The state at the end of the transient.
     pub start: Vec<f64>,
@@ -66,7 +66,7 @@ pub struct FixedStepRun {
     pub amplitude: f64,
     /// Part of the steps in contact, weighted with their length.
     pub contact_fraction: f64,
-    /// States at the end of each of the last periods asked for.
+    /// States at the end of each of the last requested periods.
     pub strobe: Vec<Vec<f64>>,
     /// Switches noticed, the first of them.
     pub events: Vec<GridEvent>,

@@ -1,4 +1,4 @@
-//! One run: the transient thrown away, the motion recorded, observed and named.
+//! One run: the transient is discarded, the motion recorded, observed and classified.
 
 pub mod fixed_step;
 
@@ -60,7 +60,7 @@ impl Classification {
 pub struct Simulation {
     /// Drive periods recorded.
     pub periods: usize,
-    /// Drive periods thrown away first.
+    /// Drive periods discarded first.
     pub transient: usize,
     /// The state at the end of the transient, where the recording starts.
     pub start: Vec<f64>,
@@ -77,7 +77,7 @@ pub struct Simulation {
     /// the orbit's size: what is recorded is the orbit only where this is rounding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_to_orbit: Option<f64>,
-    /// States at the end of each of the last periods asked for.
+    /// States at the end of each of the last requested periods.
     pub strobe: Vec<Vec<f64>>,
     /// Contacts begun and ended, the first of them.
     pub events: Vec<ContactEvent>,
@@ -102,7 +102,7 @@ pub struct Simulation {
     pub trajectory: Recording,
 }
 
-/// Events that are listed unless more are asked for: their JSON stays below 10 MB.
+/// Events listed by default: their JSON stays below 10 MB.
 const LISTED_EVENTS: usize = 50_000;
 
 /// Whether a count may be left out of a document.

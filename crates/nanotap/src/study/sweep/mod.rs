@@ -1,6 +1,6 @@
 //! Sweeps: how the motion changes with one or two parameters, from any number of starts.
 //!
-//! Every value of the parameters is a case of its own. From each start the motion is
+//! Every value of the parameters is a separate case. From each start the motion is
 //! [classified](nanotap_dynamics::classify()), named, and recorded: per-period extrema of the
 //! tip deflection, stroboscopic states, observables, multipliers or exponents. Nothing
 //! depends on the order of work or the number of threads.
@@ -12,8 +12,8 @@
 //! **Transients.** Sized by what is measured: [`classify`](nanotap_dynamics::classify()) runs
 //! until it can name the motion. If that is a stable orbit, closed by Newton and seen to
 //! be approached, the recording is of the orbit itself, as if the rest of the decay had
-//! been waited for. A number of periods may be asked for instead; then exactly that many
-//! are thrown away, and what follows is recorded as it is.
+//! been waited for. A number of periods may be given instead; then exactly that many
+//! are discarded, and what follows is recorded.
 //!
 //! **Following.** With [`Follow`], the motion at one value starts from the last state at
 //! the value before, up or down the first parameter: hysteresis shows. Then a whole line
@@ -82,9 +82,7 @@ impl Sweep {
         options: SweepOptions,
         starts: Starts,
     ) -> Result<Self, Error> {
-        let over = options.over.0.iter();
-        let over = over.map(|axis| Over::parse(axis, case));
-        let over: Vec<Over> = over.collect::<Result<_, _>>()?;
+        let over = options.over.parse(case)?;
         check::check(case, &options, &over, &starts)?;
         // What the case says of a parameter that varies does not matter, and must not
         // make two datasets differ.

@@ -54,7 +54,7 @@ pub struct FromNeighbour {
 
 impl Runs {
     /// Tries the orbits of a finished dataset of this sweep at the neighbouring values, and
-    /// keeps beside it what no start had met there; nothing if that was done.
+    /// stores with it what no start had met there; nothing if that was done.
     pub(super) fn share(&self, store: &Store, control: &Control<'_>) -> Result<(), WorkError> {
         if store.read_beside(FILE)?.is_some() {
             return Ok(());
@@ -280,7 +280,7 @@ fn closed(mut map: Strobe, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
     orbits
 }
 
-/// What was kept beside a dataset; nothing where nothing was tried.
+/// The motions stored with a dataset; none where nothing was tried.
 ///
 /// # Errors
 /// When the file cannot be read or is damaged.

@@ -4,7 +4,7 @@ use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Follow, Starts, Summary, Sweep};
+use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
@@ -79,6 +79,12 @@ impl SweepOptions {
             over: Axes(axes.into_iter().map(Into::into).collect()),
             ..Self::default()
         }
+    }
+
+    /// Number of runs over these parameters.
+    pub fn runs(&self, over: &[Over]) -> usize {
+        let values = over.iter().map(|over| over.count).product::<usize>();
+        values * self.starts.unwrap_or(1) * self.follow.directions().len().max(1)
     }
 
     /// Where motions start.

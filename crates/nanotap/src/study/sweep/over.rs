@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::{Case, Key, ValueOfKeyError};
 use crate::model::beam::MAX_MODES;
+use crate::study::value::Axes;
 
 /// Most values of one parameter.
 const MOST: usize = 1_000_000;
@@ -40,6 +41,16 @@ pub struct Over {
     /// The values, where they are listed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub listed: Vec<f64>,
+}
+
+impl Axes {
+    /// The parameters with their values.
+    ///
+    /// # Errors
+    /// When a parameter or a value is not valid for the case.
+    pub fn parse(&self, case: &Case) -> Result<Vec<Over>, Error> {
+        self.0.iter().map(|axis| Over::parse(axis, case)).collect()
+    }
 }
 
 impl Over {

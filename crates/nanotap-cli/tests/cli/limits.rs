@@ -102,9 +102,11 @@ fn counts_that_are_too_large_together_are_refused() {
     let folder = Folder::with_paper_case();
     let many = ["--set", "model.modes=50"];
     let orbit = ["orbit", "case.toml", "--period", "10000"];
-    folder
-        .run(&[&orbit[..], &many].concat())
-        .refused(&["10000", "100 variables", "the largest period is 1677"]);
+    folder.run(&[&orbit[..], &many].concat()).refused(&[
+        "10000",
+        "100 variables",
+        "the largest period is 1677",
+    ]);
     let states = [
         "simulate",
         "case.toml",

@@ -14,6 +14,7 @@ mod beam_equations;
 pub mod cantilever;
 pub mod contact;
 pub mod drive_form;
+#[cfg(feature = "proof")]
 pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;

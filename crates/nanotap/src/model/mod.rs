@@ -28,6 +28,7 @@ pub mod sample_law;
 pub mod spectrum;
 pub mod strobe;
 mod tangent;
+pub mod words;
 
 use std::sync::{Arc, OnceLock};
 

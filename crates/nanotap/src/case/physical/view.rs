@@ -13,7 +13,7 @@ use super::mapping::{MappingRow, Scales, mapping_table};
 use super::reader::Reader;
 use super::sample::Sample;
 use super::tip::Tip;
-use crate::case::file::{cosine_term, modes};
+use crate::case::file::{modes, word};
 use crate::case::key::{Key, Laws, ModelKind};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
@@ -242,7 +242,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let ratio = drive.second.map(|s| s.frequency.ratio(frequency));
     let like = Cantilever {
         modes: modes(reader.stated),
-        cosine_term: cosine_term(reader.stated),
+        cosine_term: word(reader.stated, Key::CosineTerm).unwrap_or_default(),
         contact: sample.law,
         actuation: drive.actuation,
         tone2_ratio: ratio.transpose()?,

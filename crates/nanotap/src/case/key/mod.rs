@@ -16,7 +16,7 @@ use super::near_name::near_name;
 use super::quantity::Kind;
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
-use crate::model::oscillator::{self, OscillatorParameter};
+use crate::model::oscillator::OscillatorParameter;
 use crate::model::parameter::{Applies, Parameter, Unit};
 use crate::model::words::words;
 use keys::{ALTERNATIVES, TABLE};
@@ -412,7 +412,7 @@ impl Key {
         let (low, high) = match self.entry().means {
             Means::Nothing => return self.entry().range,
             Means::Cantilever(parameter) => parameter.entry().range,
-            Means::Oscillator(parameter) => oscillator::range(parameter),
+            Means::Oscillator(parameter) => parameter.range(),
         };
         Range {
             low,

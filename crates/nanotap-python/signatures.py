@@ -179,7 +179,7 @@ HEAD = '''"""The function of every study. Written by signatures.py; do not edit 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _datasets, _motions, _studies
+from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
@@ -232,7 +232,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     options = schema["properties"]
     required = set(schema.get("required", ()))
     extra, result, returns = PYTHON.get(name, DOCUMENT)
-    arguments, documents, passed = [], [], []
+    arguments, documents = [], []
     for option, declared in options.items():
         argument = argument_name(option)
         default = None if option in required else python_default(declared)
@@ -241,7 +241,6 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
             f"    {argument}: {kind}" + (f" = {default}" if default else "") + ","
         )
         documents.append((argument, kind, documentation(declared)))
-        passed.append(f'        "{option}": {argument},')
     for argument, kind, default, text in extra:
         arguments.append(f"    {argument}: {kind} = {default},")
         documents.append((argument, kind, text))
@@ -278,9 +277,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     body = "\n".join(
         [
             docstring(about, documents, returns),
-            "    options = {",
-            *passed,
-            "    }",
+            f'    options = _arguments.options("{name}", locals())',
             call,
         ]
     )
@@ -398,9 +395,9 @@ def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -
         "    Raises",
         "    ------",
         "    ValueError",
-        "        Something that was asked for is not right.",
+        "        An argument is not valid.",
         "    RuntimeError",
-        "        The computation did not succeed.",
+        "        The computation failed.",
     ]
     first = textwrap.fill(f"{about}.", 84, subsequent_indent="    ")
     return f'    """{first}\n\n' + "\n".join(lines) + '\n    """'

@@ -1,17 +1,17 @@
-//! The one interface between a system and its analysis: the stroboscopic map
-//! `P`, which takes the state at drive phase 0 to the state one drive period later.
+//! The interface between a system and its analysis: the stroboscopic map `P`, which takes the state
+//! at drive phase 0 to the state one drive period later.
 
 use nalgebra::DMatrix;
 
 /// A local extremum of a switching function along one drive period.
 ///
-/// A motion grazes when one of these values passes through zero: a contact is
-/// born or dies there, and the map is only once differentiable.
+/// A motion grazes when one of these values crosses zero: a contact appears or vanishes there, and
+/// the map is only once differentiable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangency {
     /// Drive phase of the extremum as a fraction of the period, in `[0, 1)`.
     pub phase: f64,
-    /// Value of the switching function there: its sign tells touched from missed.
+    /// Value of the switching function: its sign tells contact from a near miss.
     pub value: f64,
 }
 
@@ -68,10 +68,9 @@ pub trait Scheduling: Sized {
 
 /// The stroboscopic map of a periodically forced system.
 ///
-/// An implementor owns whatever work space it needs, hence `&mut self`; a
-/// parallel analysis clones the map once per task, so a clone must be cheap
-/// (shared, immutable data behind an `Arc`). The same state must give the same
-/// bits on every clone and every call.
+/// An implementation owns its work space, hence `&mut self`. A parallel analysis clones the map
+/// once per task, so a clone must be cheap (shared, immutable data in an `Arc`). The same state
+/// must give the same bits on every clone and in every call.
 pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// Why a period could not be computed.
     type Error: std::error::Error + Send + Sync + 'static;
@@ -79,7 +78,7 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// Dimension of the state.
     fn dimension(&self) -> usize;
 
-    /// Length of one drive period.
+    /// Length of one drive period, in the system's unit of time.
     fn period(&self) -> f64;
 
     /// How many of the last entries of the state are whole numbers that the map sets, such as
@@ -138,14 +137,14 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
         f64::INFINITY
     }
 
-    /// From here on motions pass through a rigid stop that they hardly touch. Past its grazing an
-    /// orbit then goes on smoothly, as it would without the touch, so that the grazing can be
-    /// located and followed. A map without rigid stops stays as it is.
+    /// From now on motions pass through a rigid stop that they hardly touch. Beyond its grazing an
+    /// orbit then continues smoothly, as if without contact, so that the grazing can be located and
+    /// followed. A map without rigid stops does nothing.
     fn pass_touches(&mut self) {}
 
-    /// Appends every local extremum of the switching functions over the period
-    /// that starts at `state`, in order of phase, and replaces `state` by
-    /// `P(state)`. A smooth system leaves `tangencies` as it is.
+    /// Appends all local extrema of the switching functions over the period that starts at `state`,
+    /// in order of phase, and replaces `state` by `P(state)`. A smooth system leaves `tangencies`
+    /// unchanged.
     ///
     /// # Errors
     /// When the period cannot be computed from this state.
@@ -190,7 +189,7 @@ pub fn in_sequence_through<M: StroboscopicMap>(
         .collect()
 }
 
-/// A one-parameter family of stroboscopic maps, for continuation.
+/// A one-parameter family of stroboscopic maps, for continuation in one parameter.
 pub trait MapFamily: Sync {
     /// The map at one parameter value.
     type Map: StroboscopicMap;
@@ -198,9 +197,9 @@ pub trait MapFamily: Sync {
     type Error: std::error::Error + Send + Sync + 'static;
 
     /// The map at `parameter`.
-    ///
+    /// The map at this parameter value.
     /// # Errors
-    /// When the parameter value makes no sense for the system.
+    /// If the system does not exist at this parameter value.
     fn at(&self, parameter: f64) -> Result<Self::Map, Self::Error>;
 
     /// Replaces `state` by `P(state; parameter)`, `jacobian` by `∂P/∂state` and
@@ -218,7 +217,7 @@ pub trait MapFamily: Sync {
     ) -> Result<(), <Self::Map as StroboscopicMap>::Error>;
 }
 
-/// A two-parameter family of stroboscopic maps.
+/// A two-parameter family of stroboscopic maps, for continuation of bifurcations.
 pub trait TwoParameterFamily: Sync {
     /// The map at one pair of values.
     type Map: StroboscopicMap;

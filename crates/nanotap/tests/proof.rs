@@ -7,8 +7,8 @@ use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::enclosed::{EnclosureError, enclosed};
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::study::kind::Study as _;
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitRequest, OrbitStudy, orbit};
+use nanotap::study::Study as _;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy, orbit};
 use nanotap::study::proof::{ProofReport, Prover, candidate};
 use nanotap_flow::Trajectory;
 use nanotap_proof::{Interval, ProofError, Stability, prove};
@@ -155,10 +155,10 @@ fn found(case: &Case, options: &OrbitOptions) -> (OrbitReport, ProofReport) {
 fn a_report_says_of_stability_what_is_proved() {
     let case = case(&["modes=1", "omega=2.9422193073652134"]);
     let report = |prove: bool| {
-        let request = OrbitRequest {
+        let request = OrbitOptions {
             period: Some(1),
             prove,
-            ..OrbitRequest::default()
+            ..OrbitOptions::default()
         };
         let report = OrbitStudy::run(&case, &request, &Control::default());
         report.unwrap().motion

@@ -8,13 +8,13 @@ use nanotap::case::units::Units;
 use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{Comparison, ContactLawsStudy, SampleMotion};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
 /// The same lever and drive on every contact law: what difference the sample makes.
@@ -22,9 +22,7 @@ pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let result = progress::study::<ContactLawsStudy, _>(|control| {
-        ContactLawsStudy::run(&case, &request, control)
-    })?;
+    let result = progress::study::<ContactLawsStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| csv(&result, &case.units()))?;
     arguments
         .plot

@@ -203,6 +203,12 @@ def counted(study: str) -> str:
     return _studies()[study][0]
 
 
+def options(study: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a study among the arguments of its function."""
+    names = _studies()[study][1]
+    return {name: arguments["from_" if name == "from" else name] for name in names}
+
+
 def request(study: str, options: Mapping[str, Any]) -> str:
     """The request of a study, as JSON.
 

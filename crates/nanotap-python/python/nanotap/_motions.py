@@ -176,10 +176,10 @@ def _recorded(
         rates = np.array([event["gap_rate"] for event in events], dtype=float)
         variables["event_gap_rate"] = ("event", rates)
     last = document["periods"]
-    told = {"long_name": "end of this recorded period", "units": "drive periods"}
+    attrs = {"long_name": "end of this recorded period", "units": "drive periods"}
     ends = np.arange(last - len(strobe) + 1, last + 1)
     return variables, {
-        "strobe_period": ("strobe_period", ends, told),
+        "strobe_period": ("strobe_period", ends, attrs),
         "state": words(entries),
     }
 
@@ -337,11 +337,11 @@ def _over(
     variables["failure"] = (dims, failed, why)
     coords = _coords(arrays, variables, names, options)
     if states is not None:
-        told = {"long_name": "initial state, from 0", "units": "1"}
-        coords["start"] = ("start", np.arange(len(states)), told)
+        attrs = {"long_name": "initial state, from 0", "units": "1"}
+        coords["start"] = ("start", np.arange(len(states)), attrs)
         if states.shape[1] == len(entries):
-            told = {"long_name": "initial state", "units": "model units"}
-            variables["initial_state"] = (("start", "state"), states, told)
+            attrs = {"long_name": "initial state", "units": "model units"}
+            variables["initial_state"] = (("start", "state"), states, attrs)
             coords["state"] = words(entries)
     # The value in the case of a parameter that varies does not matter.
     attributes = case_attributes(case, noun) | {"over": json.dumps(list(varied))}

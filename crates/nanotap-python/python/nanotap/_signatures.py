@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _datasets, _motions, _studies
+from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
@@ -53,13 +53,11 @@ def modes(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "points": points,
-    }
+    options = _arguments.options("modes", locals())
     return _motions.modes(case, options)
 
 def simulate(
@@ -139,23 +137,11 @@ def simulate(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "strobe": strobe,
-        "events": events,
-        "max_period": max_period,
-        "observables": observables,
-        "resolution": resolution,
-        "method": method,
-        "steps": steps,
-        "switching": switching,
-    }
+    options = _arguments.options("simulate", locals())
     return _motions.simulate(case, options, series, threads, progress, parameters)
 
 @overload
@@ -241,19 +227,11 @@ def orbit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "period": period,
-        "state": state,
-        "harmonics": harmonics,
-        "observables": observables,
-        "resolution": resolution,
-        "derivatives": derivatives,
-        "prove": prove,
-    }
+    options = _arguments.options("orbit", locals())
     return _motions.orbit(case, options, threads, progress, parameters)
 
 def attractors(
@@ -313,19 +291,11 @@ def attractors(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "starts": starts,
-        "unseen": unseen,
-        "seed": seed,
-        "box": box,
-        "max_period": max_period,
-        "unstable": unstable,
-        "prove": prove,
-    }
+    options = _arguments.options("attractors", locals())
     return _studies.attractors(case, options, threads, progress)
 
 def branch(
@@ -400,24 +370,11 @@ def branch(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "parameter": parameter,
-        "from": from_,
-        "to": to,
-        "period": period,
-        "state": state,
-        "switch": switch,
-        "diagram": diagram,
-        "values": values,
-        "starts": starts,
-        "seed": seed,
-        "second": second,
-        "max_step": max_step,
-    }
+    options = _arguments.options("branch", locals())
     return _studies.branch(case, options, threads, progress)
 
 def approach(
@@ -494,23 +451,11 @@ def approach(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "from": from_,
-        "to": to,
-        "points": points,
-        "branches": branches,
-        "switch": switch,
-        "max_period": max_period,
-        "speed": speed,
-        "fm": fm,
-        "phase": phase,
-        "shift": shift,
-        "closest": closest,
-    }
+    options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
 
 def fit(
@@ -580,24 +525,11 @@ def fit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "data": data,
-        "free": free,
-        "per_curve": per_curve,
-        "bounds": bounds,
-        "columns": columns,
-        "laws": laws,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-        "jumps": jumps,
-        "phase": phase,
-        "profile": profile,
-    }
+    options = _arguments.options("fit", locals())
     return _studies.fit(case, options, threads, progress)
 
 def sweep(
@@ -678,22 +610,11 @@ def sweep(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "box": box,
-        "state": state,
-        "follow": follow,
-        "periods": periods,
-        "strobe": strobe,
-        "transient": transient,
-        "max_period": max_period,
-    }
+    options = _arguments.options("sweep", locals())
     return _datasets.sweep(case, options, out, chunk, threads, client, progress)
 
 def window(
@@ -746,16 +667,11 @@ def window(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-    }
+    options = _arguments.options("window", locals())
     return _datasets.window(case, options, out, threads, client, progress)
 
 def basin(
@@ -820,20 +736,11 @@ def basin(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "x": x,
-        "y": y,
-        "state": state,
-        "attractors": attractors,
-        "starts": starts,
-        "seed": seed,
-        "periods": periods,
-        "max_period": max_period,
-    }
+    options = _arguments.options("basin", locals())
     return _datasets.basin(case, options, out, chunk, threads, client, progress)
 
 def lyapunov(
@@ -874,18 +781,11 @@ def lyapunov(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "section": section,
-        "phase": phase,
-        "points": points,
-    }
+    options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)
 
 def convergence(
@@ -917,15 +817,11 @@ def convergence(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "largest": largest,
-        "tolerance": tolerance,
-        "period": period,
-    }
+    options = _arguments.options("convergence", locals())
     return _studies.convergence(case, options)
 
 def contact_laws(
@@ -966,14 +862,9 @@ def contact_laws(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is not valid.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "period": period,
-        "arm": arm,
-        "from": from_,
-        "to": to,
-    }
+    options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)

@@ -65,12 +65,12 @@ def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
             for entry in ds.state.values:
                 chosen[str(entry)] = variable.sel(state=entry, drop=True)
     part = ds[list(set(dims) & set(map(str, ds.coords)))].assign(chosen)
-    beside = {
+    coords = {
         str(name): coord
         for name, coord in ds.coords.items()
         if coord.dims and set(coord.dims) <= set(dims)
     }
-    return part.assign_coords(beside).to_dataframe(dim_order=list(dims))
+    return part.assign_coords(coords).to_dataframe(dim_order=list(dims))
 
 
 def csv(result: Any, path: Path) -> None:

@@ -4,7 +4,7 @@ use divan::Bencher;
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
-use nanotap::study::approach::{ApproachRequest, ApproachStudy};
+use nanotap::study::approach::{ApproachOptions, ApproachStudy};
 use nanotap::study::registry::Study as _;
 use nanotap::study::threads::install;
 
@@ -28,13 +28,13 @@ fn approach(bencher: Bencher<'_, '_>, name: &str, points: usize, threads: usize)
         text,
     };
     let case = Case::parse(Some(source), &[]).expect("a valid case");
-    let request = ApproachRequest {
+    let options = ApproachOptions {
         points,
-        ..ApproachRequest::default()
+        ..ApproachOptions::default()
     };
     bencher.bench_local(|| {
         install(Some(threads), || {
-            ApproachStudy::run(&case, &request, &Control::default()).expect("a curve")
+            ApproachStudy::run(&case, &options, &Control::default()).expect("a curve")
         })
         .expect("threads")
     });

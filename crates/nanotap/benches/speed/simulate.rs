@@ -1,4 +1,4 @@
-//! One run, as the command does it, beside its bare propagation.
+//! One run, as the command does it, and its bare propagation.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -37,7 +37,7 @@ fn run(bencher: Bencher<'_, '_>, modes: usize, observables: Set) {
     let options = SimulateOptions {
         periods: PERIODS,
         transient: Some(0),
-        observables,
+        observables: Some(observables),
         ..SimulateOptions::default()
     };
     bencher

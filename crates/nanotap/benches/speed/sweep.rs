@@ -5,7 +5,8 @@ use divan::counter::ItemsCount;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Sweep, SweepOptions};
 
 use crate::cases;
 use crate::folder::Folder;
@@ -41,17 +42,12 @@ fn bare(bencher: Bencher<'_, '_>) {
 #[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
 fn runs_96(bencher: Bencher<'_, '_>, threads: usize) {
     let subject = cases::subject(&cases::paper(3));
-    let over = Over::parse("omega=2:4:24", &subject).expect("a range");
     let options = SweepOptions {
         transient: Some(400),
-        starts: Starts::Seeded {
-            count: 4,
-            seed: 1,
-            sides: Vec::new(),
-        },
-        ..SweepOptions::new(vec![over])
+        starts: Some(4),
+        ..SweepOptions::over(["omega=2:4:24"])
     };
-    let sweep = Sweep::new(subject, options).expect("options that make sense");
+    let sweep = Sweep::new(&subject, options).expect("options that make sense");
     let how = Work {
         share: Share::default(),
         threads,

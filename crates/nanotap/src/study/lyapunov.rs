@@ -17,39 +17,9 @@ use crate::map::UNINTERRUPTED;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
-use crate::study::kind::Study;
+use crate::study::Study;
 use crate::study::limits::MOST_PERIODS;
-use crate::study::simulate::{Classification, Named, SimulateError, check_states, starting_state};
-
-/// How to measure.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LyapunovOptions {
-    /// Drive periods thrown away first.
-    pub transient: usize,
-    /// The state at the start; `None`: rest.
-    pub state: Option<Vec<f64>>,
-    /// Drive periods averaged over.
-    pub periods: usize,
-    /// What the section is taken at.
-    pub section: Section,
-    /// Points of the section.
-    pub points: usize,
-    /// Budgets for naming the motion.
-    pub classify: ClassifyOptions,
-}
-
-impl Default for LyapunovOptions {
-    fn default() -> Self {
-        Self {
-            transient: 1000,
-            state: None,
-            periods: 20_000,
-            section: Section::Phase(0.0),
-            points: 5000,
-            classify: ClassifyOptions::default(),
-        }
-    }
-}
+use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
 /// Where a motion is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -85,7 +55,7 @@ pub struct LyapunovReport {
     pub period: Option<usize>,
     /// Why it was named so.
     pub evidence: String,
-    /// Drive periods thrown away first.
+    /// Drive periods discarded first.
     pub transient: usize,
     /// Drive periods averaged over.
     pub periods: usize,
@@ -200,11 +170,11 @@ impl StroboscopicMap for Stoppable<'_> {
     }
 }
 
-impl From<Unfinished> for SimulateError {
+impl From<Unfinished> for Error {
     fn from(error: Unfinished) -> Self {
         match error {
-            Unfinished::Stopped => Self::Stopped,
-            Unfinished::Flow(error) => Self::Flow(error),
+            Unfinished::Stopped => Self::stopped(),
+            Unfinished::Flow(error) => error.into(),
         }
     }
 }
@@ -217,22 +187,13 @@ pub fn lyapunov(
     model: &Model,
     options: &LyapunovOptions,
     control: &Control<'_>,
-) -> Result<LyapunovReport, SimulateError> {
+) -> Result<LyapunovReport, Error> {
     let mut state = starting_state(model, options.state.as_deref())?;
-    if options.periods == 0 {
-        return Err(SimulateError::NoPeriods);
-    }
+    check_periods(options.periods)?;
     check_states(model, options.points, "points")?;
     let mut map = Stoppable {
         map: Strobe::new(model),
         control: *control,
-    };
-    let stopped = |error| {
-        if control.is_cancelled() {
-            SimulateError::Stopped
-        } else {
-            error
-        }
     };
     let defaults = SpectrumOptions::default();
     // The tangent vectors align themselves during the last periods of the transient.
@@ -247,15 +208,16 @@ pub fn lyapunov(
         ..defaults
     };
     let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
-        stopped(SimulateError::Flow(MotionError::Flow(
-            FlowError::NotFinite {
-                what: "the tangent vectors of the motion",
-            },
-        )))
+        if control.is_cancelled() {
+            return Error::stopped();
+        }
+        let what = "the tangent vectors of the motion";
+        FlowError::NotFinite { what }.into()
     })?;
-    let named = Named::of(&classify(&mut map, &start, &options.classify).kind);
+    let named = Named::of(&classify(&mut map, &start, &ClassifyOptions::default()).kind);
     map.goes_on()?;
-    let section = cut(model, &start, options.section, options.points, control)?;
+    let section_at = options.section_at();
+    let section = cut(model, &start, section_at, options.points, control)?;
     Ok(LyapunovReport {
         classification: named.classification,
         period: named.orbit.map(|o| o.period),
@@ -272,7 +234,7 @@ pub fn lyapunov(
         errors: spectrum.errors,
         mean: spectrum.strobe.mean_state().to_vec(),
         section,
-        section_at: options.section,
+        section_at,
     })
 }
 
@@ -359,10 +321,10 @@ pub enum SectionKind {
 /// Most points of a section: 300 MB with three modes.
 pub const MOST_SECTION_POINTS: usize = 2_000_000;
 
-/// What the study of Lyapunov exponents is asked for.
+/// Options of the Lyapunov spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct LyapunovRequest {
+pub struct LyapunovOptions {
     /// Drive periods averaged over
     #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
     pub periods: usize,
@@ -382,33 +344,25 @@ pub struct LyapunovRequest {
     pub points: usize,
 }
 
-impl Default for LyapunovRequest {
+impl Default for LyapunovOptions {
     fn default() -> Self {
-        let options = LyapunovOptions::default();
         Self {
-            periods: options.periods,
-            transient: options.transient,
-            state: options.state,
+            periods: 20_000,
+            transient: 1000,
+            state: None,
             section: SectionKind::default(),
             phase: 0.0,
-            points: options.points,
+            points: 5000,
         }
     }
 }
 
-impl LyapunovRequest {
-    /// How to measure.
-    pub fn options(&self) -> LyapunovOptions {
-        LyapunovOptions {
-            transient: self.transient,
-            state: self.state.clone(),
-            periods: self.periods,
-            section: match self.section {
-                SectionKind::Phase => Section::Phase((self.phase / 360.0).rem_euclid(1.0)),
-                SectionKind::Contact => Section::Contact,
-            },
-            points: self.points,
-            ..LyapunovOptions::default()
+impl LyapunovOptions {
+    /// Where the section is taken.
+    fn section_at(&self) -> Section {
+        match self.section {
+            SectionKind::Phase => Section::Phase((self.phase / 360.0).rem_euclid(1.0)),
+            SectionKind::Contact => Section::Contact,
         }
     }
 }
@@ -420,14 +374,14 @@ pub struct LyapunovStudy;
 impl Study for LyapunovStudy {
     const NAME: &'static str = "lyapunov";
     const ABOUT: &'static str = "Lyapunov spectrum with error bars, and a Poincaré section";
-    type Request = LyapunovRequest;
+    type Options = LyapunovOptions;
     type Report = LyapunovReport;
 
     fn compute(
         case: &Case,
-        request: &LyapunovRequest,
+        options: &LyapunovOptions,
         control: &Control<'_>,
     ) -> Result<LyapunovReport, Error> {
-        Ok(lyapunov(&case.model()?, &request.options(), control)?)
+        lyapunov(&case.model()?, options, control)
     }
 }

@@ -3,7 +3,7 @@
 
 use nanotap::case::Case;
 use nanotap::control::Control;
-use nanotap::study::branch::{BranchOptions, BranchReport, SeedOptions, branch};
+use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 
 use crate::approach::{STIFF, studied};
 
@@ -77,8 +77,8 @@ fn paper(omega: f64, modes: usize) -> String {
 fn a_diagram_holds_the_period_3_that_few_starts_meet() {
     let case = studied(&paper(3.0, 3), &[]);
     let options = BranchOptions {
-        doublings: 1,
-        census: Some(SeedOptions::default()),
+        switch: Some(1),
+        diagram: true,
         ..BranchOptions::over(case.key("omega").unwrap(), 2.4, 3.2)
     };
     let report = branch(&case, &options, &Control::default()).unwrap();

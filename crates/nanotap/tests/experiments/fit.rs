@@ -6,7 +6,7 @@ use nanotap::control::Control;
 use nanotap::model::strobe::Strobe;
 use nanotap::observe::{Set, measure};
 use nanotap::study::approach::{ApproachOptions, Way, approach};
-use nanotap::study::fit::{Entry, FitReport, FitRequest, FittedParameter, Table, fit, residuals};
+use nanotap::study::fit::{Entry, FitOptions, FitReport, FittedParameter, Table, fit, residuals};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
@@ -46,8 +46,8 @@ impl Noise {
 fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, Way)> {
     let length = case.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some(from * 1e-9 / length),
-        to: Some(to * 1e-9 / length),
+        from: Some((from * 1e-9 / length).into()),
+        to: Some((to * 1e-9 / length).into()),
         points,
         branches: false,
         ..ApproachOptions::default()
@@ -99,15 +99,15 @@ fn measured(
     }
 }
 
-fn request(tables: Vec<Table>, free: &[&str]) -> FitRequest {
-    FitRequest {
+fn request(tables: Vec<Table>, free: &[&str]) -> FitOptions {
+    FitOptions {
         data: tables,
         free: free.iter().map(|name| (*name).to_owned()).collect(),
-        ..FitRequest::default()
+        ..FitOptions::default()
     }
 }
 
-fn fitted(case: &Case, request: &FitRequest) -> FitReport {
+fn fitted(case: &Case, request: &FitOptions) -> FitReport {
     fit(case, request, &Control::default()).unwrap()
 }
 
@@ -124,7 +124,7 @@ fn covered(
 ) -> [usize; 3] {
     let one = |repetition: u64| {
         let table = table(&mut Noise(1000 + repetition));
-        let asked = FitRequest {
+        let asked = FitOptions {
             jumps,
             ..request(vec![table], &FREE)
         };
@@ -295,7 +295,7 @@ fn the_place_of_a_jump_is_a_datum() {
     let table = measured(&curve, &mut Noise(17), [0.1, 0.5], true);
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
     let with = request(vec![table], &FREE);
-    let without = FitRequest {
+    let without = FitOptions {
         jumps: false,
         ..with.clone()
     };
@@ -429,7 +429,7 @@ fn a_resonance_curve_is_fitted_with_both_its_branches() {
     let free = ["sample.stiffness", "sample.loss_tangent", "cantilever.Q"];
     let report = fitted(
         &start,
-        &FitRequest {
+        &FitOptions {
             profile: false,
             ..request(vec![table], &free)
         },
@@ -575,7 +575,7 @@ fn what_only_stands_as_one_number_is_named() {
 /// Derivatives of the residuals against differences of fourth order.
 fn derivatives_are_right(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     at: &[f64],
     steps: &[f64],
     within: f64,
@@ -688,7 +688,7 @@ fn curves_share_a_sample_and_have_distances_of_their_own() {
         table.name = format!("curve {k}");
         table
     });
-    let request = FitRequest {
+    let request = FitOptions {
         per_curve: vec!["gap.offset".to_owned()],
         ..request(tables.collect(), &["sample.stiffness"])
     };
@@ -793,7 +793,7 @@ fn of_several_laws_the_one_behind_the_data_is_chosen() {
         &["sample.modulus=3 GPa"],
     );
     let bounds = serde_json::from_str(r#"{"sample.hamaker": ["4e-20 J", "4e-19 J"]}"#).unwrap();
-    let request = FitRequest {
+    let request = FitOptions {
         laws: vec!["hertz, dmt".to_owned(), "thin-sphere".to_owned()],
         bounds,
         ..request(vec![table], &["sample.modulus", "sample.hamaker"])
@@ -837,7 +837,7 @@ fn laws_are_refused_in_words() {
         ("hertz,hertz", "sample.modulus", "twice"),
         ("hertz,dmt", "sample.viscosity", "sample.viscosity"),
     ] {
-        let request = FitRequest {
+        let request = FitOptions {
             laws: vec![laws.to_owned()],
             ..request(vec![table()], &[free])
         };
@@ -845,7 +845,7 @@ fn laws_are_refused_in_words() {
         assert!(refused.to_string().contains(word), "{refused}");
     }
     let plain = Case::parse(None, &["alpha1=0.1".to_owned(), "omega=3".to_owned()]);
-    let request = FitRequest {
+    let request = FitOptions {
         laws: vec!["hertz".to_owned()],
         ..request(
             vec![Table::parse("a.csv", "alpha5,phase\n0,90\n0.1,95\n0.2,97\n").unwrap()],
@@ -939,11 +939,12 @@ const FOLLOWED: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \
 fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) -> Table {
     let length = case.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some(range[0] * 1e-9 / length),
-        to: Some(range[1] * 1e-9 / length),
+        from: Some((range[0] * 1e-9 / length).into()),
+        to: Some((range[1] * 1e-9 / length).into()),
         points,
         branches: false,
-        phase: Some(90.0),
+        fm: true,
+        phase: 90.0,
         ..ApproachOptions::default()
     };
     let report = approach(case, &options, &Control::default()).unwrap();
@@ -1003,7 +1004,7 @@ fn a_curve_under_frequency_modulation_is_fitted_as_it_is() {
         "sample.damping",
         "gap.offset",
     ];
-    let asked = FitRequest {
+    let asked = FitOptions {
         profile: false,
         ..request(vec![table], &free)
     };
@@ -1038,7 +1039,7 @@ fn derivatives_of_a_curve_under_frequency_modulation_are_exact() {
         "drive_ratio",
         "drive_dissipation",
     ];
-    let with_columns = |request: FitRequest| FitRequest {
+    let with_columns = |request: FitOptions| FitOptions {
         columns: columns.map(str::to_owned).to_vec(),
         ..request
     };

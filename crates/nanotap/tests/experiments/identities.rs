@@ -24,7 +24,7 @@ fn greatest_deviation(set: &[&str]) -> f64 {
     let options = ApproachOptions {
         points: 25,
         branches: false,
-        to: Some(2e-9 / resolved.scales.length),
+        to: Some((2e-9 / resolved.scales.length).into()),
         ..ApproachOptions::default()
     };
     let curve = approach(&lever, &options, &Control::default()).unwrap();
@@ -99,8 +99,8 @@ fn the_setpoint_lies_on_the_approach_curve() {
     let report = solve_setpoint(&lever, &Control::default()).unwrap();
     let scale = lever.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some((report.zc() + 1e-12) / scale),
-        to: Some((report.zc() - 1e-12) / scale),
+        from: Some(((report.zc() + 1e-12) / scale).into()),
+        to: Some(((report.zc() - 1e-12) / scale).into()),
         points: 3,
         branches: false,
         ..ApproachOptions::default()

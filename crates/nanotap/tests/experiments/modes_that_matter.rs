@@ -2,8 +2,7 @@
 
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::convergence::convergence;
-use nanotap::study::orbit::OrbitOptions;
+use nanotap::study::convergence::{ConvergenceOptions, convergence};
 
 /// Far from the sample each mode is a damped oscillator by itself: its energy, and its part in
 /// the tip's motion, follow from a_j = (Ω² − iα3Ω) I_j α2/(β_j⁴ − Ω² + iα3Ω) (no tip mass).
@@ -17,9 +16,10 @@ fn shares_of_a_free_lever_are_the_closed_form() {
     };
     let found = convergence(
         &case,
-        4,
-        0.01,
-        &OrbitOptions::default(),
+        &ConvergenceOptions {
+            largest: 4,
+            ..ConvergenceOptions::default()
+        },
         &Control::default(),
     )
     .unwrap();
@@ -60,12 +60,13 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
         omega: 20.0,
         ..Cantilever::paper()
     };
-    let options = OrbitOptions {
-        period: Some(1),
-        ..OrbitOptions::default()
-    };
     let tolerance = 0.05;
-    let found = convergence(&case, 6, tolerance, &options, &Control::default()).unwrap();
+    let options = ConvergenceOptions {
+        largest: 6,
+        tolerance,
+        period: Some(1),
+    };
+    let found = convergence(&case, &options, &Control::default()).unwrap();
     let report = &found.readings;
     let sum = |of: fn(&nanotap::study::mode_share::ModeShare) -> f64| -> f64 {
         report.mode_shares.iter().map(of).sum()
@@ -101,9 +102,10 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
 fn a_motion_that_is_no_orbit_is_left_undecided() {
     let found = convergence(
         &Cantilever::paper(),
-        3,
-        0.01,
-        &OrbitOptions::default(),
+        &ConvergenceOptions {
+            largest: 3,
+            ..ConvergenceOptions::default()
+        },
         &Control::default(),
     )
     .unwrap();

@@ -3,7 +3,7 @@
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::study::attractors::{
-    Attractors, AttractorsOptions, AttractorsRequest, AttractorsStudy, EndReport, attractors,
+    Attractors, AttractorsOptions, AttractorsStudy, EndReport, attractors,
 };
 use nanotap::study::registry::Study as _;
 use serde_json::Value;
@@ -67,8 +67,8 @@ fn piecewise_linear_censuses_find_the_expected_motions() {
         let keys = case["set"].as_object().unwrap().iter();
         let keys: Vec<String> = keys.map(|(key, value)| format!("{key}={value}")).collect();
         let case_of_keys = Case::parse(None, &keys).unwrap();
-        let request = AttractorsRequest::default();
-        let found = AttractorsStudy::run(&case_of_keys, &request, &Control::default()).unwrap();
+        let options = AttractorsOptions::default();
+        let found = AttractorsStudy::run(&case_of_keys, &options, &Control::default()).unwrap();
         assert!(found.followed_at.is_none());
         let motions = case["motions"].as_array().unwrap();
         assert!(found.attractors.len() >= motions.len(), "{number}");

@@ -2,10 +2,10 @@
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
-use nanotap::study::approach::{
-    ApproachOptions, ApproachPoint, ApproachReport, ApproachRequest, Way, approach,
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way, approach};
+use nanotap::study::frequency_modulation::{
+    Driven, FreeOscillation, FrequencyModulationOptions, Held, Modulated, frequency_modulation,
 };
-use nanotap::study::frequency_modulation::{Driven, FreeOscillation, Held, Modulated};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::request::read;
 
@@ -24,14 +24,14 @@ fn reference(q: f64, amplitude: f64, gap: f64) -> Case {
 /// A curve between distances in nm.
 fn modulated(case: &Case, (from, to): (f64, f64), points: usize) -> ApproachReport {
     let unit = 1e-9 / case.physical().unwrap().scales.length;
-    let options = ApproachOptions {
-        from: Some(from * unit),
-        to: Some(to * unit),
+    let options = FrequencyModulationOptions {
+        from: Some((from * unit).into()),
+        to: Some((to * unit).into()),
         points,
-        phase: Some(90.0),
-        ..ApproachOptions::default()
+        phase: 90.0,
+        ..FrequencyModulationOptions::default()
     };
-    approach(case, &options, &Control::default()).unwrap()
+    frequency_modulation(case, &options, &Control::default()).unwrap()
 }
 
 fn nearest(report: &ApproachReport) -> (&ApproachPoint, Modulated) {
@@ -182,13 +182,13 @@ fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
         words.push(format!("drive.actuation={actuation}"));
         let case = Case::parse(None, &words).unwrap();
         for phase in [60.0, 90.0, 110.0] {
-            let options = ApproachOptions {
+            let options = FrequencyModulationOptions {
                 points: 6,
-                to: Some(10e-9 / case.physical().unwrap().scales.length),
-                phase: Some(phase),
-                ..ApproachOptions::default()
+                to: Some((10e-9 / case.physical().unwrap().scales.length).into()),
+                phase: phase,
+                ..FrequencyModulationOptions::default()
             };
-            let report = approach(&case, &options, &Control::default()).unwrap();
+            let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
             let free = report.modulation.as_ref().unwrap();
             assert!(
                 free.ended.is_empty(),
@@ -278,15 +278,15 @@ fn the_shift_against_the_amplitude_at_one_least_distance() {
     let scales = case.physical().unwrap().scales;
     let unit = 1e-9 / scales.length;
     let (stiffness, strength, closest) = (40.0, 2e-19 * 10e-9 / 6.0, 1e-9);
-    let options = ApproachOptions {
-        from: Some(401.0 * unit),
-        to: Some(1.02 * unit),
-        closest: Some(unit),
+    let options = FrequencyModulationOptions {
+        from: Some((401.0 * unit).into()),
+        to: Some((1.02 * unit).into()),
+        closest: Some(unit.into()),
         points: 30,
-        phase: Some(90.0),
-        ..ApproachOptions::default()
+        phase: 90.0,
+        ..FrequencyModulationOptions::default()
     };
-    let report = approach(&case, &options, &Control::default()).unwrap();
+    let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
     let kept = report.modulation.as_ref().unwrap();
     assert!(kept.ended.is_empty() && kept.jumps.is_empty(), "{kept:?}");
     assert!(report.returned && report.hysteresis.is_empty());
@@ -327,14 +327,16 @@ fn the_shift_against_the_amplitude_at_one_least_distance() {
     let small = (1.0 + slope / stiffness).sqrt() - 1.0;
     assert!((shift / small - 1.0).abs() < 0.002, "{shift} {small}");
     let refused = serde_json::json!({"closest": "1 nm"});
-    let refused: ApproachRequest = read(refused).unwrap();
-    let refused = refused.options(&case).unwrap_err().to_string();
+    let refused: ApproachOptions = read(refused).unwrap();
+    let refused = approach(&case, &refused, &Control::default())
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("add fm"), "{refused}");
-    let none = ApproachOptions {
-        to: Some(0.5 * unit),
+    let none = FrequencyModulationOptions {
+        to: Some((0.5 * unit).into()),
         ..options
     };
-    let refused = approach(&case, &none, &Control::default()).unwrap_err();
+    let refused = frequency_modulation(&case, &none, &Control::default()).unwrap_err();
     assert!(refused.to_string().contains("no amplitude"), "{refused}");
 }
 
@@ -346,15 +348,15 @@ fn a_shift_tells_its_distances() {
     let scales = case.physical().unwrap().scales;
     let unit = 1e-9 / scales.length;
     let at = |shift: f64| {
-        let options = ApproachOptions {
-            from: Some(12.0 * unit),
-            to: Some(9.5 * unit),
+        let options = FrequencyModulationOptions {
+            from: Some((12.0 * unit).into()),
+            to: Some((9.5 * unit).into()),
             points: 12,
-            phase: Some(90.0),
-            shift: Some(shift / scales.frequency),
-            ..ApproachOptions::default()
+            phase: 90.0,
+            shift: Some((shift / scales.frequency).into()),
+            ..FrequencyModulationOptions::default()
         };
-        let report = approach(&case, &options, &Control::default()).unwrap();
+        let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
         report.modulation.unwrap().setpoints.unwrap()
     };
     let found = at(-50.0);
@@ -392,14 +394,14 @@ fn the_first_order_takes_a_driven_base_into_account() {
             ];
             let case = lever((40.0, 5.0, "100 kHz"), (10.0, 11.5), &sample);
             let unit = 1e-9 / case.physical().unwrap().scales.length;
-            let options = ApproachOptions {
-                from: Some(12.0 * unit),
-                to: Some(11.5 * unit),
+            let options = FrequencyModulationOptions {
+                from: Some((12.0 * unit).into()),
+                to: Some((11.5 * unit).into()),
                 points: 2,
-                phase: Some(phase),
-                ..ApproachOptions::default()
+                phase: phase,
+                ..FrequencyModulationOptions::default()
             };
-            let report = approach(&case, &options, &Control::default()).unwrap();
+            let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
             let (_, found) = nearest(&report);
             found.relative_shift / found.first_order_shift.unwrap() - 1.0
         };
@@ -423,13 +425,13 @@ fn a_neck_at_drive_phase_0_loses_no_orbit() {
         "sample.work_of_adhesion=168.764 mJ/m^2",
     ];
     let case = lever((2.8 * MODAL, 10.6016, "75 kHz"), (30.0, 20.0), &neck);
-    let options = ApproachOptions {
-        to: Some(-10e-9 / case.physical().unwrap().scales.length),
+    let options = FrequencyModulationOptions {
+        to: Some((-10e-9 / case.physical().unwrap().scales.length).into()),
         points: 20,
-        phase: Some(68.7),
-        ..ApproachOptions::default()
+        phase: 68.7,
+        ..FrequencyModulationOptions::default()
     };
-    let report = approach(&case, &options, &Control::default()).unwrap();
+    let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
     let told = report.modulation.as_ref().unwrap();
     assert!(told.ended.is_empty() && told.jumps.is_empty(), "{told:?}");
     assert!(report.returned && report.hysteresis.is_empty());
@@ -475,8 +477,10 @@ fn what_cannot_be_held_is_refused() {
         phase: 90.0,
     };
     let request = serde_json::json!({"shift": "-50 Hz"});
-    let request: ApproachRequest = read(request).unwrap();
-    let refused = request.options(&case).unwrap_err().to_string();
+    let request: ApproachOptions = read(request).unwrap();
+    let refused = approach(&case, &request, &Control::default())
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("add fm"), "{refused}");
     let free = FreeOscillation::of(&case, held).unwrap();
     // One mode at its tip lags by 90° at its own frequency, and the mode is the spring.

@@ -5,6 +5,7 @@ use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::map::Map;
 use nanotap::study::branch::{BranchOptions, branch};
+use nanotap::study::value::Interval;
 
 /// Over a water bridge a period-3 motion forms one in two periods of three. It ends upwards where
 /// the tip begins to reach the film on the sample in the third, and downwards where it no longer
@@ -75,7 +76,7 @@ fn a_branch_goes_on_where_a_neck_forms_at_drive_phase_0() {
     let key = Key::find("gap.tip").unwrap();
     let frequency = Key::find("drive.frequency").unwrap();
     let options = BranchOptions {
-        second: Some((frequency, 74.8e3, 75.2e3)),
+        second: Some(Interval::of_key(frequency, 74.8e3, 75.2e3)),
         ..BranchOptions::over(key, 18.5e-9, 22e-9)
     };
     let up = branch(&case, &options, &Control::default()).unwrap();

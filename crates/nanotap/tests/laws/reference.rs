@@ -7,8 +7,6 @@ use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 
-use nanotap_dynamics::StartBox;
-
 use crate::common::{DMT, EV, HERTZ, air, lever};
 
 /// The orbit of `case` near amplitude `a` (nm) and phase `phase` (degrees): with one mode the
@@ -179,7 +177,9 @@ fn a_census_finds_the_two_stable_orbits() {
     let speed = size * model.frequency();
     let options = AttractorsOptions {
         starts: Some(16),
-        start_box: Some(StartBox::new(vec![-size, -speed], vec![size, speed]).unwrap()),
+        sides: [("a1", -size, size), ("v1", -speed, speed)]
+            .into_iter()
+            .collect(),
         ..AttractorsOptions::default()
     };
     let found = attractors(&model, &options, &Control::default()).unwrap();

@@ -4,11 +4,11 @@ use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::observe::{Derivative, Observables, Set, Value, measure};
-use nanotap::study::FreeMotion;
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::solve_setpoint;
 use nanotap::study::value::Axes;
-use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap::study::window::{Condition, Window, WindowOptions};
+use nanotap::study::{Computation as _, FreeMotion};
 
 use crate::common::{DMT, EV, lever};
 
@@ -57,15 +57,15 @@ fn a_setpoint_is_met_at_its_distances() {
 #[test]
 fn a_window_over_a_sample_that_attracts() {
     let case = quick(10.0, 9.0, &DMT);
-    let request = WindowRequest {
+    let options = WindowOptions {
         over: Axes(vec![
             "drive.frequency=99kHz:101kHz:2".to_owned(),
             "gap.tip=5nm:14nm:4".to_owned(),
         ]),
         starts: 4,
-        ..WindowRequest::default()
+        ..WindowOptions::default()
     };
-    let sweep = request.sweep(&case).unwrap();
+    let sweep = options.sweep(&case).unwrap();
     let folder = std::env::temp_dir().join(format!("nanotap-window-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
@@ -76,7 +76,7 @@ fn a_window_over_a_sample_that_attracts() {
     };
     sweep.compute(&store, &how).unwrap();
     let window = Window::of(&store).unwrap();
-    let [frequency, gap] = [0, 1].map(|k| sweep.options().over[k].key);
+    let [frequency, gap] = [0, 1].map(|k| sweep.over()[k].key);
     let mut seen = Vec::new();
     for (row, &y) in window.conditions.iter().zip(&window.y) {
         for (condition, &x) in row.iter().zip(&window.x) {

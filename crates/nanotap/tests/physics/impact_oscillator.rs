@@ -8,6 +8,7 @@ use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::{Set, measure};
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::study::value::Interval;
 use nanotap_flow::Trajectory;
 
 fn rigid(omega: f64, restitution: f64) -> Oscillator {
@@ -381,7 +382,7 @@ fn grazing_is_named_from_both_sides_and_followed_in_two_parameters() {
             1.0,
         ));
         let options = BranchOptions {
-            second: Some((second, low, high)),
+            second: Some(Interval::of_key(second, low, high)),
             ..BranchOptions::over(first, from, to)
         };
         let report = branch(&base, &options, &Control::default()).unwrap();
@@ -422,7 +423,7 @@ fn a_cascade_is_followed_to_its_end() {
         ..rigid(2.0, 0.8)
     };
     let options = BranchOptions {
-        doublings: 6,
+        switch: Some(6),
         max_step: 0.01,
         ..BranchOptions::over(Key::OscillatorOmega, 2.0, 2.74)
     };

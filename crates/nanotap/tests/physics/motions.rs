@@ -1,5 +1,6 @@
 //! Which motions there are, and where they change: the analysis joined to the model.
 
+use nanotap::ErrorKind;
 use nanotap::case::{Case, Key, PlaneFamily};
 use nanotap::control::Control;
 use nanotap::model::Model;
@@ -12,7 +13,7 @@ use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::lyapunov::{LyapunovOptions, Section, lyapunov, section};
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap::study::simulate::{Classification, SimulateError, SimulateOptions, simulate};
+use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 use nanotap::study::start_box::default_box;
 use nanotap_dynamics::{
     AttractorKind, CensusOptions, DMatrix, Scheduling as _, StartOutcome, StroboscopicMap as _,
@@ -295,7 +296,7 @@ fn exponents_stop_when_they_are_to() {
             ..LyapunovOptions::default()
         };
         let stopped = lyapunov(&model, &options, &control);
-        assert!(matches!(stopped, Err(SimulateError::Stopped)));
+        assert_eq!(stopped.unwrap_err().kind, ErrorKind::Stopped);
     }
 }
 

@@ -1,11 +1,13 @@
 //! Basins on slices.
 
+use nanotap::ErrorKind;
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::basin::figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::strobe::Strobe;
-use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, shares};
+use nanotap::study::Computation as _;
+use nanotap::study::basin::{Basin, BasinOptions, SliceRange, shares};
 use nanotap_dynamics::{CancelFlag, ClassifyOptions, Control, MotionKind, classify};
 
 use crate::folder::{Folder, assert_same};
@@ -19,11 +21,9 @@ fn bistable() -> Case {
 }
 
 fn slice(nx: usize, ny: usize) -> BasinOptions {
-    let x = SliceRange::parse(&format!("a1=-1:1:{nx}")).unwrap();
-    let y = SliceRange::parse(&format!("v1=-4:4:{ny}")).unwrap();
     BasinOptions {
         starts: 24,
-        ..BasinOptions::new(x, y)
+        ..BasinOptions::over(&format!("a1=-1:1:{nx}"), &format!("v1=-4:4:{ny}"))
     }
 }
 
@@ -201,9 +201,8 @@ fn bad_slices_are_refused() {
         let error = SliceRange::parse(given).unwrap_err();
         assert!(error.to_string().contains(&format!("`{given}`")), "{error}");
     }
-    let range = |text| SliceRange::parse(text).unwrap();
     let refused = |x, y, change: &dyn Fn(&mut BasinOptions)| {
-        let mut options = BasinOptions::new(range(x), range(y));
+        let mut options = BasinOptions::over(x, y);
         change(&mut options);
         Basin::new(&bistable(), &options, &Control::default())
             .unwrap_err()
@@ -243,6 +242,6 @@ fn bad_slices_are_refused() {
         cancel: Some(&cancel),
         progress: None,
     };
-    let stopped = Basin::new(&bistable(), &slice(5, 5), &control);
-    assert!(matches!(stopped, Err(BasinError::Cancelled)));
+    let stopped = Basin::new(&bistable(), &slice(5, 5), &control).unwrap_err();
+    assert_eq!(stopped.kind, ErrorKind::Stopped);
 }

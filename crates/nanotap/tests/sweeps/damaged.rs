@@ -8,7 +8,8 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Work, table};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Over, Sweep, SweepOptions, summary};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Summary, Sweep, SweepOptions};
 use nanotap_dynamics::Control;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -21,8 +22,7 @@ fn small(path: &Path) {
         modes: 1,
         ..Cantilever::paper()
     });
-    let over = vec![Over::parse("omega=18:20:2", &subject).unwrap()];
-    let sweep = Sweep::new(subject, SweepOptions::new(over)).unwrap();
+    let sweep = Sweep::new(&subject, SweepOptions::over(["omega=18:20:2"])).unwrap();
     let store = Store::create_or_resume(path, sweep.schema().clone()).unwrap();
     let work = Work {
         share: Share::WHOLE,
@@ -44,8 +44,31 @@ fn read(path: &Path) {
             let _ = store.read_chunk(&block, variable);
         }
     }
-    let _ = summary(&store);
+    let _ = Summary::of(&store);
     let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
+}
+
+/// A store is not written through a symbolic link in it: the link's target stays as it was.
+#[cfg(unix)]
+#[test]
+fn links_inside_a_store_are_refused() {
+    let folder = Folder::new();
+    let store = folder.join("links.zarr");
+    small(&store);
+    let target = folder.join("elsewhere");
+    std::fs::write(&target, "untouched").unwrap();
+    let chunk = store.join("period").join("0.0");
+    let chunk = if chunk.exists() {
+        chunk
+    } else {
+        store.join("period").join("0")
+    };
+    std::fs::remove_file(&chunk).unwrap();
+    std::os::unix::fs::symlink(&target, &chunk).unwrap();
+    let schema = Store::open(&store).unwrap().schema().clone();
+    let refused = Store::create_or_resume(&store, schema).unwrap_err();
+    assert!(refused.to_string().contains("symbolic link"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
 }
 
 /// What somebody may write in place of a value.
@@ -164,6 +187,6 @@ fn the_whole_one_is_read() {
     let path = folder.join("data");
     let store = Store::open(&path).unwrap();
     store.require_all().unwrap();
-    assert_eq!(summary(&store).unwrap().runs % 2, 0);
+    assert_eq!(Summary::of(&store).unwrap().runs % 2, 0);
     assert!(files.contains_key(Path::new(".zmetadata")));
 }

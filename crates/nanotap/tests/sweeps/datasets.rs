@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Follow, Summary, Sweep, SweepOptions};
 use nanotap_dynamics::{CancelFlag, Control};
 
 use crate::folder::{Folder, assert_same, bytes};
@@ -14,19 +15,15 @@ use crate::folder::{Folder, assert_same, bytes};
 /// 24 values of Ω × 3 starts, cut into 24 chunks.
 fn sweep(follow: Follow) -> Sweep {
     let subject = Case::from(Cantilever::paper());
-    let over = vec![Over::parse("omega=2.8:3.2:24", &subject).unwrap()];
     let options = SweepOptions {
-        starts: Starts::Seeded {
-            count: 3,
-            seed: 7,
-            sides: Vec::new(),
-        },
+        starts: Some(3),
+        seed: 7,
         follow,
         periods: 8,
-        strobe: 3,
-        ..SweepOptions::new(over)
+        strobe: Some(3),
+        ..SweepOptions::over(["omega=2.8:3.2:24"])
     };
-    Sweep::new(subject, options).unwrap()
+    Sweep::new(&subject, options).unwrap()
 }
 
 fn how(threads: usize) -> Work<'static> {
@@ -123,7 +120,7 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     };
     assert!(finished >= 8 && finished < total, "{finished} of {total}");
     assert!(matches!(
-        summary(&store),
+        Summary::of(&store),
         Err(StoreError::Unfinished { .. })
     ));
 
@@ -210,27 +207,24 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
     let path = folder.join("store");
     let sweep = sweep(Follow::Off);
     Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
-    let other = |case: Cantilever, starts: Starts| {
+    let other = |case: Cantilever, starts, seed| {
         let options = SweepOptions {
-            starts,
+            starts: Some(starts),
+            seed,
             ..sweep.options().clone()
         };
-        let other = Sweep::new(Case::from(case), options).unwrap();
+        let other = Sweep::new(&Case::from(case), options).unwrap();
         Store::create_or_resume(&path, other.schema().clone())
             .unwrap_err()
             .to_string()
-    };
-    let seeded = |seed| Starts::Seeded {
-        count: 3,
-        seed,
-        sides: Vec::new(),
     };
     let message = other(
         Cantilever {
             alpha4: 25.0,
             ..Cantilever::paper()
         },
-        seeded(7),
+        3,
+        7,
     );
     assert!(
         message.contains("case.alpha4: 20.0 there, 25.0 here"),
@@ -240,16 +234,9 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         !message.contains("alpha6") && !message.contains("seed"),
         "{message}"
     );
-    let message = other(Cantilever::paper(), seeded(8));
+    let message = other(Cantilever::paper(), 3, 8);
     assert!(message.contains("seed: 7 there, 8 here"), "{message}");
-    let message = other(
-        Cantilever::paper(),
-        Starts::Seeded {
-            count: 4,
-            seed: 7,
-            sides: Vec::new(),
-        },
-    );
+    let message = other(Cantilever::paper(), 4, 7);
     assert!(
         message.contains("sweep.starts.count: 3 there, 4 here"),
         "{message}"
@@ -257,7 +244,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
 
     // The case's own value of the parameter that varies does not matter.
     let same = Sweep::new(
-        Case::from(Cantilever {
+        &Case::from(Cantilever {
             omega: 9.0,
             ..Cantilever::paper()
         }),
@@ -271,7 +258,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         periods: 9,
         ..sweep.options().clone()
     };
-    let longer = Sweep::new(Case::from(Cantilever::paper()), options).unwrap();
+    let longer = Sweep::new(&Case::from(Cantilever::paper()), options).unwrap();
     Store::create_or_resume(&second, longer.schema().clone()).unwrap();
     let message = merge(&[path.clone(), second], &folder.join("m"))
         .unwrap_err()

@@ -3,10 +3,11 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::dataset::{Share, Store, Work};
+use nanotap::study::Computation as _;
 use nanotap::study::FreeMotion;
-use nanotap::study::sweep::{SweepRequest, from_neighbours};
+use nanotap::study::sweep::{Sweep, SweepOptions, from_neighbours};
 use nanotap::study::value::Axes;
-use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap::study::window::{Condition, Window, WindowOptions};
 use nanotap_dynamics::Control;
 
 use crate::folder::Folder;
@@ -38,19 +39,19 @@ fn no_window_calls_a_bistable_point_safe() {
          [sample]\nmaterial = \"polystyrene\"\nloss_tangent = 0.1\n\
          [drive]\nfrequency_ratio = 1.001\nfree_amplitude = \"20 nm\"\n[gap]\ntip = \"15 nm\"\n",
     );
-    let request = WindowRequest {
+    let options = WindowOptions {
         over: Axes(vec![
             "drive.frequency=325kHz:335kHz:7".to_owned(),
             "gap.tip=2nm:25nm:12".to_owned(),
         ]),
-        ..WindowRequest::default()
+        ..WindowOptions::default()
     };
-    let sweep = request.sweep(&lever).unwrap();
+    let sweep = options.sweep(&lever).unwrap();
     let folder = Folder::new();
     let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
     sweep.compute(&store, &how()).unwrap();
     let window = Window::of(&store).unwrap();
-    let [frequency, gap] = [0, 1].map(|k| sweep.options().over[k].key);
+    let [frequency, gap] = [0, 1].map(|k| sweep.over()[k].key);
     let mut safe = 0;
     for (row, &y) in window.conditions.iter().zip(&window.y) {
         for (condition, &x) in row.iter().zip(&window.x) {
@@ -74,13 +75,12 @@ fn a_sweep_hands_on_what_one_value_found() {
         "[model]\nmodes = 3\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\nalpha4 = 20.0\n\
          alpha5 = 0.0\nalpha6 = 0.2\nomega = 3.0\n",
     );
-    let request = SweepRequest {
-        over: Axes(vec!["omega=3.115:3.175:13".to_owned()]),
+    let options = SweepOptions {
         starts: Some(12),
         periods: 3,
-        ..SweepRequest::default()
+        ..SweepOptions::over(["omega=3.115:3.175:13"])
     };
-    let sweep = request.sweep(&paper).unwrap();
+    let sweep = Sweep::new(&paper, options).unwrap();
     let folder = Folder::new();
     let store = Store::create_or_resume(&folder.join("sweep"), sweep.schema().clone()).unwrap();
     sweep.compute(&store, &how()).unwrap();

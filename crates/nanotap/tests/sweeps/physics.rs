@@ -5,10 +5,9 @@ use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::sweep::figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::study::Computation as _;
 use nanotap::study::orbit::OrbitOptions;
-use nanotap::study::sweep::{
-    Follow, Over, Starts, Summary, Sweep, SweepError, SweepOptions, summary,
-};
+use nanotap::study::sweep::{Follow, Summary, Sweep, SweepOptions};
 use nanotap_dynamics::Control;
 
 use crate::folder::Folder;
@@ -21,17 +20,12 @@ struct Swept {
 
 impl Swept {
     fn of(subject: &Case, over: &[&str], change: impl FnOnce(&mut SweepOptions)) -> Self {
-        let over = over
-            .iter()
-            .map(|o| Over::parse(o, subject).unwrap())
-            .collect();
         let mut options = SweepOptions {
             periods: 20,
-            strobe: 20,
-            ..SweepOptions::new(over)
+            ..SweepOptions::over(over.iter().copied())
         };
         change(&mut options);
-        let sweep = Sweep::new(subject.clone(), options).unwrap();
+        let sweep = Sweep::new(subject, options).unwrap();
         let folder = Folder::new();
         let store = Store::create_or_resume(&folder.join("s"), sweep.schema().clone()).unwrap();
         let control = Control::default();
@@ -91,7 +85,7 @@ impl Swept {
     }
 
     fn summary(&self) -> Summary {
-        summary(&self.store).unwrap()
+        Summary::of(&self.store).unwrap()
     }
 }
 
@@ -101,14 +95,6 @@ fn paper(omega: f64, alpha1: f64) -> Case {
         alpha1,
         ..Cantilever::paper()
     })
-}
-
-fn seeded(count: usize) -> Starts {
-    Starts::Seeded {
-        count,
-        seed: 1,
-        sides: Vec::new(),
-    }
 }
 
 /// Period 1 doubles at Ω = 2.9137224181 (the project's list of numbers, N = 3, Eq. 26):
@@ -166,7 +152,7 @@ fn the_orbit_at_three_is_recorded_as_it_is() {
 #[test]
 fn seeded_starts_find_what_coexists() {
     let subject = paper(20.0, 0.0);
-    let swept = Swept::of(&subject, &["alpha1=0:0.1:2"], |o| o.starts = seeded(12));
+    let swept = Swept::of(&subject, &["alpha1=0:0.1:2"], |o| o.starts = Some(12));
     let summary = swept.summary();
     assert_eq!(summary.counts["periodic"], 24, "{summary:?}");
     let (periods, tops, bottoms) = (
@@ -194,7 +180,7 @@ fn seeded_starts_find_what_coexists() {
 #[test]
 fn chaos_is_called_so_with_its_exponent() {
     let swept = Swept::of(&paper(2.6, 0.1), &["omega=2.6:2.6:1"], |o| {
-        o.starts = seeded(4);
+        o.starts = Some(4);
     });
     assert_eq!(swept.summary().counts["chaotic"], 4);
     let (values, errors) = (swept.column("lyapunov"), swept.column("lyapunov_error"));
@@ -214,7 +200,7 @@ fn a_given_transient_is_run_as_given() {
     let subject = paper(2.6, 0.1);
     let swept = Swept::of(&subject, &["omega=2.6:2.6:1"], |o| {
         o.transient = Some(7);
-        o.starts = Starts::Given(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]);
+        o.state = Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]);
     });
     let model = subject.model().unwrap();
     let run = nanotap::study::simulate::simulate(
@@ -243,8 +229,8 @@ fn following_keeps_to_its_motion() {
     let subject = paper(20.0, 0.0);
     // A state that leads to the period-4 orbit, from the seeded starts.
     let seeds = Swept::of(&subject, &["alpha1=0:0:1"], |o| {
-        o.starts = seeded(12);
-        o.strobe = 1;
+        o.starts = Some(12);
+        o.strobe = Some(1);
     });
     let on_four = seeds
         .column("period")
@@ -254,7 +240,7 @@ fn following_keeps_to_its_motion() {
     let state = seeds.row("strobe", &[0, on_four]);
     let both = Swept::of(&subject, &["alpha2=0.1:0.12:5"], |o| {
         o.follow = Follow::Both;
-        o.starts = Starts::Given(state);
+        o.state = Some(state);
     });
     // α5 = 0: the model is homogeneous, so the motion scales with α2 and stays period 4
     // wherever the start leads there; upwards it is followed from its own orbit.
@@ -338,72 +324,50 @@ fn pictures_are_drawn() {
 #[test]
 fn impossible_sweeps_are_refused_before_anything_is_computed() {
     let subject = paper(2.6, 0.1);
-    let over = |text: &str| Over::parse(text, &subject).unwrap();
-    let refused = |over: Vec<Over>, change: &dyn Fn(&mut SweepOptions)| -> String {
-        let mut options = SweepOptions::new(over);
+    let refused = |over: &[&str], change: &dyn Fn(&mut SweepOptions)| -> String {
+        let mut options = SweepOptions::over(over.iter().copied());
         change(&mut options);
-        Sweep::new(subject.clone(), options)
-            .unwrap_err()
-            .to_string()
+        Sweep::new(&subject, options).unwrap_err().to_string()
     };
-    let omega = || vec![over("omega=2:4:10")];
+    let omega = || &["omega=2:4:10"];
     let keep = |_: &mut SweepOptions| {};
     for (message, word) in [
-        (refused(vec![], &keep), "one or two"),
+        (refused(&[], &keep), "one or two"),
+        (refused(&["omega=2:3:2", "omega=3:4:2"], &keep), "twice"),
         (
-            refused(vec![over("omega=2:3:2"), over("omega=3:4:2")], &keep),
-            "twice",
-        ),
-        (
-            refused(
-                vec![
-                    over("omega=2:3:2"),
-                    over("alpha1=0:1:2"),
-                    over("alpha2=0:1:2"),
-                ],
-                &keep,
-            ),
+            refused(&["omega=2:3:2", "alpha1=0:1:2", "alpha2=0:1:2"], &keep),
             "one or two",
         ),
-        (refused(vec![over("alpha4=-5:5:3")], &keep), "alpha4 = -5"),
-        (refused(vec![over("omega=0:4:3")], &keep), "`omega` = 0"),
+        (refused(&["alpha4=-5:5:3"], &keep), "alpha4 = -5"),
+        (refused(&["omega=0:4:3"], &keep), "`omega` = 0"),
         (refused(omega(), &|o| o.periods = 0), "0 periods"),
         (refused(omega(), &|o| o.max_period = 0), "longest period"),
-        (refused(omega(), &|o| o.starts = seeded(0)), "0 starts"),
+        (refused(omega(), &|o| o.starts = Some(0)), "0 starts"),
         (
-            refused(omega(), &|o| o.starts = Starts::Given(vec![0.0; 5])),
+            refused(omega(), &|o| o.state = Some(vec![0.0; 5])),
             "5 numbers where 6",
         ),
         (
-            refused(omega(), &|o| o.starts = Starts::Given(vec![f64::NAN; 6])),
+            refused(omega(), &|o| o.state = Some(vec![f64::NAN; 6])),
             "finite",
         ),
         (
             refused(omega(), &|o| {
-                let sides = vec![("a4".into(), 0.0, 1.0)];
-                o.starts = Starts::Seeded {
-                    count: 2,
-                    seed: 1,
-                    sides,
-                };
+                o.starts = Some(2);
+                o.sides = [("a4", 0.0, 1.0)].into_iter().collect();
             }),
             "a1, a2, a3",
         ),
         (
-            refused(vec![over("modes=1:3:3")], &|o| {
-                o.starts = Starts::Given(vec![0.0; 6]);
+            refused(&["modes=1:3:3"], &|o| {
+                o.state = Some(vec![0.0; 6]);
             }),
             "number of modes",
         ),
         (refused(omega(), &|o| o.periods = 1 << 40), "too many"),
+        (refused(omega(), &|o| o.periods = 90_000_000), "GiB"),
         (
-            refused(omega(), &|o| {
-                (o.periods, o.strobe) = (90_000_000, 90_000_000);
-            }),
-            "GiB",
-        ),
-        (
-            refused(vec![over("omega=2:4:100000")], &|o| {
+            refused(&["omega=2:4:100000"], &|o| {
                 o.follow = Follow::Up;
                 o.periods = 10_000;
             }),
@@ -412,12 +376,6 @@ fn impossible_sweeps_are_refused_before_anything_is_computed() {
     ] {
         assert!(message.contains(word), "{word}: {message}");
     }
-    let many = Sweep::new(
-        subject.clone(),
-        SweepOptions {
-            starts: seeded(usize::MAX),
-            ..SweepOptions::new(omega())
-        },
-    );
-    assert!(matches!(many, Err(SweepError::TooMuch { .. })));
+    let many = refused(omega(), &|o| o.starts = Some(usize::MAX));
+    assert!(many.contains("too many"), "{many}");
 }

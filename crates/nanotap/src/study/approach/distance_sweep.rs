@@ -217,7 +217,7 @@ impl<'a> DistanceSweep<'a> {
         let far = if swings { far.max(BEYOND * reach) } else { far };
         let sweep = SweepOptions {
             max_period,
-            ..SweepOptions::new(Vec::new())
+            ..SweepOptions::default()
         };
         let model = case.with(case.gap_key(), far).model()?;
         // The slowest decay of the free lever, by its trace.

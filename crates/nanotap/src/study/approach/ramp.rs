@@ -4,7 +4,8 @@
 use nanotap_dynamics::{Control, StroboscopicMap as _};
 
 use super::quasistatic::MOVING;
-use super::{ApproachError, ApproachPoint, Curve, Way};
+use super::{ApproachPoint, Curve, Way};
+use crate::Error;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::{PhysicalMotion, Set, measure};
@@ -20,17 +21,20 @@ pub(super) fn ramp(
     distances: &[f64],
     start: &[f64],
     control: &Control<'_>,
-) -> Result<Vec<ApproachPoint>, ApproachError> {
+) -> Result<Vec<ApproachPoint>, Error> {
     let case = curve.case;
     let model = |gap: f64| case.with(case.gap_key(), gap).model();
     let step = speed * model(distances[0])?.system.drive().period();
     let span = distances[0] - distances[distances.len() - 1];
     let needed = 2.0 * span / step;
     if needed.is_nan() || needed > MAX_PERIODS as f64 {
-        return Err(ApproachError::Slow {
-            needed,
-            most: MAX_PERIODS,
-        });
+        return Err(Error::input(
+            format!(
+                "at this speed the lever takes {needed:.3e} drive periods there and back; \
+                 {MAX_PERIODS} are followed at most"
+            ),
+            "raise {speed}, or leave it away: the lever then settles at each distance",
+        ));
     }
     let there = distances.iter().map(|&gap| (Way::Approach, gap));
     let back = distances.iter().rev().map(|&gap| (Way::Retract, gap));
@@ -41,7 +45,10 @@ pub(super) fn ramp(
         .windows(2)
         .any(|pair| whole(pair[0]) == whole(pair[1]))
     {
-        return Err(ApproachError::Fast);
+        return Err(Error::input(
+            "at this speed less than a drive period passes between two written distances",
+            "lower {speed} or {points}",
+        ));
     }
     let mut state = start.to_vec();
     let mut before = distances[0];
@@ -61,7 +68,8 @@ pub(super) fn ramp(
             let share = k as f64 / periods as f64;
             let at = before * (1.0 - share) + gap * share;
             let here = model(at)?;
-            let failed = |error| ApproachError::Flow { gap: at, error };
+            let failed =
+                |error: MotionError| Error::numerics(format!("at the distance {at}: {error}"));
             if k == periods {
                 table.push(row(curve, way, gap, &here, &state).map_err(failed)?);
             }

@@ -74,7 +74,7 @@ impl Along<'_> {
         rows
     }
 
-    /// The orbits at every row that continue those found beside other parameters; `None` where one
+    /// The orbits at every row that continue those found at other parameters; `None` where one
     /// of them has no continuation.
     pub(super) fn continued_from(&self, before: &Rows) -> Option<Rows> {
         let row = |(place, candidates): (&Vec<f64>, &Vec<Candidate>)| {

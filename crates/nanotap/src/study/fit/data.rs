@@ -4,7 +4,7 @@
 //! which its rows then set, or by an observable, by either of its names (`phase`, `E_dis (eV)`).
 //! What experimenters say is understood: `distance` and `zc` are the gap between tip and sample,
 //! `frequency` is that of the drive, and `amplitude` is what a lock-in amplifier reads, unless
-//! the table has that under a name of its own (then it is, as everywhere, half of peak to peak).
+//! the table has that under another name (then it is, as everywhere, half of peak to peak).
 //! `NAME error (unit)` holds standard errors, `direction` which way the abscissa went, `curve`
 //! to which curve a row belongs.
 //!
@@ -133,17 +133,17 @@ impl Data {
                 "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
             ));
         }
-        let besides = data
+        let observed = data
             .columns
             .iter()
             .find(|c| c.quantity.observable().is_some());
-        if let (true, Some(besides)) = (data.is_modulated(), besides) {
+        if let (true, Some(observed)) = (data.is_modulated(), observed) {
             return Err(Error::option(
                 "data",
                 format!(
                     "`{}` stands beside a curve under frequency modulation, which holds amplitude \
                      and phase",
-                    besides.name
+                    observed.name
                 ),
                 "name the {columns} that count: frequency_shift, drive_ratio",
             ));

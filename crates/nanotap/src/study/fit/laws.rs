@@ -1,7 +1,7 @@
 //! The same data under several contact laws.
 
 use super::report::{ComparedLaw, FitReport};
-use super::{FitRequest, fit_one, names};
+use super::{FitOptions, fit_one, names};
 use crate::Error;
 use crate::case::under_law::LawName;
 use crate::case::{Case, Key};
@@ -14,7 +14,7 @@ const DECIDED: f64 = 10.0;
 /// Fits each law of the request; the report is that of the best, with all of them in `laws`.
 pub(super) fn compare(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     control: &Control<'_>,
 ) -> Result<FitReport, Error> {
     let laws = names(&request.laws)
@@ -51,7 +51,7 @@ pub(super) fn compare(
                 let all = names(given).into_iter();
                 all.filter(|name| takes(law, name)).collect()
             };
-            let mut request = FitRequest {
+            let mut request = FitOptions {
                 laws: Vec::new(),
                 free: of_law(&request.free),
                 per_curve: of_law(&request.per_curve),
@@ -93,7 +93,7 @@ fn takes(law: &LawName, name: &str) -> bool {
 }
 
 /// Where keys begin that the case does not state: in the middle of their bounds.
-fn middles(request: &FitRequest) -> Vec<(Key, f64)> {
+fn middles(request: &FitOptions) -> Vec<(Key, f64)> {
     let middle = |bound: &crate::study::value::Interval| {
         let key = Key::find(&bound.name)?;
         let read = |text: &str| key.kind().parse(text).ok();

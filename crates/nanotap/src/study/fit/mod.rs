@@ -53,7 +53,7 @@ use solve::LeastSquares as _;
 
 use crate::Error;
 use crate::case::Case;
-use crate::study::kind::Study;
+use crate::study::Study;
 use crate::study::setpoint::at_setpoint;
 use crate::study::value::Intervals;
 
@@ -62,10 +62,10 @@ const MOST_STARTS: usize = 1000;
 /// Longest period of the orbits.
 const MOST_PERIOD: usize = 64;
 
-/// What a fit is asked for.
+/// Options of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct FitRequest {
+pub struct FitOptions {
     /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
     /// `phase (deg)`
     #[schemars(extend("x-own" = true))]
@@ -105,7 +105,7 @@ pub struct FitRequest {
     pub profile: bool,
 }
 
-impl Default for FitRequest {
+impl Default for FitOptions {
     fn default() -> Self {
         Self {
             data: Vec::new(),
@@ -134,12 +134,12 @@ impl Study for FitStudy {
     const COUNTED: &'static str = "starts";
     const ANY_DISTANCE: bool = true;
     const PARTIAL: bool = true;
-    type Request = FitRequest;
+    type Options = FitOptions;
     type Report = FitReport;
 
     fn compute(
         case: &Case,
-        request: &FitRequest,
+        request: &FitOptions,
         control: &Control<'_>,
     ) -> Result<FitReport, Error> {
         fit(case, request, control)
@@ -150,7 +150,7 @@ impl Study for FitStudy {
 ///
 /// # Errors
 /// When the data or the parameters are not understood, or no orbit is found where the data are.
-pub fn fit(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
     if names(&request.laws).is_empty() {
         fit_one(case, request, control)
     } else {
@@ -159,7 +159,7 @@ pub fn fit(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<F
 }
 
 /// The same under the law that the case has.
-fn fit_one(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
     #[expect(
         clippy::redundant_closure_for_method_calls,
         reason = "the method itself is not general enough in its lifetime"
@@ -170,7 +170,7 @@ fn fit_one(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<F
 /// Does `work` on the data and parameters of a request.
 fn with_search<R>(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     control: &Control<'_>,
     work: impl FnOnce(&Search<'_>) -> Result<R, Error>,
 ) -> Result<R, Error> {
@@ -225,7 +225,7 @@ pub struct Residuals {
 /// As [`fit`], and when there are not as many values as parameters or no derivatives there.
 pub fn residuals(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     values: &[f64],
     control: &Control<'_>,
 ) -> Result<Residuals, Error> {
@@ -249,7 +249,7 @@ pub fn residuals(
     })
 }
 
-/// Names, of which several may stand in one text.
+/// Names; one text may have several, separated by commas.
 fn names(given: &[String]) -> Vec<String> {
     let parts = given.iter().flat_map(|text| text.split(','));
     let names = parts.map(str::trim).filter(|name| !name.is_empty());

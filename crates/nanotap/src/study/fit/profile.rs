@@ -25,7 +25,7 @@ pub(super) enum Profile {
 }
 
 /// The intervals of half-width `width` in standard errors, unless chi2 is lower by more than
-/// `deeper` beside them.
+/// `deeper` next to them.
 pub(super) fn profile(
     problem: &Problem<'_>,
     best: &Solution<Point>,

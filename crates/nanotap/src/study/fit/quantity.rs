@@ -1,5 +1,5 @@
-//! What a column of measured values is: an observable of the motion, or what a loop of frequency
-//! modulation tells.
+//! What a column of measured values is: an observable of the motion, or a number of
+//! frequency modulation.
 
 use crate::case::physical::Kind;
 use crate::observe::{Dimension, OBSERVABLES, Observable};
@@ -14,8 +14,8 @@ pub enum Quantity {
     Modulated(&'static ModulatedColumn),
 }
 
-/// What an instrument under frequency modulation records; the other columns of the study are
-/// formulas that stand beside it.
+/// What an instrument under frequency modulation records; the other columns of the study
+/// are formulas to compare with.
 const RECORDED: [&str; 4] = [
     "frequency_shift",
     "relative_shift",

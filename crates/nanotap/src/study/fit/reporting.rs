@@ -18,7 +18,7 @@ use super::report::{
 use super::search::{Found, Search, UNLIKELY, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
 
-/// What chi2 may be lower beside the best values.
+/// By how much chi2 may be lower near the best values.
 const DEEPER: f64 = 0.1;
 /// Times that a fit goes on from where its profile found a lower chi2.
 const DEEPER_ROUNDS: usize = 4;
@@ -152,7 +152,7 @@ impl Search<'_> {
         information(&found.solution.jacobian, &sizes)
     }
 
-    /// The intervals of the parameters. Where chi2 is found to be lower beside the best values than
+    /// The intervals of the parameters. Where chi2 is found to be lower near the best values than
     /// there, the fit goes on from that place.
     fn with_intervals(&self, mut found: Found) -> (Found, Vec<[Option<f64>; 2]>) {
         let mut rounds = DEEPER_ROUNDS;
@@ -399,10 +399,10 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     for (curve, rows) in found.candidates.iter().enumerate() {
         for (row, candidates) in rows.iter().enumerate() {
             let at = problem.place(x, curve, &data.curves[curve].rows[row]);
-            let besides = candidates
+            let others_here = candidates
                 .iter()
                 .filter(|c| c.branch != chosen[first + row]);
-            for candidate in besides {
+            for candidate in others_here {
                 let values = problem.values(x, curve, &at, candidate);
                 let Some(values) = values else { continue };
                 let columns = data.columns.iter().zip(values).enumerate();

@@ -1,7 +1,7 @@
 //! The search for the best values: a rough fit that finds the branches, a fine one in standard
 //! errors, other starts where nothing describes the data.
 
-use super::FitRequest;
+use super::FitOptions;
 use super::branches::Rows;
 use super::data::Data;
 use super::jumps::Jump;
@@ -15,7 +15,7 @@ use crate::control::Control;
 /// A fit at work.
 pub(super) struct Search<'a> {
     pub(super) problem: Problem<'a>,
-    pub(super) request: &'a FitRequest,
+    pub(super) request: &'a FitOptions,
     pub(super) control: &'a Control<'a>,
 }
 

@@ -1,5 +1,5 @@
 //! Curves under frequency modulation: at every row the orbit that has the amplitude and phase
-//! that the loop held, with the drive's frequency and strength as unknowns beside its state.
+//! that the loop held, with the drive's frequency and strength as unknowns in addition to its state.
 //!
 //! What such an instrument records is the frequency less that of the free lever, and the drive
 //! over the free lever's. Both change with a parameter as the equations of orbit, amplitude and
@@ -53,7 +53,7 @@ struct Free {
     frequency: f64,
     strength: f64,
     loss: f64,
-    /// How it changes with the keys that were asked for first: many rows ask for the same.
+    /// How it changes with the keys of the first request: many rows request the same.
     known: OnceLock<FreeChanges>,
 }
 
@@ -161,7 +161,7 @@ impl Loop {
         })
     }
 
-    /// What the free lever does beside a row.
+    /// The free lever at a row.
     fn free(case: &Case, held: Held) -> Option<Free> {
         let oscillation = FreeOscillation::of(case, held).ok()?;
         let sizes = Sizes::of(case)?;
@@ -177,7 +177,7 @@ impl Loop {
     }
 
     /// A row's place without the distance: where rows have it in common, the free lever is one.
-    fn besides_distance(problem: &Problem<'_>, at: &[f64]) -> Vec<f64> {
+    fn without_distance(problem: &Problem<'_>, at: &[f64]) -> Vec<f64> {
         let swept = problem.data.swept.iter().zip(at);
         swept
             .filter(|(swept, _)| !is_distance(swept.key))
@@ -216,15 +216,15 @@ impl Loop {
             let at = problem.place(x, curve, row);
             let case = problem.case_at(base, &at);
             let held = self.at(problem, x, &at, &case)?;
-            let besides = Self::besides_distance(problem, &at);
-            let known = free.take().filter(|(of, _)| *of == besides);
+            let rest = Self::without_distance(problem, &at);
+            let known = free.take().filter(|(of, _)| *of == rest);
             let of_row = match known {
                 Some((_, known)) => known,
                 None => Arc::new(Self::free(&case, held)?),
             };
-            free = Some((besides.clone(), Arc::clone(&of_row)));
+            free = Some((rest.clone(), Arc::clone(&of_row)));
             let gap = case.get(case.gap_key());
-            let from = last.as_ref().filter(|(of, ..)| *of == besides);
+            let from = last.as_ref().filter(|(of, ..)| *of == rest);
             let (far, start) = match from {
                 Some((_, before, driven)) => (*before, driven.clone()),
                 None => (
@@ -235,7 +235,7 @@ impl Loop {
             let mut walk = HeldWalk::new(&case, held, start, far);
             let Stepped { orbit, breaks } = walk.step(gap, &Control::default()).ok()?;
             branch += breaks.len();
-            last = Some((besides, gap, orbit.driven()));
+            last = Some((rest, gap, orbit.driven()));
             Self::seen(problem, &case, &of_row, orbit, branch)
         };
         let rows = problem.data.curves[curve].rows.iter();
@@ -252,9 +252,9 @@ impl Loop {
         branch: usize,
     ) -> Option<RowPoint> {
         let driven = orbit.driven();
-        let told = told(case, free, &driven)?;
+        let found = modulated(case, free, &driven)?;
         let columns = problem.data.columns.iter();
-        let values = columns.map(|column| (column.quantity.modulated()?.of)(&told));
+        let values = columns.map(|column| (column.quantity.modulated()?.of)(&found));
         Some(RowPoint {
             orbit: Some(orbit.orbit),
             lost: false,
@@ -304,7 +304,7 @@ impl Loop {
         }
     }
 
-    /// The free lever beside every row.
+    /// The free lever at every row.
     fn frees(self, problem: &Problem<'_>, x: &[f64], bases: &[Case]) -> Vec<Option<Arc<Free>>> {
         let mut known: Option<(usize, Vec<f64>, Option<Arc<Free>>)> = None;
         let mut all = Vec::new();
@@ -314,15 +314,15 @@ impl Loop {
                 continue;
             }
             let at = problem.place(x, curve, row);
-            let besides = Self::besides_distance(problem, &at);
+            let rest = Self::without_distance(problem, &at);
             let same = known
                 .take()
-                .filter(|(of, place, _)| *of == curve && *place == besides);
+                .filter(|(of, place, _)| *of == curve && *place == rest);
             let (_, _, free) = known.insert(same.unwrap_or_else(|| {
                 let case = problem.case_at(&bases[curve], &at);
                 let held = self.at(problem, x, &at, &case);
                 let free = held.and_then(|held| Self::free(&case, held));
-                (curve, besides, free.map(Arc::new))
+                (curve, rest, free.map(Arc::new))
             }));
             all.push(free.clone());
         }
@@ -348,7 +348,7 @@ impl Loop {
             }
             let mut by = of.direct(&point.values);
             for (key, weight) in effects {
-                let (driven, told) = &by_key[keys.iter().position(|other| other == key)?];
+                let (driven, found) = &by_key[keys.iter().position(|other| other == key)?];
                 let drive = [driven.frequency, driven.strength];
                 let changes = drive.iter().chain(&driven.state);
                 state
@@ -356,7 +356,7 @@ impl Loop {
                     .zip(changes)
                     .for_each(|(sum, part)| *sum += weight * part);
                 for (column, of) in columns.iter().enumerate() {
-                    let number = (of.quantity.modulated()?.of)(told)?;
+                    let number = (of.quantity.modulated()?.of)(found)?;
                     let zero = problem.read(x, curve, column, 0.0);
                     let scale = problem.read(x, curve, column, 1.0) - zero;
                     by[column] += weight * scale * number;
@@ -376,8 +376,8 @@ fn keys_of(effects: &[Effects]) -> Vec<Key> {
     keys
 }
 
-/// What a loop tells of a drive, in SI.
-fn told(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
+/// The numbers of frequency modulation of a drive, in SI.
+fn modulated(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
     let sizes = Sizes::of(case)?;
     let frequency = driven.frequency * sizes.frequency;
     let strength = driven.strength * sizes.strength;
@@ -399,7 +399,7 @@ fn told(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
 }
 
 impl HeldRow {
-    /// How drive and state, and what the loop tells, change with keys of the case.
+    /// How drive, state and the numbers of frequency modulation change with keys of the case.
     fn by(&self, keys: &[Key]) -> Option<Vec<(Driven, Modulated)>> {
         let (case, free) = (&self.case, &*self.free);
         let held = Held {
@@ -410,7 +410,7 @@ impl HeldRow {
         let at_row = amplitudes(case, held, keys)?;
         let changes = held.changes(case, self.driven.clone(), &at_row).ok()?;
         let of_free = free.changes(keys)?;
-        let told_here = told(case, free, &self.driven)?;
+        let here_now = modulated(case, free, &self.driven)?;
         let (sizes, free_sizes) = (Sizes::of(case)?, Sizes::of(&free.case)?);
         let one = |((key, change), (by, loss)): ((&Key, Driven), FreeChange)| {
             let (here, there) = (Sizes::by(case, *key)?, Sizes::by(&free.case, *key)?);
@@ -422,20 +422,20 @@ impl HeldRow {
                 by[0] * free_sizes.frequency + oscillation.frequency * there.frequency;
             let free_strength = by[1] * free_sizes.strength + oscillation.strength * there.strength;
             let shift = frequency - free_frequency;
-            let relative = (shift - told_here.relative_shift * free_frequency) / free.frequency;
-            let ratio = (strength - told_here.drive_ratio * free_strength) / free.strength;
-            let rest = told_here.drive_ratio - 1.0 - told_here.relative_shift;
+            let relative = (shift - here_now.relative_shift * free_frequency) / free.frequency;
+            let ratio = (strength - here_now.drive_ratio * free_strength) / free.strength;
+            let rest = here_now.drive_ratio - 1.0 - here_now.relative_shift;
             let loss = if rest == 0.0 { 0.0 } else { loss? };
-            let told = Modulated {
+            let found = Modulated {
                 drive_frequency: frequency,
                 drive_strength: strength,
                 frequency_shift: shift,
                 relative_shift: relative,
                 drive_ratio: ratio,
                 drive_dissipation: loss * rest + free.loss * (ratio - relative),
-                ..told_here
+                ..here_now
             };
-            Some((change, told))
+            Some((change, found))
         };
         keys.iter().zip(changes).zip(of_free).map(one).collect()
     }
@@ -484,7 +484,7 @@ impl Free {
         let value = self.case.get(key);
         let step = 1e-5 * if value == 0.0 { 1.0 } else { value.abs() };
         let amplitude = self.held.amplitude * Sizes::of(&self.case)?.length;
-        let beside = |side: f64| {
+        let at_side = |side: f64| {
             let case = self.case.with(key, value + side * step);
             let amplitude = if key == Key::DriveFreeAmplitude {
                 amplitude + side * step
@@ -497,7 +497,7 @@ impl Free {
             };
             Some(Loop::free(&case, held)?.loss)
         };
-        Some((beside(1.0)? - beside(-1.0)?) / (2.0 * step))
+        Some((at_side(1.0)? - at_side(-1.0)?) / (2.0 * step))
     }
 }
 

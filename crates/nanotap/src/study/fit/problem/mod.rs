@@ -33,7 +33,7 @@ pub(super) struct Problem<'a> {
     /// Residuals beyond this many standard errors count by their logarithm only (Cauchy's
     /// loss), so that rows on a branch that is not theirs yet do not lead astray.
     pub(super) robust: Option<f64>,
-    /// Jumps whose folds count beside the rows.
+    /// Jumps whose folds count in addition to the rows.
     pub(super) jumps: Vec<Jump>,
     /// What a loop of frequency modulation held.
     pub(super) held: Option<Loop>,
@@ -56,7 +56,7 @@ pub(super) struct RowPoint {
     /// All that is observed of it.
     pub(super) observables: Option<Box<Observables>>,
     /// Derivative of the state by every parameter, under frequency modulation of drive and state;
-    /// empty until it was asked for.
+    /// empty until requested.
     pub(super) states: Vec<Vec<f64>>,
     /// The case and its model; none where the orbit is lost.
     pub(super) at: Option<Arc<(Case, Model)>>,
@@ -181,12 +181,12 @@ impl Problem<'_> {
                 } else {
                     x[k].abs()
                 };
-            let beside = |side: f64| {
+            let at_side = |side: f64| {
                 let mut x = x.to_vec();
                 x[k] += side * step;
                 self.cases(&x)
             };
-            let (low, high) = (beside(-1.0), beside(1.0));
+            let (low, high) = (at_side(-1.0), at_side(1.0));
             for (curve, effects) in all.iter_mut().enumerate() {
                 let slope = (high[curve].get(strength) - low[curve].get(strength)) / (2.0 * step);
                 if key == Key::DriveFreeAmplitude {
@@ -619,7 +619,7 @@ impl Problem<'_> {
     }
 }
 
-/// Standard errors within which rows beside a jump must lie for it to count.
+/// Standard errors within which rows next to a jump must lie for it to count.
 const NEAR: f64 = 6.0;
 /// How far beyond the jump its fold is looked for, in lengths of the curve.
 const REACH: f64 = 0.5;

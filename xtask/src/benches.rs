@@ -193,7 +193,7 @@ speed                    fastest       │ slowest       │ median        │ m
     }
 
     #[test]
-    fn a_run_without_results_is_no_success() {
+    fn a_run_without_results_is_a_failure() {
         assert!(!succeeds_with_results(&[], true));
         assert!(!succeeds_with_results(&lines(), false));
     }

@@ -17,7 +17,7 @@ mod wheel;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use steps::{BESIDE, STEPS, Step};
+use steps::{OTHER_TASKS, STEPS, Step};
 use tally::Tally;
 use tools::Workspace;
 
@@ -81,7 +81,7 @@ fn select(arguments: &[String]) -> Result<Selection, String> {
             name => selected.push(
                 STEPS
                     .iter()
-                    .chain(BESIDE)
+                    .chain(OTHER_TASKS)
                     .find(|step| step.name == name)
                     .ok_or_else(|| format!("no task is called `{name}`"))?,
             ),
@@ -98,7 +98,7 @@ fn usage() -> String {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
     text.push_str("\n  other tasks:\n");
-    for step in BESIDE {
+    for step in OTHER_TASKS {
         let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
     }
     text += "  bench        run every bench and write docs/benches.md\n";

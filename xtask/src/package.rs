@@ -102,10 +102,13 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     }
     let mut trial = environment.program("python");
     // Outside of the checkout, whose own package would be found first.
-    let said = output(&folder, trial.args(["-c", TRIAL]));
+    let printed = output(&folder, trial.args(["-c", TRIAL]));
     println!(
         "{}",
-        said.as_deref().unwrap_or("the package does not run").trim()
+        printed
+            .as_deref()
+            .unwrap_or("the package does not run")
+            .trim()
     );
-    Ok(Tally::check(said.is_some()))
+    Ok(Tally::check(printed.is_some()))
 }

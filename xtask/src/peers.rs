@@ -81,7 +81,7 @@ fn environment(workspace: &Workspace) -> Result<PathBuf, String> {
             package,
         ]);
         if !succeeds(&workspace.root, &mut install)? {
-            println!("going on without {package}");
+            println!("continuing without {package}");
         }
     }
     std::fs::write(&stamp, wanted)

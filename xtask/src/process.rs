@@ -72,7 +72,7 @@ fn pass_on(from: Option<impl Read>, mut to: impl Write, lines: &Mutex<Vec<String
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
-        // A tool may print invalid UTF-8; its lines are passed on all the same.
+        // A tool may print invalid UTF-8; its lines are passed on unchanged.
         match reader.read_until(b'\n', &mut bytes) {
             Ok(0) | Err(_) => return,
             Ok(_) => {}

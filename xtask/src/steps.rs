@@ -39,7 +39,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "lint",
-        about: "clippy, warnings refused",
+        about: "clippy without warnings",
         run: lint,
     },
     Step {
@@ -59,7 +59,7 @@ pub(crate) static STEPS: &[Step] = &[
     },
     Step {
         name: "doc",
-        about: "the documentation builds without a warning",
+        about: "the API documentation, without warnings",
         run: doc,
     },
     Step {
@@ -70,7 +70,7 @@ pub(crate) static STEPS: &[Step] = &[
 ];
 
 /// Tasks that are not checks.
-pub(crate) static BESIDE: &[Step] = &[
+pub(crate) static OTHER_TASKS: &[Step] = &[
     Step {
         name: "wheel",
         about: "build the Python package in target/wheels",

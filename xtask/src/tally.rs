@@ -176,7 +176,7 @@ mod tests {
             tally("        PASS [   0.003s] xtask tally::tests::reads_pytest"),
             None
         );
-        assert_eq!(tally("3 passed the door"), None);
+        assert_eq!(tally("3 passed the gate"), None);
         assert_eq!(tally(""), None);
     }
 

@@ -142,7 +142,7 @@ impl Environment {
         let installed = process::succeeds(root, environment.program("python").args(pip).arg(list))?;
         if !installed {
             return Err(format!(
-                "what {} names could not be installed",
+                "the packages of {} could not be installed",
                 list.display()
             ));
         }

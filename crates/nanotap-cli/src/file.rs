@@ -59,6 +59,9 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
     if path.is_dir() {
         return Err(refused(path, "it is a folder"));
     }
+    if path.exists() && !path.is_file() {
+        return Err(refused(path, "it is not a regular file"));
+    }
     if !FORCE.load(Ordering::Relaxed) && path.is_file() {
         let there = fs::read(path).map_err(|error| refused(path, error))?;
         if !is_ours(ending, &there) {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System, Transition};
 
 const MODES: [usize; 6] = [1, 2, 3, 5, 10, 20];
@@ -147,26 +147,26 @@ fn request(cantilever: &Cantilever, set: Set) -> Request {
     let rate = request.output(&cantilever.rate);
     let asked = |one: fn(Set) -> bool| one(set) || matches!(set, Set::Typical);
     if asked(|s| matches!(s, Set::TipExtrema)) {
-        request.least(tip);
-        request.greatest(tip);
+        request.add(Functional::Least(tip));
+        request.add(Functional::Greatest(tip));
     }
     if asked(|s| matches!(s, Set::GapLeast)) {
-        request.least(gap);
+        request.add(Functional::Least(gap));
     }
     if asked(|s| matches!(s, Set::ForceExtrema)) {
-        request.least(force);
-        request.greatest(force);
+        request.add(Functional::Least(force));
+        request.add(Functional::Greatest(force));
     }
     if asked(|s| matches!(s, Set::MeanAndHarmonic)) {
-        request.integral(tip);
-        request.integral(force);
-        request.fourier(tip, OMEGA);
+        request.add(Functional::Integral(tip));
+        request.add(Functional::Integral(force));
+        request.add(Functional::Fourier(tip, OMEGA));
     }
     if asked(|s| matches!(s, Set::Dissipation)) {
-        request.product(force, rate);
+        request.add(Functional::Product(force, rate));
     }
     if matches!(set, Set::MeanSquare) {
-        request.product(tip, tip);
+        request.add(Functional::Product(tip, tip));
     }
     request
 }

@@ -11,7 +11,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, Reset, System, Transition};
 use proptest::prelude::*;
@@ -177,11 +177,17 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         request.output(&other),
         request.output_by_regime(&force),
     ];
-    let extrema = channels.map(|c| (request.least(c), request.greatest(c)));
-    let integrals = channels.map(|c| request.integral(c));
-    let fouriers = channels.map(|c| frequencies.map(|omega| request.fourier(c, omega)));
+    let extrema = channels.map(|c| {
+        (
+            request.add(Functional::Least(c)),
+            request.add(Functional::Greatest(c)),
+        )
+    });
+    let integrals = channels.map(|c| request.add(Functional::Integral(c)));
+    let fouriers =
+        channels.map(|c| frequencies.map(|omega| request.add(Functional::Fourier(c, omega))));
     let pairs = [(0, 0), (0, 1), (1, 2), (2, 2)];
-    let products = pairs.map(|(a, b)| request.product(channels[a], channels[b]));
+    let products = pairs.map(|(a, b)| request.add(Functional::Product(channels[a], channels[b])));
     let mut accumulator = Accumulator::new(&request.plan(&system).unwrap());
 
     let mut flow = Flow::new(Arc::clone(&system));
@@ -221,18 +227,18 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
     for (i, signal) in signals.iter().enumerate() {
         let (low, high) = signal.range().unwrap();
         for (key, expected) in [(extrema[i].0, low.value), (extrema[i].1, high.value)] {
-            let found = accumulator.extremum(key);
+            let found = accumulator.values()[key].re;
             prop_assert!(
                 (found - expected).abs() <= 1e-12 * sizes[i],
                 "{i}: {found} {expected}"
             );
         }
-        let (found, expected) = (accumulator.integral(integrals[i]), signal.integral());
+        let (found, expected) = (accumulator.values()[integrals[i]].re, signal.integral());
         let known = 1e-12 * sizes[i] * duration;
         prop_assert!((found - expected).abs() <= known, "{i}: {found} {expected}");
         prop_assert!((signal.mean() - found / duration).abs() <= 1e-12 * sizes[i]);
         for (key, omega) in fouriers[i].iter().zip(frequencies) {
-            let found = accumulator.fourier(*key);
+            let found = accumulator.values()[*key];
             let expected = signal.fourier(omega) * (0.5 * duration);
             prop_assert!(
                 (found - expected).modulus() <= known,
@@ -241,7 +247,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         }
     }
     for (key, (a, b)) in products.iter().zip(pairs) {
-        let found = accumulator.product(*key);
+        let found = accumulator.values()[*key].re;
         let expected = signals[a].product_integral(&signals[b]);
         let known = 1e-12 * sizes[a] * sizes[b] * duration;
         prop_assert!(
@@ -286,7 +292,10 @@ fn clearing_begins_anew() {
         request.output(&example.gap()),
         "one output, one channel"
     );
-    let (least, first) = (request.least(gap), request.fourier(gap, OMEGA));
+    let (least, first) = (
+        request.add(Functional::Least(gap)),
+        request.add(Functional::Fourier(gap, OMEGA)),
+    );
     let plan = request.plan(&system).unwrap();
     let mut flow = Flow::new(Arc::clone(&system));
     flow.start(&example.start(), 0.0).unwrap();
@@ -295,14 +304,14 @@ fn clearing_begins_anew() {
     let (mut lowest, mut sum) = (f64::INFINITY, nanotap_flow::Complex::new(0.0, 0.0));
     for _ in 0..5 {
         flow.run_period(&mut (&mut whole, &mut each)).unwrap();
-        lowest = lowest.min(each.take_extremum(least));
-        sum += each.fourier(first);
-        assert_eq!(each.extremum(least), f64::INFINITY);
+        lowest = lowest.min(each.take(least));
+        sum += each.values()[first];
+        assert_eq!(each.values()[least].re, f64::INFINITY);
         each.clear();
         assert_eq!(each.duration(), 0.0);
     }
-    assert_eq!(whole.extremum(least), lowest);
-    assert!((whole.fourier(first) - sum).modulus() < 1e-13);
+    assert_eq!(whole.values()[least].re, lowest);
+    assert!((whole.values()[first] - sum).modulus() < 1e-13);
     assert_eq!(whole.periods(), 5);
 }
 
@@ -319,7 +328,7 @@ fn harmonics_stay_exact_over_many_periods() {
     let system = example.system().unwrap();
     let mut request = Request::new();
     let force = request.output_by_regime(&example.force());
-    let keys = [1, 2, 5].map(|n| request.fourier(force, f64::from(n) * OMEGA));
+    let keys = [1, 2, 5].map(|n| request.add(Functional::Fourier(force, f64::from(n) * OMEGA)));
     let mut accumulator = Accumulator::new(&request.plan(&system).unwrap());
     let mut flow = Flow::new(Arc::clone(&system));
     flow.start(&example.start(), 0.0).unwrap();
@@ -327,14 +336,14 @@ fn harmonics_stay_exact_over_many_periods() {
         flow.run_period(&mut ()).unwrap();
     }
     flow.run_period(&mut accumulator).unwrap();
-    let first = keys.map(|key| accumulator.fourier(key));
+    let first = keys.map(|key| accumulator.values()[key]);
     let many = 100_000;
     for _ in 1..many {
         flow.run_period(&mut accumulator).unwrap();
     }
     for (key, first) in keys.into_iter().zip(first) {
         assert!(first.modulus() > 1e-6, "the motion taps");
-        let mean = accumulator.fourier(key) / f64::from(many);
+        let mean = accumulator.values()[key] / f64::from(many);
         let error = (mean - first).modulus() / first.modulus();
         assert!(error < 1e-11, "{error:e}");
     }
@@ -357,7 +366,7 @@ fn outputs_that_do_not_fit_are_refused() {
     assert!(request.plan(&system).is_err());
     let mut request = Request::new();
     let gap = request.output(&example.gap());
-    request.fourier(gap, f64::NAN);
+    request.add(Functional::Fourier(gap, f64::NAN));
     assert!(request.plan(&system).is_err());
 }
 

@@ -15,7 +15,7 @@ fn oscillator(omega: f64, gap: f64, damping: f64) -> System {
 
 fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> System {
     let (zero, one) = (Interval::ZERO, Interval::ONE);
-    let entries = [zero, one, -one, -Interval::typed(damping)];
+    let entries = [zero, one, -one, -Interval::decimal(damping)];
     let still = HarmonicVector {
         constant: vec![zero; 2],
         tones: vec![vec![Rectangle::ZERO; 2]],
@@ -23,14 +23,14 @@ fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> S
     let wall = Transition {
         guard: Output {
             row: vec![-one, zero],
-            constant: Interval::typed(gap),
+            constant: Interval::decimal(gap),
             tones: vec![Rectangle::ZERO],
         },
         target: 0,
         reset: Some(Reset {
             matrix: Matrix::from_fn(2, 2, |i, j| match (i, j) {
                 (0, 0) => one,
-                (1, 1) => -Interval::typed(restitution),
+                (1, 1) => -Interval::decimal(restitution),
                 _ => zero,
             }),
             offset: still.clone(),
@@ -38,11 +38,11 @@ fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> S
         starts_at_zero: vec![(0, 1)],
     };
     let forcing = HarmonicVector {
-        tones: vec![vec![Rectangle::ZERO, Interval::typed(force).into()]],
+        tones: vec![vec![Rectangle::ZERO, Interval::decimal(force).into()]],
         ..still
     };
     let matrix = Matrix::from_fn(2, 2, |i, j| entries[2 * i + j]);
-    let omega = Interval::typed(omega);
+    let omega = Interval::decimal(omega);
     let period = Interval::point(2.0) * Interval::pi() / omega;
     let parts = RegimeParts {
         matrix,
@@ -92,10 +92,10 @@ fn the_orbit_exists_is_held_and_is_stable() {
         assert!(holds(*entry, reference), "{entry:?} {reference:?}");
         assert!(entry.hi() - entry.lo() < 1e-12);
     }
-    let alone = theorem.alone.as_ref().unwrap();
-    assert!(alone.time > 1e-6);
+    let isolation = theorem.isolation.as_ref().unwrap();
+    assert!(isolation.time > 1e-6);
     // Every impact multiplies areas by r², and damping by e^{−cT} per period.
-    let decay = -(Interval::typed(DAMPING) * system.period());
+    let decay = -(Interval::decimal(DAMPING) * system.period());
     let area = RESTITUTION.powi(2) * decay.exp().middle();
     let discs = &theorem.multipliers.discs;
     assert_eq!(discs.iter().map(|d| d.count).sum::<usize>(), 2);
@@ -224,7 +224,7 @@ fn without_impacts_the_forced_response_is_the_orbit() {
         switches: Vec::new(),
     };
     let free = prove(&oscillator(omega, 1.001 * amplitude, DAMPING), &none).unwrap();
-    assert!(free.alone.is_none() && free.switches.is_empty());
+    assert!(free.isolation.is_none() && free.switches.is_empty());
     assert_eq!(free.multipliers.stability(), Stability::Stable);
     let at_start = amplitude * amplitude * (1.0 - omega * omega);
     assert!((free.states[0][0].middle() - at_start).abs() < 1e-14);

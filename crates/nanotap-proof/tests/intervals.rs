@@ -226,11 +226,11 @@ fn nothing_is_promised_of_what_overflows() {
 fn what_was_typed_is_held() {
     // 0.1 = 0.1000000000000000055… − 5.55e-18.
     assert!(holds(
-        Interval::typed(0.1),
+        Interval::decimal(0.1),
         (0.1, -5.551_115_123_125_783e-18)
     ));
-    assert_eq!(Interval::typed(0.0), Interval::ZERO);
-    assert!(Interval::typed(20.0).contains(20.0));
+    assert_eq!(Interval::decimal(0.0), Interval::ZERO);
+    assert!(Interval::decimal(20.0).contains(20.0));
 }
 
 /// The sum as a rounded sum and its error, exactly (Knuth).

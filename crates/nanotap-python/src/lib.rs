@@ -38,6 +38,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<dataset::Recipe>()?;
     module.add_class::<dataset::Receiver>()?;
     for function in [
+        wrap_pyfunction!(run_command_line, module)?,
         wrap_pyfunction!(case::case_keys, module)?,
         wrap_pyfunction!(case::catalogue, module)?,
         wrap_pyfunction!(motion::modes, module)?,
@@ -65,4 +66,10 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add_function(function)?;
     }
     Ok(())
+}
+
+/// Runs the terminal program with `arguments`, whose first item is its name; returns the exit code.
+#[pyfunction]
+fn run_command_line(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| nanotap_cli::run(arguments))
 }

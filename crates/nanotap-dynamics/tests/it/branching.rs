@@ -307,6 +307,8 @@ fn a_hard_grazing_is_located() {
 #[derive(Clone, Debug)]
 struct Watched(f64);
 
+impl nanotap_dynamics::Scheduling for Watched {}
+
 impl StroboscopicMap for Watched {
     type Error = Infallible;
 

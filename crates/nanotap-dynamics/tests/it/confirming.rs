@@ -43,6 +43,17 @@ impl<F> Pair<F> {
     }
 }
 
+impl<F: Formula> nanotap_dynamics::Scheduling for Pair<F> {
+    fn coarse(&self) -> Option<Self> {
+        let coarse = self.coarse.clone()?;
+        Some(Self {
+            map: System(coarse),
+            coarse: None,
+            ..self.clone()
+        })
+    }
+}
+
 impl<F: Formula> StroboscopicMap for Pair<F> {
     type Error = Infallible;
 
@@ -52,15 +63,6 @@ impl<F: Formula> StroboscopicMap for Pair<F> {
 
     fn period(&self) -> f64 {
         self.map.period()
-    }
-
-    fn coarse(&self) -> Option<Self> {
-        let coarse = self.coarse.clone()?;
-        Some(Self {
-            map: System(coarse),
-            coarse: None,
-            ..self.clone()
-        })
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {

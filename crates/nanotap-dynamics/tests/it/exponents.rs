@@ -40,6 +40,8 @@ struct Constant {
     log_determinant: Option<f64>,
 }
 
+impl nanotap_dynamics::Scheduling for Constant {}
+
 impl StroboscopicMap for Constant {
     type Error = Infallible;
 

@@ -17,6 +17,8 @@ struct Affine {
     offset: Vec<f64>,
 }
 
+impl nanotap_dynamics::Scheduling for Affine {}
+
 impl StroboscopicMap for Affine {
     type Error = Infallible;
 

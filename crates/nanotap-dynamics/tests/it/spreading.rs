@@ -4,14 +4,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap_dynamics::{
-    AttractorKind, CensusOptions, Control, DMatrix, GlobalOptions, GlobalValue, MotionKind,
-    StartBox, StartSet, attractors_along, classify, grid_neighbours, orbits_shared,
+    AttractorContinuationOptions, AttractorKind, AttractorsAtValue, CensusOptions, Control,
+    DMatrix, MotionKind, StartBox, StartSet, classify, continue_attractors, grid_neighbours,
+    share_orbits,
 };
 
 use crate::systems::{Cubic, Family, Formula, Logistic, Nested, System};
 
-fn few() -> GlobalOptions {
-    GlobalOptions {
+fn few() -> AttractorContinuationOptions {
+    AttractorContinuationOptions {
         census: CensusOptions {
             max_starts: 24,
             ..CensusOptions::default()
@@ -19,7 +20,7 @@ fn few() -> GlobalOptions {
     }
 }
 
-fn fixed_points(value: &GlobalValue) -> Vec<f64> {
+fn fixed_points(value: &AttractorsAtValue) -> Vec<f64> {
     let mut found: Vec<f64> = value
         .attractors
         .iter()
@@ -47,7 +48,7 @@ fn what_one_value_shows_all_know() {
         }
         StartSet::given(states)
     };
-    let found = attractors_along(&Family(Cubic), &values, starts, &few(), &Control::default());
+    let found = continue_attractors(&Family(Cubic), &values, starts, &few(), &Control::default());
     let branch_of_positive = found[0].attractors[0].branch;
     for (r, value) in values.iter().zip(&found) {
         let expected = (r - 1.0).sqrt();
@@ -60,8 +61,8 @@ fn what_one_value_shows_all_know() {
             assert!(a.branch < 2);
         }
     }
-    assert_eq!(found[16].attractors[1].shown_by, Some(17));
-    assert_eq!(found[17].attractors[1].shown_by, None);
+    assert_eq!(found[16].attractors[1].found_from, Some(17));
+    assert_eq!(found[17].attractors[1].found_from, None);
 }
 
 /// The period-3 window of the logistic map, 1 + √8 = 3.828427 … 3.841499 for its period
@@ -71,13 +72,13 @@ fn a_window_keeps_its_period() {
     let values: Vec<f64> = (0..31).map(|k| 3.825 + 0.0005 * f64::from(k)).collect();
     let sides = StartBox::new(vec![0.0], vec![1.0]).unwrap();
     let starts = |_: usize, _: &System<Logistic>| StartSet::drawn(sides.clone(), 2);
-    let options = GlobalOptions {
+    let options = AttractorContinuationOptions {
         census: CensusOptions {
             max_starts: 4,
             ..CensusOptions::default()
         },
     };
-    let found = attractors_along(
+    let found = continue_attractors(
         &Family(Logistic),
         &values,
         starts,
@@ -127,7 +128,7 @@ fn a_plane_fills_from_one_corner() {
         known[0].push(orbit);
     }
     let filled = || {
-        orbits_shared(
+        share_orbits(
             known.clone(),
             at,
             grid_neighbours(&[6, 5]),
@@ -209,7 +210,7 @@ fn what_goes_on_one_way_is_not_tried_the_other() {
             .collect();
         assert!(near.swap(0, Ordering::Relaxed) > 20);
         let neighbours = grid_neighbours(&[20]);
-        let shared = orbits_shared(
+        let shared = share_orbits(
             known,
             at,
             neighbours,

@@ -10,7 +10,7 @@ pub(crate) trait Formula: Clone + Send + Sync {
     /// How many of the last entries are whole numbers that the map sets.
     const DISCRETE: usize = 0;
     /// How many motions at a time a census follows.
-    const SIDE_BY_SIDE: usize = 1;
+    const BATCH_SIZE: usize = 1;
     fn image(&self, x: &[f64], out: &mut [f64]);
     fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>);
     /// Derivative with respect to the family's parameter.
@@ -25,6 +25,12 @@ pub(crate) trait Formula: Clone + Send + Sync {
 #[derive(Clone, Debug)]
 pub(crate) struct System<F>(pub F);
 
+impl<F: Formula> nanotap_dynamics::Scheduling for System<F> {
+    fn batch_size(&self) -> usize {
+        F::BATCH_SIZE
+    }
+}
+
 impl<F: Formula> StroboscopicMap for System<F> {
     type Error = Infallible;
 
@@ -38,10 +44,6 @@ impl<F: Formula> StroboscopicMap for System<F> {
 
     fn discrete_entries(&self) -> usize {
         F::DISCRETE
-    }
-
-    fn side_by_side(&self) -> usize {
-        F::SIDE_BY_SIDE
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
@@ -117,7 +119,7 @@ impl Henon {
 
 impl Formula for Henon {
     const DIMENSION: usize = 2;
-    const SIDE_BY_SIDE: usize = 16;
+    const BATCH_SIZE: usize = 16;
     fn image(&self, x: &[f64], out: &mut [f64]) {
         out[0] = 1.0 - self.a * x[0] * x[0] + x[1];
         out[1] = self.b * x[0];

@@ -14,6 +14,8 @@ _Progress: TypeAlias = Callable[[int, int], object] | None
 _Table: TypeAlias = tuple[list[str], _Floats]
 _Path: TypeAlias = str | os.PathLike[str]
 
+def run_command_line(arguments: list[str]) -> int: ...
+
 class CaseCore:
     def __new__(
         cls,

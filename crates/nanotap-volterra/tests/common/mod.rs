@@ -31,6 +31,8 @@ impl Strobe {
     }
 }
 
+impl nanotap_dynamics::Scheduling for Strobe {}
+
 impl StroboscopicMap for Strobe {
     type Error = VolterraError;
 

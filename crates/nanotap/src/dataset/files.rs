@@ -49,8 +49,16 @@ fn put<E: From<io::Error>>(
 ) -> Result<(), E> {
     let target = followed(path)?;
     let there = fs::metadata(&target).ok();
-    if there.as_ref().is_some_and(fs::Metadata::is_dir) {
-        return Err(io::Error::new(ErrorKind::IsADirectory, "it is a folder").into());
+    if let Some(there) = &there
+        && !there.is_file()
+    {
+        // A pipe or a device would be replaced by a file.
+        let kind = if there.is_dir() {
+            "a folder"
+        } else {
+            "not a regular file"
+        };
+        return Err(io::Error::other(format!("it is {kind}")).into());
     }
     let temporary = temporary(&target)?;
     let write = || -> Result<(), E> {
@@ -163,6 +171,13 @@ mod tests {
         symlink("circle", folder.join("circle")).unwrap();
         assert!(write(&folder.join("circle"), b"x").is_err());
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_not_replaced() {
+        let refused = write(Path::new("/dev/null"), b"x").unwrap_err();
+        assert_eq!(refused.to_string(), "it is not a regular file");
     }
 
     #[test]

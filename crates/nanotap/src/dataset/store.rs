@@ -53,7 +53,10 @@ impl Store {
                     what: "a file".into(),
                 });
             }
-            Ok(_) => refuse_strangers(path, &metadata, &documents)?,
+            Ok(_) => {
+                refuse_links(path)?;
+                refuse_strangers(path, &metadata, &documents)?;
+            }
         }
         for (name, document) in &documents {
             write_if_other(&path.join(name), document.as_bytes())?;
@@ -495,6 +498,27 @@ fn consolidated(documents: &[(String, String)]) -> String {
 
 fn pretty(document: &Value) -> String {
     serde_json::to_string_pretty(document).unwrap_or_default() + "\n"
+}
+
+/// Refuses a folder with symbolic links in it: they would lead writing out of the store.
+fn refuse_links(path: &Path) -> Result<(), StoreError> {
+    let listing = fs::read_dir(path).map_err(StoreError::io("list", path))?;
+    for entry in listing.flatten() {
+        let kind = entry.file_type().map_err(StoreError::io("look at", path))?;
+        if kind.is_symlink() {
+            return Err(StoreError::Occupied {
+                path: path.into(),
+                what: format!(
+                    "a folder with the symbolic link {:?} in it",
+                    entry.file_name()
+                ),
+            });
+        }
+        if kind.is_dir() {
+            refuse_links(&entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a folder that is a store of other attributes, or no store at all.

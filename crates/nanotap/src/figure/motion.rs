@@ -157,9 +157,9 @@ pub(crate) fn contact_intervals(
     let period = model.period();
     let mut intervals: Vec<(f64, f64)> = Vec::new();
     for s in recording
-        .stretches(model)
+        .pieces()
         .iter()
-        .filter(|s| s.contact && s.start < periods * period)
+        .filter(|s| model.touches(s.regime) && s.start < periods * period)
     {
         let (from, to) = (
             s.start / period,

@@ -2,10 +2,10 @@
 //! bifurcations, and the loci of these in two parameters.
 
 use nanotap_dynamics::{
-    AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions,
-    ClassifyOptions, ContinuationOptions, Control, CurveOptions, Diagram, DiagramBranch,
-    DiagramOptions, Direction, GlobalOptions, LyapunovOptions, PeriodicOrbit, ShootingOptions,
-    StartSet, assemble_diagram, attractors_along, continue_orbit, trace_curve,
+    AttractorContinuationOptions, AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd,
+    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, Control, CurveOptions,
+    Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions, PeriodicOrbit,
+    ShootingOptions, StartSet, assemble_diagram, continue_attractors, continue_orbit, trace_curve,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -474,7 +474,7 @@ fn census_seeds(
         drawn.unwrap_or_else(|| StartSet::given(Vec::new()))
     };
     let classify = ClassifyOptions::default();
-    let how = GlobalOptions {
+    let how = AttractorContinuationOptions {
         census: CensusOptions {
             pilots: options.starts,
             max_starts: options.starts,
@@ -491,7 +491,7 @@ fn census_seeds(
         },
     };
     let family = case.family(range.key);
-    let known = attractors_along(&family, &values, starts, &how, control);
+    let known = continue_attractors(&family, &values, starts, &how, control);
     let mut found = Vec::new();
     for (value, at) in values.iter().zip(known) {
         for each in at.attractors {

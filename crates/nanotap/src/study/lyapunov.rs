@@ -1,11 +1,10 @@
 //! Lyapunov spectrum and Poincaré section of any motion.
 
-use std::sync::Arc;
-
-use nalgebra::{DMatrix, RowDVector};
-use nanotap_dynamics::{ClassifyOptions, StroboscopicMap, Tangency, classify, lyapunov_spectrum};
-use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, FlowError, Output, Trajectory};
+use nalgebra::DMatrix;
+use nanotap_dynamics::{
+    ClassifyOptions, Scheduling, StroboscopicMap, Tangency, classify, lyapunov_spectrum,
+};
+use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +14,6 @@ use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
 use crate::map::UNINTERRUPTED;
-use crate::model::recording::each_period;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
@@ -105,6 +103,8 @@ impl Stoppable<'_> {
         Ok(())
     }
 }
+
+impl Scheduling for Stoppable<'_> {}
 
 impl StroboscopicMap for Stoppable<'_> {
     type Error = Unfinished;
@@ -280,38 +280,7 @@ fn cut(
         state,
     };
     let mut found = Vec::with_capacity(points);
-    if let Some(nonlinear) = &model.nonlinear {
-        let mut state = start.to_vec();
-        for _ in 0..points.saturating_mul(RAREST) {
-            if found.len() >= points {
-                break;
-            }
-            if control.is_cancelled() {
-                return Err(Unfinished::Stopped);
-            }
-            each_period(nonlinear, &mut state, 1, |_, recorded| {
-                let times: Vec<f64> = match at {
-                    Section::Phase(phase) => vec![phase.rem_euclid(1.0) * period],
-                    Section::Contact => recorded
-                        .switches()
-                        .iter()
-                        .filter(|s| !nonlinear.contact[s.from] && nonlinear.contact[s.to])
-                        .map(|s| s.time)
-                        .collect(),
-                };
-                found.extend(times.into_iter().filter_map(|time| {
-                    let sample = recorded.at(time)?;
-                    let mut state = sample.state.as_slice().to_vec();
-                    state.resize(model.dimension(), sample.branch as f64);
-                    Some(point(state, time))
-                }));
-            })?;
-        }
-        found.truncate(points);
-        return Ok(found);
-    }
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(start, 0.0).map_err(MotionError::from)?;
+    let mut record = model.recorder(start)?;
     for _ in 0..points.saturating_mul(RAREST) {
         if found.len() >= points {
             break;
@@ -319,43 +288,23 @@ fn cut(
         if control.is_cancelled() {
             return Err(Unfinished::Stopped);
         }
-        let mut recorder = Recorder::default();
-        flow.run_period(&mut recorder).map_err(MotionError::from)?;
-        let trajectory = recorder.finish(Arc::clone(&model.system));
+        let recorded = record(1)?;
         match at {
             Section::Phase(phase) => {
                 let time = phase.rem_euclid(1.0) * period;
-                found.extend(trajectory.state_at(time).map(|state| point(state, time)));
+                found.extend(recorded.state_at(time).map(|state| point(state, time)));
             }
             Section::Contact => {
-                for event in trajectory
-                    .events()
-                    .iter()
-                    .filter(|e| begins_contact(model, e.from, e.to))
-                {
-                    let state = state_before(&trajectory, event.time);
-                    found.extend(state.map(|state| point(state, event.time)));
+                let switches = recorded.switches().into_iter();
+                for switch in switches.filter(|e| begins_contact(model, e.from, e.to)) {
+                    let state = recorded.state_before(switch.time);
+                    found.extend(state.map(|state| point(state, switch.time)));
                 }
             }
         }
     }
     found.truncate(points);
     Ok(found)
-}
-
-/// The state just before a switch at `time`: an impact turns the velocity round.
-fn state_before(trajectory: &Trajectory, time: f64) -> Option<Vec<f64>> {
-    let system = trajectory.system();
-    let (n, tones) = (system.dimension(), system.drive().frequencies().len());
-    (0..n)
-        .map(|i| {
-            let mut row = RowDVector::zeros(n);
-            row[i] = 1.0;
-            let signal = trajectory.signal(&Output::linear(row, tones));
-            let piece = signal.pieces.iter().rev().find(|p| p.start < time)?;
-            Some(piece.signal.at((time - piece.start).min(piece.length)))
-        })
-        .collect()
 }
 
 /// Where a section is taken.

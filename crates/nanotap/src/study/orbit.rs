@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 use nanotap_dynamics::{
-    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingOptions,
-    StroboscopicMap as _, check_size, classify, close_orbit, close_orbit_from_points, find_orbits,
+    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, Scheduling as _,
+    ShootingOptions, StroboscopicMap as _, check_size, classify, close_orbit,
+    close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;

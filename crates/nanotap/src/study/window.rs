@@ -11,7 +11,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nanotap_dynamics::Control;
+use nanotap_dynamics::{Control, SameMotion};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
@@ -214,9 +214,6 @@ impl Window {
     }
 }
 
-/// Relative difference beyond which two orbits are two.
-const DIFFERENT: f64 = 1e-6;
-
 /// What the motions of one point come to. What is there counts before what could not be named.
 fn condition(motions: &[Seen]) -> Condition {
     let any = |wanted: &[Classification]| {
@@ -232,8 +229,8 @@ fn condition(motions: &[Seen]) -> Condition {
     }
     let orbits: Vec<&Seen> = motions.iter().filter(|m| m.period == 1).collect();
     let differ = |a: &Seen, b: &Seen| {
-        let apart = |x: f64, y: f64| (x - y).abs() > DIFFERENT * x.abs().max(y.abs());
-        apart(a.amplitude, b.amplitude) || apart(a.maximum, b.maximum)
+        let same = SameMotion::numbers;
+        !same(a.amplitude, b.amplitude) || !same(a.maximum, b.maximum)
     };
     if orbits
         .first()

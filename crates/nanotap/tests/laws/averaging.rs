@@ -8,7 +8,7 @@ use nanotap::case::file::Source;
 use nanotap::model::Model;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::averaged_orbits::{averaged_distances, averaged_orbits};
-use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 use std::path::Path;
 
 /// The cases of the folder with their expected orbits.

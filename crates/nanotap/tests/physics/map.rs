@@ -8,7 +8,7 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::strobe::Strobe;
-use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 
 fn regular() -> Map {
     let case = Cantilever {
@@ -89,7 +89,7 @@ fn many_states_pass_through_those_that_each_passes_alone() {
     ];
     for (model, side_by_side) in models {
         let mut map = Strobe::new(&model);
-        assert_eq!(map.side_by_side() > 1, side_by_side);
+        assert_eq!(map.batch_size() > 1, side_by_side);
         let d = map.dimension();
         let numbers = 0..u32::try_from(10 * d).unwrap();
         let starts: Vec<f64> = numbers.map(|k| 0.05 * (f64::from(k) * 1.7).sin()).collect();

@@ -16,7 +16,7 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 use nanotap::study::start_box::default_box;
 use nanotap_dynamics::{
-    AttractorKind, CensusOptions, DMatrix, StartOutcome, StroboscopicMap as _,
+    AttractorKind, CensusOptions, DMatrix, Scheduling as _, StartOutcome, StroboscopicMap as _,
     TwoParameterFamily as _, census,
 };
 

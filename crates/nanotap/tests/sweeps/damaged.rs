@@ -48,6 +48,29 @@ fn read(path: &Path) {
     let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
 }
 
+/// A store is not written through a symbolic link in it: the link's target stays as it was.
+#[cfg(unix)]
+#[test]
+fn links_inside_a_store_are_refused() {
+    let folder = Folder::new();
+    let store = folder.join("links.zarr");
+    small(&store);
+    let target = folder.join("elsewhere");
+    std::fs::write(&target, "untouched").unwrap();
+    let chunk = store.join("period").join("0.0");
+    let chunk = if chunk.exists() {
+        chunk
+    } else {
+        store.join("period").join("0")
+    };
+    std::fs::remove_file(&chunk).unwrap();
+    std::os::unix::fs::symlink(&target, &chunk).unwrap();
+    let schema = Store::open(&store).unwrap().schema().clone();
+    let refused = Store::create_or_resume(&store, schema).unwrap_err();
+    assert!(refused.to_string().contains("symbolic link"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
+}
+
 /// What somebody may write in place of a value.
 fn hostile() -> impl Strategy<Value = Value> {
     prop::sample::select(vec![

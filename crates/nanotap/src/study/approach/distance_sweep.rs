@@ -16,7 +16,7 @@ use std::fmt;
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
     ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
-    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
+    Scheduling as _, ShootingOptions, UndecidedReason, classify, close_orbit,
     close_orbit_from_points, continue_orbit, switch_at_flip,
 };
 

@@ -82,7 +82,7 @@ impl Along<'_> {
             let mut map = Strobe::new(&model);
             let one = |candidate: &Candidate| {
                 let orbit = continued(&mut map, &candidate.orbit)?;
-                let near = orbit.distance_to(&candidate.orbit).1 <= FAR * candidate.orbit.scale();
+                let near = orbit.is_near(&candidate.orbit, FAR);
                 (orbit.is_stable() && near).then_some(Candidate {
                     branch: candidate.branch,
                     orbit,
@@ -106,7 +106,7 @@ impl Along<'_> {
             };
             runs += 1;
             let found = self.settled(row, Some(&state));
-            let new = found.filter(|o| !rows[row].iter().any(|known| same(&known.orbit, o)));
+            let new = found.filter(|o| !rows[row].iter().any(|known| known.orbit.is_same_as(o)));
             let Some(orbit) = new else {
                 row += apart;
                 continue;
@@ -154,7 +154,9 @@ impl Along<'_> {
             let Some(orbit) = self.follow(a, b, &last, HALVINGS) else {
                 return;
             };
-            let known = rows[pair[1]].iter().any(|known| same(&known.orbit, &orbit));
+            let known = rows[pair[1]]
+                .iter()
+                .any(|known| known.orbit.is_same_as(&orbit));
             if known {
                 return;
             }
@@ -192,7 +194,9 @@ impl Along<'_> {
                 continue;
             };
             state = orbit.states.first().cloned();
-            let known = rows[row].iter().find(|known| same(&known.orbit, &orbit));
+            let known = rows[row]
+                .iter()
+                .find(|known| known.orbit.is_same_as(&orbit));
             let candidate = if let Some(known) = known {
                 known.clone()
             } else {
@@ -222,7 +226,7 @@ impl Along<'_> {
         let mut there = rows[near].iter();
         let continues = there.find(|candidate| {
             let found = self.follow(&self.places[near], here, &candidate.orbit, HALVINGS);
-            found.is_some_and(|found| same(&found, orbit))
+            found.is_some_and(|found| found.is_same_as(orbit))
         });
         continues.map(|candidate| candidate.branch)
     }
@@ -240,7 +244,7 @@ impl Along<'_> {
             continued(&mut Strobe::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
-        let near = |found: &PeriodicOrbit| found.distance_to(orbit).1 <= FAR * orbit.scale();
+        let near = |found: &PeriodicOrbit| found.is_near(orbit, FAR);
         let closed = closed.filter(|found| found.is_stable() && near(found));
         if closed.is_some() || halvings == 0 {
             return closed;
@@ -295,11 +299,6 @@ pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<Perio
     close_orbit_from_points(map, &points, orbit.period, &ShootingOptions::default())
         .ok()
         .filter(|found| found.period == orbit.period)
-}
-
-/// Whether two orbits are one: rounding is far below, and two branches far above.
-fn same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
-    a.is_same_as(b) || a.distance_to(b).1 <= 1e-7 * a.scale()
 }
 
 /// Least cost up to a candidate, and the row and candidate before it.

@@ -4,7 +4,7 @@
 //! Starts are drawn; an attractor whose basin is small is met at some values and missed at
 //! others. So each stable orbit that the runs ended on is tried at the neighbouring values,
 //! both ways along every parameter, and what is new there at its neighbours in turn
-//! ([`nanotap_dynamics::orbits_shared`]). Where starts of all sizes are drawn at each value, the
+//! ([`nanotap_dynamics::share_orbits`]). Where starts of all sizes are drawn at each value, the
 //! states of a slowly moved lever there ([`states_near`]) are tried as well: one approach
 //! serves all distances of a line of values, and of many lines or values some are chosen, whose
 //! states neighbours lead to in turn. What that finds is stored with the dataset, in
@@ -15,7 +15,7 @@
 
 use nanotap_dynamics::{
     AttractorKind, Control, PeriodicOrbit, ShootingOptions, close_orbit, grid_neighbours,
-    orbits_shared,
+    share_orbits,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -115,7 +115,7 @@ impl Runs {
         let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
         let classify = self.options.classify();
-        let values = orbits_shared(known, at, neighbours, &classify, control);
+        let values = share_orbits(known, at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {
             let gained = value.attractors.into_iter().skip(own[k]);

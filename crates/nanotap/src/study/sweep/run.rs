@@ -1,8 +1,8 @@
 //! One run of a sweep, and the runs of one piece of work.
 
 use nanotap_dynamics::{
-    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap,
-    classify_beside,
+    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, Scheduling as _,
+    StroboscopicMap, classify_beside,
 };
 
 use super::{Runs, SweepOptions};
@@ -269,7 +269,7 @@ impl<'a> Runner<'a> {
         cancelled: &impl Fn() -> bool,
     ) -> Option<Vec<Outcome>> {
         let mut outcomes = Vec::with_capacity(starts.len());
-        for starts in starts.chunks(self.map.side_by_side()) {
+        for starts in starts.chunks(self.map.batch_size()) {
             let mut states = starts.concat();
             let mut failures = vec![None; starts.len()];
             for done in (0..transient).step_by(UNINTERRUPTED) {
@@ -348,7 +348,7 @@ impl<'a> Runner<'a> {
 
     fn watch(&self, from: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {
         let watcher = self.watcher.as_ref().map_err(Clone::clone)?;
-        watcher.watch(from, periods, kept)
+        watcher.record(from, periods, kept)
     }
 
     /// Records the motion from `from`; with `period`, one turn of that orbit stands for

@@ -54,6 +54,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<attractors::AttractorsStudy>(),
     StudyEntry::of::<branch::BranchStudy>(),
     StudyEntry::of::<approach::ApproachStudy>(),
+    StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
     StudyEntry::of::<fit::FitStudy>(),
     StudyEntry::dataset::<sweep::SweepStudy>(),
     StudyEntry::dataset::<window::WindowStudy>(),

@@ -258,6 +258,36 @@ impl Store {
         })
     }
 
+    /// Calls a function for each entry of a finished dataset, with the entry and its numbers of some
+    /// variables.
+    ///
+    /// # Errors
+    /// When a variable or a chunk is missing or damaged.
+    pub fn each<const N: usize>(
+        &self,
+        names: [&str; N],
+        mut call: impl FnMut(&[usize], [f64; N]),
+    ) -> Result<(), StoreError> {
+        for chunk in 0..self.chunks() {
+            let block = self.schema.grid.block(chunk);
+            let column = |name: &&str| {
+                let missing = || StoreError::NotAStore {
+                    path: self.path.clone(),
+                    what: format!("it is no sweep: it has no variable `{name}`"),
+                };
+                let variable = self.schema.index_of(name).ok_or_else(missing)?;
+                Ok(self.read_chunk(&block, variable)?.numbers())
+            };
+            let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>()?;
+            let number = |k: usize, flat: usize| columns[k].get(flat).copied();
+            for (flat, entry) in block.entries().enumerate() {
+                let row = std::array::from_fn(|k| number(k, flat).unwrap_or(f64::NAN));
+                call(&entry, row);
+            }
+        }
+        Ok(())
+    }
+
     /// Returns an error if chunks are missing.
     ///
     /// # Errors

@@ -257,7 +257,7 @@ impl Level {
     }
 }
 
-/// What a [`Level`] is made of besides the system.
+/// Components of a [`Level`] in addition to the system.
 struct Readouts<'a> {
     readout: &'a [[f64; 2]],
     rate_readout: &'a [[f64; 2]],

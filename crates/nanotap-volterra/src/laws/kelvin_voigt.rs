@@ -3,9 +3,9 @@
 //! If the elastic law is `E g(δ)`, the force is `E g(δ) + η g'(δ) δ̇` (García, Gómez, Martínez,
 //! Patil, Dietz, Magerle, Phys. Rev. Lett. 97, 2006; García, Chem. Soc. Rev. 49, 2020): for the
 //! sphere `4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇)`, on a rigid tip. On the way out the sum becomes
-//! negative before the contact ends. A surface that cannot pull lets go where `F = 0` and is
-//! then where the tip is not: no force, until the tip is outside or presses again; a surface
-//! that pulls stays until `d = a0`.
+//! negative before the contact ends. A surface that cannot pull releases the tip where `F = 0`, and
+//! then there is no force until the tip is outside or presses again; a surface that pulls stays
+//! until `d = a0`.
 
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{Shape, deep};
@@ -164,7 +164,7 @@ impl Formula for KelvinVoigt {
         if index == 0 { sum } else { -sum }
     }
 
-    /// Where the surface has let go the tip is free.
+    /// A released tip is free.
     fn touches(&self, branch: usize) -> bool {
         branch == 1
     }

@@ -480,7 +480,7 @@ impl Case {
         if !key.is_physical() {
             return Ok(None);
         }
-        let (low, high, width) = quantities.beside(key)?;
+        let (low, high, width) = quantities.bracket(key)?;
         Ok(Some((low.scales, high.scales, width)))
     }
 

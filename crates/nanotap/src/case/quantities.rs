@@ -107,7 +107,7 @@ impl Quantities {
     /// and of the parameters of a nonlinear law, by central differences of the mapping, which is a
     /// sequence of closed forms.
     pub(super) fn derivatives(&self, key: Key) -> Result<Slopes, Box<CaseFileError>> {
-        let (low, high, width) = self.beside(key)?;
+        let (low, high, width) = self.bracket(key)?;
         let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
         let numbers = Parameter::every()
             .map(|parameter| (parameter, slope(parameter)))
@@ -133,7 +133,7 @@ impl Quantities {
     }
 
     /// The mapping slightly below and above the value of a key, and the distance of these values.
-    pub(super) fn beside(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
+    pub(super) fn bracket(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
         let here = self.view()?;
         let value = self.get(key).unwrap_or(f64::NAN);
         // Where the mapping is smooth its third derivative is of order 1/value³, so that

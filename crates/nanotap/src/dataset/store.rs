@@ -418,14 +418,14 @@ fn documents(schema: &Schema) -> Vec<(String, String)> {
             .to_string()
             .into(),
     );
-    let beside: Vec<&str> = schema
+    let coordinates: Vec<&str> = schema
         .coordinates
         .iter()
         .filter(|c| c.dimensions.as_slice() != [c.name.clone()])
         .map(|c| c.name.as_str())
         .collect();
-    if !beside.is_empty() {
-        root.insert(COORDINATES.into(), beside.join(" ").into());
+    if !coordinates.is_empty() {
+        root.insert(COORDINATES.into(), coordinates.join(" ").into());
     }
     let mut all = vec![
         (zarr::GROUP.to_owned(), zarr::group()),

@@ -3,8 +3,8 @@
 //! A tone is A sin(wτ + θ). Driven through the base (the paper's piezo), the clamped end
 //! moves by A in units of g₀. Driven directly, a force of amplitude A in units of EI g₀/L³ (a
 //! third of k g₀) acts on the tip (a magnet) or is spread evenly over the beam (light, heat),
-//! the clamped end is at rest, and the gap has no motion of its own. A static force A at the
-//! tip would bend it by A/3.
+//! the clamped end is at rest, and the gap is not modulated. A static force A at the tip would bend it
+//! by A/3.
 //!
 //! A second tone has p/q of the first one's frequency. Both repeat after q periods of the
 //! first, so that the stroboscopic map is of that period.

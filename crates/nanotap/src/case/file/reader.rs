@@ -142,8 +142,8 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         let Some(before) = known.insert(key, entry) else {
             continue;
         };
-        let beside = before.is_override() && before.key != entry.key;
-        if beside || !entry.is_override() {
+        let overrides = before.is_override() && before.key != entry.key;
+        if overrides || !entry.is_override() {
             problems.add(|| refusal::same_key(before, entry));
         }
     }

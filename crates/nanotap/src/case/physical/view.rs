@@ -179,8 +179,8 @@ impl Physical {
     /// What stays while a quantity varies, said as numbers of their own. An experimenter who
     /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
     /// voltage, not the lever's answer to it), the second tone its place among the harmonics
-    /// of the first, the sample its place, and the unit of length g₀ stays so that all values
-    /// are told in one.
+    /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
+    /// the same unit.
     pub(crate) fn held(&self, stated: &Stated) -> Stated {
         let mut held = stated.clone();
         held.set(Key::GapBeam, self.scales.length);

@@ -102,7 +102,7 @@ enum Token {
 }
 
 /// Reads `N s/m`, `N·s·m^-1`, `kg/(m s^2)`, `kg m⁻³`: factors joined by a space, `·` or `*`,
-/// a slash, powers. A product after a slash must stand in parentheses.
+/// a slash, powers. A product after a slash must be in parentheses.
 struct UnitParser<'a> {
     tokens: Vec<Token>,
     at: usize,

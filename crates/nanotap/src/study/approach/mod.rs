@@ -324,7 +324,7 @@ impl Distances {
             ));
         }
         let last = (self.points - 1) as f64;
-        // Amplitudes at a kept least distance stand in equal ratios.
+        // Amplitudes at a fixed least distance are in equal ratios.
         let between = |share: f64| match closest {
             Some(closest) if share > 0.0 && share < 1.0 => {
                 let ratio = (to - closest) / (from - closest);

@@ -343,8 +343,8 @@ fn bounded(ratio: f64) -> Result<f64, PhysicalError> {
     ))
 }
 
-/// α1 from the measured f₂/f₁, which grows with α1 from that of the bare beam, 6.2669: at
-/// first with its square, so that light tips are not told from none.
+/// α1 from the measured f₂/f₁, which grows with α1 from that of the bare beam, 6.2669: at first
+/// with its square, so that light tips cannot be distinguished from none.
 fn ratio_from_second_mode(f2: f64, f0: f64) -> Result<f64, PhysicalError> {
     let measured = f2 / f0;
     let bare = frequency_ratio(0.0)?;

@@ -375,7 +375,7 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         .share_x();
     for (name, label) in [
         ("first_harmonic", "amplitude $A$"),
-        ("phase", "phase behind the drive (°)"),
+        ("phase", "phase lag (°)"),
     ] {
         let index = schema.index_of(name).unwrap_or(0);
         let mut curves: BTreeMap<(String, usize), Vec<(f64, f64)>> = BTreeMap::new();

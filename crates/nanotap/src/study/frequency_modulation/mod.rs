@@ -222,7 +222,7 @@ pub const COLUMNS: [ModulatedColumn; 8] = [
     },
     ModulatedColumn {
         name: "sader_jarvis_force",
-        label: "force after Sader, Jarvis",
+        label: "force (Sader–Jarvis)",
         kind: Some(Kind::Force),
         of: |m| m.sader_jarvis_force,
     },
@@ -233,7 +233,7 @@ pub const COLUMNS: [ModulatedColumn; 8] = [
 pub struct ModulationReport {
     /// The amplitude that is held, in the model's unit of length.
     pub amplitude: f64,
-    /// The phase behind the drive that is held, degrees.
+    /// Phase lag kept by the feedback, degrees.
     pub phase: f64,
     /// Frequency of the free lever at this phase, in the model's unit.
     pub free_frequency: f64,

@@ -16,14 +16,13 @@ use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
 
-/// Basins of attraction on a two-dimensional slice of initial states.
+/// Compute basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// The attractors, from `nanotap attractors --json`; without it, a census in the slice
-    /// finds them
+    /// The attractors, from `nanotap attractors --json`; default: found by sampling the slice
     #[arg(long, value_name = "FILE", conflicts_with = "starts")]
     attractors: Option<PathBuf>,
 

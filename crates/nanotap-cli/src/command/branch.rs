@@ -32,11 +32,11 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     request: Request<BranchOptions>,
 
-    /// What --plot shows against the parameter
+    /// Observable that --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
     show: Option<Shown>,
 
-    /// List every point in the JSON document, however long it becomes
+    /// List every point in the JSON document, whatever its length
     #[arg(long)]
     all_points: bool,
 

@@ -1,4 +1,4 @@
-//! `nanotap case`: the case, checked and view.
+//! `nanotap case`: check a case and print it resolved.
 
 use clap::Args;
 use nanotap::ErrorKind;
@@ -25,7 +25,7 @@ use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
-/// Check a case and show it resolved.
+/// Check a case and print it resolved.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]

@@ -15,7 +15,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// The same motion with N = 1 … K modes: how many are enough.
+/// Compare the motion with 1 to K modes: how many are enough.
 pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

@@ -15,7 +15,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Mode shapes and frequencies, in free flight and in contact.
+/// Compute mode shapes and frequencies, in free flight and in contact.
 pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

@@ -18,7 +18,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, number, progress, series, style};
 
-/// A periodic orbit by Newton, stable or not.
+/// Compute a periodic orbit by Newton's method, stable or not.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]

@@ -11,7 +11,7 @@ use crate::output;
 /// The name of the schema of a case.
 const CASE: &str = "case";
 
-/// The JSON schema of what a study is asked for and reports, or of a case.
+/// Print the JSON schema of a study's options and report, or of a case.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// A study, or `case` for the keys of a case; without it, all of them by name

@@ -1,4 +1,4 @@
-//! `nanotap simulate`: one run.
+//! `nanotap simulate`: a single motion.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{number, progress, series, style};
 
-/// One run: its steady state, or how it gets there.
+/// Simulate a motion: its steady state or its transient.
 pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

@@ -602,7 +602,7 @@ pub struct AttractorsStudy;
 
 impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
-    const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
+    const ABOUT: &'static str = "Find coexisting attractors by sampling initial states";
     const COUNTED: &'static str = "starts";
     const PARTIAL: bool = true;
     type Options = AttractorsOptions;

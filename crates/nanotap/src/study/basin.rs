@@ -708,7 +708,7 @@ pub struct BasinStudy;
 
 impl DatasetStudy for BasinStudy {
     const NAME: &'static str = "basin";
-    const ABOUT: &'static str = "Basins of attraction on a two-dimensional slice of initial states";
+    const ABOUT: &'static str = "Compute basins of attraction on a two-dimensional slice of initial states";
     const COUNTED: &'static str = "rows";
     type Options = BasinOptions;
     type Report = Shares;

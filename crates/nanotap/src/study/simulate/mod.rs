@@ -493,7 +493,7 @@ pub struct SimulateStudy;
 
 impl Study for SimulateStudy {
     const NAME: &'static str = "simulate";
-    const ABOUT: &'static str = "One run: its steady state, or how it gets there";
+    const ABOUT: &'static str = "Simulate a motion: its steady state or its transient";
     type Options = SimulateOptions;
     type Report = SimulateReport;
 

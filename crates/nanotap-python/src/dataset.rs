@@ -46,7 +46,7 @@ impl Recipe {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let entry = registry::study(name)
-            .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
+            .ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
         let request = json(request)?;
         let studied = case.studied(py)?;
         let done = watched(py, progress, move |control| {
@@ -106,7 +106,7 @@ impl Recipe {
         let done = watched(py, None, move |control| {
             recipe
                 .chunk_files(chunk, control)
-                .ok_or_else(|| Failure::input(format!("there is no chunk {chunk}")))
+                .ok_or_else(|| Failure::input(format!("no chunk {chunk}")))
         })?;
         let files = done.result.iter().map(|file| PyBytes::new(py, file));
         Ok(files.collect())
@@ -238,7 +238,7 @@ fn drawn(figure: &Figure, format: &str) -> Result<Vec<u8>, Failure> {
         "pdf" => figure.to_pdf()?,
         other => {
             return Err(Failure::input(format!(
-                "`{other}` is no format that can be drawn; there are svg, png and pdf"
+                "unknown figure format `{other}`: expected svg, png or pdf"
             )));
         }
     })

@@ -118,9 +118,8 @@ pub(crate) fn describe(
             }
             _ => None,
         };
-        let figure = figure.ok_or_else(|| {
-            Failure::input(format!("there is no {study} to draw: columns are missing"))
-        })?;
+        let figure = figure
+            .ok_or_else(|| Failure::input(format!("cannot draw {study}: columns are missing")))?;
         Ok(figure.to_json()?)
     };
     Ok(described()?)

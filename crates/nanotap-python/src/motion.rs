@@ -183,7 +183,7 @@ fn report(
             )?)?)
         }
         other => Err(Error::input(
-            format!("{other} is no study of single motions"),
+            format!("{other} is not a study of single motions"),
             format!("there are {} and {}", SimulateStudy::NAME, OrbitStudy::NAME),
         )),
     }

@@ -130,7 +130,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         let _ = writeln!(
             text,
             "\n  {}",
-            style::bold("transient chaos: it is no attractor")
+            style::bold("transient chaos, not an attractor")
         );
         text.push_str(&motion::paragraph(&format!(
             "mean lifetime {:.0} drive periods (95 %: {:.0} … {:.0}) from {} escapes ({}); {} still wander \

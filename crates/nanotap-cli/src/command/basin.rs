@@ -67,7 +67,7 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
     };
     let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
     let document: serde_json::Value =
-        serde_json::from_str(&text).map_err(|error| refuse(format!("it is no JSON: {error}")))?;
+        serde_json::from_str(&text).map_err(|error| refuse(format!("not JSON: {error}")))?;
     let list = document["attractors"]
         .as_array()
         .filter(|list| !list.is_empty())

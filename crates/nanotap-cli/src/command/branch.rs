@@ -52,7 +52,7 @@ pub(crate) struct Arguments {
 fn shown() -> impl TypedValueParser<Value = Shown> {
     let choices = Shown::choices().map(|(name, what)| PossibleValue::new(name).help(what));
     PossibleValuesParser::new(choices)
-        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("nothing is called {name}")))
+        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("unknown observable {name}")))
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

@@ -143,7 +143,7 @@ fn readings(case: &GivenCase, result: &Convergence) -> String {
     }
     format!(
         "  {}\n{}\n  {}\n",
-        style::bold("what one reads, and the part of each mode with the most modes"),
+        style::bold("readings, and the share of each mode with the most modes"),
         table.render(),
         style::bold(&report.reading_verdict)
     )

@@ -70,10 +70,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for path in std::iter::once(&arguments.data).chain(&arguments.also) {
         if path.extension().is_some_and(|ending| ending == "toml") {
             return Err(Failure::input(
-                format!(
-                    "{}: a case file stands where the data are named",
-                    path.display()
-                ),
+                format!("{}: expected a data file, got a case file", path.display()),
                 "name the data first, then the case: nanotap fit DATA CASE",
             ));
         }

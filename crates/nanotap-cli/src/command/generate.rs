@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                     "--out {}: completions go to standard output",
                     folder.display()
                 ),
-                "leave --out away and redirect the output where the shell looks for completions",
+                "omit --out and redirect the output where the shell looks for completions",
             ));
         }
     };

@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(name) => all.remove(name).ok_or_else(|| {
             let known: Vec<&str> = all.keys().map(String::as_str).collect();
             Failure::input(
-                format!("there is no study `{name}`"),
+                format!("unknown study `{name}`"),
                 format!("there are {}", known.join(", ")),
             )
         })?,

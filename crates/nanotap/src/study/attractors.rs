@@ -278,7 +278,7 @@ pub fn attractors(
     match starts {
         Some(0) => {
             return Err(Error::input(
-                "at least one start is needed, 0 were asked for",
+                "expected at least one start, got 0",
                 "give 1 or more {starts}",
             ));
         }

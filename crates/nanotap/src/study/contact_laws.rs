@@ -339,8 +339,7 @@ pub struct ContactLawsStudy;
 
 impl Study for ContactLawsStudy {
     const NAME: &'static str = "contact-laws";
-    const ABOUT: &'static str =
-        "Compare contact laws under the same lever and drive";
+    const ABOUT: &'static str = "Compare contact laws under the same lever and drive";
     type Options = ContactLawsOptions;
     type Report = Comparison;
 

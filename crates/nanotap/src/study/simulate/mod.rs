@@ -172,7 +172,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 pub(in crate::study) fn check_periods(periods: usize) -> Result<(), Error> {
     if periods == 0 {
         return Err(Error::input(
-            "at least one period must be recorded, 0 were asked for",
+            "expected at least one recorded period, got 0",
             "give 1 or more {periods}",
         ));
     }

@@ -121,8 +121,7 @@ pub struct SweepStudy;
 
 impl DatasetStudy for SweepStudy {
     const NAME: &'static str = "sweep";
-    const ABOUT: &'static str =
-        "Sweep one or two parameters, from any number of initial states";
+    const ABOUT: &'static str = "Sweep one or two parameters, from any number of initial states";
     const COUNTED: &'static str = "values";
     type Options = SweepOptions;
     type Report = Summary;

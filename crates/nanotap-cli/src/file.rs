@@ -22,7 +22,7 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 /// What this command was asked to write.
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// How the tables begin that commands write, and what stands in those of datasets.
+/// Beginnings of the tables that commands write, and columns of those of datasets.
 const TABLES: [&str; 12] = [
     "tau,tip,tip_rate",
     "order,tip,tip_lag_degrees",
@@ -58,6 +58,9 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
     }
     if path.is_dir() {
         return Err(refused(path, "it is a folder"));
+    }
+    if path.exists() && !path.is_file() {
+        return Err(refused(path, "it is not a regular file"));
     }
     if !FORCE.load(Ordering::Relaxed) && path.is_file() {
         let there = fs::read(path).map_err(|error| refused(path, error))?;

@@ -71,9 +71,9 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
         // A table has no control.
         let curve = key.entry().takes == Takes::Table;
-        let beside = [Key::Modes, Key::CosineTerm].contains(key);
+        let in_addition = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {
-            key.is_physical() && !curve || beside
+            key.is_physical() && !curve || in_addition
         } else {
             takes
         }

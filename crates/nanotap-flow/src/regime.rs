@@ -121,7 +121,7 @@ impl Regime {
     }
 
     /// Calls `visit` with every entry of the constant parts of forcing and response.
-    pub(crate) fn each_constant(&mut self, visit: &mut impl FnMut(&mut f64)) {
+    pub(crate) fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
         let constants = [&mut self.forcing.constant, &mut self.response.constant];
         constants.into_iter().flatten().for_each(visit);
     }

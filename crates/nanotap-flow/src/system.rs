@@ -411,7 +411,7 @@ impl System {
     /// Calls `visit` with every constant of forcings, guards and resets and what was prepared from
     /// them, in the same order for all systems of one structure. Between two systems that differ in
     /// constant forces and thresholds only, these numbers vary linearly and nothing else does.
-    pub fn each_constant(&mut self, visit: &mut impl FnMut(&mut f64)) {
+    pub fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
         for regime in &mut self.regimes {
             regime.each_constant(visit);
         }

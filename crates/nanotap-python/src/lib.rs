@@ -1,9 +1,9 @@
-//! The Python door: what crosses between Python and the library. No physics and no
+//! The Python module: what crosses between Python and the library. No physics and no
 //! numerics here, and nothing that Python itself says better.
 //!
 //! Results cross as the documents of the terminal's JSON and as numpy arrays; the package
 //! `nanotap` makes typed objects, xarray Datasets and pandas tables of them. Work runs on
-//! a thread of its own while the caller waits outside the interpreter lock
+//! a separate thread while the caller waits outside the interpreter lock
 //! ([`watch`]), so that Ctrl-C is heard and a panic becomes an exception.
 
 #![allow(
@@ -38,6 +38,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<dataset::Recipe>()?;
     module.add_class::<dataset::Receiver>()?;
     for function in [
+        wrap_pyfunction!(run_command_line, module)?,
         wrap_pyfunction!(case::case_keys, module)?,
         wrap_pyfunction!(case::catalogue, module)?,
         wrap_pyfunction!(motion::modes, module)?,
@@ -65,4 +66,10 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add_function(function)?;
     }
     Ok(())
+}
+
+/// Runs the terminal program with `arguments`, whose first item is its name; returns the exit code.
+#[pyfunction]
+fn run_command_line(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| nanotap_cli::run(arguments))
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
@@ -12,7 +13,6 @@ use nanotap::study::attractors::{
 };
 use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -34,11 +34,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
-    let found = progress::study::<AttractorsStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| AttractorsStudy::run(&case, &request, control))
-    })??;
+    let found = progress::study::<AttractorsStudy>(&case, &request, &arguments.threads)?;
     arguments.study.out.write(|| csv(&model, &found))?;
     arguments
         .study
@@ -303,17 +299,8 @@ fn table(attractors: &[AttractorReport], units: &Units) -> String {
 }
 
 fn tip(low: f64, high: f64, units: &Units) -> String {
-    let kind = nanotap::case::physical::Kind::Length;
-    units.si(kind).map_or_else(
-        || {
-            format!(
-                "{} … {}",
-                number::significant(low, 5),
-                number::significant(high, 5)
-            )
-        },
-        |unit| format!("{} … {}", kind.format(unit * low), kind.format(unit * high)),
-    )
+    let [low, high] = [low, high].map(|v| number::quantity(units, Kind::Length, v, [5, 4]));
+    format!("{low} … {high}")
 }
 
 /// Starts without a verdict, those with one reason together.

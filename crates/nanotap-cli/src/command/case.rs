@@ -14,7 +14,7 @@ use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::table::shown_phase;
-use nanotap::study::kind::cantilever as cantilever_of;
+use nanotap::study::cantilever as cantilever_of;
 use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase};
 
@@ -326,12 +326,12 @@ fn force_rows(table: &mut Table, force: &SampleForce) {
             &format!("of gap and force, from {} to {}", gap(*first), gap(*last)),
         ]);
     }
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for (parameter, key, value) in force.parameters() {
-        if told.contains(&key) {
+        if shown.contains(&key) {
             continue;
         }
-        told.push(key);
+        shown.push(key);
         let value = if value.is_infinite() {
             "rigid".to_owned()
         } else {

@@ -41,7 +41,7 @@ impl AffineMap {
     }
 
     /// Calls `visit` with every part of the constant `c`.
-    pub(crate) fn each_constant(&mut self, visit: &mut impl FnMut(&mut f64)) {
+    pub(crate) fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
         let linear = self.columns.len() - self.vectors;
         let parts = self.columns[linear..].iter_mut().flatten().flatten();
         parts.for_each(visit);

@@ -6,14 +6,14 @@ use nanotap::model::Model;
 
 use crate::cases::{self, MODES};
 
-/// From case to a model that is ready to run, as along a sweep over the drive.
+/// From a case to a model that is ready to run, as in a sweep over the drive.
 #[divan::bench(args = MODES)]
 fn model(bencher: Bencher<'_, '_>, modes: usize) {
     let case = cases::paper(modes);
     bencher.bench_local(|| Model::cantilever(black_box(&case)).expect("a valid case"));
 }
 
-/// The same of a case whose eigenbases are not known from one before.
+/// The same for a case whose eigenbases are not known from a previous one.
 #[divan::bench(args = MODES)]
 fn another_stiffness(bencher: Bencher<'_, '_>, modes: usize) {
     let mut case = cases::paper(modes);

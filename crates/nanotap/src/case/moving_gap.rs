@@ -9,13 +9,13 @@ use std::sync::Arc;
 use nanotap_dynamics::StroboscopicMap as _;
 
 use super::{Case, CaseError};
-use crate::model::strobe::Strobe;
+use crate::model::strobe::ModelMap;
 use crate::model::{Model, MotionError};
 
 /// The map and the model of a case at a gap that can be changed for the price of a few additions.
 #[derive(Clone, Debug)]
 pub struct MovingGap {
-    map: Strobe,
+    map: ModelMap,
     model: Model,
     /// Present gap, in the model's unit of length, and that of `model`.
     gap: [f64; 2],
@@ -79,7 +79,7 @@ impl MovingGap {
             Arc::make_mut(&mut model.system).each_constant(&mut |constant| all.push(*constant));
         });
         Ok(Self {
-            map: Strobe::new(&model),
+            map: ModelMap::new(&model),
             model,
             gap: [gap; 2],
             system,
@@ -183,7 +183,7 @@ mod tests {
             "sample.hamaker=1e-19 J",
             "drive.frequency=70 kHz",
             "drive.free_amplitude=10 nm",
-            "gap.tip=8 nm",
+            "gap.tip=1 nm",
         ];
         cases.push(Case::parse(None, &words.map(str::to_owned)).unwrap());
         cases
@@ -202,7 +202,7 @@ mod tests {
                 let gap = start * (1.0 - 0.03 * f64::from(k)) + 1e-3 * f64::from(k % 3);
                 let fresh = case.with(case.gap_key(), gap).model().unwrap();
                 let mut expected = state.clone();
-                Strobe::new(&fresh).advance(&mut expected).unwrap();
+                ModelMap::new(&fresh).advance(&mut expected).unwrap();
                 moving.set(gap).unwrap();
                 let here = moving.model().unwrap();
                 let [seen, known] =
@@ -223,7 +223,7 @@ mod tests {
             let [mut state, mut expected] = [other.clone(), other];
             moving.advance(&mut state).unwrap();
             let first = case.model().unwrap();
-            Strobe::new(&first).advance(&mut expected).unwrap();
+            ModelMap::new(&first).advance(&mut expected).unwrap();
             assert_eq!(state, expected);
             assert!(moving.set(f64::NAN).is_err());
         }

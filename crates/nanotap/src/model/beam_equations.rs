@@ -537,7 +537,7 @@ impl BeamTangent {
 
     /// The derivative of a linear form.
     pub(crate) fn combined(&self, beam: &Beam<'_>, form: &LinearForm) -> Output {
-        beam.with_numbers(form, |dual| dual.derivative)
+        beam.with_numbers(form, |dual| dual.derivative())
             .plus(form.height.value, &self.height)
             .plus(form.rate.value, &self.height_rate)
     }
@@ -582,9 +582,9 @@ impl BeamTangent {
             let speed = beam.speed(&each, &moving);
             let change = layout
                 .row(&each.row_change, 1)
-                .plus(each.base.derivative, &moving)
+                .plus(each.base.derivative(), &moving)
                 .plus(each.base.value, &base_rate);
-            let weighted = speed.scaled(each.damping.derivative);
+            let weighted = speed.scaled(each.damping.derivative());
             of_measured.push([weighted.plus(each.damping.value, &change), change]);
         }
         factors.push([moving.scaled(by).plus(case.alpha3, &base_rate), base_rate]);

@@ -1,7 +1,7 @@
 //! The equations of cantilevers and oscillators with numbers that are intervals, for proofs.
 //!
 //! Every parameter is the interval of all decimal numbers that are read as its value
-//! ([`Interval::typed`]), wave numbers β_j come from an interval Newton step on
+//! ([`Interval::decimal`]), wave numbers β_j come from an interval Newton step on
 //! cos β + sech β = 0, and matrices, forcing and guards follow by the same formulas as the
 //! plain ones, Eqs. (8)–(18), rounded outwards.
 
@@ -128,7 +128,7 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     ];
     let repetition = case.tone2_ratio.map_or(1, FrequencyRatio::denominator);
     let period =
-        Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::typed(case.omega);
+        Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::decimal(case.omega);
     Ok(System::new(period, beam.frequencies.clone(), regimes)?)
 }
 
@@ -139,7 +139,7 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
 /// # Errors
 /// [`EnclosureError::Flow`] where its flow cannot be enclosed.
 pub fn enclosed_oscillator(oscillator: &Oscillator) -> Result<System, EnclosureError> {
-    let typed = Interval::typed;
+    let typed = Interval::decimal;
     let (zero, one) = (Interval::ZERO, Interval::ONE);
     let (mass, wall) = (typed(oscillator.mass), typed(oscillator.gap));
     let still = HarmonicVector {
@@ -240,7 +240,7 @@ fn derived(value: f64) -> Interval {
     if value == 0.0 {
         return Interval::ZERO;
     }
-    let typed = Interval::typed(value);
+    let typed = Interval::decimal(value);
     typed + typed * Interval::around_zero(8.0 * f64::EPSILON)
 }
 
@@ -271,7 +271,7 @@ fn sum(a: &Output, b: &Output) -> Output {
 
 impl EnclosedBeam {
     fn new(case: &Cantilever, memory: usize) -> Result<Self, EnclosureError> {
-        let typed = Interval::typed;
+        let typed = Interval::decimal;
         let approximate = Modes::shared(case.modes)
             .map_err(|_| EnclosureError::WaveNumber { mode: case.modes })?;
         let modes = approximate

@@ -23,6 +23,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::dual::Dual;
 use crate::model::parameter::Parameter;
+use nanotap_arithmetic::Scalar as _;
 
 /// What a measured mode adds: a term of rank one to each matrix, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,14 +81,14 @@ impl Correction {
         if !derivative {
             return u * u.transpose() * number.value;
         }
-        u * u.transpose() * number.derivative
+        u * u.transpose() * number.derivative()
             + (u * du.transpose() + du * u.transpose()) * number.value
     }
 
     /// `number` times u, or the derivative of that.
     pub(crate) fn vector(&self, number: Dual, derivative: bool) -> DVector<f64> {
         if derivative {
-            &self.row * number.derivative + &self.row_change * number.value
+            &self.row * number.derivative() + &self.row_change * number.value
         } else {
             &self.row * number.value
         }
@@ -142,11 +143,11 @@ impl FreeModes {
             let part = -square * at_tip(j) * at_tip(k) / (square - other);
             change.axpy(part, &self.shapes.column(j), 1.0);
         }
-        change *= ratio.derivative;
+        change *= ratio.derivative();
         let loaded = |x: &DVector<f64>| x + p * (case.alpha1 * p.dot(x));
         let carried = p * case.alpha1 + &beam.integral;
         let deflection = Dual::new(at_tip(k), change.dot(p));
-        let own = Dual::new(square, -square * at_tip(k).powi(2) * ratio.derivative);
+        let own = Dual::new(square, -square * at_tip(k).powi(2) * ratio.derivative());
         let squared = frequency.map_or(own, |f| f * f);
         let mass = stiffness.map_or(Dual::constant(1.0), |stiffness| {
             stiffness * deflection * deflection / squared
@@ -156,7 +157,7 @@ impl FreeModes {
         Correction {
             base: Dual::new(
                 v.dot(&carried),
-                change.dot(&carried) + ratio.derivative * v.dot(p),
+                change.dot(&carried) + ratio.derivative() * v.dot(p),
             ),
             mass: mass - one,
             damping: quality.map_or((mass - one) * natural, |quality| {
@@ -164,7 +165,7 @@ impl FreeModes {
             }),
             stiffness: mass * squared - own,
             row: loaded(&v),
-            row_change: loaded(&change) + p * (at_tip(k) * ratio.derivative),
+            row_change: loaded(&change) + p * (at_tip(k) * ratio.derivative()),
         }
     }
 }

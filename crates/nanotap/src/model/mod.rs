@@ -14,6 +14,7 @@ mod beam_equations;
 pub mod cantilever;
 pub mod contact;
 pub mod drive_form;
+#[cfg(feature = "proof")]
 pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;
@@ -332,7 +333,7 @@ impl Model {
 
     /// Calls `visit` with every constant of its outputs: the numbers that move with the gap, apart
     /// from those of its system.
-    pub(crate) fn each_output_constant(&mut self, visit: &mut impl FnMut(&mut f64)) {
+    pub(crate) fn each_output_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
         let outputs = [&mut self.gap, &mut self.height].into_iter();
         for output in outputs.chain(&mut self.force) {
             visit(&mut output.constant);

@@ -1,4 +1,4 @@
-//! What must hold of every contact law.
+//! Properties of every contact law.
 
 use nanotap::case::Case;
 use nanotap::model::Model;
@@ -35,8 +35,8 @@ pub(crate) fn parameter(name: &str) -> Parameter {
     Parameter::find(name).unwrap()
 }
 
-/// States, contacts, peak force and the energy that the sample takes, in flight as well,
-/// against an independent integration.
+/// States, contacts, peak force and dissipated energy, in flight as well, compared with an
+/// independent integration.
 #[test]
 fn every_law_agrees_with_located_runge_kutta() {
     for law in ContactLaw::ALL {
@@ -69,7 +69,7 @@ fn every_law_agrees_with_located_runge_kutta() {
                 "{law} {omega}: {lost} {}",
                 independent.dissipated
             );
-            // The integration sees forces at its steps only.
+            // The integration evaluates forces at its steps only.
             assert!((seen.peak_force / independent.force[1] - 1.0).abs() < 1e-2);
             let pulls = independent.force[0] < -1e-6;
             assert_eq!(
@@ -85,8 +85,9 @@ fn every_law_agrees_with_located_runge_kutta() {
     }
 }
 
-/// Jacobians and the derivatives to every parameter against differences of fourth order;
-/// states in flight over a surface that recovers, in contact, and parting at once.
+/// Jacobians and the derivatives with respect to every parameter compared with differences of
+/// fourth order; states in flight over a recovering surface, in contact, and at immediate
+/// separation.
 #[test]
 fn derivatives_of_every_law() {
     for law in ContactLaw::ALL {
@@ -102,7 +103,7 @@ fn derivatives_of_every_law() {
                 state = advance(&subject, &state);
             }
             let mut starts = vec![state.clone()];
-            // Deep in the sample, resting and moving out.
+            // Deep in the sample, at rest and moving outwards.
             for speed in [0.0, 3.0] {
                 let mut state = vec![0.0; model.dimension()];
                 (state[0], state[modes]) = (-0.1, speed);
@@ -116,9 +117,9 @@ fn derivatives_of_every_law() {
     }
 }
 
-/// A periodic motion closes its energy balance and its volumes to rounding.
+/// A periodic motion balances its energy and its volumes to rounding.
 #[test]
-fn orbits_of_every_law_close_their_balances() {
+fn orbits_of_every_law_balance_energy_and_volume() {
     for law in ContactLaw::ALL {
         for (omega, modes) in [(20.0, 3), (2.6, 3), (20.0, 6)] {
             let model = Model::cantilever(&on(law, omega).with_modes(modes)).unwrap();
@@ -142,8 +143,8 @@ fn orbits_of_every_law_close_their_balances() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Anything anywhere: the run goes on, the sample never gives energy, a surface that
-    /// recovers never pulls, and only contact ends contact.
+    /// For random parameters and states: the run continues, the sample never supplies energy, a
+    /// recovering surface never pulls, and only contact ends contact.
     #[test]
     fn samples_are_passive(
         law in 0..4_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
@@ -171,13 +172,13 @@ proptest! {
         prop_assert!(seen.energy_balance.sample_damping >= 0.0);
         if ![ContactLaw::SpringDamper, ContactLaw::MovingSurface].contains(&law) {
             let scale = seen.peak_force.max(stiffness * (a.abs() + memory.abs())) + 1e-3;
-            // A start in the sample may be given that pulls for no time at all.
+            // A start in the sample may be one that pulls, for zero time.
             prop_assert!(seen.least_force >= -1e-10 * scale, "{}", seen.least_force);
         }
         for pair in run.events().windows(2) {
             prop_assert!(pair[0].to == pair[1].from);
         }
-        // The map at each period's start finds the regime that the run was in.
+        // The map at the start of each period finds the regime of the run.
         for k in 0..8 {
             let t = f64::from(k) * model.period();
             let segment = run.segment_at(t).unwrap();
@@ -215,7 +216,7 @@ fn without_a_damper_every_law_is_the_papers_spring() {
     assert_eq!((recovered[6], relaxed[6]), (0.0, 0.0));
 }
 
-/// A law's further parameters can be varied like the paper's.
+/// Further parameters of a law can be varied like the paper's.
 #[test]
 fn a_case_has_the_parameters_of_its_law() {
     let of = |law| Case::from(on(law, 2.6));

@@ -1,6 +1,6 @@
-//! An independent integration of a beam on any of the samples: Runge–Kutta of fourth order
-//! in small steps, switches located by bisection of the step, the equations written down
-//! from the samples' mechanics and not from the product's regimes.
+//! An independent integration of a beam on any of the samples: Runge–Kutta of fourth order in small
+//! steps, switches located by bisection of the step, with equations derived from the mechanics of
+//! the samples and not from the product's regimes.
 
 use nalgebra::DVector;
 use nanotap::model::cantilever::Cantilever;
@@ -10,7 +10,7 @@ use nanotap::model::galerkin::Galerkin;
 use crate::contact_laws::parameter;
 use crate::moving_surface::MovingSurface;
 
-/// The beam and where its sample is.
+/// State of the beam and the sample.
 #[derive(Clone)]
 pub(crate) struct Motion {
     /// Displacements and velocities of the modes.
@@ -19,7 +19,7 @@ pub(crate) struct Motion {
     pub(crate) surface: f64,
     pub(crate) damper: f64,
     pub(crate) touching: bool,
-    /// What the sample took, and the greatest and the least force.
+    /// The energy dissipated in the sample, and the largest and the smallest force.
     pub(crate) dissipated: f64,
     pub(crate) force: [f64; 2],
     pub(crate) contacts: usize,
@@ -59,7 +59,7 @@ impl Independent {
         ]
     }
 
-    /// Force of the touched sample on the tip at height `h` and speed `v`.
+    /// Force of the sample in contact on the tip at height `h` and speed `v`.
     fn pressed(&self, h: f64, v: f64, m: &Motion) -> f64 {
         let (c, damper) = (&self.case, m.damper);
         match c.contact {
@@ -72,7 +72,7 @@ impl Independent {
         }
     }
 
-    /// Speed of a moving surface, at which the two dampers and springs balance.
+    /// Speed of a surface in contact, from the balance of the two dampers and springs.
     fn surface_speed(&self, h: f64, v: f64, m: &Motion) -> f64 {
         let (c, own) = (&self.case, MovingSurface::of(&self.case));
         let springs = -own.stiffness * m.surface;
@@ -216,7 +216,7 @@ impl Independent {
                 if m.touching && self.case.contact != ContactLaw::MovingSurface {
                     m.surface = height;
                 }
-                // A small step on, where the guard that is zero here has become positive.
+                // A small step later the guard that is zero here is positive.
                 let on = left.min(1e-4 * h);
                 m = self.step(t, &m, on);
                 (t, left) = (t + on, left - on);

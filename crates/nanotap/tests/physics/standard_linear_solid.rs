@@ -1,4 +1,4 @@
-//! The spring beside a relaxing arm.
+//! The spring with a relaxing arm.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }
 
-/// An arm that relaxes at once leaves the spring α4, one that never does adds its own.
+/// An arm that relaxes at once leaves the spring α4; one that never relaxes adds its own spring.
 #[test]
 fn limits_of_the_relaxation_time_are_springs() {
     let spring = |stiffness| Cantilever {
@@ -49,7 +49,7 @@ fn limits_of_the_relaxation_time_are_springs() {
     }
 }
 
-/// An ever stiffer arm of the same damper is a Kelvin–Voigt surface.
+/// In the limit of a stiff arm with the same damper the surface is a Kelvin–Voigt one.
 #[test]
 fn a_stiff_arm_is_a_kelvin_voigt_surface() {
     let expected = after(&on(ContactLaw::KelvinVoigt, 20.0), 30);
@@ -64,11 +64,11 @@ fn a_stiff_arm_is_a_kelvin_voigt_surface() {
     assert!(last < 1e-3, "{last}");
 }
 
-/// Pressed in at rest and shaken, the sample is indented harmonically: the loop of force and
-/// indentation has the area π δ₀² k ωτ/(1 + ω²τ²), and the spring seen is the storage
-/// modulus α4 + k ω²τ²/(1 + ω²τ²).
+/// Pressed in at rest and driven, the sample is indented harmonically: the loop of force and
+/// indentation has the area π δ₀² k ωτ/(1 + ω²τ²), and the stiffness is the storage modulus α4 + k
+/// ω²τ²/(1 + ω²τ²).
 #[test]
-fn harmonic_indentation_loses_what_the_loss_modulus_says() {
+fn harmonic_indentation_dissipates_according_to_the_loss_modulus() {
     for (omega, time) in [(2.6, 0.01), (2.6, 0.4), (20.0, 0.05), (20.0, 3.0)] {
         let case = Cantilever {
             alpha2: 1e-3,

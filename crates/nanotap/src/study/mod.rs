@@ -61,6 +61,8 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<attractors::AttractorsStudy>(),
     StudyEntry::of::<branch::BranchStudy>(),
     StudyEntry::of::<approach::ApproachStudy>(),
+    #[cfg(feature = "fm")]
+    StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
     #[cfg(feature = "fit")]
     StudyEntry::of::<fit::FitStudy>(),
     #[cfg(feature = "dataset")]

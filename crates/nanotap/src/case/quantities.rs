@@ -133,7 +133,10 @@ impl Quantities {
     }
 
     /// The mapping slightly below and above the value of a key, and the distance of these values.
-    pub(super) fn bracket(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
+    pub(super) fn bracket(
+        &self,
+        key: Key,
+    ) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
         let here = self.view()?;
         let value = self.get(key).unwrap_or(f64::NAN);
         // Where the mapping is smooth its third derivative is of order 1/value³, so that

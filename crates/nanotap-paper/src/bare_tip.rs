@@ -8,7 +8,7 @@ use nanotap_figures::{Figure, Panel};
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
 use super::motion_view::{KEY, View, empty_portrait};
-use super::runs::{Counted, Runs, how_many};
+use super::runs::{Counted, Runs, how_many, stability};
 use super::section::{Picture, Section};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
@@ -80,16 +80,15 @@ impl Reading {
 
     /// Time series and phase portrait of an orbit.
     fn panels(&self, orbit: &PeriodicOrbit, periods: usize) -> Result<[Panel; 2], PaperError> {
-        let stability = if orbit.is_stable() {
-            "stable"
-        } else {
-            "unstable"
-        };
         let omega = self.counted.case.omega;
         let view = View::new(&self.counted.model, &orbit.states[0], periods)?;
         let whole = View::new(&self.counted.model, &orbit.states[0], orbit.period)?;
         Ok([
-            view.time_panel(format!("Ω = {omega}: period {}, {stability}", orbit.period)),
+            view.time_panel(format!(
+                "Ω = {omega}: period {}, {}",
+                orbit.period,
+                stability(orbit)
+            )),
             whole.portrait_panel(
                 format!("largest |μ| = {}", digits(orbit.spectral_radius(), 4)),
                 0.8,
@@ -241,10 +240,7 @@ pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         (None, None) => {
             let orbit = bare.fast.best(4).or_else(|| bare.fast.best(1));
             let Some(orbit) = orbit else {
-                return Err(PaperError::Failed {
-                    what: "Fig. 16".into(),
-                    why: "no orbit at Ω = 20".into(),
-                });
+                return Err(PaperError::failed("Fig. 16")("no orbit at Ω = 20"));
             };
             let words = "No period-2 orbit was found, stable or unstable; the figure shows the subharmonic that exists at Ω = 20.";
             (&bare.fast, orbit, orbit.period, words)

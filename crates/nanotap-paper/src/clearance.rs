@@ -158,10 +158,8 @@ fn row(
     state: &[f64],
     periods: usize,
 ) -> Result<Option<Row>, PaperError> {
-    let clearance = Clearance::of(model, state, periods).map_err(|error| PaperError::Failed {
-        what: motion.clone(),
-        why: error.to_string(),
-    })?;
+    let clearance =
+        Clearance::of(model, state, periods).map_err(PaperError::failed(motion.clone()))?;
     Ok(clearance.map(|clearance| Row {
         figure,
         motion,

@@ -158,12 +158,8 @@ const EQ25: [(f64, i32); 3] = [(7.79, 2), (20.33, 2), (55.81, 2)];
 /// Eq. (25).
 pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let table_of = |modes: usize| {
-        ModeTable::new(&Cantilever::paper_eq24().with_modes(modes)).map_err(|error| {
-            PaperError::Failed {
-                what: "the frequencies in contact".into(),
-                why: error.to_string(),
-            }
-        })
+        ModeTable::new(&Cantilever::paper_eq24().with_modes(modes))
+            .map_err(PaperError::failed("the frequencies in contact"))
     };
     let mut table = Table::new(
         "Frequencies in contact at α₁ = 0.1, α₄ = 20; the paper prints 7.79, 20.33, 55.81",
@@ -403,16 +399,13 @@ pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
             &nanotap::model::Model::cantilever(&case)?,
         ))
     };
-    let failed = |error: nanotap::model::MotionError| PaperError::Failed {
-        what: "a run".into(),
-        why: error.to_string(),
-    };
+    let failed = PaperError::failed("a run");
     let factor = 3.0;
     let (mut small, mut large) = (map_of(0.1)?, map_of(0.1 * factor)?);
     let mut x = vec![0.1, 0.01, 0.001, 0.2, 0.02, 0.002];
     let mut y: Vec<f64> = x.iter().map(|v| factor * v).collect();
-    small.advance(&mut x).map_err(failed)?;
-    large.advance(&mut y).map_err(failed)?;
+    small.advance(&mut x).map_err(&failed)?;
+    large.advance(&mut y).map_err(&failed)?;
     let size = y.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let difference = x
         .iter()

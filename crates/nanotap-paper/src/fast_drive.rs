@@ -38,10 +38,8 @@ impl Fast {
             .first()
             .map(|(orbit, _)| (*orbit).clone());
         let Some(attractor) = attractor else {
-            return Err(PaperError::Failed {
-                what: "the census at Ω = 20".into(),
-                why: "no periodic attractor was found".into(),
-            });
+            let failed = PaperError::failed("the census at Ω = 20");
+            return Err(failed("no periodic attractor was found"));
         };
         Ok(Self {
             counted,
@@ -310,8 +308,6 @@ pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
 
 /// A figure that reports one long period with its amplitude.
 struct LongPeriod {
-    name: &'static str,
-    id: &'static str,
     number: usize,
     period: usize,
     /// Number of motions of this period that the paper has up to this figure.
@@ -325,6 +321,7 @@ fn long_period(
     figure: &LongPeriod,
 ) -> Result<Section, PaperError> {
     let fast = Fast::new(runs)?;
+    let section_id = section.id;
     let (period, amplitude) = (figure.period, figure.amplitude);
     let grid = fast
         .scan
@@ -336,7 +333,7 @@ fn long_period(
     let look = fast.counted.look(&fast.attractor)?.observables;
     Ok(section
         .picture(Picture::new(
-            figure.name,
+            section_id,
             format!("Is there a period-{period} motion at Ω = 20, α₁ = 0.1? (Fig. {})", figure.number),
             format!(
                 "Eq. (26). (a, b) The only attractor of the exact flow, over {period} drive periods.{} {KEY}",
@@ -347,7 +344,7 @@ fn long_period(
         ))
         .check(
             Check::new(
-                figure.id,
+                section_id,
                 format!("Fig. {}: a period-{period} motion of amplitude {amplitude} exists at Ω = 20, α₁ = 0.1", figure.number),
                 format!(
                     "no initial state leads to one; the only attractor has period {} and amplitude {} (N = 3)",
@@ -371,8 +368,6 @@ fn long_period(
 /// Fig. 10.
 pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig10",
-        id: "fig10",
         number: 10,
         period: 11,
         claimed: 1,
@@ -384,8 +379,6 @@ pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
 /// Fig. 11.
 pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig11",
-        id: "fig11",
         number: 11,
         period: 28,
         claimed: 1,
@@ -397,8 +390,6 @@ pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
 /// Fig. 12.
 pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig12",
-        id: "fig12",
         number: 12,
         period: 21,
         claimed: 1,
@@ -410,8 +401,6 @@ pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
 /// Fig. 13.
 pub(super) fn fig13(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig13",
-        id: "fig13",
         number: 13,
         period: 21,
         claimed: 2,

@@ -2,8 +2,8 @@
 //! sections need: its extrema, its bifurcations, and where it is stable.
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationError, ContinuationOptions,
-    Direction, MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
+    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationOptions, Direction,
+    MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
 };
 
 use super::PaperError;
@@ -81,11 +81,11 @@ impl FollowedBranch {
                 || follow(Direction::Increasing),
             )
         });
-        let failed = |error: ContinuationError| PaperError::Failed {
-            what: format!("the period-{} branch from Ω = {entry}", orbit.period),
-            why: error.to_string(),
-        };
-        let (down, up) = (down.map_err(failed)?, up.map_err(failed)?);
+        let failed = PaperError::failed(format!(
+            "the period-{} branch from Ω = {entry}",
+            orbit.period
+        ));
+        let (down, up) = (down.map_err(&failed)?, up.map_err(&failed)?);
         let mut points = points_of(&down, case)?;
         points.reverse();
         // In reversed order a bifurcation precedes the point that it followed.

@@ -132,10 +132,7 @@ fn budgets() -> ClassifyOptions {
 
 fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> {
     let model = subject.model()?;
-    let area = default_box(&model).map_err(|error| PaperError::Failed {
-        what: "the box of initial states".into(),
-        why: error.to_string(),
-    })?;
+    let area = default_box(&model).map_err(PaperError::failed("the box of initial states"))?;
     let options = CensusOptions {
         pilots: INITIAL_RUNS,
         classify: budgets(),
@@ -162,25 +159,21 @@ fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> 
         let mut state = starts[*start].clone();
         let mut map = Strobe::new(&model);
         for _ in 0..options.classify.max_transient {
-            map.advance(&mut state).map_err(|error| not_drawn(&error))?;
+            map.advance(&mut state).map_err(not_drawn)?;
         }
         motions.push(seen(Kind::Undecided, &state, SHOWN_PERIODS)?);
     }
     Ok(Column { at, motions })
 }
 
-fn not_drawn(error: &impl ToString) -> PaperError {
-    PaperError::Failed {
-        what: "a motion's maxima".into(),
-        why: error.to_string(),
-    }
+fn not_drawn<E: ToString>(error: E) -> PaperError {
+    PaperError::failed("a motion's maxima")(error)
 }
 
 /// Largest deflection of the tip away from the sample (for an oscillator: distance from its stop)
 /// in each of `periods` drive periods from `state`.
 pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec<f64>, PaperError> {
-    let trajectory =
-        Trajectory::record(&model.system, state, periods).map_err(|error| not_drawn(&error))?;
+    let trajectory = Trajectory::record(&model.system, state, periods).map_err(not_drawn)?;
     let signal = trajectory.signal(if model.beam.is_some() {
         &model.tip
     } else {

@@ -92,10 +92,7 @@ fn part(section: &Section) -> Result<String, PaperError> {
         let svg = picture
             .bare()
             .to_svg()
-            .map_err(|source| PaperError::Figure {
-                name: picture.name.clone(),
-                source,
-            })?;
+            .map_err(PaperError::failed(picture.name.clone()))?;
         // An XML declaration is not allowed inside a page.
         let svg = svg.find("<svg").map_or(svg.as_str(), |start| &svg[start..]);
         let _ = writeln!(

@@ -204,13 +204,10 @@ struct Orbit {
 impl Orbit {
     /// The orbit to which runs lead.
     fn find(oscillator: Oscillator) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: format!("a period-1 orbit at ω = {ENTRY}"),
-            why,
-        };
+        let what = format!("a period-1 orbit at ω = {ENTRY}");
         let model = oscillator.model()?;
         let mut map = Strobe::new(&model);
-        let area = default_box(&model).map_err(|error| failed(error.to_string()))?;
+        let area = default_box(&model).map_err(PaperError::failed(&what))?;
         let found = area.starts(SEED, 32).into_iter().find_map(|start| {
             match classify(&mut map, &start, &ClassifyOptions::default()).kind {
                 Settled::Periodic(orbit) if orbit.period == 1 => Some(orbit),
@@ -220,7 +217,7 @@ impl Orbit {
         Self::look(
             oscillator,
             &model,
-            found.ok_or_else(|| failed("no run converges to one".into()))?,
+            found.ok_or_else(|| PaperError::failed(what)("no run converges to one"))?,
         )
     }
 
@@ -233,10 +230,7 @@ impl Orbit {
             1,
             &ShootingOptions::default(),
         )
-        .map_err(|error| PaperError::Failed {
-            what: format!("the orbit of {oscillator:?}"),
-            why: error.to_string(),
-        })?;
+        .map_err(PaperError::failed(format!("the orbit of {oscillator:?}")))?;
         Self::look(oscillator, &model, orbit)
     }
 
@@ -245,12 +239,8 @@ impl Orbit {
         model: &Model,
         orbit: PeriodicOrbit,
     ) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: "the orbit's extrema".into(),
-            why,
-        };
         let o = measure(model, &orbit.states[0], 1, Set::ALL)
-            .map_err(|error| failed(error.to_string()))?;
+            .map_err(PaperError::failed("the orbit's extrema"))?;
         Ok(Self {
             oscillator,
             closed: orbit,
@@ -266,10 +256,7 @@ impl Orbit {
         let mut flips = Vec::new();
         for direction in [Direction::Decreasing, Direction::Increasing] {
             let branch = continue_orbit(&family, ENTRY, &self.closed, direction, &options, control)
-                .map_err(|error| PaperError::Failed {
-                    what: "a period-1 branch".into(),
-                    why: error.to_string(),
-                })?;
+                .map_err(PaperError::failed("a period-1 branch"))?;
             // Beyond its first flip a branch may lead anywhere.
             flips.extend(
                 branch

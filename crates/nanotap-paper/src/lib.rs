@@ -75,29 +75,13 @@ pub enum PaperError {
     /// A case is invalid.
     #[error(transparent)]
     Model(#[from] CaseError),
-    /// An orbit was not found.
-    #[error("{what}: {source}")]
-    Orbit {
-        /// Description of the orbit.
-        what: String,
-        /// Reason of the failure.
-        source: nanotap::Error,
-    },
-    /// A computation that should succeed failed.
+    /// A computation that should succeed failed, or a picture could not be drawn.
     #[error("{what}: {why}")]
     Failed {
         /// Description of the computation.
         what: String,
         /// Reason of the failure.
         why: String,
-    },
-    /// A picture could not be drawn.
-    #[error("{name}: {source}")]
-    Figure {
-        /// Name of the picture.
-        name: String,
-        /// Reason of the failure.
-        source: nanotap_figures::FigureError,
     },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
@@ -107,6 +91,17 @@ pub enum PaperError {
         /// Error of the operating system.
         source: std::io::Error,
     },
+}
+
+impl PaperError {
+    /// The conversion of an error of the computation or picture that `what` names.
+    fn failed<E: ToString>(what: impl Into<String>) -> impl Fn(E) -> PaperError {
+        let what = what.into();
+        move |error| PaperError::Failed {
+            what: what.clone(),
+            why: error.to_string(),
+        }
+    }
 }
 
 impl From<nanotap::model::ModelError> for PaperError {

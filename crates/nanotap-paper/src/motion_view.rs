@@ -32,12 +32,8 @@ struct Stretch {
 impl<'a> View<'a> {
     /// `periods` drive periods of `model` from the state `start`.
     pub(super) fn new(model: &'a Model, start: &[f64], periods: usize) -> Result<Self, PaperError> {
-        let trajectory = Trajectory::record(&model.system, start, periods).map_err(|error| {
-            PaperError::Failed {
-                what: "a motion to draw".into(),
-                why: error.to_string(),
-            }
-        })?;
+        let trajectory = Trajectory::record(&model.system, start, periods)
+            .map_err(PaperError::failed("a motion to draw"))?;
         Ok(Self { model, trajectory })
     }
 

@@ -195,10 +195,7 @@ fn report_percent(control: &Control<'_>, reported: &AtomicUsize, part: f64) {
 
 /// The box of the initial states.
 fn start_box(model: &Model) -> Result<StartBox, PaperError> {
-    default_box(model).map_err(|error| PaperError::Failed {
-        what: "the box of initial states".into(),
-        why: error.to_string(),
-    })
+    default_box(model).map_err(PaperError::failed("the box of initial states"))
 }
 
 /// Chaos from which no escape was observed.
@@ -259,19 +256,16 @@ impl Counted {
 
     /// Observables of a motion that does not repeat, over [`OBSERVED_PERIODS`] periods from `state`.
     pub(super) fn watch(&self, state: &[f64]) -> Result<Observables, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: "a run to observe".into(),
-            why,
-        };
-        measure(&self.model, state, OBSERVED_PERIODS, Set::ALL).map_err(|e| failed(e.to_string()))
+        measure(&self.model, state, OBSERVED_PERIODS, Set::ALL)
+            .map_err(PaperError::failed("a run to observe"))
     }
 
     /// Observables of a closed orbit of this case.
     pub(super) fn look(&self, orbit: &PeriodicOrbit) -> Result<OrbitReport, PaperError> {
-        report(&self.model, orbit, HARMONICS).map_err(|source| PaperError::Orbit {
-            what: format!("a period-{} orbit", orbit.period),
-            source,
-        })
+        report(&self.model, orbit, HARMONICS).map_err(PaperError::failed(format!(
+            "a period-{} orbit",
+            orbit.period
+        )))
     }
 
     /// The result of a proof for an orbit, to be appended to its description; empty if nothing was
@@ -358,6 +352,15 @@ impl Counted {
             &self.case,
             &format!("--starts {} --seed {SEED}", self.starts),
         )
+    }
+}
+
+/// Whether an orbit is stable, in a word.
+pub(super) fn stability(orbit: &PeriodicOrbit) -> &'static str {
+    if orbit.is_stable() {
+        "stable"
+    } else {
+        "unstable"
     }
 }
 

@@ -12,7 +12,7 @@ use super::check::{Check, Verdict, digits};
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
-use super::runs::{Counted, Runs, SEED, how_many};
+use super::runs::{Counted, Runs, SEED, how_many, stability};
 use super::section::{Picture, Section, Table};
 use super::time_step::Grid;
 use nanotap::case::Case;
@@ -58,15 +58,11 @@ impl Slow {
         let mut parts = Vec::new();
         for orbit in &orbits {
             let o = self.counted.look(orbit)?.observables;
-            let stability = if orbit.is_stable() {
-                "stable"
-            } else {
-                "unstable"
-            };
             parts.push(format!(
-                "W from {} to {}, {stability}, μ = {}{}",
+                "W from {} to {}, {}, μ = {}{}",
                 digits(o.tip_min, 4),
                 digits(o.tip_max, 4),
+                stability(orbit),
                 multiplier(orbit),
                 self.counted.proved(orbit)
             ));
@@ -201,15 +197,10 @@ pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         words.push("(a, b) The attractor.");
     }
     if let Some(orbit) = slow.of_period(1).first() {
-        let stability = if orbit.is_stable() {
-            "stable"
-        } else {
-            "unstable"
-        };
         let series = View::new(model, &orbit.states[0], 2)?;
         let loop_view = View::new(model, &orbit.states[0], 1)?;
         figure = figure
-            .with(series.time_panel(format!("period 1, {stability}")))
+            .with(series.time_panel(format!("period 1, {}", stability(orbit))))
             .with(loop_view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         words.push("(c, d) The only period-1 orbit that Newton found.");
     }
@@ -241,14 +232,9 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         let Some(orbit) = slow.of_period(period).first().copied() else {
             continue;
         };
-        let stability = if orbit.is_stable() {
-            "stable"
-        } else {
-            "unstable"
-        };
         let view = View::new(model, &orbit.states[0], period)?;
         figure = figure
-            .with(view.time_panel(format!("period {period}, {stability}")))
+            .with(view.time_panel(format!("period {period}, {}", stability(orbit))))
             .with(view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         captions.push(format!(
             "{letters} The unstable period-{period} orbit, found by Newton."
@@ -398,10 +384,7 @@ fn slow_grids(runs: &Runs<'_>) -> Result<Table, PaperError> {
 fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperError> {
     let omega = 3.15;
     let model = subject.with(OMEGA, omega).model()?;
-    let area = default_box(&model).map_err(|error| PaperError::Failed {
-        what: "the box of initial states".into(),
-        why: error.to_string(),
-    })?;
+    let area = default_box(&model).map_err(PaperError::failed("the box of initial states"))?;
     let mut map = Strobe::new(&model);
     let found = area.starts(SEED, 32).into_iter().find_map(|start| {
         match classify(&mut map, &start, &ClassifyOptions::default()).kind {
@@ -425,15 +408,12 @@ struct Returns {
 
 impl Returns {
     fn of(model: &Model, state: &[f64], watched: usize) -> Result<Self, PaperError> {
-        let failed = |error: nanotap::model::MotionError| PaperError::Failed {
-            what: "a run on the chaotic attractor".into(),
-            why: error.to_string(),
-        };
+        let failed = PaperError::failed("a run on the chaotic attractor");
         let mut map = Strobe::new(model);
         let mut states = vec![state.to_vec()];
         for k in 0..watched {
             let mut next = states[k].clone();
-            map.advance(&mut next).map_err(failed)?;
+            map.advance(&mut next).map_err(&failed)?;
             states.push(next);
         }
         let norm = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>().sqrt();

@@ -594,4 +594,59 @@ mod tests {
         assert!(!Range::POSITIVE.contains(0.0) && Range::NOT_NEGATIVE.contains(0.0));
         assert!(!Range::ANY.contains(f64::NAN) && !Range::ANY.contains(f64::INFINITY));
     }
+
+    /// The entry of a number of a contact law is all that files, messages, mapping, documents and
+    /// schema need.
+    #[test]
+    fn a_number_of_a_contact_law_is_one_entry() {
+        let schema = crate::case::schema::schema().to_value();
+        for law in ContactLaw::ALL {
+            let numbers: Vec<Parameter> = Parameter::of_law(law).collect();
+            let mut words = vec![
+                "cantilever.k=2 N/m".to_owned(),
+                "cantilever.f0=70 kHz".to_owned(),
+                "cantilever.Q=200".to_owned(),
+                format!("sample.law={law}"),
+                "sample.stiffness=5 N/m".to_owned(),
+                "drive.frequency=70 kHz".to_owned(),
+                "drive.free_amplitude=10 nm".to_owned(),
+                "gap.tip=8 nm".to_owned(),
+            ];
+            for &number in &numbers {
+                let key = Key::stating(number).unwrap();
+                words.push(format!("{key}={}", key.kind().example()));
+            }
+            let case = crate::case::Case::parse(None, &words).unwrap();
+            let view = case.physical().unwrap();
+            let document = crate::case::document::CaseDocument::of(&case);
+            let document = serde_json::to_value(document).unwrap();
+            for &number in &numbers {
+                let (name, key) = (number.name(), Key::stating(number).unwrap());
+                let expected = key.kind().parse(key.kind().example()).unwrap();
+                assert_eq!(case.get(key), expected, "{key}");
+                assert!(
+                    (document["physical"][name].as_f64().unwrap() / expected - 1.0).abs() < 1e-14
+                );
+                assert_eq!(document[name].as_f64().unwrap(), case.get(Key::of(number)));
+                let row = view
+                    .mapping()
+                    .into_iter()
+                    .find(|row| row.parameter == number);
+                assert!(!row.unwrap().formula.is_empty(), "{key}");
+                for (table, key) in [("model", Key::of(number)), ("sample", key)] {
+                    let described = &schema["properties"][table]["properties"][name];
+                    assert_eq!(described["description"], key.meaning(), "{key}");
+                    assert_eq!(case.key(key.path()).ok(), Some(key), "{key}");
+                }
+                assert!(case.to_toml().contains(&format!("\n{name} = ")), "{key}");
+                // Any other law refuses it by name.
+                let other = words.iter().filter(|word| !word.starts_with("sample.law"));
+                let other: Vec<String> = other.cloned().collect();
+                let refused = crate::case::Case::parse(None, &other)
+                    .unwrap_err()
+                    .to_string();
+                assert!(refused.contains(law.name()), "{refused}");
+            }
+        }
+    }
 }

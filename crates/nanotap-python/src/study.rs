@@ -1,4 +1,4 @@
-//! What exists, and how it changes: census, branches, exponents, modes enough, the paper.
+//! Studies: attractors, branches, exponents, convergence, the paper.
 
 use std::path::PathBuf;
 
@@ -98,8 +98,8 @@ pub(crate) fn lyapunov<'py>(
     Ok((document, PyArray1::from_vec(py, values).reshape(shape)?))
 }
 
-/// The paper computed again, its report and pictures in the folder `out`: JSON, and whether
-/// Ctrl-C stopped it.
+/// Recomputes the paper, with report and figures in the folder `out`: JSON, and whether Ctrl-C
+/// stopped it.
 #[pyfunction]
 #[pyo3(signature = (*, out, only, quick, threads, progress))]
 pub(crate) fn paper(

@@ -403,7 +403,7 @@ impl Studied<'_> {
 }
 
 fn progress(done: usize, finest: usize, counted: &str) -> String {
-    let more = if done < finest { ", going on …" } else { "" };
+    let more = if done < finest { " so far" } else { "" };
     format!("{done} {counted}{more}")
 }
 

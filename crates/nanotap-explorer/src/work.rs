@@ -84,7 +84,7 @@ impl Workers {
         });
         match tokio::time::timeout(LONGEST, task).await {
             Ok(Ok(done)) => done,
-            Ok(Err(_)) => Err(ApiError::failed("the computation broke off")),
+            Ok(Err(_)) => Err(ApiError::failed("internal error; please report")),
             Err(_) => Err(too_long()),
         }
     }

@@ -187,7 +187,10 @@ impl Shelf {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let found = kept.figures.iter().find(|(own, _)| *own == number);
         found.map(|(_, figure)| Arc::clone(figure)).ok_or_else(|| {
-            ApiError::input("this figure is no longer available", "compute the study again")
+            ApiError::input(
+                "this figure is no longer available",
+                "compute the study again",
+            )
         })
     }
 }

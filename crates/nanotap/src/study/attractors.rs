@@ -1,5 +1,4 @@
-//! Every motion that coexists: a census from many seeded starts, each attractor with what
-//! can be read off it.
+//! Coexisting attractors and their observables, found by a census: a sampling of initial states.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
@@ -28,14 +27,14 @@ use crate::study::simulate::{Classification, largest_exponent};
 use crate::study::start_box::{box_with, default_starts};
 use crate::study::value::Intervals;
 
-/// What a census found.
+/// Results of a census.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Attractors {
-    /// Starts.
+    /// Number of initial states.
     pub starts: usize,
-    /// Seed of the starts.
+    /// Seed of the initial states.
     pub seed: u64,
-    /// Where the starts lay: name of the coordinate, lower and upper end.
+    /// Box of the initial states: name of the coordinate, lower and upper end.
     #[serde(rename = "box")]
     pub sides: Vec<Side>,
     /// Attractors, most frequent first.
@@ -43,52 +42,52 @@ pub struct Attractors {
     /// The same shares for each size of the starts, where they were drawn at several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<SizeReport>,
-    /// How much may have been missed, where starts were drawn until that was small.
+    /// Bound on undiscovered motions, where sampling went on until it was small.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen: Option<UnseenReport>,
-    /// Why no further start was followed.
+    /// Reason why the census ended.
     pub end: EndReport,
     /// Relative tolerance of the approximate flow on which starts were followed, if they were: shares,
     /// lifetimes and the bound of what was not seen are of that flow. Orbits, multipliers and exponents
     /// are always those of the exact flow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub followed_at: Option<f64>,
-    /// Starts left undecided.
+    /// Undecided initial states.
     pub undecided: Vec<UndecidedStart>,
-    /// Part of the starts left undecided.
+    /// Fraction of the initial states that is undecided.
     pub undecided_fraction: Share,
-    /// Part of the starts that left every bound.
+    /// Fraction of the initial states whose motion is unbounded.
     pub unbounded: Share,
-    /// Chaos that ends, if some starts escaped from it while others had not yet.
+    /// Transient chaos, if some initial states escaped from it and others have not yet.
     pub transient_chaos: Option<TransientChaosReport>,
-    /// Unstable orbits, if they were looked for.
+    /// Unstable orbits, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unstable: Option<Vec<InSi<OrbitReport>>>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
 }
 
-/// What became of the starts of one size.
+/// Results of the initial states of one size.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SizeReport {
     /// Size of their box, as a part of the largest.
     pub scale: f64,
-    /// How many there were.
+    /// Number of initial states.
     pub starts: usize,
-    /// Part that goes to each attractor, in the order of the attractors.
+    /// Fraction that goes to each attractor, in the order of the attractors.
     pub fractions: Vec<f64>,
 }
 
-/// How much of the set of starts may lead to motions that were not found.
+/// Fraction of the initial states that may lead to undiscovered motions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct UnseenReport {
-    /// Motions found.
+    /// Number of discovered motions.
     pub motions: usize,
-    /// Starts since the last of them was found.
+    /// Initial states since the last discovery.
     pub starts: usize,
-    /// With 95 % confidence at most this part of the starts leads to motions not found.
+    /// Upper bound, with 95 % confidence, of the fraction that leads to undiscovered motions.
     pub fraction: f64,
-    /// The part at which no more starts were to be drawn.
+    /// Fraction below which sampling ends.
     pub target: f64,
 }
 
@@ -96,28 +95,28 @@ pub struct UnseenReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum EndReport {
-    /// All given starts were followed.
+    /// All requested initial states were followed.
     AllStarts,
-    /// The share of starts that may lead to motions not found is as small as requested.
+    /// The undiscovered fraction is as small as requested.
     BoundMet,
-    /// As many starts were drawn as a census draws at most.
+    /// The limit of initial states was reached.
     MaxStarts {
-        /// How many that is.
+        /// The limit.
         limit: usize,
     },
-    /// The starts took as many drive periods as a census takes at most.
+    /// The limit of drive periods was reached.
     MaxPeriods {
-        /// How many that is.
+        /// The limit.
         limit: usize,
     },
     /// The work was stopped.
     Cancelled,
 }
 
-/// A side of the box of starts.
+/// A side of the box of initial states.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Side {
-    /// The coordinate.
+    /// Name of the coordinate.
     pub coordinate: String,
     /// Lower end.
     pub lower: f64,
@@ -125,14 +124,14 @@ pub struct Side {
     pub upper: f64,
 }
 
-/// A part of the starts.
+/// A fraction of the initial states.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
-    /// How many.
+    /// Count.
     pub count: usize,
-    /// As a part of all.
+    /// Fraction of all.
     pub fraction: f64,
-    /// Its 95 % interval (Wilson's).
+    /// 95 % confidence interval of the fraction (Wilson).
     pub fraction_interval: [f64; 2],
 }
 
@@ -146,25 +145,25 @@ impl From<Fraction> for Share {
     }
 }
 
-/// One attractor.
+/// An attractor.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AttractorReport {
-    /// What it is.
+    /// Class of the motion.
     pub classification: Classification,
-    /// What part of the starts goes there.
+    /// Fraction of the initial states that reaches it.
     #[serde(flatten)]
     pub share: Share,
     /// Lyapunov exponents per drive period, largest first; of an orbit from its multipliers.
     pub lyapunov: Vec<f64>,
-    /// One standard error of each, where they are measured.
+    /// Standard error of each, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lyapunov_errors: Option<Vec<f64>>,
-    /// Why it is named so, in words.
+    /// Evidence for the class, in words.
     pub evidence: String,
     /// The orbit, if it is periodic.
     #[serde(flatten)]
     pub orbit: Option<OrbitReport>,
-    /// What was seen of it, if it is not.
+    /// A recording of the motion, if it is not periodic.
     #[serde(flatten)]
     pub non_periodic: Option<NonPeriodic>,
     /// The same in SI, of a physical case.
@@ -173,7 +172,7 @@ pub struct AttractorReport {
 }
 
 impl Attractors {
-    /// Proves every orbit in it, as far as that can be.
+    /// Proves its orbits where possible.
     fn prove(&mut self, case: &Case) {
         let prover = Prover::new(case);
         let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
@@ -205,7 +204,7 @@ impl Attractors {
     }
 }
 
-/// A motion that does not repeat.
+/// A motion that is not periodic.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct NonPeriodic {
     /// None.
@@ -217,34 +216,34 @@ pub struct NonPeriodic {
     pub observables: Observables,
 }
 
-/// A start left undecided.
+/// An undecided initial state.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UndecidedStart {
-    /// Its number.
+    /// Number of the initial state.
     pub start: usize,
-    /// Where it began.
+    /// The initial state.
     pub state: Vec<f64>,
     /// Why there is none.
     pub reason: String,
 }
 
-/// Chaos that ends.
+/// Transient chaos.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TransientChaosReport {
     /// Lyapunov exponents per drive period while it lasts.
     pub lyapunov: Vec<f64>,
-    /// One standard error of each.
+    /// Standard error of each.
     pub lyapunov_errors: Vec<f64>,
     /// Mean lifetime in drive periods.
     pub lifetime: f64,
-    /// Its 95 % interval.
+    /// 95 % confidence interval of the mean lifetime.
     pub lifetime_interval: [f64; 2],
-    /// Escapes that it rests on.
+    /// Number of escapes behind the estimate.
     pub escapes: usize,
-    /// Part of the starts still on transient chaos at the end.
+    /// Fraction of the initial states that is still on transient chaos at the end.
     #[serde(rename = "wandering")]
     pub unescaped: Share,
-    /// Where the escaped ones went: index of the attractor and how many.
+    /// Attractors of the escapes: index and count.
     pub destinations: Vec<(usize, usize)>,
 }
 
@@ -264,10 +263,10 @@ pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
-/// Takes the census.
+/// Finds coexisting attractors by sampling initial states.
 ///
 /// # Errors
-/// When the options are not valid for the model, or an attractor cannot be measured.
+/// When the options are invalid for the model, or an attractor cannot be measured.
 pub fn attractors(
     model: &Model,
     options: &AttractorsOptions,

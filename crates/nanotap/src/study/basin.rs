@@ -60,11 +60,11 @@ const ENTRIES: &str = "state_entries";
 pub struct SliceRange {
     /// The name of the entry of the state.
     pub name: String,
-    /// First value.
+    /// First value of the axis.
     pub from: f64,
-    /// Last value.
+    /// Last value of the axis.
     pub to: f64,
-    /// How many values, both ends included.
+    /// Number of values, ends included.
     pub count: usize,
 }
 
@@ -72,7 +72,7 @@ impl SliceRange {
     /// Reads `name=from:to:count`.
     ///
     /// # Errors
-    /// When it has another form, or the numbers make no range.
+    /// When the text has another form, or the range is empty or not finite.
     pub fn parse(given: &str) -> Result<Self, Error> {
         let refuse = |what: String| {
             Error::input(
@@ -130,14 +130,14 @@ impl SliceRange {
     }
 }
 
-/// An attractor, as the dataset holds it.
+/// An attractor of a basin dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// What it is.
+    /// Class of the motion.
     pub classification: String,
     /// Its minimal period, if it is an orbit.
     pub period: Option<usize>,
-    /// Largest modulus of a multiplier, if it is an orbit.
+    /// Largest |multiplier|, if it is an orbit.
     pub multiplier: Option<f64>,
     /// Largest Lyapunov exponent a period, if it was measured.
     pub lyapunov: Option<f64>,
@@ -158,7 +158,7 @@ impl Basin {
     /// Checks the options and finds the attractors.
     ///
     /// # Errors
-    /// When the options make no sense, nothing attracts, or `control` stopped it.
+    /// When the options are invalid, no attractor is found, or the work was cancelled.
     pub fn new(case: &Case, options: &BasinOptions, control: &Control<'_>) -> Result<Self, Error> {
         for (what, number) in [
             ("0 starts", options.starts),
@@ -416,7 +416,7 @@ impl Known {
         }
     }
 
-    /// What it is called: `period 4`, `chaotic`.
+    /// Name of the attractor: `period 4`, `chaotic`.
     pub fn name(&self) -> String {
         self.period
             .map_or_else(|| self.classification.clone(), |n| format!("period {n}"))
@@ -509,31 +509,31 @@ fn schema(
     }
 }
 
-/// What part of a slice goes where.
+/// Fractions of a slice by attractor.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
     /// Points of the slice.
     pub points: usize,
-    /// The attractors, with the part of the points that goes to each.
+    /// The attractors, each with its fraction of the points.
     pub attractors: Vec<AttractorShare>,
-    /// Part of the points that reached none within the periods.
+    /// Fraction of the points that reached no attractor within the periods.
     pub unsettled: f64,
-    /// Part of the points that left every bound.
+    /// Fraction of the points whose motion is unbounded.
     pub unbounded: f64,
-    /// Part of the points that could not be followed.
+    /// Fraction of the points that could not be computed.
     pub failed: f64,
 }
 
-/// An attractor and its part of a slice.
+/// An attractor and its fraction of a slice.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AttractorShare {
-    /// What it is.
+    /// Class of the motion.
     pub classification: String,
     /// Its minimal period, if it is an orbit.
     pub period: Option<usize>,
     /// A state on it.
     pub state: Vec<f64>,
-    /// Part of the points of the slice that goes there.
+    /// Fraction of the points of the slice that reaches it.
     pub fraction: f64,
 }
 
@@ -562,7 +562,7 @@ pub(crate) fn labels(store: &Store, block: &Block) -> Result<Vec<i32>, StoreErro
     }
 }
 
-/// What part of a finished dataset goes where.
+/// Computes the fractions of a finished dataset.
 ///
 /// # Errors
 /// When a chunk is missing or damaged.

@@ -23,12 +23,12 @@ use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, values};
 use crate::{Error, ErrorKind};
 
-/// A parameter and its range, in the unit of the parameter.
+/// A parameter and its range, in its own unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// The parameter.
     pub key: Key,
-    /// Its value at the start.
+    /// Value at the start.
     pub from: f64,
     /// The other end.
     pub to: f64,
@@ -92,29 +92,29 @@ const MAX_BRANCHES: usize = 64;
 pub struct BranchReport {
     /// The parameter's key.
     pub parameter: &'static str,
-    /// Its value at the start.
+    /// Value at the start.
     pub from: f64,
-    /// The other end of its range.
+    /// Value at the other end of the range.
     pub to: f64,
     /// The branches.
     pub branches: Vec<BranchSummary>,
-    /// Their points, branch by branch, in order along the arc.
+    /// Points, branch by branch, in order of arc length.
     pub points: Vec<PointReport>,
-    /// How many points between these are not listed.
+    /// Number of omitted points between these.
     pub points_left_out: usize,
-    /// Their bifurcations.
+    /// Bifurcations of the branches.
     pub bifurcations: Vec<BifurcationReport>,
-    /// Loci in two parameters, if a second one was given.
+    /// Bifurcation curves in two parameters, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loci: Option<Loci>,
-    /// What could not be followed.
+    /// Failures.
     pub failures: Vec<FailureReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
     /// The parameter, for figures.
     #[serde(skip)]
     pub key: Key,
-    /// Of a physical case: what a value of the parameter is to be multiplied with for SI.
+    /// For a physical case, the factor from values of the parameter to SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
 }
@@ -134,20 +134,20 @@ impl BranchReport {
     }
 }
 
-/// One branch.
+/// A branch.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BranchSummary {
     /// Period of its orbits.
     pub period: usize,
-    /// Index of the branch that it left at a flip.
+    /// Index of the branch from which it emerges at a flip.
     pub parent: Option<usize>,
-    /// Doublings between it and a seed.
+    /// Number of period doublings from a seed.
     pub depth: usize,
-    /// Points.
+    /// Number of points.
     pub points: usize,
     /// Least and greatest parameter reached.
     pub range: [f64; 2],
-    /// Why it ends.
+    /// Reason of its end.
     pub end: String,
     /// Whether it was followed to its end: out of the range, into another branch, or to
     /// where the motion ceases to be.
@@ -157,11 +157,11 @@ pub struct BranchSummary {
 /// One orbit of a branch.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PointReport {
-    /// Index of its branch.
+    /// Index of the branch.
     pub branch: usize,
     /// Period.
     pub period: usize,
-    /// The parameter.
+    /// Value of the parameter.
     pub parameter: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
@@ -169,7 +169,7 @@ pub struct PointReport {
     pub multipliers: Vec<[f64; 2]>,
     /// Whether every multiplier is inside the unit circle.
     pub stable: bool,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI, where the parameter is a quantity of a physical case.
@@ -182,25 +182,25 @@ pub struct PointReport {
 pub struct BifurcationReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
     pub kind: &'static str,
-    /// Index of its branch.
+    /// Index of the branch.
     pub branch: usize,
     /// Period of the orbit.
     pub period: usize,
-    /// The parameter.
+    /// Value of the parameter.
     pub parameter: f64,
-    /// Width of the last bracket of the parameter.
+    /// Width of the final bracket of the parameter.
     pub uncertainty: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
     /// Floquet multipliers.
     pub multipliers: Vec<[f64; 2]>,
-    /// Of a Neimark–Sacker point: angle of the pair in degrees.
+    /// Angle of the multiplier pair at a Neimark–Sacker point, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle: Option<f64>,
-    /// Of a grazing: when, in drive periods from the state.
+    /// Time of a grazing, in drive periods from the state.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI, where the parameter is a quantity of a physical case.
@@ -208,7 +208,7 @@ pub struct BifurcationReport {
     pub physical: Option<PhysicalMotion>,
 }
 
-/// Loci of bifurcations in two parameters.
+/// Bifurcation curves in two parameters.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Loci {
     /// The second parameter's key.
@@ -222,7 +222,7 @@ pub struct Loci {
     pub key: Key,
 }
 
-/// One locus.
+/// A bifurcation curve.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurveReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
@@ -233,19 +233,19 @@ pub struct CurveReport {
     pub first: Vec<f64>,
     /// The second parameter along it.
     pub second: Vec<f64>,
-    /// Why it ends, at its first and last point.
+    /// Reasons of its ends, at the first and last point.
     pub ends: [String; 2],
     /// What it meets at its first and last point: grazing, codimension two, or cut where it could
     /// not be followed; nothing at the edge of the window.
     pub meets: [Option<&'static str>; 2],
 }
 
-/// Something that could not be followed.
+/// An orbit or branch that could not be followed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FailureReport {
     /// Where.
     pub parameter: f64,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
@@ -351,7 +351,7 @@ pub fn branches_through(
 /// Follows branches of `case`.
 ///
 /// # Errors
-/// When the options are not valid for the case, or there is nothing to follow.
+/// When the options are invalid for the case, or no orbit is found.
 pub fn branch(
     case: &Case,
     options: &BranchOptions,
@@ -611,7 +611,7 @@ fn described(case: &Case, range: Range, observables: Set, diagram: &Diagram) -> 
     report
 }
 
-/// Why a branch ends, in words.
+/// Reason of a branch's end, in words.
 fn end_of(case: &Case, key: Key, branch: &Branch) -> String {
     let shown = |value| case.shown(key, value);
     match branch.end {

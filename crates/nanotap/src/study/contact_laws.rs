@@ -29,7 +29,7 @@ use crate::study::simulate::{Classification, Named};
 use crate::study::value::{Amount, values};
 use crate::study::{Study, cantilever};
 
-/// The motion on one sample.
+/// The motion under one contact law.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SampleMotion {
     /// The law.
@@ -37,11 +37,11 @@ pub struct SampleMotion {
     /// The case with this law.
     #[schemars(with = "Map<String, Value>")]
     pub case: Cantilever,
-    /// What a run from rest goes to.
+    /// Class of the motion that a run from rest reaches.
     pub from_rest: Classification,
-    /// Its period, if periodic.
+    /// Period in drive periods, if periodic.
     pub from_rest_period: Option<usize>,
-    /// The orbit of the asked period, if there is one.
+    /// The orbit of the requested period, if any.
     #[serde(flatten)]
     pub orbit: Option<OrbitLook>,
     /// Why there is none.
@@ -65,9 +65,9 @@ pub struct OrbitLook {
     pub state: Vec<f64>,
     /// Largest |multiplier|.
     pub spectral_radius: f64,
-    /// Whether it attracts.
+    /// Whether it is stable.
     pub stable: bool,
-    /// What can be read off it.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// Indentation −V_T and force along the orbit.
@@ -75,7 +75,7 @@ pub struct OrbitLook {
     pub force_loop: Vec<[f64; 2]>,
 }
 
-/// The motions on all samples.
+/// The motions under all contact laws.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Comparison {
     /// Drive frequency Ω.
@@ -120,9 +120,9 @@ pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Err
     Ok(ContactLaw::ALL.into_iter().filter_map(on).collect())
 }
 
-/// Compares the motions under the lever and drive of `case` on each sample: under the nonlinear
-/// law of a physical case and the others that its quantities define, or else under each
-/// piecewise-linear law. A law without an orbit of the period is not an error.
+/// Compares the motions of `case` under each contact law: its nonlinear law and the others that its
+/// quantities define, or else each piecewise-linear law. A law without an orbit of the period is
+/// not an error.
 ///
 /// # Errors
 /// When the case is not a cantilever, or the options are not valid for it.

@@ -1,4 +1,4 @@
-//! Which modes matter: the same motion computed with N = 1 … K modes.
+//! Convergence of a motion with the number of modes N = 1 … K.
 
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
@@ -16,7 +16,7 @@ use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use crate::study::simulate::Classification;
 use crate::study::{Study, cantilever};
 
-/// A motion at each number of modes.
+/// The motion with each number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Convergence {
     /// Numbers of modes N.
@@ -25,16 +25,15 @@ pub struct Convergence {
     /// the most modes, as a part of its amplitude; null where the motions differ in
     /// kind (another period, or none).
     pub difference: Vec<Option<f64>>,
-    /// What each is, one a number of modes.
+    /// Motion with each number of modes.
     pub motions: Vec<Motion>,
-    /// The least N from which on the difference stays below the tolerance.
+    /// Smallest N from which the difference stays below the tolerance.
     pub enough: Option<usize>,
     /// The tolerance.
     pub tolerance: f64,
     /// The verdict in words.
     pub verdict: String,
-    /// What an experimenter reads, how much each number of modes misses of it, and which modes
-    /// take part.
+    /// Instrument readings, their errors with each number of modes, and the share of each mode.
     #[serde(flatten)]
     pub readings: ReadingsReport,
     /// The orbits, for figures.
@@ -48,21 +47,21 @@ pub struct Convergence {
 /// The motion with one number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Motion {
-    /// N.
+    /// Number of modes.
     pub modes: usize,
-    /// What it is.
+    /// Class of the motion.
     pub classification: Classification,
-    /// Its period.
+    /// Period in drive periods.
     pub period: Option<usize>,
-    /// Greatest tip displacement.
+    /// Largest tip deflection.
     pub tip_max: Option<f64>,
-    /// Least tip displacement.
+    /// Smallest tip deflection.
     pub tip_min: Option<f64>,
-    /// Part of the time in contact.
+    /// Contact time / period.
     pub contact_fraction: Option<f64>,
     /// Largest |multiplier|.
     pub spectral_radius: Option<f64>,
-    /// Why it is no orbit, if it is none.
+    /// Reason why it is not an orbit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }

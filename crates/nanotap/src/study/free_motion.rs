@@ -7,7 +7,7 @@ use nanotap_flow::Complex;
 use crate::model::Model;
 use crate::observe::lag;
 
-/// The motion far from the sample.
+/// The free motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeMotion {
     /// Amplitude of the tip deflection at the drive's frequency, A₀.

@@ -21,7 +21,7 @@ use crate::study::Study;
 use crate::study::limits::MOST_PERIODS;
 use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
-/// Where a motion is cut.
+/// Poincaré section.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Section {
@@ -46,24 +46,24 @@ pub struct SectionPoint {
     pub state: Vec<f64>,
 }
 
-/// The spectrum and the section.
+/// Lyapunov spectrum and Poincaré section.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LyapunovReport {
-    /// What the motion was found to be.
+    /// Class of a motion.
     pub classification: Classification,
-    /// Its period, if periodic.
+    /// Period in drive periods, if periodic.
     pub period: Option<usize>,
-    /// Why it was named so.
+    /// Evidence for the class, in words.
     pub evidence: String,
-    /// Drive periods discarded first.
+    /// Drive periods of the discarded transient.
     pub transient: usize,
-    /// Drive periods averaged over.
+    /// Drive periods of the average.
     pub periods: usize,
     /// Exponents, natural logarithm per drive period, largest first.
     pub exponents: Vec<f64>,
-    /// One standard error of each.
+    /// Standard error of each.
     pub errors: Vec<f64>,
-    /// Their sum: how fast volumes of states shrink.
+    /// Sum of the exponents: contraction rate of volumes in state space.
     pub sum: f64,
     /// The same from the trace of the equations and the time in each regime, with twice the
     /// logarithm of the restitution at every impact, over the same periods: the check.
@@ -179,10 +179,10 @@ impl From<Unfinished> for Error {
     }
 }
 
-/// Measures the spectrum of `model`'s motion and cuts it.
+/// Computes the Lyapunov spectrum and a Poincaré section of the motion of `model`.
 ///
 /// # Errors
-/// When the start makes no sense, the flow fails, or the work was stopped.
+/// When the initial state is invalid, the flow fails, or the work was cancelled.
 pub fn lyapunov(
     model: &Model,
     options: &LyapunovOptions,

@@ -19,7 +19,7 @@ use crate::study::{Study, cantilever};
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModeTable {
-    /// N.
+    /// Number of modes.
     pub modes: usize,
     /// By how much these modes together are stiffer than the beam against a constant force at
     /// the tip, as a part of its static stiffness k = 3EI/L³.

@@ -1,4 +1,4 @@
-//! A periodic orbit by Newton, with its stability and what can be read off it.
+//! Periodic orbits by Newton's method, with stability and observables.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
@@ -29,14 +29,14 @@ use crate::study::proof::{ProofReport, Prover};
 use crate::study::simulate::{Named, starting_state};
 use crate::study::start_box::default_box;
 
-/// A periodic orbit and everything that is known about it.
+/// A periodic orbit with its stability and observables.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OrbitReport {
     /// Minimal period in drive periods.
     pub period: usize,
     /// State at drive phase 0.
     pub state: Vec<f64>,
-    /// States at phase 0 of all its periods.
+    /// States at drive phase 0 of all its periods.
     pub states: Vec<Vec<f64>>,
     /// Largest entry of Pⁿ(x) − x.
     pub residual: f64,
@@ -55,7 +55,7 @@ pub struct OrbitReport {
     pub determinant_defect: f64,
     /// Contacts begun and ended.
     pub events: Vec<ContactEvent>,
-    /// What can be read off it.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// Harmonics, distortion and phase.
@@ -64,7 +64,7 @@ pub struct OrbitReport {
     /// Derivatives by the requested keys.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<&'static str, Derivative>,
-    /// What of the range of a nonlinear force law it leaves.
+    /// Excursions beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
     /// The proof, if requested.
@@ -104,7 +104,7 @@ pub const MOST_HARMONICS: usize = 100_000;
 /// Finds a periodic orbit of `model`.
 ///
 /// # Errors
-/// When none is found, with the reason.
+/// When no orbit is found, with the reason.
 pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error> {
     if options.period == Some(0) {
         return Err(no_period());

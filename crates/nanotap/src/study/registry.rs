@@ -46,22 +46,22 @@ use crate::study::setpoint::at_setpoint;
 pub use crate::study::{DatasetPlan, DatasetStudy};
 pub use crate::study::{Document, STUDIES, Study};
 
-/// A study without its types.
+/// An entry of the registry: a study from JSON to JSON.
 #[derive(Clone, Copy, Debug)]
 pub struct StudyEntry {
-    /// What every front end calls it.
+    /// Name in every front end.
     pub name: &'static str,
-    /// What it finds out, in a line.
+    /// Help text of one line.
     pub about: &'static str,
-    /// The JSON schema of its request.
+    /// JSON schema of the options.
     pub request: fn() -> Schema,
-    /// The JSON schema of its document, or of what its dataset comes to.
+    /// JSON schema of the document, or of the summary of the dataset.
     pub report: fn() -> Schema,
-    /// What its progress counts.
+    /// What its progress counts, in the plural.
     pub counted: &'static str,
-    /// Whether the report of work that was stopped holds what is finished.
+    /// Whether the report of cancelled work holds the finished part.
     pub partial: bool,
-    /// Whether it chooses the distance itself.
+    /// Whether it chooses the distance itself, so that none is solved for a setpoint.
     pub any_distance: bool,
     /// Runs it.
     pub run: Run,

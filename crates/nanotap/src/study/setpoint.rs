@@ -1,4 +1,4 @@
-//! The distance at which the amplitude has its setpoint: what the feedback loop finds.
+//! The distance at which the amplitude reaches its setpoint, as a feedback loop finds it.
 //!
 //! The feedback comes from far and slowly: the lever follows its branch of stable orbits, and
 //! jumps where that ends (see [`approach`](super::approach)). It stops at the first distance at
@@ -31,7 +31,7 @@ use crate::observe::table::shown_phase;
 use crate::observe::{Observables, OutOfRange, PhysicalMotion, Set, measure};
 use crate::{Error, ErrorKind};
 
-/// One distance at which an orbit has the setpoint amplitude.
+/// A distance at which an orbit has the setpoint amplitude.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointSolution {
     /// The distance, in the model's unit of length.
@@ -40,15 +40,15 @@ pub struct SetpointSolution {
     pub zc: f64,
     /// Period of the orbit.
     pub period: usize,
-    /// Whether it attracts.
+    /// Whether it is stable.
     pub stable: bool,
     /// Largest |multiplier|.
     pub spectral_radius: f64,
-    /// Whether the approach stops here.
+    /// Whether the approach stops at this distance.
     pub reached: bool,
     /// State at drive phase 0.
     pub state: Vec<f64>,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI.
@@ -58,29 +58,29 @@ pub struct SetpointSolution {
 /// Another stable orbit at the chosen distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointState {
-    /// Its period.
+    /// Period in drive periods.
     pub period: usize,
     /// Largest |multiplier|.
     pub spectral_radius: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI.
     pub physical: PhysicalMotion,
 }
 
-/// The setpoint solved for the distance.
+/// Solution of a setpoint for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointReport {
     /// A_set/A₀.
     pub ratio: f64,
     /// A_set in m.
     pub amplitude: f64,
-    /// All distances at which an orbit has this amplitude, the farthest first.
+    /// All distances at which an orbit has this amplitude, from far to near.
     pub solutions: Vec<SetpointSolution>,
-    /// Which of them the approach reaches.
+    /// Index of the one that the approach reaches.
     pub chosen: usize,
     /// Other stable orbits at the distance that the approach reaches.
     pub other_states: Vec<SetpointState>,
@@ -92,7 +92,7 @@ impl SetpointReport {
         self.solutions.get(self.chosen).map_or(f64::NAN, |s| s.zc)
     }
 
-    /// What was solved, in a sentence.
+    /// The solution, in a sentence.
     pub fn remark(&self) -> Remark {
         let others = self.solutions.len() - 1;
         let stable = self
@@ -236,7 +236,7 @@ pub struct SolvedCase {
     /// How its setpoint was solved, if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setpoint_solved: Option<SetpointReport>,
-    /// What of the range of a nonlinear force law the undriven lever leaves where it rests.
+    /// Excursions of the rest position beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
 }

@@ -1,4 +1,4 @@
-//! A motion followed along the distance, so slowly that it always settles.
+//! Quasi-static motion of the lever along the distance.
 //!
 //! A lever that is brought near slowly stays on its branch of stable orbits until that ends: at
 //! a fold, at a bifurcation that destabilises it, where it grazes and does not go on, or where
@@ -31,7 +31,7 @@ use super::BEYOND;
 
 /// Steps of the grid on which motions without a branch are followed, in the scale of distances.
 const GRID: f64 = 100.0;
-/// Longest period of orbits whose branches are followed.
+/// Longest period of continued orbits, drive periods.
 const LONGEST_BRANCH: usize = 8;
 /// Distance between places, in the scale of distances, that are one.
 const SAME_PLACE: f64 = 1e-7;
@@ -57,12 +57,12 @@ const ROW_TRANSIENT: usize = 128;
 const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
 
-/// Why a piece of a way ends.
+/// Reason why a piece of a path ends.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum End {
     /// The range of distances ends.
     Range,
-    /// The orbits are stable no longer; with the first that is not.
+    /// The orbits lose stability; holds the first unstable one.
     Bifurcation {
         at: Box<Bifurcation>,
         unstable: Option<Box<PeriodicOrbit>>,
@@ -106,7 +106,7 @@ impl Stretch {
     }
 }
 
-/// A motion as it was found.
+/// A motion and the state that starts it.
 #[derive(Clone, Debug)]
 pub(in crate::study) struct Met {
     pub(in crate::study) classification: Classification,
@@ -151,7 +151,7 @@ impl Met {
     }
 }
 
-/// What the lever does along a piece of its way.
+/// Motion of the lever along a piece of its path.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum Motion {
     /// The stable orbits of a stretch, by its index.
@@ -170,7 +170,7 @@ pub(in crate::study) struct Piece {
     pub(in crate::study) motion: Motion,
     /// Where the motion was first seen.
     pub(in crate::study) entered: f64,
-    /// Why it ends.
+    /// Reason of its end.
     pub(in crate::study) end: End,
     /// Whether the lever jumps there.
     pub(in crate::study) jumps: bool,
@@ -184,7 +184,7 @@ impl Piece {
     }
 }
 
-/// Where the lever is.
+/// The lever's motion at a distance.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum Place {
     On { stretch: usize, gap: f64 },

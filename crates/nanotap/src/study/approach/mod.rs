@@ -49,7 +49,7 @@ const BEYOND: f64 = 1.25;
 /// Where a curve at a kept least distance ends, as a part of the amplitude with which it begins.
 const LEAST_AMPLITUDE: f64 = 0.02;
 
-/// Which way the sample moves.
+/// Direction of the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
@@ -62,7 +62,7 @@ pub enum Way {
 }
 
 impl Way {
-    /// The word for it.
+    /// Name in documents.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Approach => "approach",
@@ -72,32 +72,32 @@ impl Way {
     }
 }
 
-/// The motion at one distance on one way.
+/// The motion at one distance in one direction.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ApproachPoint {
-    /// Which way.
+    /// Direction.
     pub way: Way,
     /// The distance, in the model's unit of length.
     pub gap: f64,
     /// The distance in m, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zc: Option<f64>,
-    /// What the motion is.
+    /// Class of the motion.
     pub classification: Classification,
-    /// Its minimal period, if periodic.
+    /// Minimal period in drive periods, if periodic.
     pub period: Option<usize>,
     /// Largest |multiplier|, if periodic.
     pub spectral_radius: Option<f64>,
-    /// What it looks like; nothing if undecided or unbounded.
+    /// Observables in the model's units; none if undecided or unbounded.
     #[serde(flatten)]
     pub observables: Option<Observables>,
     /// The same in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
-    /// Why it is undecided, if it is.
+    /// Reason why it is undecided.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// What frequency modulation tells, where amplitude and phase are held.
+    /// Results of frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<Modulated>,
     /// The same in SI, of a physical case.
@@ -141,21 +141,21 @@ impl ApproachPoint {
 /// A jump of a slowly moved lever from one motion to another.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct StateJump {
-    /// Which way.
+    /// Direction.
     pub way: Way,
-    /// Where, in the model's unit of length.
+    /// Distance, in the model's unit of length.
     pub gap: f64,
-    /// The same in m, of a physical case.
+    /// Distance in m, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zc: Option<f64>,
-    /// How well that is known, in the model's unit of length.
+    /// Uncertainty of the distance, in the model's unit of length.
     pub uncertainty: f64,
     /// What ends the motion before it: fold, flip, neimark-sacker, grazing, crossing, or a
     /// sentence.
     pub reason: String,
-    /// The motion before it, at its end.
+    /// The motion before the jump, at its end.
     pub before: ApproachPoint,
-    /// The motion after it.
+    /// The motion after the jump.
     pub after: ApproachPoint,
 }
 
@@ -166,8 +166,8 @@ pub struct Hysteresis {
     pub near: f64,
     /// Farthest distance.
     pub far: f64,
-    /// Greatest difference of the amplitude at the drive's frequency within it; of the relative
-    /// frequency shift where the amplitude is held.
+    /// Largest difference of the amplitude at the drive frequency in it; of the relative frequency
+    /// shift where the amplitude is kept.
     pub difference: f64,
 }
 
@@ -176,19 +176,19 @@ pub struct Hysteresis {
 pub struct ApproachReport {
     /// The key of the distance in a case file.
     pub parameter: &'static str,
-    /// Where the approach begins.
+    /// First distance of the approach.
     pub from: f64,
-    /// Where it turns back.
+    /// Distance at which the approach turns back.
     pub to: f64,
     /// Free amplitude A₀ at the drive's frequency.
     pub free_amplitude: f64,
-    /// Free phase, degrees behind the drive.
+    /// Free phase lag, degrees.
     pub free_phase: f64,
     /// Distance at which the free motion begins to touch.
     pub free_reach: f64,
     /// The motions at the requested distances: those of the approach, then those of the retract.
     pub table: Vec<ApproachPoint>,
-    /// Where the lever changes from one motion to another by a jump, in the order of the way.
+    /// Jumps of the lever from one motion to another, in order.
     pub jumps: Vec<StateJump>,
     /// Stable orbits of the same distances on neither way, that lie on stretches of stable orbits
     /// on which a way is at other distances, by descending distance.
@@ -196,28 +196,28 @@ pub struct ApproachReport {
     /// Least height of the beam above the sample in the motion at the nearest distance, in the
     /// model's unit of length: where it is not above zero, another part than the tip touches.
     pub beam_clearance: Option<f64>,
-    /// Where the two ways differ, its ends as exact as those of the branches.
+    /// Intervals in which approach and retract differ, with ends as exact as those of the branches.
     pub hysteresis: Vec<Hysteresis>,
-    /// Whether the way back ends in the motion with which the way there began; if not, it
-    /// begins too near.
+    /// Whether the retract ends in the motion with which the approach began; if not, the approach
+    /// began too near.
     pub returned: bool,
     /// Branches through the periodic motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub branches: Option<BranchReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
-    /// Of a physical case: what a distance is to be multiplied with for SI.
+    /// For a physical case, the factor from distances to m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
-    /// Frequency modulation, where amplitude and phase are held.
+    /// Frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<ModulationReport>,
 }
 
-/// Brings the sample near and takes it away.
+/// Computes an approach and retract curve.
 ///
 /// # Errors
-/// When the options are not valid for the case.
+/// When the options are invalid for the case.
 pub fn approach(
     case: &Case,
     options: &ApproachOptions,
@@ -272,9 +272,9 @@ pub(in crate::study) struct Distances {
     pub(in crate::study) from: Option<f64>,
     /// The last; `None`: 0, where the sample is at the tip's rest position.
     pub(in crate::study) to: Option<f64>,
-    /// Their number.
+    /// Number of distances.
     pub(in crate::study) points: usize,
-    /// The least distance of the oscillation, where that is kept.
+    /// Least distance of the oscillation, if it is kept constant.
     pub(in crate::study) closest: Option<f64>,
 }
 
@@ -346,7 +346,7 @@ pub(in crate::study) fn no_drive() -> Error {
     )
 }
 
-/// How a curve is written.
+/// Distances and speed of a curve.
 struct Curve<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
@@ -386,7 +386,7 @@ impl Curve<'_> {
     }
 }
 
-/// How branches are followed.
+/// Options of the continuation.
 fn branching(options: &ApproachOptions) -> BranchOptions {
     BranchOptions {
         switch: Some(options.switch),

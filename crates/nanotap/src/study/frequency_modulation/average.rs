@@ -36,7 +36,7 @@ enum StaticForce<'a> {
     Spring(f64),
 }
 
-/// The averages of a force over a sinusoidal oscillation.
+/// Averages of a force over a sinusoidal oscillation.
 pub struct Averages<'a> {
     force: StaticForce<'a>,
     amplitude: f64,

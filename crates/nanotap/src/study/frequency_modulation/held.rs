@@ -19,7 +19,7 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Set, first_harmonic_changes, measure};
 
-/// What the loop holds.
+/// Setpoint of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
     /// Amplitude of the tip's deflection at the drive's frequency, in the model's unit of length.

@@ -129,7 +129,7 @@ pub struct ModulatedInSi {
     pub drive_strength: f64,
     /// Frequency shift Δf, Hz.
     pub frequency_shift: f64,
-    /// Energy that the sample takes in a period, from the excitation, J.
+    /// Energy dissipated in the sample per period, from the excitation, J.
     pub drive_dissipation: f64,
     /// The same in eV.
     #[serde(rename = "drive_dissipation_eV")]
@@ -274,7 +274,7 @@ pub const OPEN_LOOP: &str = "multipliers are those of the orbit at constant freq
 /// is one at its end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Jump {
-    /// Which way.
+    /// Direction.
     pub way: Way,
     /// The last distance before it, in the model's unit of length.
     pub from: f64,
@@ -282,14 +282,14 @@ pub struct Jump {
     pub to: f64,
 }
 
-/// Where a curve ended.
+/// An early end of a curve.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Ended {
-    /// Which way.
+    /// Direction.
     pub way: Way,
     /// The last distance, in the model's unit of length.
     pub gap: f64,
-    /// Why there is none beyond.
+    /// Reason of the end.
     pub reason: String,
 }
 

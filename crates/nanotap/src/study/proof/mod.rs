@@ -14,14 +14,14 @@ use serde::Serialize;
 #[cfg(feature = "proof")]
 pub use prover::{NotProved, Prover, candidate};
 
-/// What was proved of a periodic orbit.
+/// Result of a proof about a periodic orbit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ProofReport {
     /// Whether the orbit was proved to exist.
     pub proved: bool,
-    /// The theorem, or why there is none.
+    /// The theorem, or the reason why there is none.
     pub statement: String,
-    /// What is known, if it exists.
+    /// Enclosures, if the orbit is proved to exist.
     #[serde(flatten)]
     pub theorem: Option<TheoremReport>,
 }
@@ -35,12 +35,12 @@ pub struct TheoremReport {
     pub state: Vec<[f64; 2]>,
     /// When contact begins and ends.
     pub switches: Vec<SwitchReport>,
-    /// How far from it no other orbit of the same contacts is.
+    /// Neighbourhood without another orbit of the same contacts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unique_within: Option<UniqueWithin>,
     /// Discs that hold the multipliers.
     pub multipliers: Vec<DiscReport>,
-    /// What is proved: stable, unstable or undecided.
+    /// Proved stability: stable, unstable or undecided.
     pub stability: &'static str,
 }
 

@@ -16,7 +16,7 @@ use crate::number::shortest;
 
 use super::{DiscReport, ProofReport, SwitchReport, TheoremReport, UniqueWithin};
 
-/// Why an orbit is not proved.
+/// Reasons why an orbit is not proved.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum NotProved {
     /// The case has no equations in intervals.
@@ -27,7 +27,7 @@ pub enum NotProved {
     Test(#[from] ProofError),
 }
 
-/// What proves the orbits of one case.
+/// Prover for the orbits of one case.
 #[derive(Debug)]
 pub struct Prover {
     system: Result<System, EnclosureError>,

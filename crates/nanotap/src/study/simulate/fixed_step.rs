@@ -1,7 +1,7 @@
 //! The paper's method, to compare with the exact flow: fourth-order Runge–Kutta with a fixed
 //! step in each regime, switching on the grid.
 //!
-//! It is there to show what it does wrong. Its contacts begin and end up to a step late,
+//! Its contacts begin and end up to a step late,
 //! which acts like a small force that differs from period to period: what looks like a
 //! subharmonic of a high period can be a product of the step. Therefore the period read off its
 //! strobe points is called apparent, and is reported
@@ -47,7 +47,7 @@ pub struct FixedStepRun {
     pub switching: &'static str,
     /// Drive periods recorded.
     pub periods: usize,
-    /// Drive periods discarded first.
+    /// Drive periods of the discarded transient.
     pub transient: usize,
     /// The state at the end of the transient.
     pub start: Vec<f64>,
@@ -64,18 +64,18 @@ pub struct FixedStepRun {
     pub tip_min: f64,
     /// Half of peak to peak.
     pub amplitude: f64,
-    /// Part of the steps in contact, weighted with their length.
+    /// Contact time / period, from the lengths of the steps.
     pub contact_fraction: f64,
     /// States at the end of each of the last requested periods.
     pub strobe: Vec<Vec<f64>>,
     /// Switches noticed, the first of them.
     pub events: Vec<GridEvent>,
-    /// How many more there were than are listed.
+    /// Number of events that are not listed.
     #[serde(skip_serializing_if = "is_none")]
     pub events_left_out: usize,
-    /// Speed, drive periods a second.
+    /// Speed, drive periods per second.
     pub periods_per_second: f64,
-    /// What the exact flow does from the last state.
+    /// The exact flow from the last state.
     pub exact: ExactVerdict,
     /// Time, tip displacement and its rate, for figures: the first recorded periods.
     #[serde(skip)]
@@ -85,18 +85,18 @@ pub struct FixedStepRun {
     pub strobe_curve: Vec<[f64; 2]>,
 }
 
-/// What the exact flow makes of a motion.
+/// Classification by the exact flow.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ExactVerdict {
-    /// Its class.
+    /// Class.
     pub classification: Classification,
-    /// Its period.
+    /// Period in drive periods.
     pub period: Option<usize>,
-    /// Why.
+    /// Reason.
     pub evidence: String,
 }
 
-/// Nearness, as a part of the motion's size, at which the eye takes a run as periodic.
+/// Return distance, relative to the motion's size, below which a run looks periodic.
 pub const APPARENT_CLOSURE: f64 = 1e-6;
 /// Longest apparent period looked for.
 const LONGEST_APPARENT: usize = 64;

@@ -1,4 +1,4 @@
-//! One run: the transient is discarded, the motion recorded, observed and classified.
+//! Simulation of a motion: the transient is discarded, the rest recorded, measured and classified.
 
 pub mod fixed_step;
 
@@ -27,22 +27,22 @@ use fixed_step::{FixedStepRun, fixed_step_run};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Classification {
-    /// It goes to a stable periodic orbit, closed by Newton.
+    /// Converges to a stable periodic orbit, closed by Newton's method.
     Periodic,
-    /// It fills a torus.
+    /// Quasi-periodic: on a torus.
     QuasiPeriodic,
-    /// It is chaotic for as long as it was watched.
+    /// Chaotic during the whole run.
     Chaotic,
-    /// It leaves every bound.
+    /// Unbounded.
     Unbounded,
-    /// It is observed before it has settled, as where the distance changes at a finite speed.
+    /// Measured during a transient, as where the distance changes at a finite speed.
     Transient,
-    /// None of these could be shown.
+    /// Undecided.
     Undecided,
 }
 
 impl Classification {
-    /// The word for it.
+    /// Name in documents.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Periodic => "periodic",
@@ -60,11 +60,11 @@ impl Classification {
 pub struct Simulation {
     /// Drive periods recorded.
     pub periods: usize,
-    /// Drive periods discarded first.
+    /// Drive periods of the discarded transient.
     pub transient: usize,
     /// The state at the end of the transient, where the recording starts.
     pub start: Vec<f64>,
-    /// What the motion was found to be, followed on from the end of the transient.
+    /// Class of the motion, followed on from the end of the transient.
     pub classification: Classification,
     /// Its minimal period in drive periods, if periodic.
     pub period: Option<usize>,
@@ -79,22 +79,22 @@ pub struct Simulation {
     pub distance_to_orbit: Option<f64>,
     /// States at the end of each of the last requested periods.
     pub strobe: Vec<Vec<f64>>,
-    /// Contacts begun and ended, the first of them.
+    /// Contacts begun and ended, up to a limit.
     pub events: Vec<ContactEvent>,
-    /// How many more there were than are listed.
+    /// Number of events that are not listed.
     #[serde(skip_serializing_if = "is_none")]
     pub events_left_out: usize,
-    /// What can be read off the recorded stretch.
+    /// Observables of the recorded part.
     #[serde(flatten)]
     pub observables: Observables,
-    /// What of the range of a nonlinear force law it leaves.
+    /// Excursions beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
-    /// Speed of the propagation alone, drive periods a second.
+    /// Speed of the propagation alone, drive periods per second.
     pub periods_per_second: f64,
     /// Evaluations of the gap a drive period; of the force under a nonlinear law.
     pub evaluations_per_period: f64,
-    /// The stable orbit it goes to, if periodic.
+    /// The stable orbit to which the motion converges, if periodic.
     #[serde(skip)]
     pub orbit: Option<PeriodicOrbit>,
     /// The first recorded periods, for figures and time series.
@@ -477,17 +477,17 @@ impl SimulateOptions {
     }
 }
 
-/// What one run came to.
+/// Result of a simulation.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SimulateReport {
-    /// By the exact flow.
+    /// From the exact flow.
     Exact(Box<InSi<Simulation>>),
-    /// By fixed steps.
+    /// From fixed time steps.
     FixedStep(Box<FixedStepRun>),
 }
 
-/// One run.
+/// Simulates a motion.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulateStudy;
 

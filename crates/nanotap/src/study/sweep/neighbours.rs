@@ -48,7 +48,7 @@ pub struct FromNeighbour {
     pub first_harmonic: f64,
     /// Greatest tip deflection.
     pub tip_max: f64,
-    /// Part of the time in contact.
+    /// Contact time / period.
     pub contact_fraction: f64,
 }
 

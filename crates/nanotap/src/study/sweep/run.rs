@@ -27,7 +27,7 @@ pub enum Starts {
     Given(Vec<f64>),
     /// In seeded quasi-random states.
     Seeded {
-        /// How many.
+        /// Count.
         count: usize,
         /// Their seed.
         seed: u64,
@@ -38,7 +38,7 @@ pub enum Starts {
     /// Rest, the linear responses, and draws of every size
     /// ([`default_starts`](crate::study::start_box::default_starts)).
     Spread {
-        /// How many.
+        /// Count.
         count: usize,
         /// Seed of the draws.
         seed: u64,
@@ -70,7 +70,7 @@ impl Starts {
     }
 }
 
-/// What one run came to.
+/// Result of a simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub(super) classification: Classification,

@@ -34,8 +34,6 @@ mod solve;
 mod statistics;
 
 use nanotap_dynamics::Control;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 pub use crate::case::table::{Entry, MOST_ROWS, Table};
 pub use data::{Column, Curve, Data, Row, Swept};
@@ -54,6 +52,7 @@ use solve::LeastSquares as _;
 use crate::Error;
 use crate::case::Case;
 use crate::study::Study;
+use crate::study::request::options;
 use crate::study::setpoint::at_setpoint;
 use crate::study::value::Intervals;
 
@@ -62,65 +61,46 @@ const MOST_STARTS: usize = 1000;
 /// Longest period of the orbits.
 const MOST_PERIOD: usize = 64;
 
-/// Options of a fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FitOptions {
-    /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
-    /// `phase (deg)`
-    #[schemars(extend("x-own" = true))]
-    pub data: Vec<Table>,
-    /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub free: Vec<String>,
-    /// Parameters to find, one value a curve
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub per_curve: Vec<String>,
-    /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
-    #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
-    pub bounds: Intervals,
-    /// Columns of the data that count; without it, all
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub columns: Vec<String>,
-    /// Contact laws to compare, as in hertz,dmt; without it, the case's own
-    #[schemars(extend("x-value" = "LAW,…"))]
-    pub laws: Vec<String>,
-    /// Starts to try as long as nothing describes the data
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the further starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Longest period of the orbits looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// The place at which the data jump from a branch that ends in a fold counts too
-    #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
-    pub jumps: bool,
-    /// Phase behind the drive that the loop held, in degrees, of curves of a frequency shift
-    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Intervals by the profile of the likelihood
-    #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
-    pub profile: bool,
-}
-
-impl Default for FitOptions {
-    fn default() -> Self {
-        Self {
-            data: Vec::new(),
-            free: Vec::new(),
-            per_curve: Vec::new(),
-            bounds: Intervals::default(),
-            columns: Vec::new(),
-            laws: Vec::new(),
-            starts: 8,
-            seed: 0,
-            max_period: 4,
-            jumps: true,
-            phase: 90.0,
-            profile: true,
-        }
+options! {
+    /// Options of a fit.
+    pub struct FitOptions {
+        /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
+        /// `phase (deg)`
+        #[schemars(extend("x-own" = true))]
+        pub data: Vec<Table> = Vec::new(),
+        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub free: Vec<String> = Vec::new(),
+        /// Parameters to find, one value a curve
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub per_curve: Vec<String> = Vec::new(),
+        /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
+        #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+        pub bounds: Intervals = Intervals::default(),
+        /// Columns of the data that count; without it, all
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub columns: Vec<String> = Vec::new(),
+        /// Contact laws to compare, as in hertz,dmt; without it, the case's own
+        #[schemars(extend("x-value" = "LAW,…"))]
+        pub laws: Vec<String> = Vec::new(),
+        /// Starts to try as long as nothing describes the data
+        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 8,
+        /// Seed of the further starts
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 0,
+        /// Longest period of the orbits looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 4,
+        /// The place at which the data jump from a branch that ends in a fold counts too
+        #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
+        pub jumps: bool = true,
+        /// Phase behind the drive that the loop held, in degrees, of curves of a frequency shift
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Intervals by the profile of the likelihood
+        #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
+        pub profile: bool = true,
     }
 }
 

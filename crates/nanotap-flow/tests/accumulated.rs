@@ -1,6 +1,6 @@
-//! What is accumulated while a motion runs is what its recorded trajectory gives, which is
-//! computed otherwise: on random systems of 1 to 12 oscillators of every damping, that meet a
-//! springy stop or hit a rigid one.
+//! Accumulated observables agree with those of the recorded trajectory, which are computed
+//! independently: random systems of 1 to 12 oscillators with any damping, with a soft or a rigid
+//! stop.
 
 #![allow(
     clippy::disallowed_methods,
@@ -21,8 +21,8 @@ const OMEGA: f64 = 1.7;
 /// An oscillator: its frequency, damping ratio, displacement, velocity, and weight in the gap.
 type Oscillator = (f64, f64, f64, f64, f64);
 
-/// Oscillators that a drive pushes, whose weighted sum `w` with the gap `w + offset` meets a
-/// stop of stiffness `k` and damper `c`, or bounces off it with the restitution `e`.
+/// Driven oscillators whose weighted sum `w` meets a stop with the gap `w + offset`: a spring `k`
+/// and damper `c`, or a rigid stop with the coefficient of restitution `e`.
 #[derive(Clone, Debug)]
 struct Example {
     oscillators: Vec<Oscillator>,
@@ -71,7 +71,7 @@ impl Example {
         states.flatten().collect()
     }
 
-    /// `None` where eigenvalues are too close to tell apart in double precision.
+    /// `None` if eigenvalues are too close to be separated in double precision.
     fn system(&self) -> Option<Arc<System>> {
         let n = self.dimension();
         let drive = Drive::single(OMEGA).unwrap();
@@ -156,7 +156,7 @@ fn example() -> impl Strategy<Value = Example> {
         })
 }
 
-/// Periods that are looked at.
+/// Number of periods compared.
 const PERIODS: usize = 3;
 
 fn compare(example: &Example) -> Result<(), TestCaseError> {
@@ -194,7 +194,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
     flow.start(&example.start(), 0.0).unwrap();
     let mut recorder = Recorder::default();
     for _ in 0..PERIODS {
-        // Rigid stops may chatter, which is refused where there is no sticking.
+        // Rigid stops may chatter, which is an error in a system without sticking.
         if flow
             .run_period(&mut (&mut accumulator, &mut recorder))
             .is_err()
@@ -219,7 +219,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         .iter()
         .map(|s| {
             let (low, high) = s.range().unwrap();
-            // Terms of a signal cancel each other; its rounding is that of the largest.
+            // Terms of a signal cancel; its rounding is that of the largest term.
             let terms = s.pieces.iter().map(|p| p.signal.noise() / f64::EPSILON);
             terms.fold(low.value.abs().max(high.value.abs()), f64::max)
         })
@@ -270,15 +270,15 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 100, max_shrink_iters: 50, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_is_accumulated_is_what_the_trajectory_gives(example in example()) {
+    fn accumulated_observables_agree_with_the_trajectory(example in example()) {
         compare(&example)?;
     }
 }
 
-/// Cleared in between, an accumulator gives the later periods alone, with the same phase of
-/// the drive; an extremum that is taken gives each period's own.
+/// After it is cleared, an accumulator gives the later periods only, with the same phase of the
+/// drive; extrema that are read per period are those of each period.
 #[test]
-fn clearing_begins_anew() {
+fn clearing_restarts_the_accumulation() {
     let example = Example {
         oscillators: vec![(1.0, 0.05, 0.2, 0.0, 1.0), (6.3, 0.02, 0.0, 0.1, -0.5)],
         offset: 0.1,
@@ -315,9 +315,9 @@ fn clearing_begins_anew() {
     assert_eq!(whole.periods(), 5);
 }
 
-/// A stop that a motion of period one taps has the same Fourier coefficients in each period, in
-/// the hundred-thousandth as in the first: phases of multiples of the drive's frequency do not
-/// lose digits with time.
+/// A periodic motion that taps a stop has the same Fourier coefficients in each period, in the
+/// hundred-thousandth as in the first: the phases of harmonics of the drive do not lose digits with
+/// time.
 #[test]
 fn harmonics_stay_exact_over_many_periods() {
     let example = Example {
@@ -349,7 +349,7 @@ fn harmonics_stay_exact_over_many_periods() {
     }
 }
 
-/// What does not fit is refused.
+/// Outputs of the wrong size are refused.
 #[test]
 fn outputs_that_do_not_fit_are_refused() {
     let example = Example {
@@ -370,8 +370,8 @@ fn outputs_that_do_not_fit_are_refused() {
     assert!(request.plan(&system).is_err());
 }
 
-/// A whole period's flight whose least gap comes just before its end: random cases found that it
-/// lay beyond the last tabulated point, as for a quarter of all ratios of period and step.
+/// A flight of a whole period whose least gap occurs just before its end: random cases found that
+/// it was beyond the last tabulated point, as for a quarter of all ratios of period and step.
 #[test]
 fn extrema_at_the_end_of_a_flight_are_seen() {
     let example = Example {
@@ -389,8 +389,8 @@ fn extrema_at_the_end_of_a_flight_are_seen() {
     compare(&example).unwrap();
 }
 
-/// Terms so fast beside the drive that a table ends before the flight does, and a beat that
-/// grows up to the last period's end.
+/// Terms so fast compared with the drive that a table ends before the flight, and a beat that grows
+/// up to the end of the last period.
 #[test]
 fn extrema_beyond_the_table_are_seen() {
     let mut oscillators = vec![
@@ -398,7 +398,7 @@ fn extrema_beyond_the_table_are_seen() {
         (400.28, 1e-5, -0.1, 0.0, 1.0),
         (4000.0, 0.001, 0.01, 0.0, 0.3),
     ];
-    // More terms than a guard's table follows: extrema have one of their own, with finer steps.
+    // More terms than a guard's table contains: extrema have a separate one with finer steps.
     oscillators.extend((0..8).map(|j| (500.0 + 20.0 * f64::from(j), 0.05, 1e-3, 0.0, 0.2)));
     let example = Example {
         oscillators,

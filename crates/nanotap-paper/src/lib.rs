@@ -70,7 +70,7 @@ pub enum PaperError {
         known: String,
     },
     /// The computation was cancelled.
-    #[error("cancelled before the report was finished")]
+    #[error("stopped before the report was finished")]
     Cancelled,
     /// A case is invalid.
     #[error(transparent)]

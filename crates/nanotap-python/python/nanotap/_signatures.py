@@ -23,7 +23,7 @@ __all__ = [
     "contact_laws",
     "convergence",
     "fit",
-    "frequency_modulation",
+    "fm",
     "lyapunov",
     "modes",
     "orbit",
@@ -42,7 +42,7 @@ def modes(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     points : int
         Points along the beam in the table of mode shapes (2 to 1000000).
 
@@ -54,7 +54,7 @@ def modes(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -85,7 +85,7 @@ def simulate(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods recorded (1 to 2000000).
     transient : int | None
@@ -138,7 +138,7 @@ def simulate(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -194,7 +194,7 @@ def orbit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int | None
         Its period in drive periods; without it, that of the motion to which a run
         converges (1 to 10000).
@@ -228,7 +228,7 @@ def orbit(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -253,7 +253,7 @@ def attractors(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     starts : int | None
         Starts, spread evenly over one box of states. Without it, starts of every
         size, from the resonant response down to below the gap, go on until the
@@ -292,7 +292,7 @@ def attractors(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -323,7 +323,7 @@ def branch(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     parameter : str
         The parameter, as the case file calls it (omega, alpha4, gap …); of a
         physical case also a quantity of it (drive.frequency, gap.tip,
@@ -371,7 +371,7 @@ def branch(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -401,7 +401,7 @@ def approach(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     from_ : float | str | None
         Distance at which to begin, in units of the case ("30 nm") or as alpha5;
         without it, 1.25 times what the free tip swings towards the sample.
@@ -452,14 +452,14 @@ def approach(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
     options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
 
-def frequency_modulation(
+def fm(
     case: Case,
     *,
     from_: float | str | None = None,
@@ -510,8 +510,8 @@ def frequency_modulation(
     RuntimeError
         The computation failed.
     """
-    options = _arguments.options("frequency-modulation", locals())
-    return _studies.document("frequency-modulation", case, options, threads, progress)
+    options = _arguments.options("fm", locals())
+    return _studies.document("fm", case, options, threads, progress)
 
 def fit(
     case: Case,
@@ -536,7 +536,7 @@ def fit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
@@ -580,7 +580,7 @@ def fit(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -611,7 +611,7 @@ def sweep(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in omega=2:4:400 (first, last, how many), or
         alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
@@ -665,7 +665,7 @@ def sweep(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -690,7 +690,7 @@ def window(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in gap.tip=5nm:25nm:41,
         drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
@@ -722,7 +722,7 @@ def window(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -751,7 +751,7 @@ def basin(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     x : str | Mapping[str, Any]
         The horizontal axis, as in a1=-1:1:200: entry of the state, first value,
         last value, how many (a1…aN, v1…vN; oscillator: x, v).
@@ -791,7 +791,7 @@ def basin(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -813,7 +813,7 @@ def lyapunov(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods averaged over (1 to 100000000).
     transient : int
@@ -836,7 +836,7 @@ def lyapunov(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -855,7 +855,7 @@ def convergence(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     largest : int
         Largest number of modes (2 to 50).
     tolerance : float
@@ -872,7 +872,7 @@ def convergence(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -894,12 +894,11 @@ def contact_laws(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int
         Period of the orbits compared (1 to 10000).
     arm : float | None
-        Stiffness of the standard linear solid's arm; without it, the case's, or
-        twice alpha4.
+        Stiffness of the relaxing arm; without it, the case's, or twice alpha4.
     from_ : float | str | None
         Lowest drive frequency to which the orbits are followed.
     to : float | str | None
@@ -917,7 +916,7 @@ def contact_laws(
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """

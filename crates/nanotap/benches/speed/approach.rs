@@ -1,4 +1,4 @@
-//! Approach and retract curves with the branches that coexist, by one thread or two.
+//! Approach and retract curves with coexisting branches, on one thread and on two.
 
 use divan::Bencher;
 use nanotap::case::Case;
@@ -8,13 +8,13 @@ use nanotap::study::approach::{ApproachOptions, ApproachStudy};
 use nanotap::study::registry::Study as _;
 use nanotap::study::threads::install;
 
-/// A stiff lever over a spring and a damper, two modes; 100 distances each way.
+/// A stiff lever over a spring and a damper, two modes; 100 distances in each direction.
 #[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
 fn spring_damper_100(bencher: Bencher<'_, '_>, threads: usize) {
     approach(bencher, "stiff-lever.toml", 100, threads);
 }
 
-/// A lever over a DMT sample with van der Waals attraction; 10 distances each way.
+/// A lever over a DMT sample with van der Waals attraction; 10 distances in each direction.
 #[divan::bench(args = [1, 2], sample_count = 3, sample_size = 1)]
 fn dmt_10(bencher: Bencher<'_, '_>, threads: usize) {
     approach(bencher, "dforce-dmt.toml", 10, threads);

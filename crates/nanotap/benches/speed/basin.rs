@@ -10,7 +10,7 @@ use nanotap::study::basin::{Basin, BasinOptions};
 use crate::cases;
 use crate::folder::Folder;
 
-/// 48 × 48 starts at Ω = 20 without a tip mass, by one thread or two; the census before is
+/// 48 × 48 starts at Ω = 20 without a tip mass, on one thread and on two; the preceding census is
 /// not timed. Items are points.
 #[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
 fn points_2304(bencher: Bencher<'_, '_>, threads: usize) {

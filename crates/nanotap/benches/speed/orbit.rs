@@ -7,7 +7,7 @@ use nanotap_dynamics::{ShootingOptions, close_orbit};
 
 use crate::cases::{self, MODES};
 
-/// The period-1 orbit at Ω = 3.5 with its multipliers, from a start 1 % away from it.
+/// The period-1 orbit at Ω = 3.5 with its multipliers, from a relative distance of 0.01.
 #[divan::bench(args = MODES)]
 fn newton(bencher: Bencher<'_, '_>, modes: usize) {
     let case = Cantilever {

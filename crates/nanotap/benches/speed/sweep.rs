@@ -11,7 +11,7 @@ use nanotap::study::sweep::{Sweep, SweepOptions};
 use crate::cases;
 use crate::folder::Folder;
 
-/// The runs of [`runs_96`] without anything but the motion: what it should cost little more than.
+/// The motions of [`runs_96`] without recording: a lower bound of its cost.
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn bare(bencher: Bencher<'_, '_>) {
     const VALUES: usize = 24;
@@ -37,8 +37,8 @@ fn bare(bencher: Bencher<'_, '_>) {
         });
 }
 
-/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods discarded and 100 recorded, by one
-/// thread or two. Items are runs.
+/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods discarded and 100 recorded, on one thread
+/// and on two. Items are runs.
 #[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
 fn runs_96(bencher: Bencher<'_, '_>, threads: usize) {
     let subject = cases::subject(&cases::paper(3));

@@ -120,6 +120,11 @@ impl Nonlinear {
         self
     }
 
+    /// Changes the gap.
+    pub(crate) fn set_gap(&mut self, gap: f64) -> Result<(), MotionError> {
+        Ok(Arc::make_mut(&mut self.system).set_offset(gap)?)
+    }
+
     /// The branch of the law in a state of the model at drive phase 0: the one that it
     /// remembers, if that can be.
     fn branch(&self, state: &[f64]) -> usize {
@@ -474,7 +479,7 @@ impl Variation {
         }
         let galerkin = Galerkin::new(case)?;
         let drive = model.system.drive();
-        let beam = Beam::new(&galerkin, drive, false)?;
+        let beam = Beam::new(&galerkin, drive, 0)?;
         let n = nonlinear.system.dimension();
         let mut change = Change {
             law: law.to_vec(),
@@ -658,6 +663,11 @@ impl EngineMap for NonlinearMap {
         self.nonlinear.period
     }
 
+    fn move_gap(&mut self, gap: f64, _: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
+        Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
+        Ok(self.flow.system_mut().set_offset(gap)?)
+    }
+
     fn evaluations(&self) -> u64 {
         self.flow.statistics().evaluations
     }
@@ -744,6 +754,14 @@ impl EngineMap for CoarseMap {
 
     fn period(&self) -> f64 {
         self.nonlinear.period
+    }
+
+    fn move_gap(&mut self, gap: f64, _: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
+        Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
+        if let Ok(coarse) = Coarse::new(&self.nonlinear.system, self.nonlinear.period) {
+            self.coarse = coarse;
+        }
+        Ok(())
     }
 
     fn evaluations(&self) -> u64 {

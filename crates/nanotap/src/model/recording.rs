@@ -135,7 +135,7 @@ impl Model {
     /// Puts the position of a surface with a memory into a state: in contact it is where the tip
     /// holds it, of which a memory that the end of the contact sets anew knows nothing.
     pub(crate) fn set_surface(&self, state: &mut [f64], contact: bool, height: f64) {
-        if self.forgetting.is_some() && contact {
+        if self.memory_reset.is_some() && contact {
             state[self.dimension() - self.memory] = height;
         }
     }

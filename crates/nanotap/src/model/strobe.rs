@@ -26,6 +26,8 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
     fn dimension(&self) -> usize;
     /// The drive period.
     fn period(&self) -> f64;
+    /// [`ModelMap::move_gap`].
+    fn move_gap(&mut self, gap: f64, visit: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError>;
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
     fn evaluations(&self) -> u64;
     /// [`StroboscopicMap::discrete_entries`].
@@ -123,6 +125,20 @@ impl ModelMap {
             None => Box::new(ExactMap::new(model, exact)),
             Some(engine) => Box::new(NonlinearMap::new(engine, nonlinear)),
         })
+    }
+
+    /// Changes the gap: of a piecewise-linear model by `visit`, which sets the constants of its
+    /// system in turn and then that of its gap, of one under a nonlinear force to `gap`. The next
+    /// motion starts anew.
+    ///
+    /// # Errors
+    /// When the gap is not finite.
+    pub(crate) fn move_gap(
+        &mut self,
+        gap: f64,
+        visit: &mut dyn FnMut(&mut f64),
+    ) -> Result<(), MotionError> {
+        self.0.move_gap(gap, visit)
     }
 
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
@@ -287,7 +303,7 @@ impl ExactMap {
             last: Vec::new(),
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
-            parts_at_rest: model.forgetting.is_some(),
+            parts_at_rest: model.memory_reset.is_some(),
             is_rigid: model.rigid_stop.is_some(),
             tangents: tangents.into(),
         }
@@ -338,6 +354,17 @@ impl EngineMap for ExactMap {
 
     fn period(&self) -> f64 {
         self.flow.system().drive().period()
+    }
+
+    fn move_gap(&mut self, gap: f64, visit: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
+        if !gap.is_finite() {
+            return Err(FlowError::NotFinite { what: "the gap" }.into());
+        }
+        self.last.clear();
+        self.ensemble = None;
+        self.flow.system_mut().each_constant(visit);
+        visit(&mut Arc::make_mut(&mut self.gap).constant);
+        Ok(())
     }
 
     fn evaluations(&self) -> u64 {

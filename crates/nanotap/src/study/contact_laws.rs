@@ -1,9 +1,10 @@
 //! The same lever and drive on each of the samples: what difference the contact law makes.
 //!
-//! The samples share spring α4 and damper; the standard linear solid has the damper in series
-//! with an arm of a given stiffness, so that with an ever stiffer arm it becomes the
-//! Kelvin–Voigt surface. A moving surface is compared where the case has one. Compared are the periodic orbit of one period on each, stable or
-//! not, and how it goes on with the drive frequency.
+//! The samples share spring α4 and damper. Where a law has the damper in an arm, in series with a
+//! spring, the stiffness of the arm is given: with an ever stiffer arm such a solid becomes the
+//! Kelvin–Voigt surface. Laws whose numbers do not follow from spring, damper and arm are compared
+//! where the case has them. The periodic orbit of one period on each law is compared, stable or
+//! not, and its branch in the drive frequency.
 
 use nanotap_dynamics::{ClassifyOptions, Control, ShootingOptions, classify, close_orbit};
 use schemars::JsonSchema;
@@ -16,7 +17,7 @@ use crate::case::Key;
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::contact::moving_surface::MovingSurface;
+use crate::model::parameter::Parameter;
 use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
 use crate::model::strobe::Strobe;
@@ -86,14 +87,14 @@ pub struct Comparison {
     pub samples: Vec<SampleMotion>,
 }
 
-/// The case with each law, spring and damper the same; a moving surface only where it has one.
+/// The case with each law, spring and damper the same; see the module.
 ///
 /// # Errors
 /// When the arm's stiffness is not positive.
 pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Error> {
-    let is_solid = case.contact == ContactLaw::StandardLinearSolid;
-    let own = is_solid.then_some(case.relaxation_stiffness);
-    let arm = arm.or(own).unwrap_or(2.0 * case.alpha4);
+    let own = case.arm();
+    let arm = arm.or(own.map(|[stiffness, _]| stiffness));
+    let arm = arm.unwrap_or(2.0 * case.alpha4);
     if !(arm > 0.0 && arm.is_finite()) {
         return Err(Error::input(
             format!(
@@ -102,32 +103,22 @@ pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Err
             "give {arm} a stiffness above 0",
         ));
     }
-    let damper = if is_solid {
-        case.relaxation_stiffness * case.relaxation_time
-    } else {
-        case.alpha6
+    let damper = own.map_or(case.alpha6, |[_, damper]| damper);
+    let on = |law: ContactLaw| {
+        let numbers = match law.entry().like {
+            Some(like) => like(arm, damper),
+            // Numbers that do not follow from others, only a case that has them gives.
+            None if law == case.contact => case.own_numbers(),
+            None => return None,
+        };
+        let alpha6 = if law.has_damper() { damper } else { 0.0 };
+        Some(
+            case.clone()
+                .on(law, &numbers)
+                .with(Parameter::Alpha6, alpha6),
+        )
     };
-    // Only a case with a moving surface defines one.
-    let moves = case.contact == ContactLaw::MovingSurface;
-    Ok(ContactLaw::ALL
-        .into_iter()
-        .filter(|contact| moves || *contact != ContactLaw::MovingSurface)
-        .map(|contact| {
-            let solid = contact == ContactLaw::StandardLinearSolid;
-            Cantilever {
-                contact,
-                alpha6: if solid { 0.0 } else { damper },
-                relaxation_stiffness: if solid { arm } else { 0.0 },
-                relaxation_time: if solid { damper / arm } else { 0.0 },
-                surface: if contact == ContactLaw::MovingSurface {
-                    case.surface
-                } else {
-                    MovingSurface::NONE
-                },
-                ..case.clone()
-            }
-        })
-        .collect())
+    Ok(ContactLaw::ALL.into_iter().filter_map(on).collect())
 }
 
 /// Compares the motions under the lever and drive of `case` on each sample: under the nonlinear
@@ -303,7 +294,7 @@ options! {
         /// Period of the orbits compared
         #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
         pub period: usize = 1,
-        /// Stiffness of the standard linear solid's arm; without it, the case's, or twice alpha4
+        /// Stiffness of the relaxing arm; without it, the case's, or twice alpha4
         #[schemars(extend("x-value" = "K"))]
         pub arm: Option<f64> = None,
         /// Lowest drive frequency to which the orbits are followed
@@ -355,7 +346,6 @@ impl Study for ContactLawsStudy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::parameter::Parameter;
 
     /// The loop's area is the energy that the sample takes, less what a surface loses while
     /// it recovers.
@@ -393,8 +383,9 @@ mod tests {
     #[test]
     fn samples_share_spring_and_damper() {
         let all = cases(&Cantilever::paper(), None).unwrap();
-        assert_eq!(all[2].relaxation_stiffness, 40.0);
-        assert!((all[2].relaxation_stiffness * all[2].relaxation_time - 0.2).abs() < 1e-15);
+        let [arm, damper] = all[2].arm().unwrap();
+        assert_eq!(arm, 40.0);
+        assert!((damper - 0.2).abs() < 1e-15);
         // And from a solid back to the same three.
         assert_eq!(cases(&all[2], None).unwrap()[1].alpha6, all[1].alpha6);
         assert!(all.iter().all(|case| case.validate().is_ok()));

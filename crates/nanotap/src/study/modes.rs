@@ -52,10 +52,10 @@ impl ModeTable {
         case.validate()?;
         let beam = Modes::new(case.modes).map_err(CantileverError::from)?;
         // Measured modes fill the matrices.
-        let dense = if case.higher_modes.is_empty() {
-            None
-        } else {
+        let dense = if case.has_measured_modes() {
             Some(Galerkin::new(case)?)
+        } else {
+            None
         };
         let galerkin = |regime| match &dense {
             Some(equations) => Ok(spectrum::dense_frequencies(equations, regime)),

@@ -17,7 +17,7 @@ use crate::Error;
 use crate::case::Case;
 use crate::model::recording::{NonlinearRecording, Recording};
 use crate::model::strobe::Strobe;
-use crate::model::{Forgetting, Model};
+use crate::model::{MemoryReset, Model};
 use crate::observe::PhysicalMotion;
 use crate::observe::{
     ContactEvent, Derivative, Kept, Observables, OutOfRange, Set, Spectrum, watch,
@@ -334,15 +334,15 @@ fn nonlinear_defect(orbit: &PeriodicOrbit, recording: &NonlinearRecording) -> f6
 /// How far the multipliers are from Liouville's formula.
 fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Trajectory) -> f64 {
     let expected = log_determinant(model, trajectory);
-    match &model.forgetting {
-        Some(forgetting) if !trajectory.events().is_empty() => {
+    match &model.memory_reset {
+        Some(memory_reset) if !trajectory.events().is_empty() => {
             // One direction is lost, and its multiplier is zero.
             let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
             let found: f64 = kept
                 .iter()
                 .map(|m| nanotap_arithmetic::ln(m.modulus()))
                 .sum();
-            (found - expected - log_remembered(model, forgetting, trajectory)).abs()
+            (found - expected - log_remembered(model, memory_reset, trajectory)).abs()
         }
         // Both vanish where the motion sticks.
         _ if orbit.log_determinant == expected => 0.0,
@@ -356,15 +356,16 @@ fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Traject
 /// tip's row, a contact, a flight and the next contact's beginning map the beam's state by
 /// S Φ + κ e^{rt} pᵀ, κ the kick per change of memory. By the lemma on determinants its
 /// determinant is that of S Φ times 1 + e^{rt} pᵀ Φ⁻¹ κ, since S⁻¹κ = κ.
-fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajectory) -> f64 {
+fn log_remembered(model: &Model, memory_reset: &MemoryReset, trajectory: &Trajectory) -> f64 {
     let flight = &model.system.regimes()[0];
     let basis = flight.basis();
     let tip = &model.height.row;
     let back = |length: f64| {
         if !basis.clusters.is_empty() {
-            return nanotap_arithmetic::matrix_exp(&(flight.matrix() * -length)) * &forgetting.kick;
+            return nanotap_arithmetic::matrix_exp(&(flight.matrix() * -length))
+                * &memory_reset.kick;
         }
-        let kicked = &basis.left * forgetting.kick.map(|v| Complex::new(v, 0.0));
+        let kicked = &basis.left * memory_reset.kick.map(|v| Complex::new(v, 0.0));
         let turned = kicked.zip_map(
             &DVector::from_column_slice(&basis.eigenvalues),
             |q, rate| q * (rate * -length).exponential(),
@@ -372,7 +373,7 @@ fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajector
         (&basis.right * turned).map(|z| z.re)
     };
     let factor = |length: f64| {
-        1.0 + nanotap_arithmetic::exp(forgetting.rate * length) * (tip * back(length))[0]
+        1.0 + nanotap_arithmetic::exp(memory_reset.rate * length) * (tip * back(length))[0]
     };
     flights(model, trajectory)
         .map(|length| nanotap_arithmetic::ln(factor(length).abs()))
@@ -409,7 +410,7 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
         return f64::NEG_INFINITY;
     }
     // A memory that is forgotten is left out, and its jump with it.
-    let forgets = model.forgetting.as_ref();
+    let forgets = model.memory_reset.as_ref();
     let forgotten = match forgets {
         Some(f) if !trajectory.events().is_empty() => f.rate * trajectory.end(),
         _ => 0.0,

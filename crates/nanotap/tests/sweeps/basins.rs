@@ -49,8 +49,8 @@ fn computed(
     store
 }
 
-/// Ω = 20, α1 = 0: a period-1 and a period-4 coexist. Every point's label must be where a
-/// plain run from that very state settles.
+/// Ω = 20, α1 = 0: a period-1 and a period-4 motion coexist. The label of every point must be the
+/// motion to which a plain run from its state converges.
 #[test]
 fn chunks_computed_elsewhere_are_the_same_bytes() {
     let folder = Folder::new();
@@ -67,7 +67,7 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
 }
 
 #[test]
-fn labels_are_where_runs_settle() {
+fn labels_agree_with_plain_runs() {
     let folder = Folder::new();
     let store = computed(&bistable(), &slice(14, 12), &folder.join("a"), 2);
     let found = shares(&store).unwrap();
@@ -117,7 +117,7 @@ fn labels_are_where_runs_settle() {
 }
 
 #[test]
-fn bytes_do_not_depend_on_threads_or_stops() {
+fn bytes_do_not_depend_on_threads_or_interruptions() {
     let folder = Folder::new();
     let (subject, options) = (bistable(), slice(9, 40));
     let whole = folder.join("whole");
@@ -152,7 +152,7 @@ fn bytes_do_not_depend_on_threads_or_stops() {
     assert_same(&whole, &path);
 }
 
-/// States that were given stand for the census, and are checked like any start.
+/// Given states replace the census, and are checked like any start.
 #[test]
 fn attractors_can_be_given() {
     let folder = Folder::new();
@@ -182,7 +182,7 @@ fn attractors_can_be_given() {
 }
 
 #[test]
-fn bad_slices_are_refused() {
+fn invalid_slices_are_refused() {
     for given in [
         "",
         "a1",

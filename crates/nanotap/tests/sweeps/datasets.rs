@@ -1,4 +1,4 @@
-//! Stores: resuming, threads, shares, merging, refusals.
+//! Stores: resuming, threads, shares, merging, errors.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,7 +12,7 @@ use nanotap_dynamics::{CancelFlag, Control};
 
 use crate::folder::{Folder, assert_same, bytes};
 
-/// 24 values of Ω × 3 starts, cut into 24 chunks.
+/// 24 values of Ω × 3 starts, in 24 chunks.
 fn sweep(follow: Follow) -> Sweep {
     let subject = Case::from(Cantilever::paper());
     let options = SweepOptions {
@@ -65,7 +65,7 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
         let store = Store::create_or_resume(&there, sweep.schema().clone()).unwrap();
         for chunk in (0..store.chunks()).rev() {
             let files = sweep.chunk_files(chunk, &nowhere).unwrap();
-            // What was cut short on its way, or belongs elsewhere, is refused.
+            // Incomplete chunks and chunks of other datasets are refused.
             let mut short = files.clone();
             short[3].truncate(5);
             for wrong in [&short[..], &files[1..]] {
@@ -76,7 +76,7 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
             store.take_files(chunk, &files).unwrap();
         }
         assert_eq!(store.missing(), 0);
-        // Nothing is left to compute but what the values show their neighbours.
+        // Only the continuation to neighbouring values is left to compute.
         computed(&sweep, &there, 1);
         assert_same(&here, &there);
         assert!(sweep.chunk_files(store.chunks(), &nowhere).is_none());
@@ -93,13 +93,13 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
 }
 
 #[test]
-fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
+fn interrupted_damaged_and_killed_work_resumes_to_the_same_bytes() {
     let folder = Folder::new();
     let sweep = sweep(Follow::Off);
     let whole = folder.join("whole");
     computed(&sweep, &whole, 2);
 
-    // Stopped on the way.
+    // Interrupted.
     let path = folder.join("resumed");
     let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
     let (cancel, last) = (CancelFlag::new(), AtomicUsize::new(0));
@@ -133,7 +133,7 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     std::fs::write(path.join("period_max/2.0.0"), b"x").unwrap();
     let zeros = vec![0; std::fs::read(path.join("tip_max/3.0")).unwrap().len()];
     std::fs::write(path.join("tip_max/3.0"), zeros).unwrap();
-    // Half a day old; what is young may be another process's.
+    // Half a day old; a younger one may belong to another process.
     let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(43_200);
     for half in ["tip_max/.5.0.123.tmp", ".chunks/.9.123.tmp"] {
         let file = std::fs::File::create(path.join(half)).unwrap();
@@ -144,13 +144,13 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     sweep.compute(&store, &how(2)).unwrap();
     assert_same(&whole, &path);
 
-    // Killed while the store was being made.
+    // Killed while the store was being created.
     let bare = folder.join("bare");
     std::fs::create_dir_all(bare.join("period")).unwrap();
     std::fs::copy(whole.join(".zgroup"), bare.join(".zgroup")).unwrap();
     computed(&sweep, &bare, 2);
     assert_same(&whole, &bare);
-    // Nothing is left to do, and nothing changes.
+    // Nothing is left to compute, and nothing changes.
     computed(&sweep, &bare, 2);
     assert_same(&whole, &bare);
 }
@@ -188,14 +188,14 @@ fn shares_of_several_machines_merge_to_the_bytes_of_one() {
     computed(&sweep, &merged, 1);
     assert_same(&whole, &merged);
 
-    // Or all on one store, on a shared disk.
+    // Or all in one store, on a shared disk.
     let common = folder.join("common");
     for share in ["2/3", "3/3", "1/3"] {
         shared(&common, share);
     }
     assert_same(&whole, &common);
 
-    // A damaged chunk is not taken over.
+    // A damaged chunk is not merged.
     std::fs::write(parts[0].join("period/0.0"), b"x").unwrap();
     let holed = merge(&parts, &folder.join("holed")).unwrap();
     assert_eq!(holed.missing, [0]);
@@ -242,7 +242,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         "{message}"
     );
 
-    // The case's own value of the parameter that varies does not matter.
+    // The case's own value of the varied parameter does not matter.
     let same = Sweep::new(
         &Case::from(Cantilever {
             omega: 9.0,
@@ -252,7 +252,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
     );
     Store::create_or_resume(&path, same.unwrap().schema().clone()).unwrap();
 
-    // Merging what does not belong together.
+    // Merging datasets that do not belong together.
     let second = folder.join("second");
     let options = SweepOptions {
         periods: 9,
@@ -270,7 +270,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
 }
 
 #[test]
-fn what_is_no_store_is_left_alone() {
+fn other_folders_are_left_unchanged() {
     let folder = Folder::new();
     let sweep = sweep(Follow::Off);
     let file = folder.join("file");
@@ -293,7 +293,7 @@ fn what_is_no_store_is_left_alone() {
 }
 
 #[test]
-fn an_opened_store_is_the_one_that_was_made() {
+fn an_opened_store_equals_the_created_one() {
     let folder = Folder::new();
     let path = folder.join("store");
     let sweep = sweep(Follow::Both);
@@ -328,7 +328,7 @@ fn an_opened_store_is_the_one_that_was_made() {
         (row[0], row[2], row[3], row[4]),
         ("2.8", "up", "periodic", "2")
     );
-    // The value that the table shows is the one in the store.
+    // The value in the table is the one in the store.
     let block = store.schema().grid.block(0);
     let place = store.schema().index_of("tip_max").unwrap();
     let Values::Real(tips) = store.read_chunk(&block, place).unwrap() else {

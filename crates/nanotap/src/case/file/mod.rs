@@ -22,7 +22,7 @@ use std::path::Path;
 
 pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
-pub(crate) use reader::{Described, cosine_term, modes, parse, word};
+pub(crate) use reader::{Described, modes, parse, word};
 
 use toml::de::{DeTable, DeValue};
 

@@ -115,11 +115,10 @@ impl ApproachPoint {
         case: &Case,
         (way, gap): (Way, f64),
         classification: Classification,
-        observables: Option<Observables>,
+        observables: Option<&Observables>,
         orbit: Option<PeriodicOrbit>,
     ) -> Self {
         let view = case.physical();
-        let seen = observables.as_ref();
         Self {
             way,
             gap,
@@ -127,10 +126,10 @@ impl ApproachPoint {
             classification,
             period: orbit.as_ref().map(|orbit| orbit.period),
             spectral_radius: orbit.as_ref().map(PeriodicOrbit::spectral_radius),
-            physical: seen
+            physical: observables
                 .zip(view)
                 .map(|(seen, view)| PhysicalMotion::of(seen, view)),
-            observables,
+            observables: observables.copied(),
             reason: None,
             modulation: None,
             modulation_si: None,
@@ -380,7 +379,7 @@ impl Curve<'_> {
                 self.case,
                 (way, gap),
                 classification,
-                observables,
+                observables.as_ref(),
                 met.orbit,
             )
         }

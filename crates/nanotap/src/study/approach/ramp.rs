@@ -1,12 +1,12 @@
 //! The curve at a finite speed: the distance changes each drive period, by the period's length
 //! times the speed, and the lever is given no time to settle.
 
-use nanotap_dynamics::{Control, StroboscopicMap as _};
+use nanotap_dynamics::Control;
 
 use super::quasistatic::MOVING;
 use super::{ApproachPoint, Curve, Way};
 use crate::Error;
-use crate::model::strobe::Strobe;
+use crate::case::MovingGap;
 use crate::model::{Model, MotionError};
 use crate::observe::{Set, measure};
 
@@ -23,8 +23,8 @@ pub(super) fn ramp(
     control: &Control<'_>,
 ) -> Result<Vec<ApproachPoint>, Error> {
     let case = curve.case;
-    let model = |gap: f64| case.with(case.gap_key(), gap).model();
-    let step = speed * model(distances[0])?.system.drive().period();
+    let mut lever = MovingGap::new(&case.with(case.gap_key(), distances[0]))?;
+    let step = speed * lever.period();
     let span = distances[0] - distances[distances.len() - 1];
     let needed = 2.0 * span / step;
     if needed.is_nan() || needed > MAX_PERIODS as f64 {
@@ -67,13 +67,14 @@ pub(super) fn ramp(
         for k in 1..=periods {
             let share = k as f64 / periods as f64;
             let at = before * (1.0 - share) + gap * share;
-            let here = model(at)?;
             let failed =
                 |error: MotionError| Error::numerics(format!("at the distance {at}: {error}"));
+            lever.set(at).map_err(failed)?;
             if k == periods {
-                table.push(row(curve, way, gap, &here, &state).map_err(failed)?);
+                let here = lever.model().map_err(failed)?;
+                table.push(row(curve, way, gap, here, &state).map_err(failed)?);
             }
-            Strobe::new(&here).advance(&mut state).map_err(failed)?;
+            lever.advance(&mut state).map_err(failed)?;
             if control.is_cancelled() {
                 break;
             }
@@ -98,7 +99,7 @@ fn row(
         curve.case,
         (way, gap),
         MOVING,
-        Some(seen),
+        Some(&seen),
         None,
     ))
 }

@@ -9,7 +9,7 @@ use super::{
     Modulated, ModulationReport, OPEN_LOOP,
 };
 use crate::case::{Case, Key};
-use crate::model::contact::ContactLaw;
+use crate::model::cantilever::Cantilever;
 use crate::observe::{Set, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
@@ -281,12 +281,10 @@ impl Curve<'_> {
 
     /// The numbers of frequency modulation of an orbit of this amplitude.
     fn modulated(&self, orbit: &HeldOrbit, amplitude: f64, gap: f64) -> Modulated {
-        // A rigid stop has no static force, and the force of a moving surface depends on its height.
-        let moves = self
-            .case
-            .cantilever()
-            .is_some_and(|c| c.contact == ContactLaw::MovingSurface && c.law.is_none());
-        let known = !self.case.has_rigid_stop() && !moves;
+        // A rigid stop has no static force; that of a surface that attracts depends on where it is.
+        let cantilever = self.case.cantilever();
+        let attracts = cantilever.is_some_and(Cantilever::has_attractive_surface);
+        let known = !self.case.has_rigid_stop() && !attracts;
         let averages = known.then(|| self.averages(amplitude));
         let free = self.free.with_amplitude(amplitude);
         Modulated::of(orbit, &free, averages.as_ref(), gap)
@@ -319,7 +317,7 @@ impl Curve<'_> {
         let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
         let modulation = self.modulated(&orbit, amplitude, gap);
         let kind = Classification::Periodic;
-        let (seen, orbit) = (Some(observables), Some(orbit.orbit));
+        let (seen, orbit) = (Some(&observables), Some(orbit.orbit));
         Ok(ApproachPoint {
             modulation: Some(modulation),
             ..ApproachPoint::new(self.case, (way, gap), kind, seen, orbit)

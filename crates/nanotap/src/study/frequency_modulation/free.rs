@@ -10,7 +10,6 @@ use crate::case::{Case, Key};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::drive_form::Actuation;
 use crate::model::strobe::Strobe;
 use crate::observe::{Set, measure};
@@ -203,14 +202,10 @@ fn alone(case: &Case, held: Held) -> Case {
     match case.cantilever() {
         Some(cantilever) => Case::from(Cantilever {
             law: None,
-            contact: ContactLaw::SpringDamper,
             alpha4: 0.0,
             alpha5: far,
             alpha6: 0.0,
-            relaxation_stiffness: 0.0,
-            relaxation_time: 0.0,
-            surface: MovingSurface::NONE,
-            ..cantilever.clone()
+            ..cantilever.clone().on(ContactLaw::SpringDamper, &[])
         }),
         None => case.with(Key::OscillatorGap, far),
     }

@@ -9,15 +9,24 @@
 //! [`Averages`] are the usual approximations of the shift, and
 //! [`sader_jarvis`](average::sader_jarvis) gives the force back from a curve of shifts.
 
+#[cfg(feature = "fm")]
 pub mod average;
+#[cfg(feature = "fm")]
 mod curve;
+#[cfg(feature = "fm")]
 pub mod free;
+#[cfg(feature = "fm")]
 pub mod held;
+#[cfg(feature = "fm")]
 pub(crate) mod walk;
 
+#[cfg(feature = "fm")]
 pub use average::Averages;
+#[cfg(feature = "fm")]
 pub use curve::frequency_modulation;
+#[cfg(feature = "fm")]
 pub use free::FreeOscillation;
+#[cfg(feature = "fm")]
 pub use held::{Driven, Held, HeldOrbit};
 
 use nanotap_dynamics::Control;
@@ -69,6 +78,7 @@ pub struct Modulated {
     pub sader_jarvis_force: Option<f64>,
 }
 
+#[cfg(feature = "fm")]
 impl Modulated {
     /// Of an orbit with the tip at rest at `gap`.
     pub fn of(
@@ -310,12 +320,28 @@ options! {
     }
 }
 
+/// Stands for the curve of a build without the feature `fm`.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "fm"))]
+pub fn frequency_modulation(
+    _: &Case,
+    _: &FrequencyModulationOptions,
+    _: &Control<'_>,
+) -> Result<ApproachReport, Error> {
+    Err(Error::input(
+        "this program was built without frequency modulation",
+        "build it with the feature `fm`",
+    ))
+}
+
 /// Approach and retract curve under frequency modulation.
 #[derive(Clone, Copy, Debug)]
 pub struct FrequencyModulationStudy;
 
 impl Study for FrequencyModulationStudy {
-    const NAME: &'static str = "frequency-modulation";
+    const NAME: &'static str = "fm";
     const ABOUT: &'static str = "Frequency shift and excitation against the distance to the sample, \
                                  with amplitude and phase held";
     const COUNTED: &'static str = "distances";

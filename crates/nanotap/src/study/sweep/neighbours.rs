@@ -28,6 +28,7 @@ use crate::dataset::{Store, StoreError, WorkError};
 use crate::model::strobe::Strobe;
 use crate::observe::{Set, measure};
 use crate::study::approach::{states_at, states_near};
+use crate::study::short_run::short_run;
 
 /// The file of a sweep's dataset that keeps them.
 const FILE: &str = "neighbours.json";
@@ -114,7 +115,7 @@ impl Runs {
             .collect();
         let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
-        let classify = self.options.classify();
+        let classify = short_run(self.options.max_period);
         let values = share_orbits(known, at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {

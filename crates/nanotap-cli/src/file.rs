@@ -45,7 +45,7 @@ pub(crate) fn force() {
 }
 
 /// The ending of `path`, in lower case, among those that can be written there, if the file may
-/// be written: nobody else's, and asked for once.
+/// be written: a file of nanotap or none, and requested once.
 pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Failure> {
     let ending = ending(path, endings)?;
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
@@ -53,7 +53,7 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
     if !claimed.insert(place) {
         return Err(Failure::input(
             format!("{}: two outputs cannot go to one file", path.display()),
-            "give each a name of its own",
+            "give each output a different name",
         ));
     }
     if path.is_dir() {
@@ -202,11 +202,8 @@ pub(crate) fn ending<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fa
         .ok_or_else(|| {
             let list: Vec<String> = endings.iter().map(|ending| format!(".{ending}")).collect();
             Failure::input(
-                format!(
-                    "{}: the ending says no format that is written here",
-                    path.display()
-                ),
-                format!("end the name in {}", alternatives(&list)),
+                format!("{}: unsupported file extension", path.display()),
+                format!("use {}", alternatives(&list)),
             )
         })
 }

@@ -298,11 +298,8 @@ impl From<nanotap_figures::FigureError> for Error {
         use nanotap_figures::FigureError;
         match error {
             FigureError::UnknownEnding { path } => Self::input(
-                format!(
-                    "{}: the ending says no format that can be drawn",
-                    path.display()
-                ),
-                "end the name in .svg, .png or .pdf",
+                format!("{}: unsupported file extension", path.display()),
+                "use .svg, .png or .pdf",
             ),
             error @ FigureError::Write { .. } => Self::files(error.to_string()),
             other => Self::numerics(other.to_string()),

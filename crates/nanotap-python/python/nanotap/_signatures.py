@@ -80,7 +80,7 @@ def simulate(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "xr.Dataset":
-    """One run: its steady state, or how it gets there.
+    """Simulate a motion: its steady state or its transient.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def orbit(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "Orbit | xr.Dataset":
-    """A periodic orbit by Newton, stable or not.
+    """Compute a periodic orbit by Newton's method, stable or not.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def attractors(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Attractors:
-    """Every motion that coexists: a census from many seeded starts.
+    """Find coexisting attractors by sampling initial states.
 
     Parameters
     ----------
@@ -850,7 +850,7 @@ def convergence(
     tolerance: float = 0.01,
     period: int | None = None,
 ) -> Convergence:
-    """The same motion with N = 1 … K modes: how many are enough.
+    """Compare the motion with 1 to K modes: how many are enough.
 
     Parameters
     ----------
@@ -889,7 +889,7 @@ def contact_laws(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
-    """The same lever and drive on every contact law: what difference the sample makes.
+    """Compare contact laws under the same lever and drive.
 
     Parameters
     ----------

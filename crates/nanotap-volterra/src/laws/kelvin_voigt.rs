@@ -48,7 +48,7 @@ const fn entry(
 /// A sphere, letting go.
 pub static SPHERE: Entry = entry(
     "voigt-sphere",
-    "Kelvin–Voigt sample under a sphere; lets go where the force vanishes",
+    "Kelvin–Voigt sample under a sphere; releases where the force vanishes",
     "4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇), never below zero",
     ROUND,
 );
@@ -62,7 +62,7 @@ pub static SPHERE_PULLING: Entry = entry(
 /// A cone, letting go.
 pub static CONE: Entry = entry(
     "voigt-cone",
-    "Kelvin–Voigt sample under a cone; lets go where the force vanishes",
+    "Kelvin–Voigt sample under a cone; releases where the force vanishes",
     "(2/π) tan θ/(1 − ν²) (Eδ² + 2ηδδ̇), never below zero",
     POINTED,
 );
@@ -76,7 +76,7 @@ pub static CONE_PULLING: Entry = entry(
 /// A punch, letting go.
 pub static PUNCH: Entry = entry(
     "voigt-punch",
-    "Kelvin–Voigt sample under a flat cylinder; lets go where the force vanishes",
+    "Kelvin–Voigt sample under a flat cylinder; releases where the force vanishes",
     "2R/(1 − ν²) (Eδ + ηδ̇), never below zero",
     ROUND,
 );

@@ -78,9 +78,7 @@ impl ForceTable {
         if text.trim_start().starts_with('[') {
             let array = DeValue::parse(text).ok();
             let table = array.and_then(|array| table_of(array.get_ref()));
-            return Self::of(
-                &table.ok_or_else(|| ForceTableError::new("this is no table", SHAPE))?,
-            );
+            return Self::of(&table.ok_or_else(|| ForceTableError::new("not a table", SHAPE))?);
         }
         Self::of(&Table::parse("the table", text)?)
     }
@@ -132,8 +130,8 @@ impl ForceTable {
             let number = |(row, entry): (usize, &Entry)| {
                 let what = match entry {
                     Entry::Number(number) => return Ok(number * factor),
-                    Entry::Missing => "there is no number".to_owned(),
-                    Entry::Text(text) => format!("`{text}` is no number"),
+                    Entry::Missing => "missing number".to_owned(),
+                    Entry::Text(text) => format!("`{text}` is not a number"),
                 };
                 Err(refuse(Some(row), what, "give a finite number".to_owned()))
             };

@@ -250,7 +250,7 @@ impl Case {
         let replaced = quantities.stated.origin.replaced.iter();
         let words = |Replaced { key, written, by }: &Replaced| {
             Remark::note(format!(
-                "{by}, set beside the file, takes the place of its {key} = {written}"
+                "{by}, set in addition to the file, replaces its {key} = {written}"
             ))
         };
         replaced.map(words).collect()

@@ -62,7 +62,7 @@ pub enum ValueError {
     #[error(transparent)]
     Table(#[from] ForceTableError),
     /// No contact law.
-    #[error("there is no law \"{given}\"; there are {}", laws().join(", "))]
+    #[error("unknown law \"{given}\"; the laws are {}", laws().join(", "))]
     Law {
         /// The name that is none.
         given: String,

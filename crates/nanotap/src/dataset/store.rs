@@ -273,7 +273,7 @@ impl Store {
             let column = |name: &&str| {
                 let missing = || StoreError::NotAStore {
                     path: self.path.clone(),
-                    what: format!("it is no sweep: it has no variable `{name}`"),
+                    what: format!("not a sweep: it has no variable `{name}`"),
                 };
                 let variable = self.schema.index_of(name).ok_or_else(missing)?;
                 Ok(self.read_chunk(&block, variable)?.numbers())

@@ -55,7 +55,9 @@ const NEAR: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RatioError {
     /// Not a ratio at all.
-    #[error("\"{given}\" is no ratio of frequencies; write it as in \"25/4\", with whole numbers")]
+    #[error(
+        "\"{given}\" is not a ratio of frequencies; write it as in \"25/4\", with whole numbers"
+    )]
     Form {
         /// The given text.
         given: String,
@@ -76,7 +78,7 @@ pub enum RatioError {
     One,
     /// Not a ratio of small whole numbers.
     #[error(
-        "the ratio {ratio} of the two frequencies is no fraction with a denominator up to {}, so the drive \
+        "the ratio {ratio} of the two frequencies is not a fraction with a denominator up to {}, so the drive \
          would not repeat; the nearest is {nearest}", LARGEST.0
     )]
     Irrational {

@@ -279,7 +279,7 @@ pub fn attractors(
     match starts {
         Some(0) => {
             return Err(Error::input(
-                "at least one start is needed, 0 were asked for",
+                "expected at least one start, got 0",
                 "give 1 or more {starts}",
             ));
         }
@@ -575,7 +575,7 @@ pub struct AttractorsStudy;
 
 impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
-    const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
+    const ABOUT: &'static str = "Find coexisting attractors by sampling initial states";
     const COUNTED: &'static str = "starts";
     const PARTIAL: bool = true;
     type Options = AttractorsOptions;

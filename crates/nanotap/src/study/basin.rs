@@ -90,12 +90,12 @@ impl SliceRange {
         };
         let number = |text: &str| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(refuse(format!("`{text}` is no finite number"))),
+            _ => Err(refuse(format!("`{text}` is not a finite number"))),
         };
         let (from, to) = (number(from)?, number(to)?);
         let count = count
             .parse()
-            .map_err(|_| refuse(format!("`{count}` is no whole number")))?;
+            .map_err(|_| refuse(format!("`{count}` is not a whole number")))?;
         if !(2..=MOST).contains(&count) {
             return Err(refuse(format!(
                 "{count} points; from 2 to {MOST} can be had"
@@ -694,7 +694,8 @@ pub struct BasinStudy;
 
 impl DatasetStudy for BasinStudy {
     const NAME: &'static str = "basin";
-    const ABOUT: &'static str = "Basins of attraction on a two-dimensional slice of initial states";
+    const ABOUT: &'static str =
+        "Compute basins of attraction on a two-dimensional slice of initial states";
     const COUNTED: &'static str = "rows";
     type Options = BasinOptions;
     type Report = Shares;

@@ -926,7 +926,7 @@ impl BranchOptions {
         }
         Err(Error::input(
             format!(
-                "a longest step of {} is no part of the range: between 0 and 1 is needed",
+                "expected a longest step between 0 and 1 of the range, got {}",
                 self.max_step
             ),
             "give a {max_step} of 0.01",

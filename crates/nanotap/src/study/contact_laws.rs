@@ -329,8 +329,7 @@ pub struct ContactLawsStudy;
 
 impl Study for ContactLawsStudy {
     const NAME: &'static str = "contact-laws";
-    const ABOUT: &'static str =
-        "The same lever and drive on every contact law: what difference the sample makes";
+    const ABOUT: &'static str = "Compare contact laws under the same lever and drive";
     type Options = ContactLawsOptions;
     type Report = Comparison;
 

@@ -249,7 +249,7 @@ pub struct ConvergenceStudy;
 
 impl Study for ConvergenceStudy {
     const NAME: &'static str = "convergence";
-    const ABOUT: &'static str = "The same motion with N = 1 … K modes: how many are enough";
+    const ABOUT: &'static str = "Compare the motion with 1 to K modes: how many are enough";
     type Options = ConvergenceOptions;
     type Report = Convergence;
 

@@ -240,7 +240,8 @@ pub struct LyapunovStudy;
 
 impl Study for LyapunovStudy {
     const NAME: &'static str = "lyapunov";
-    const ABOUT: &'static str = "Lyapunov spectrum with error bars, and a Poincaré section";
+    const ABOUT: &'static str =
+        "Compute the Lyapunov spectrum with error bars, and a Poincaré section";
     type Options = LyapunovOptions;
     type Report = LyapunovReport;
 

@@ -117,7 +117,8 @@ pub struct ModesStudy;
 
 impl Study for ModesStudy {
     const NAME: &'static str = "modes";
-    const ABOUT: &'static str = "Mode shapes and frequencies, in free flight and in contact";
+    const ABOUT: &'static str =
+        "Compute mode shapes and frequencies, in free flight and in contact";
     type Options = ModesOptions;
     type Report = ModeTable;
 

@@ -473,7 +473,7 @@ pub struct OrbitStudy;
 
 impl Study for OrbitStudy {
     const NAME: &'static str = "orbit";
-    const ABOUT: &'static str = "A periodic orbit by Newton, stable or not";
+    const ABOUT: &'static str = "Compute a periodic orbit by Newton's method, stable or not";
     type Options = OrbitOptions;
     type Report = InSi<OrbitReport>;
 

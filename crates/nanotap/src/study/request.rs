@@ -314,7 +314,7 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
                 Some(near) => format!("did you mean {{{near}}}?"),
                 None => format!("there are {}", known.join(", ")),
             };
-            return Err(Error::option(name, "there is no such option", remedy));
+            return Err(Error::option(name, "unknown option", remedy));
         };
         property.check(value)?;
     }
@@ -442,7 +442,7 @@ mod tests {
             ),
             (
                 json!({"cuont": 2}),
-                "cuont: there is no such option; did you mean count?",
+                "cuont: unknown option; did you mean count?",
             ),
             (
                 json!({"way": "left"}),

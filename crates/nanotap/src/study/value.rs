@@ -150,8 +150,9 @@ impl Interval {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{text}` is no name with two ends; write it as in a1=-1:1 or alpha4=5:40");
+        let wrong = || {
+            format!("expected NAME=LOW:HIGH, got `{text}`; write it as in a1=-1:1 or alpha4=5:40")
+        };
         let (name, range) = text.split_once('=').ok_or_else(wrong)?;
         let (low, high) = range.split_once(':').ok_or_else(wrong)?;
         let end = |end: &str| Amount::of(&end.into()).ok_or_else(wrong);
@@ -167,7 +168,8 @@ impl Interval {
     }
 
     fn pair(name: &str, ends: &Value) -> Result<Self, String> {
-        let wrong = || format!("{name}: {ends} are no two ends; write a lower and an upper one");
+        let wrong =
+            || format!("{name}: expected LOW:HIGH, got {ends}; write a lower and an upper end");
         match ends.as_array().map(Vec::as_slice) {
             Some([low, high]) => Ok(Self {
                 name: name.to_owned(),
@@ -208,7 +210,7 @@ impl<'de> Deserialize<'de> for Intervals {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = Value::deserialize(deserializer)?;
         let text = |value: &Value| {
-            let wrong = || format!("{value} is no text as in a1=-1:1");
+            let wrong = || format!("expected a text such as a1=-1:1, got {value}");
             Interval::parse(value.as_str().ok_or_else(wrong)?)
         };
         let intervals: Result<Vec<Interval>, String> = match &value {
@@ -239,7 +241,7 @@ impl Intervals {
             let value = end.text().parse::<f64>().ok().filter(|v| v.is_finite());
             value.ok_or_else(|| {
                 Error::input(
-                    format!("{}: `{end}` is no finite number", interval.name),
+                    format!("{}: `{end}` is not a finite number", interval.name),
                     "write a side as in a1=-1:1",
                 )
             })

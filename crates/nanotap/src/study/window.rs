@@ -151,7 +151,7 @@ impl Window {
         if schema.grid.axes.len() != 3 {
             return Err(StoreError::NotAStore {
                 path: store.path().into(),
-                what: "it is no sweep over two parameters".into(),
+                what: "not a sweep over two parameters".into(),
             });
         }
         let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);

@@ -247,8 +247,8 @@ fn not_toml(error: &toml::de::Error, text: &str) -> Problem {
     });
     let message = error.message().trim().replace('\n', ", ");
     if message.contains("duplicate key") {
-        return Problem::new(place, "the same key stands here twice")
-            .label("written before")
+        return Problem::new(place, "duplicate key")
+            .label("first given here")
             .help("keep one of the two");
     }
     Problem::new(place, format!("not TOML: {message}"))
@@ -305,7 +305,7 @@ mod tests {
         };
         let error = Document::parse(source).unwrap_err();
         assert!(
-            error.to_string().starts_with("c.toml:3:1: the same key"),
+            error.to_string().starts_with("c.toml:3:1: duplicate key"),
             "{error}"
         );
     }

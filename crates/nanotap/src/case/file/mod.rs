@@ -184,14 +184,14 @@ fn text_of(path: &Path) -> Result<Source, CaseFileError> {
     };
     let what = "name a TOML file with a case in it";
     if path.is_dir() {
-        return Err(refuse("this is a folder".into(), what));
+        return Err(refuse("is a folder".into(), what));
     }
     let mut bytes = Vec::new();
     let read = std::fs::File::open(path)
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes));
     match read {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            return Err(refuse("there is no such file".into(), what));
+            return Err(refuse("no such file".into(), what));
         }
         Err(error) => return Err(refuse(format!("cannot be read: {error}"), what)),
         Ok(_) if bytes.len() as u64 > LARGEST_FILE => {

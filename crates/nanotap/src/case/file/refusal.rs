@@ -36,9 +36,9 @@ pub(super) fn misplaced(document: &Document, problems: &mut Problems) {
         .collect();
     if let Some(first) = homeless.first() {
         let others = match homeless.len() - 1 {
-            0 => String::from("stands"),
-            1 => String::from("and one more key stand"),
-            more => format!("and {more} more keys stand"),
+            0 => String::from("is"),
+            1 => String::from("and one more key are"),
+            more => format!("and {more} more keys are"),
         };
         let problem = Problem::new(
             first.key_place.clone(),
@@ -214,13 +214,13 @@ pub(super) fn missing(
     let names: Vec<&str> = missing.iter().map(|key| key.name()).collect();
     let list = names.join(", ");
     let message = if document.source.is_some() && document.entries.is_empty() {
-        format!("an empty case: it lacks {list}")
+        format!("empty case: missing {list}")
     } else if document.source.is_some() {
         format!("the case lacks {list}")
     } else if document.entries.is_empty() {
         "no case was given".to_owned()
     } else {
-        format!("without a case file the keys must say all that has no default; it lacks {list}")
+        format!("no case file: set every required key; missing: {list}")
     };
     let help = if document.source.is_some() {
         "write them under [model], for example"

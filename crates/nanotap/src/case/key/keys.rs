@@ -253,7 +253,7 @@ Before from Parameter::COUNT => {
     Damping = oscillator(Of::Damping, "c", OSCILLATORS, "damper").such_as(0.0);
     Forcing = oscillator(Of::Forcing, "F", OSCILLATORS, "amplitude of the force F cos ωt");
     OscillatorOmega = oscillator(Of::Omega, "ω", OSCILLATORS, "frequency of the force").such_as(2.5);
-    OscillatorGap = oscillator(Of::Gap, "gap", OSCILLATORS, "where the stop stands; contact at x ≥ gap")
+    OscillatorGap = oscillator(Of::Gap, "gap", OSCILLATORS, "position of the stop; contact at x ≥ gap")
         .such_as(0.0);
     StopStiffness = oscillator(Of::ContactStiffness, "k₁", SOFT, "spring of the stop").such_as(20.0);
     StopDamping = oscillator(Of::ContactDamping, "c₁", SOFT, "damper of the stop").such_as(0.2);

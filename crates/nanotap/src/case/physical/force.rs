@@ -128,7 +128,7 @@ impl SampleForce {
                 }
             }
             let reason = format!(
-                "it is no part of sample.law = \"{name}\", which takes {}{}",
+                "it is not a parameter of sample.law = \"{name}\", which takes {}{}",
                 keys.join(", "),
                 laws_with(key)
             );

@@ -107,7 +107,7 @@ impl<'a> Reader<'a> {
             (None, None) => Ok(None),
             (Some(_), None) => Err(PhysicalError::missing(
                 poisson_key,
-                "a contact needs Poisson's ratio beside the modulus (0.3 to 0.5 for polymers)",
+                "a contact needs Poisson's ratio in addition to the modulus (0.3 to 0.5 for polymers)",
             )),
             (None, Some(_)) => Err(PhysicalError::missing(
                 modulus_key,

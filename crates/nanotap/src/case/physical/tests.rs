@@ -1131,7 +1131,10 @@ fn samples_have_their_laws() {
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
     let cases: [(&[Entry], &str); 12] = [
-        (&[("sample", "law", "hertz")], "it is no part of sample.law"),
+        (
+            &[("sample", "law", "hertz")],
+            "it is not a parameter of sample.law",
+        ),
         (
             &[("sample", "thickness", "50 nm")],
             "it belongs to a nonlinear force law (laws with it: thin-sphere, thin-cone, \

@@ -268,7 +268,7 @@ impl<'a> UnitParser<'a> {
                 inner
             }
             Some(Token::Integer(_)) => {
-                return Err(self.malformed("a second number stands where a unit was expected"));
+                return Err(self.malformed("a second number where a unit was expected"));
             }
             _ => return Err(self.malformed("a unit is missing")),
         };

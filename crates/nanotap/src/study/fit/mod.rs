@@ -110,7 +110,7 @@ pub struct FitStudy;
 
 impl Study for FitStudy {
     const NAME: &'static str = "fit";
-    const ABOUT: &'static str = "Parameters of lever and sample from measured curves";
+    const ABOUT: &'static str = "Fit parameters of lever and sample to measured curves";
     const COUNTED: &'static str = "starts";
     const ANY_DISTANCE: bool = true;
     const PARTIAL: bool = true;

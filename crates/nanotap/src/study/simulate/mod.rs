@@ -175,7 +175,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 pub(in crate::study) fn check_periods(periods: usize) -> Result<(), Error> {
     if periods == 0 {
         return Err(Error::input(
-            "at least one period must be recorded, 0 were asked for",
+            "expected at least one recorded period, got 0",
             "give 1 or more {periods}",
         ));
     }
@@ -485,7 +485,7 @@ pub struct SimulateStudy;
 
 impl Study for SimulateStudy {
     const NAME: &'static str = "simulate";
-    const ABOUT: &'static str = "One run: its steady state, or how it gets there";
+    const ABOUT: &'static str = "Simulate a motion: its steady state or its transient";
     type Options = SimulateOptions;
     type Report = SimulateReport;
 

@@ -103,8 +103,7 @@ pub struct SweepStudy;
 
 impl DatasetStudy for SweepStudy {
     const NAME: &'static str = "sweep";
-    const ABOUT: &'static str =
-        "How the motion changes with one or two parameters, from any number of starts";
+    const ABOUT: &'static str = "Sweep one or two parameters, from any number of initial states";
     const COUNTED: &'static str = "values";
     type Options = SweepOptions;
     type Report = Summary;

@@ -180,6 +180,14 @@ impl Flow {
         &self.system
     }
 
+    /// Sets the offset of the gap; call [`Flow::start`] next.
+    ///
+    /// # Errors
+    /// When the offset is not finite.
+    pub fn set_offset(&mut self, offset: f64) -> Result<(), VolterraError> {
+        Arc::make_mut(&mut self.system).set_offset(offset)
+    }
+
     /// What the runs so far have cost.
     pub fn statistics(&self) -> Statistics {
         self.solver.statistics

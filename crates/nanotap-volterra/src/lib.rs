@@ -119,6 +119,7 @@ pub mod trajectory;
 pub mod variation;
 
 mod bracket;
+mod force_sums;
 mod gap_table;
 mod linear;
 mod quadrature;
@@ -130,6 +131,7 @@ pub type Complex = nalgebra::Complex<f64>;
 pub use coarse::Coarse;
 pub use error::{Refusal, VolterraError};
 pub use flow::{Flow, Switch};
+pub use force_sums::ForceSums;
 pub use kernel::Kernel;
 pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
 pub use modes::Modes;

@@ -20,6 +20,7 @@ pub mod proof;
 pub mod recipe;
 pub mod registry;
 pub mod request;
+pub mod scan;
 pub mod setpoint;
 pub mod simulate;
 pub mod start_box;

@@ -169,6 +169,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
     StudyEntry::of::<super::convergence::ConvergenceStudy>(),
     StudyEntry::of::<super::contact_laws::ContactLawsStudy>(),
+    StudyEntry::of::<super::scan::ScanStudy>(),
 ];
 
 /// The study that is called `name`.

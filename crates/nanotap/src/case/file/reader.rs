@@ -35,10 +35,29 @@ type Known<'a> = BTreeMap<Key, &'a Entry>;
 ///
 /// # Errors
 /// Everything that is wrong with the text and the words, each with its place.
+#[cfg(test)]
 pub(crate) fn parse(
     source: Option<Source>,
     overrides: &[String],
 ) -> Result<Described, CaseFileError> {
+    Ok(parse_with_scan(source, overrides)?.0)
+}
+
+/// A case and its table `[scan]`, if it has one.
+pub(crate) type DescribedWithScan = (
+    Described,
+    Option<serde_json::Map<String, serde_json::Value>>,
+);
+
+/// Reads a text, if there is one, and puts the `key=value` words of `overrides` in place of
+/// what it says.
+///
+/// # Errors
+/// Everything that is wrong with the text and the words, each with its place.
+pub(crate) fn parse_with_scan(
+    source: Option<Source>,
+    overrides: &[String],
+) -> Result<DescribedWithScan, CaseFileError> {
     let mut document = source.map_or_else(|| Ok(Document::default()), Document::parse)?;
     let mut problems = Problems::default();
     for written in overrides {
@@ -47,7 +66,7 @@ pub(crate) fn parse(
         }
     }
     match described(&document, &mut problems) {
-        Some(described) if problems.is_empty() => Ok(described),
+        Some(described) if problems.is_empty() => Ok((described, document.scan)),
         _ => Err(CaseFileError::of(document.source, problems)),
     }
 }

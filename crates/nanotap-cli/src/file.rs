@@ -23,7 +23,8 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// How the tables begin that commands write, and what stands in those of datasets.
-const TABLES: [&str; 12] = [
+const TABLES: [&str; 13] = [
+    "line,direction,",
     "tau,tip,tip_rate",
     "order,tip,tip_lag_degrees",
     "attractor,classification,",
@@ -106,6 +107,7 @@ fn is_ours(ending: &str, bytes: &[u8]) -> bool {
             let rest = bytes.get(first.len() + 1..).unwrap_or_default();
             first == signature(rest)
         }
+        "gsf" => first == "Gwyddion Simple Field 1.0",
         _ => bytes
             .windows(MADE_BY.len())
             .any(|window| window == MADE_BY.as_bytes()),

@@ -97,6 +97,7 @@ fn report(
             Direction::Trace => &mut trace,
             Direction::Retrace => &mut retrace,
         };
+        image.surface.push(pixels.surface);
         image.height.push(pixels.height);
         image.amplitude_error.push(pixels.amplitude_error);
         image.phase.push(pixels.phase);

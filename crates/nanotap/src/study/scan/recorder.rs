@@ -11,6 +11,7 @@ use super::report::{BranchChange, Direction, LineStatistics, ListedPeriod, Parac
 #[derive(Clone, Copy, Debug, Default)]
 struct PixelSums {
     count: u32,
+    surface: f64,
     z: f64,
     error: f64,
     lock_in: Complex,
@@ -27,6 +28,7 @@ struct PixelSums {
 /// Pixels of a line in one direction, by channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PixelRow {
+    pub(super) surface: Vec<f64>,
     pub(super) height: Vec<f64>,
     pub(super) amplitude_error: Vec<f64>,
     pub(super) phase: Vec<f64>,
@@ -194,6 +196,7 @@ impl<'a> LineRecorder<'a> {
         self.before = [last, period.deflection];
         let pixel = &mut self.pixels[plan.pixel(index, self.direction == Direction::Retrace)];
         pixel.count += 1;
+        pixel.surface += period.surface;
         pixel.z += period.z;
         pixel.error += period.error;
         pixel.lock_in += period.lock_in;
@@ -253,6 +256,7 @@ impl<'a> LineRecorder<'a> {
             self.pixels.iter().map(mean).collect()
         };
         let mut row = PixelRow {
+            surface: of(|p| p.surface),
             height: of(|p| p.z),
             amplitude_error: of(|p| p.error),
             phase: self.pixels.iter().map(|p| lag(p.lock_in)).collect(),

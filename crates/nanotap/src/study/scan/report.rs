@@ -108,6 +108,8 @@ pub struct LineStatistics {
 /// Channels of an image: a row a line, an entry a pixel; `null` where no period falls on a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Channels {
+    /// Mean height of the surface itself, m.
+    pub surface: Vec<Vec<f64>>,
     /// Mean height, m.
     pub height: Vec<Vec<f64>>,
     /// Mean amplitude error, m.

@@ -20,7 +20,13 @@ pub struct Channel {
 }
 
 /// Every channel but the state.
-pub const CHANNELS: [Channel; 8] = [
+pub const CHANNELS: [Channel; 9] = [
+    Channel {
+        name: "surface",
+        title: "surface",
+        unit: "m",
+        values: |image| &image.surface,
+    },
     Channel {
         name: "height",
         title: "height",
